@@ -112,6 +112,12 @@ function frames(): Promise<void> {
   });
 }
 
+/** Lays out the graph, which takes a moment. */
+export async function tidy(page: Page): Promise<void> {
+  await page.getByRole("button", { name: "Tidy", exact: true }).click();
+  await expect(page.getByLabel("What happens")).toContainText("arranged");
+}
+
 /** Waits until everything is on disk. */
 export async function saved(page: Page): Promise<void> {
   await expect(page.getByText("Saved", { exact: true })).toBeVisible();

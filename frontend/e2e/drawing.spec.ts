@@ -14,6 +14,7 @@ import {
   meant,
   pick,
   saved,
+  tidy,
   umrfOf,
 } from "./canvas";
 import { LONG, Product } from "./product";
@@ -135,11 +136,10 @@ test("arrows: healed, filled, led elsewhere, drawn by two taps", async ({ browse
 
   // An action dropped onto the arrow goes into it.
   await page.getByRole("button", { name: "Fit", exact: true }).click();
-  const [above, below] = [card(page, "Wait", 0), card(page, "Wait", 2)];
+  const [before, behind] = [card(page, "Wait", 0), card(page, "Wait", 2)];
   const gap = async () => {
-    const [a, b] = [await above.boundingBox(), await below.boundingBox()];
-    if (!a || !b) throw new Error("no cards");
-    return { x: b.x + b.width / 2 - 20, y: (a.y + a.height + b.y) / 2 };
+    const [a, b] = [await boxOf(before), await boxOf(behind)];
+    return { x: a.x + a.width + (b.x - a.x - a.width) * 0.75, y: b.y + b.height / 2 };
   };
   const row = page
     .getByRole("complementary", { name: "Library" })
@@ -161,7 +161,8 @@ test("arrows: healed, filled, led elsewhere, drawn by two taps", async ({ browse
 
   // Two taps: an outcome, then what follows.
   await page.keyboard.press("Escape");
-  await page.getByRole("button", { name: "Tidy", exact: true }).click();
+  await tidy(page);
+  await page.getByRole("button", { name: "Fit", exact: true }).click();
   await card(page, "Wait", 2).getByLabel("When error", { exact: true }).click();
   await expect(page.getByRole("status").filter({ hasText: "tap what follows" })).toBeVisible();
   await card(page, "Wait", 0).click({ position: { x: 60, y: 12 } });
@@ -211,24 +212,20 @@ test("things are put in their place: aligned, spread, tidied, nudged, framed, no
 
   // Nudges in a row are one step of undo.
   await pick(page, ["Wait", 1]);
-  for (let i = 0; i < 3; i += 1) await page.keyboard.press("ArrowRight");
+  const stood = (await places(page, id)).get("Wait 1")?.y ?? 0;
+  for (let i = 0; i < 3; i += 1) await page.keyboard.press("ArrowDown");
+  await page.keyboard.press("Shift+ArrowDown");
+  await expect.poll(async () => ((await places(page, id)).get("Wait 1")?.y ?? 0) - stood).toBe(56);
   await page.keyboard.press("Shift+ArrowRight");
-  await expect
-    .poll(async () => {
-      const at = await places(page, id);
-      return (at.get("Wait 1")?.x ?? 0) - (at.get("Wait 0")?.x ?? 0);
-    })
-    .toBe(56);
-  await page.keyboard.press("Shift+ArrowDown");
-  await page.keyboard.press("Shift+ArrowDown");
+  await page.keyboard.press("Shift+ArrowRight");
 
   await pick(page, ...all);
-  await deed(page, "Align left");
+  await deed(page, "Align top");
   let at = await places(page, id);
-  expect(new Set(all.map(([name, i]) => at.get(`${name} ${i}`)?.x)).size).toBe(1);
-  await deed(page, "Distribute down");
+  expect(new Set(all.map(([name, i]) => at.get(`${name} ${i}`)?.y)).size).toBe(1);
+  await deed(page, "Distribute across");
   at = await places(page, id);
-  const [a = 0, b = 0, c = 0] = all.map(([name, i]) => at.get(`${name} ${i}`)?.y);
+  const [a = 0, b = 0, c = 0] = all.map(([name, i]) => at.get(`${name} ${i}`)?.x);
   expect(Math.abs(b - a - (c - b))).toBeLessThanOrEqual(1);
 
   // A frame round them takes them along; a note is plain text.
@@ -289,14 +286,14 @@ test("a decision that is led to the end ends either way, and what runs beside it
   const id = page.url().split("/").at(-1) ?? "";
   await add(page, "Ask");
   await enter(page, "Ask");
-  for (const [outcome, next, dx] of [
+  for (const [outcome, next, dy] of [
     ["true", "Bring", -170],
     ["false", "Answer", 170],
   ] as const) {
     const from = await boxOf(card(page, "Ask").getByLabel(`When ${outcome}`, { exact: true }));
     await page.mouse.move(from.x + from.width / 2, from.y + from.height / 2);
     await page.mouse.down();
-    await page.mouse.move(from.x + dx, from.y + 150, { steps: 6 });
+    await page.mouse.move(from.x + 150, from.y + dy, { steps: 6 });
     await page.mouse.up();
     const search = page.getByRole("combobox", { name: "Name of an action" });
     await search.fill(next);
@@ -350,8 +347,8 @@ test("a graph with a loop and a renamed output is built from nothing", async ({ 
   await page.keyboard.press("Escape");
   await enter(page, "Look");
   for (const [outcome, next, dx] of [
-    ["true", "Fetch", -170],
-    ["false", "Tell", 170],
+    ["true", "Fetch", -110],
+    ["false", "Tell", 130],
   ] as const) {
     const from = await boxOf(card(page, "Look").getByLabel(`When ${outcome}`, { exact: true }));
     await page.mouse.move(from.x + from.width / 2, from.y + from.height / 2);
@@ -368,7 +365,7 @@ test("a graph with a loop and a renamed output is built from nothing", async ({ 
   const text = page.getByRole("textbox", { name: /^text/ });
   await text.fill("nothing left");
   await text.press("Enter");
-  await page.getByRole("button", { name: "Tidy", exact: true }).click();
+  await tidy(page);
   await connect(page, "Tell", "true", "exit");
 
   // The way back is not waited for; it was drawn from the outcome to the card above.

@@ -20,7 +20,7 @@ async function picture(page: Page, name: string): Promise<void> {
   await page.screenshot({ path: resolve(FOLDER, `${name}.png`) });
 }
 
-/** Shows everything: where it would be too small to read, Fit shows the top first. */
+/** Shows everything. */
 async function whole(page: Page): Promise<void> {
   const exit = page.locator(".react-flow__node").filter({ has: page.getByLabel("End with") });
   const tools = page.getByRole("toolbar", { name: "Canvas tools" });

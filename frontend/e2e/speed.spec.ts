@@ -134,8 +134,11 @@ for (const size of SIZES) {
     const drag = await dragACard(page);
     await page.locator(".react-flow__node-action").nth(4).click();
     const key = await type(page);
+    const moved = page.locator(".react-flow__node-action").nth(4);
+    const stood = await moved.getAttribute("style");
     const tidy = Date.now();
     await page.getByRole("button", { name: /^Tidy/ }).first().click();
+    await expect(moved).not.toHaveAttribute("style", stood ?? "", { timeout: 60_000 });
     await saved(page);
     const tidied = Date.now() - tidy;
     const figures = [

@@ -130,6 +130,9 @@ test("a tablet: open, add, connect, set a parameter, start, stop", async ({ brow
     card(page, name).getByLabel(`When ${outcome}`, { exact: true });
   await tie(page, when("Look", "true"), card(page, "Grip"));
   const exit = page.locator(".react-flow__node").filter({ has: page.getByLabel("End with") });
+  // Held upright, what runs to the right does not fit beside the bars at once.
+  await page.getByRole("button", { name: "Fit", exact: true }).tap();
+  await page.waitForTimeout(400);
   await tie(page, when("Grip", "true"), exit);
   const drawn = ["Grip_0 > exit", "Look_0 > Grip_0", "entry > Look_0"];
   await expect.poll(() => arrows(product, id)).toEqual(drawn);

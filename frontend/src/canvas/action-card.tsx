@@ -1,4 +1,4 @@
-/** An action on the canvas: robot, name, state, two parameters; input above, four outcomes below. */
+/** An action on the canvas: robot, name, state, two parameters; its input before it, its four outcomes behind. */
 import { IconGhost2, IconMessageCircle } from "@tabler/icons-react";
 import { Handle, type NodeProps, Position } from "@xyflow/react";
 import { memo } from "react";
@@ -11,6 +11,7 @@ import { stopwatch, useNow } from "../ui/times";
 import style from "./action-card.module.css";
 import { useIsDimmed, useOpenThreadCount } from "./card-highlights";
 import type { CardNode } from "./elements";
+import { CARD_LINES } from "./geometry/arrange";
 import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "./outcome";
 import { ProblemBadge } from "./problem-badge";
 
@@ -29,13 +30,19 @@ function ProgressLine({ progress }: { progress: Progress | null }) {
   );
 }
 
+/** Outcomes stand 22 px apart at the right, however high the card is, else along its lower edge. */
+function spotOf(i: number, right: boolean): React.CSSProperties {
+  return right ? { top: `calc(50% + ${(i - 1.5) * 22}px)` } : { left: `${14 + i * 24}%` };
+}
+
 export const ActionCard = memo(function ActionCard({
   data,
   selected,
   isConnectable,
 }: NodeProps<CardNode>) {
-  const { action, progress, mark, other } = data;
-  const lines = cardLines(action.inputs, 2);
+  const { action, progress, mark, other, direction } = data;
+  const right = direction === "right";
+  const lines = cardLines(action.inputs, CARD_LINES);
   const color = colorOfName(action.actor);
   const dim = useIsDimmed(action.actor);
   const talk = useOpenThreadCount(action.key);
@@ -48,11 +55,12 @@ export const ActionCard = memo(function ActionCard({
       data-tone={progress?.tone}
       data-ghost={action.missing || undefined}
       data-dim={dim || undefined}
+      data-direction={direction}
     >
       <Handle
         type="target"
         id="in"
-        position={Position.Top}
+        position={right ? Position.Left : Position.Top}
         className={style.input ?? ""}
         isConnectable={isConnectable}
         role="img"
@@ -96,14 +104,14 @@ export const ActionCard = memo(function ActionCard({
           key={outcome}
           type="source"
           id={outcome}
-          position={Position.Bottom}
+          position={right ? Position.Right : Position.Bottom}
           className={style.outcome ?? ""}
           isConnectable={isConnectable}
           data-outcome={outcome}
           role="img"
           aria-label={`When ${outcomeWord[outcome]}`}
           title={`When ${action.name} ${action.instanceId} is ${outcomeWord[outcome]}`}
-          style={{ left: `${14 + i * 24}%`, color: outcomeColor[outcome] }}
+          style={{ ...spotOf(i, right), color: outcomeColor[outcome] }}
         >
           <OutcomeSign outcome={outcome} size={11} />
         </Handle>

@@ -1,9 +1,10 @@
 /** A graph as nodes and edges of the canvas; what did not change keeps its identity. */
-import type { Edge, Node } from "@xyflow/react";
+import { type Edge, type Node, Position as Side } from "@xyflow/react";
 import { relationId } from "../graph/document-keys";
 import type { Note } from "../graph/edit/notes";
 import {
   type Action,
+  type Direction,
   ENTRY,
   EXIT,
   type Graph,
@@ -35,10 +36,11 @@ export type CardNode = Node<
     mark: ProblemMark | null;
     /** The colour of somebody else who has it selected. */
     other: string | null;
+    direction: Direction;
   },
   "action"
 >;
-export type EndNode = Node<{ end: "entry" | "exit"; progress: null }, "end">;
+export type EndNode = Node<{ end: "entry" | "exit"; direction: Direction; progress: null }, "end">;
 export type CanvasNode = CardNode | EndNode | NoteNode;
 
 export interface OutcomeResponse {
@@ -99,7 +101,13 @@ export interface NodeOptions {
 
 export type ArrowOptions = Pick<NodeOptions, "selected" | "progress" | "marks">;
 
-function place(key: Key, options: NodeOptions) {
+/** On which sides arrows leave and arrive. */
+const SIDES = {
+  right: { sourcePosition: Side.Right, targetPosition: Side.Left },
+  down: { sourcePosition: Side.Bottom, targetPosition: Side.Top },
+} as const;
+
+function place(key: Key, options: NodeOptions, direction: Direction) {
   const [x, y] = options.places.get(key) ?? [0, 0];
   const measured = options.measured.get(key);
   const selected = options.selected.has(key);
@@ -108,18 +116,25 @@ function place(key: Key, options: NodeOptions) {
     position: { x, y },
     selected,
     zIndex: selected ? 1 : 0,
+    ...SIDES[direction],
     ...(measured ? { measured } : {}),
   };
 }
 
 /** The card of an action: the same as before when nothing that it shows has changed. */
-function cardOf(action: Action, options: NodeOptions, before: CanvasNode | undefined): CardNode {
+function cardOf(
+  action: Action,
+  direction: Direction,
+  options: NodeOptions,
+  before: CanvasNode | undefined,
+): CardNode {
   const [x, y] = options.places.get(action.key) ?? [0, 0];
   const data = {
     action,
     progress: options.progress.get(action.key) ?? null,
     mark: options.marks.get(action.key) ?? null,
     other: options.others?.get(action.key) ?? null,
+    direction,
   };
   const same =
     before?.type === "action" &&
@@ -127,13 +142,14 @@ function cardOf(action: Action, options: NodeOptions, before: CanvasNode | undef
     before.data.progress === data.progress &&
     before.data.mark === data.mark &&
     before.data.other === data.other &&
+    before.data.direction === direction &&
     before.position.x === x &&
     before.position.y === y &&
     before.selected === options.selected.has(action.key) &&
     before.measured === options.measured.get(action.key);
   if (same) return before;
   const ariaLabel = cardWords(action, options);
-  return { ...place(action.key, options), type: "action", ariaLabel, data };
+  return { ...place(action.key, options, direction), type: "action", ariaLabel, data };
 }
 
 /** `before`: what was drawn last; it is looked at first, since of many cards few change at once. */
@@ -145,14 +161,16 @@ export function nodesOf(
   const known = new Map(before.map((node) => [node.id, node]));
   const ends = ([ENTRY, EXIT] as const).map(
     (end): EndNode => ({
-      ...place(end, options),
+      ...place(end, options, graph.direction),
       type: "end",
       ariaLabel: end === ENTRY ? "Entry of the graph" : "Exit of the graph",
-      data: { end: end as "entry" | "exit", progress: null },
+      data: { end: end as "entry" | "exit", direction: graph.direction, progress: null },
       deletable: false,
     }),
   );
-  const cards = graph.actions.map((action) => cardOf(action, options, known.get(action.key)));
+  const cards = graph.actions.map((action) =>
+    cardOf(action, graph.direction, options, known.get(action.key)),
+  );
   const notes = noteNodes(graph, options);
   return [...notes.frames, ...ends, ...cards, ...notes.notes];
 }
@@ -164,10 +182,13 @@ function isLit(relation: Relation, outcome: Precondition, options: ArrowOptions)
   return parent !== undefined && `on_${parent.tone}` === outcome;
 }
 
-/** Where cards stand. Empty when there are too many to look for ways round them. */
+/**
+ * Where cards stand. Empty when there are too many to look for ways round them, and from left to
+ * right, where arrows go straight.
+ */
 function boxesOf(graph: Graph, options: NodeOptions): Map<Key, Rectangle> {
   const boxes = new Map<Key, Rectangle>();
-  if (graph.actions.length > MOST_CARDS) return boxes;
+  if (graph.actions.length > MOST_CARDS || graph.direction === "right") return boxes;
   const put = (key: Key, size: { width: number; height: number }) => {
     const at = options.places.get(key);
     const { width = size.width, height = size.height } = options.measured.get(key) ?? {};

@@ -11,8 +11,9 @@ export const EndPill = memo(function EndPill({
   isConnectable,
 }: NodeProps<EndNode>) {
   const entry = data.end === "entry";
+  const right = data.direction === "right";
   return (
-    <div className={style.frame}>
+    <div className={style.frame} data-direction={data.direction}>
       <div className={style.pill} data-end={data.end} data-selected={selected || undefined}>
         {entry ? (
           <IconPlayerPlayFilled size={11} aria-hidden />
@@ -23,7 +24,15 @@ export const EndPill = memo(function EndPill({
         <Handle
           type={entry ? "source" : "target"}
           id={entry ? "start" : "in"}
-          position={entry ? Position.Bottom : Position.Top}
+          position={
+            right
+              ? entry
+                ? Position.Right
+                : Position.Left
+              : entry
+                ? Position.Bottom
+                : Position.Top
+          }
           className={style.handle ?? ""}
           isConnectable={isConnectable}
           role="img"

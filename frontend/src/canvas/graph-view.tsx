@@ -12,7 +12,7 @@ import type { Progress } from "../status/progress";
 import { ActionCard } from "./action-card";
 import { type CanvasNode, edgesOf, nodesOf, surroundingsOf } from "./elements";
 import { EndPill } from "./end-pill";
-import { positionsOf } from "./geometry/arrange";
+import { useLaidOut } from "./geometry/use-laid-out";
 import { NoteCard } from "./notes/note-card";
 import { notePlaces } from "./notes/note-nodes";
 import { ArrowTips, OutcomeArrow } from "./outcome-arrow";
@@ -34,7 +34,11 @@ interface Props {
 
 export function GraphView({ graph, progress, selected = NONE, label, onSelect }: Props) {
   const [measured, setMeasured] = useState<ReadonlyMap<Key, object>>(new Map());
-  const places = useMemo(() => new Map([...positionsOf(graph), ...notePlaces(graph)]), [graph]);
+  const laidOut = useLaidOut(graph);
+  const places = useMemo(
+    () => new Map([...(laidOut ?? []), ...notePlaces(graph)]),
+    [graph, laidOut],
+  );
   const options = useMemo(
     () => ({ places, selected, progress, marks: NO_PROBLEM_MARKS, measured }),
     [places, selected, progress, measured],
@@ -44,6 +48,8 @@ export function GraphView({ graph, progress, selected = NONE, label, onSelect }:
     () => edgesOf(graph, options, surroundingsOf(graph, options, null)),
     [graph, options],
   );
+  // It fits what it shows once, on its first drawing.
+  if (laidOut === null) return <div aria-busy="true" aria-label={label} role="img" />;
   return (
     <ReactFlow<CanvasNode>
       nodes={nodes}

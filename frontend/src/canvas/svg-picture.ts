@@ -1,7 +1,8 @@
 /** A graph as one SVG picture, drawn from the same elements as the canvas. Pure. */
 
+import { Position as Side } from "@xyflow/react";
 import { type Note, notesOf } from "../graph/edit/notes";
-import type { Graph, Key, Position, Precondition } from "../graph/model";
+import type { Direction, Graph, Key, Position, Precondition } from "../graph/model";
 import { cardLines, lineText } from "../graph/value-text";
 import { colorOfName } from "../ui/name-colors";
 import {
@@ -12,8 +13,8 @@ import {
   outcomeOffset,
   surroundingsOf,
 } from "./elements";
-import { CARD, PILL, type Sizes } from "./geometry/arrange";
-import { arrowPathOf } from "./geometry/arrow-path";
+import { CARD, pillSize, type Sizes } from "./geometry/arrange";
+import { type ArrowEnds, arrowPathOf } from "./geometry/arrow-path";
 import { noteColor } from "./notes/note-colors";
 import { OUTCOMES, outcomeColor, outcomeWord } from "./outcome";
 import { NO_PROBLEM_MARKS } from "./problem-marks";
@@ -61,6 +62,7 @@ class Painter {
   private readonly edges: Arrow[];
   private readonly notes: readonly Note[];
   private readonly sizes: Sizes;
+  private readonly direction: Direction;
   private readonly color: (token: string) => string;
 
   constructor(
@@ -70,6 +72,7 @@ class Painter {
     color: (token: string) => string,
   ) {
     this.sizes = sizes;
+    this.direction = graph.direction;
     this.color = color;
     const options = {
       places: new Map(places),
@@ -109,7 +112,7 @@ class Painter {
   }
 
   private size(key: Key, kind: string) {
-    return this.sizes.get(key) ?? (kind === "end" ? PILL : CARD);
+    return this.sizes.get(key) ?? (kind === "end" ? pillSize(this.direction) : CARD);
   }
 
   private bounds(): [number, number, number, number] {
@@ -181,7 +184,9 @@ class Painter {
             ),
           ]),
       ...OUTCOMES.map((outcome, i) =>
-        this.outcome(outcome, x + width * (0.14 + 0.24 * i), y + height),
+        this.direction === "right"
+          ? this.outcome(outcome, x + width, y + height / 2 + (i - 1.5) * 22)
+          : this.outcome(outcome, x + width * (0.14 + 0.24 * i), y + height),
       ),
     ].join("");
   }
@@ -201,7 +206,8 @@ class Painter {
 
   private end({ position: { x, y }, data }: Extract<CanvasNode, { type?: "end" }>): string {
     const color = this.paint(data.end === "entry" ? "--true" : "--ink2");
-    const [left, middle] = [x + PILL.width / 2 - 42, x + PILL.width / 2];
+    const middle = x + pillSize(this.direction).width / 2;
+    const left = middle - 42;
     return (
       `<rect x="${left}" y="${y}" width="84" height="32" rx="16" fill="${this.paint("--raised")}" stroke="${color}" stroke-width="1.5"/>` +
       this.text(
@@ -219,13 +225,23 @@ class Painter {
     if (!data || !from || !to) return "";
     const source = this.size(from.id, from.type ?? "");
     const target = this.size(to.id, to.type ?? "");
-    const below = data.entry ? 7 : 11;
-    const ends = {
-      sourceX: from.position.x + source.width * outcomeOffset(data.entry, data.outcome),
-      sourceY: from.position.y + source.height + below,
-      targetX: to.position.x + target.width / 2,
-      targetY: to.position.y - 7,
-    };
+    const out = data.entry ? 7 : 11;
+    const right = this.direction === "right";
+    const row = data.entry ? 0 : (OUTCOMES.indexOf(data.outcome) - 1.5) * 22;
+    const ends: ArrowEnds = right
+      ? {
+          sourceX: from.position.x + source.width + out,
+          sourceY: from.position.y + source.height / 2 + row,
+          targetX: to.position.x - 7,
+          targetY: to.position.y + target.height / 2,
+          sourcePosition: Side.Right,
+        }
+      : {
+          sourceX: from.position.x + source.width * outcomeOffset(data.entry, data.outcome),
+          sourceY: from.position.y + source.height + out,
+          targetX: to.position.x + target.width / 2,
+          targetY: to.position.y - 7,
+        };
     const color = this.paint(
       data.entry ? "--ink3" : data.response === "ignore" ? "--ink4" : outcomeColor[data.outcome],
     );
@@ -233,7 +249,7 @@ class Painter {
     const { targetX: x, targetY: y } = ends;
     return (
       `<path d="${arrowPathOf(ends, data.lane).path}" fill="none" stroke="${color}" stroke-width="1.8"${dash}/>` +
-      `<path d="M${x - 4.5} ${y - 7}L${x} ${y + 1}L${x + 4.5} ${y - 7}Z" fill="${color}"/>`
+      `<path d="${right ? `M${x - 7} ${y - 4.5}L${x + 1} ${y}L${x - 7} ${y + 4.5}Z` : `M${x - 4.5} ${y - 7}L${x} ${y + 1}L${x + 4.5} ${y - 7}Z`}" fill="${color}"/>`
     );
   }
 

@@ -1,5 +1,5 @@
 /** Every edit action, in the order in which menus and help list them. */
-import { ALIGN, DISTRIBUTE, NUDGE, snap, tidy, tidySelection } from "./arrange";
+import { ALIGN, DISTRIBUTE, NUDGE, snap, tidy, tidySelection, turn } from "./arrange";
 import * as draw from "./draw";
 import { DRY_RUN } from "./dry-run-actions";
 import type { EditAction } from "./edit-action";
@@ -37,6 +37,7 @@ export const EDIT_ACTIONS: readonly EditAction[] = [
   draw.selectNone,
   tidy,
   tidySelection,
+  turn,
   ...ALIGN,
   ...DISTRIBUTE,
   snap,

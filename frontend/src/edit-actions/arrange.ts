@@ -3,6 +3,7 @@ import {
   IconArrowDown,
   IconArrowLeft,
   IconArrowRight,
+  IconArrowsRightDown,
   IconArrowUp,
   IconGrid4x4,
   IconLayoutAlignBottom,
@@ -15,9 +16,8 @@ import {
   IconLayoutDistributeVertical,
   IconSitemap,
 } from "@tabler/icons-react";
-import { type Align, align, type Block, distribute, tidied } from "../canvas/geometry/align";
-import { arrange, CARD } from "../canvas/geometry/arrange";
-import { moveActions } from "../graph/edit";
+import { type Align, align, type Block, distribute } from "../canvas/geometry/align";
+import { CARD } from "../canvas/geometry/arrange";
 import type { EditAction } from "./edit-action";
 import {
   type EditorContext,
@@ -26,6 +26,7 @@ import {
   selectedNotes,
   writePositions,
 } from "./editor-context";
+import { layOutGraph, layOutSome } from "./layout";
 
 /** Everything chosen that stands somewhere: actions, ends, notes. */
 function blocks(context: EditorContext): Block[] {
@@ -92,10 +93,20 @@ export const tidy: EditAction = {
   changes: true,
   also: "auto layout arrange whole graph",
   enabled: (context) => context.graph.actions.length > 0,
-  run: (context) => {
-    moveActions(context.doc, arrange(context.graph, context.sizes()));
-    requestAnimationFrame(() => context.view.fit());
-  },
+  run: (context) => void layOutGraph(context),
+};
+
+export const turn: EditAction = {
+  name: "turn",
+  label: "Left to right, or top down",
+  group: "Arrange",
+  shortcuts: ["Shift+d"],
+  icon: IconArrowsRightDown,
+  changes: true,
+  also: "direction landscape portrait horizontal vertical layout orientation turn switch",
+  enabled: (context) => context.graph.actions.length > 0,
+  run: (context) =>
+    void layOutGraph(context, context.graph.direction === "right" ? "down" : "right"),
 };
 
 export const tidySelection: EditAction = {
@@ -109,7 +120,9 @@ export const tidySelection: EditAction = {
   enabled: (context) => selectedActions(context).length > 1,
   run: (context) => {
     const keys = new Set(selectedActions(context).map(({ key }) => key));
-    writePositions(context, tidied(context.graph, keys, context.positions(), context.sizes()));
+    void layOutSome(context, keys).then((places) => {
+      if (places !== null) writePositions(context, places);
+    });
   },
 };
 

@@ -7,13 +7,14 @@
 import { notifications } from "@mantine/notifications";
 import { errorPlace, errorText } from "../api/http";
 import { readUmrfKeys } from "../api/umrf-keys";
-import { arrange } from "../canvas/geometry/arrange";
+import { arrange, isUnplaced, positionsOf } from "../canvas/geometry/arrange";
 import { mapsFrom } from "../graph/document-keys";
 import { type Clip, clipOf, isEmpty, paste } from "../graph/edit/clip";
 import { readGraph } from "../graph/read";
 import { umrfText } from "../graph/umrf-text";
 import { copyText } from "../ui/copy-text";
 import { type EditorContext, selectedActions } from "./editor-context";
+import { freshPlaces } from "./layout";
 
 export interface CopiedContent {
   /** What the system's clipboard got. */
@@ -90,17 +91,22 @@ function failed(message: string): void {
 }
 
 /** The same with places for what has none: files often come without. */
-function placed(clip: Clip): Clip {
-  const graph = readGraph(mapsFrom(clip));
+async function placed(context: EditorContext, clip: Clip): Promise<Clip> {
+  const graph = { ...readGraph(mapsFrom(clip)), direction: context.graph.direction };
   if (graph.actions.every(({ position }) => position !== null)) return clip;
-  return { ...clip, positions: { ...Object.fromEntries(arrange(graph)), ...clip.positions } };
+  const places = isUnplaced(graph)
+    ? ((await freshPlaces(graph)) ?? arrange(graph))
+    : positionsOf(graph);
+  return { ...clip, positions: { ...Object.fromEntries(places), ...clip.positions } };
 }
 
-function land(context: EditorContext, clip: Clip, own: boolean): void {
+async function land(context: EditorContext, clip: Clip, own: boolean): Promise<void> {
+  // Where the pointer is now: laying out takes a moment.
   const pointer = context.view.pointer();
+  const pieces = await placed(context, clip);
   const keys = paste(
     context.doc,
-    placed(clip),
+    pieces,
     pointer ? { at: pointer.at } : own ? { by: [40, 40] } : { at: context.view.middle() },
   );
   context.select(keys);
@@ -120,7 +126,7 @@ export async function pasteText(context: EditorContext, text: string): Promise<v
     const same = Object.keys(ours.clip.actions).some((key) =>
       context.graph.actions.some((action) => action.key === key),
     );
-    land(context, ours.clip, same);
+    await land(context, ours.clip, same);
     return;
   }
   if (text.trim() === "") {
@@ -130,7 +136,7 @@ export async function pasteText(context: EditorContext, text: string): Promise<v
   try {
     const pieces = await readUmrfKeys(text);
     if (isEmpty(pieces)) failed("This UMRF text has no actions.");
-    else land(context, pieces, false);
+    else await land(context, pieces, false);
   } catch (error) {
     const where = errorPlace(error);
     failed(where === "" ? errorText(error) : `${errorText(error)} (${where})`);

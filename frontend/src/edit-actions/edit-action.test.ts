@@ -2,7 +2,8 @@ import { expect, test } from "vitest";
 import { EMPTY_GRAPH } from "../graph/model";
 import { EDIT_ACTIONS } from "./all";
 import { editActionFor, isEnabled, isPressed, labelOf, printedKeys } from "./edit-action";
-import type { EditorContext } from "./editor-context";
+import { type EditorContext, freePosition } from "./editor-context";
+import { neighbour } from "./view";
 
 const press = (
   key: string,
@@ -65,4 +66,37 @@ test("who may only look is offered nothing that changes the graph, and told why"
   expect(changing.filter((editAction) => isEnabled(editAction, editor)).length).toBeGreaterThan(10);
   const [copy] = EDIT_ACTIONS.filter(({ name }) => name === "copy");
   expect(copy && isEnabled(copy, context)).toBe(true);
+});
+
+test("the arrow keys walk in the direction of the graph", () => {
+  const relations = [
+    { parent: "a", child: "b" },
+    { parent: "b", child: "c" },
+    { parent: "b", child: "d" },
+  ];
+  const standing = (direction: "right" | "down", places: Record<string, [number, number]>) =>
+    ({
+      graph: { ...EMPTY_GRAPH, direction, relations, actions: [{ key: "a" }] },
+      selection: new Set(["b"]),
+      positions: () => new Map(Object.entries(places)),
+    }) as unknown as EditorContext;
+  const right = standing("right", { a: [0, 0], b: [300, 0], c: [600, -80], d: [600, 90] });
+  expect([neighbour(right, "right"), neighbour(right, "left")]).toEqual(["c", "a"]);
+  const down = standing("down", { a: [0, 0], b: [0, 200], c: [-150, 400], d: [160, 400] });
+  expect([neighbour(down, "down"), neighbour(down, "up")]).toEqual(["c", "a"]);
+  const beside = { ...right, selection: new Set(["c"]) } as EditorContext;
+  expect([neighbour(beside, "down"), neighbour(beside, "up")]).toEqual(["d", null]);
+});
+
+test("one more action goes behind what is chosen, where it is free", () => {
+  const standing = (direction: "right" | "down") =>
+    ({
+      graph: { ...EMPTY_GRAPH, direction, actions: [{ key: "a" }, { key: "b" }] },
+      selection: new Set(["a"]),
+      positions: () =>
+        new Map(Object.entries({ a: [0, 0], b: direction === "right" ? [316, 0] : [0, 212] })),
+      sizes: () => new Map(),
+    }) as unknown as EditorContext;
+  expect(freePosition(standing("right"))).toEqual([316, 136]);
+  expect(freePosition(standing("down"))).toEqual([240, 212]);
 });

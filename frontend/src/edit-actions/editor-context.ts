@@ -1,7 +1,7 @@
 /** What edit actions work on: the open graph, what is selected, and the view of it. */
 import { createContext, use } from "react";
 import type * as Y from "yjs";
-import { CARD, unplaced } from "../canvas/geometry/arrange";
+import { CARD, freeSpot, placeAfter, unplaced } from "../canvas/geometry/arrange";
 import type { DryRun } from "../dry-run/use-dry-run";
 import { relationId } from "../graph/document-keys";
 import { addAction, asOneEdit, moveActions, type NewAction } from "../graph/edit";
@@ -39,14 +39,17 @@ export const GRID = 20; // px
 
 /** What the canvas can do with its view. */
 export interface CanvasView {
+  /** All of it, however small. */
   fit(): void;
+  /** As on opening: all of it where that can be read, else its beginning. */
+  open(): void;
   zoomIn(): void;
   zoomOut(): void;
   /** `whole`: as large as it fits; else only so near that it can be read. */
   show(keys: readonly Key[], goal?: "middle" | "whole"): void;
   /** Moves the view only if this is not in it. */
   reveal(at: Position): void;
-  /** The middle of what is seen, on the canvas. */
+  /** Near the middle of what is seen, on the canvas: where something new is put. */
   middle(): Position;
   screenOf(at: Position): Position;
   /** Where the pointer rests over the canvas; null when it does not. */
@@ -122,23 +125,33 @@ export function selectedRelations(context: EditorContext): Relation[] {
   return context.graph.relations.filter((relation) => context.selection.has(relationId(relation)));
 }
 
+/** Where cards and ends stand: what takes up room. */
+function takenBoxes(context: EditorContext) {
+  const sizes = context.sizes();
+  return [...context.positions()].flatMap(([key, [x, y]]) =>
+    key.startsWith("g/") ? [] : [{ x, y, ...(sizes.get(key) ?? CARD) }],
+  );
+}
+
+/** The nearest place from here that is free. Upper left corner, on the canvas. */
+export function freeFrom(context: EditorContext, start: Position): Position {
+  return freeSpot(start, CARD, takenBoxes(context), context.graph.direction);
+}
+
 /**
- * A free place for one more card: under what is selected, else in the middle of the view. Upper
+ * A free place for one more card: behind what is selected, else in the middle of the view. Upper
  * left corner, on the canvas.
  */
 export function freePosition(context: EditorContext): Position {
   const [selected] = selectedActions(context);
-  const places = context.positions();
-  const at = selected && places.get(selected.key);
-  let [x, y] = at ? [at[0], at[1] + 180] : context.view.middle();
-  if (!at) x -= CARD.width / 2;
-  const isTaken = () =>
-    context.graph.actions.some(({ key }) => {
-      const [px, py] = places.get(key) ?? [Number.POSITIVE_INFINITY, 0];
-      return Math.abs(px - x) < CARD.width + 16 && Math.abs(py - y) < CARD.height + 16;
-    });
-  for (let i = 0; i < 60 && isTaken(); i += 1) x += CARD.width / 2;
-  return [Math.round(x), Math.round(y)];
+  const at = selected && context.positions().get(selected.key);
+  if (at) {
+    const size = context.sizes().get(selected.key) ?? CARD;
+    const after = placeAfter({ x: at[0], y: at[1], ...size }, context.graph.direction);
+    return freeFrom(context, after);
+  }
+  const [x, y] = context.view.middle();
+  return freeFrom(context, [x - CARD.width / 2, y]);
 }
 
 /** Adds an action by hand: everything else stays where it is drawn. Answers its key. */

@@ -10,7 +10,7 @@ import { CARD } from "../canvas/geometry/arrange";
 import { relationId } from "../graph/document-keys";
 import { writeNote } from "../graph/edit/notes";
 import type { EditAction } from "./edit-action";
-import { type EditorContext, selectedNotes, selectedRelations } from "./editor-context";
+import { type EditorContext, freeFrom, selectedNotes, selectedRelations } from "./editor-context";
 
 const SIZE = [200, 84] as const; // px of a new note
 const AIR = 28; // px between a frame and what lies in it
@@ -124,7 +124,9 @@ export const insert: EditAction = {
     const [a, b] = [relation.parent, relation.child].map((key) => context.positions().get(key));
     const [x, y] =
       a && b ? [(a[0] + b[0] + CARD.width) / 2, (a[1] + b[1]) / 2] : context.view.middle();
-    const at = [Math.round(x), Math.round(y)] as const;
+    // Between two that stand close it goes beside the arrow.
+    const [left, top] = freeFrom(context, [x - CARD.width / 2, y]);
+    const at = [Math.round(left + CARD.width / 2), Math.round(top)] as const;
     context.openAdd({
       screen: context.view.screenOf(at),
       at,

@@ -144,26 +144,35 @@ export const showJson: EditAction = {
   run: (context) => context.setPanel("json"),
 };
 
-/** The nearest neighbour along arrows: down to what follows, up to what comes before, or beside. */
-function neighbour(context: EditorContext, way: "up" | "down" | "left" | "right"): Key | null {
-  const { relations, actions } = context.graph;
+/**
+ * The nearest neighbour along arrows: in the direction of the graph to what follows, against it to
+ * what comes before, or beside.
+ */
+export function neighbour(context: EditorContext, way: "up" | "down" | "left" | "right"): Key | null {
+  const { relations, actions, direction } = context.graph;
+  const right = direction === "right";
+  const [onward, back] = right ? (["right", "left"] as const) : (["down", "up"] as const);
   const places = context.positions();
   const [arrow] = selectedRelations(context);
-  if (arrow && (way === "up" || way === "down")) return way === "up" ? arrow.parent : arrow.child;
+  if (arrow && (way === onward || way === back)) return way === back ? arrow.parent : arrow.child;
   const [from] = [...context.selection].filter((key) => places.has(key));
   if (from === undefined)
     return relations.find((r) => r.parent === ENTRY)?.child ?? actions[0]?.key ?? null;
   const at = places.get(from) ?? [0, 0];
+  /** Where it stands across the direction. */
+  const acrossOf = (key: Key) => places.get(key)?.[right ? 1 : 0] ?? 0;
   const after = (key: Key) => relations.filter((r) => r.parent === key).map((r) => r.child);
   const before = (key: Key) => relations.filter((r) => r.child === key).map((r) => r.parent);
   const beside = () =>
     [...new Set([...before(from).flatMap(after), ...after(from).flatMap(before)])].filter(
-      (key) => (places.get(key)?.[0] ?? 0) !== at[0],
+      (key) => acrossOf(key) !== acrossOf(from),
     );
-  const found = way === "down" ? after(from) : way === "up" ? before(from) : beside();
+  const found = way === onward ? after(from) : way === back ? before(from) : beside();
   const fits = (key: Key) => {
-    const [x] = places.get(key) ?? [0, 0];
-    return key !== from && (way === "left" ? x < at[0] : way === "right" ? x > at[0] : true);
+    if (key === from) return false;
+    if (way === onward || way === back) return true;
+    const less = way === "left" || way === "up";
+    return less ? acrossOf(key) < acrossOf(from) : acrossOf(key) > acrossOf(from);
   };
   const far = (key: Key) => {
     const [x, y] = places.get(key) ?? [0, 0];
@@ -177,14 +186,14 @@ export const WALK: readonly EditAction[] = (["up", "down", "left", "right"] as c
     ...look,
     name: `walk-${way}`,
     label: {
-      up: "Go to what comes before",
-      down: "Go to what follows",
-      left: "Go to the left",
-      right: "Go to the right",
+      up: "Go up along the arrows",
+      down: "Go down along the arrows",
+      left: "Go left along the arrows",
+      right: "Go right along the arrows",
     }[way],
     shortcuts: [`Alt+Arrow${way.charAt(0).toUpperCase()}${way.slice(1)}`],
     icon: IconArrowGuide,
-    also: "walk neighbour",
+    also: "walk neighbour before follows",
     enabled: (context: EditorContext) => context.graph.actions.length > 0,
     run: (context: EditorContext) => {
       const key = neighbour(context, way);

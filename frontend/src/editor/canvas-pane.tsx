@@ -5,7 +5,7 @@ import { ReactFlowProvider } from "@xyflow/react";
 import { type ReactNode, useEffect, useMemo, useRef } from "react";
 import type { ProblemMarks } from "../canvas/problem-marks";
 import { type EditorContext, useEditorContext } from "../edit-actions/editor-context";
-import type { Key, Position } from "../graph/model";
+import { EMPTY_GRAPH, type Key, type Position } from "../graph/model";
 import { RobotFilter } from "../outline/robot-filter";
 import { FollowFrame } from "../people/people";
 import { useFollowedView } from "../people/use-followed-view";
@@ -14,6 +14,7 @@ import { useGraph, useLinkPart } from "../sync/use-room";
 import { Empty } from "../ui/empty";
 import { EditableCanvas } from "./canvas/editable-canvas";
 import { useCanvasElements } from "./canvas/use-canvas-elements";
+import { useFirstLayout } from "./canvas/use-first-layout";
 import { useViewport } from "./canvas/use-viewport";
 import style from "./canvas-pane.module.css";
 import { DryRunBar } from "./dry-run-bar";
@@ -39,8 +40,8 @@ interface Props {
 }
 
 /** What is said while there is nothing to see. */
-function Emptiness({ arrived, context }: { arrived: boolean; context: EditorContext }) {
-  if (!arrived) {
+function Emptiness({ waiting, context }: { waiting: boolean; context: EditorContext }) {
+  if (waiting) {
     return (
       <div className={style.waiting} aria-busy="true">
         <Skeleton height={92} width={208} radius="lg" />
@@ -83,22 +84,25 @@ function Inside(props: Props) {
   // The canvas keeps up with the hands of others; what stands beside it comes after.
   const context = useMemo<EditorContext>(() => ({ ...calm, graph }), [calm, graph]);
   const arrived = useLinkPart(({ seq }) => seq > 0);
+  const first = useFirstLayout(context, arrived);
   const canvas = useCanvasElements({
-    graph: context.graph,
+    graph: first.pending ? EMPTY_GRAPH : context.graph,
     selection: context.selection,
     select: context.select,
     progress: context.dryRun?.sighting.progress ?? progress,
     marks,
+    laidOut: first.places,
   });
   const { flow, places, sizes } = canvas;
   const frame = useRef<HTMLDivElement>(null);
   const pointer = useRef<Position | null>(null);
-  const begun = arrived && context.graph.actions.length > 0;
+  const begun = arrived && context.graph.actions.length > 0 && !first.pending;
   const { view, lost, onPanned, onFollow } = useViewport({
     flow,
     frame,
     places,
     sizes,
+    direction: graph.direction,
     phone,
     begun,
     progress: context.dryRun ? NOTHING : progress,
@@ -128,14 +132,21 @@ function Inside(props: Props) {
           pointer={pointer}
           writing={writing}
         />
-        <Emptiness arrived={arrived} context={context} />
+        <Emptiness
+          waiting={!arrived || (first.pending && context.graph.actions.length > 1)}
+          context={context}
+        />
         {!compact && (
-          <div className={style.robots}>
+          <div className={style.robots} data-covers="top">
             <RobotFilter />
           </div>
         )}
         <FollowFrame />
-        <div className={style.tools} data-hidden={(phone && context.dryRun !== null) || undefined}>
+        <div
+          className={style.tools}
+          data-covers="bottom"
+          data-hidden={(phone && context.dryRun !== null) || undefined}
+        >
           <Toolbar compact={compact} />
         </div>
         <div className={style.corner}>

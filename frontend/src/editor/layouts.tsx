@@ -99,6 +99,7 @@ export function DeskLayout(props: Parts & { wide: boolean; list: () => ReactNode
     <main className={style.editor} data-wide={wide || undefined}>
       <aside
         className={style.left}
+        data-covers="left"
         data-open={wide || (left && !carrying) || undefined}
         aria-label="Library"
       >
@@ -121,7 +122,12 @@ export function DeskLayout(props: Parts & { wide: boolean; list: () => ReactNode
         {!wide && <div className={style.draft}>{status()}</div>}
         {strip}
       </div>
-      <aside className={style.right} data-open={wide || right || undefined} aria-label="Details">
+      <aside
+        className={style.right}
+        data-covers="right"
+        data-open={wide || right || undefined}
+        aria-label="Details"
+      >
         {details}
       </aside>
     </main>

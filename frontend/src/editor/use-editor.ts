@@ -28,6 +28,7 @@ const NONE: ReadonlySet<string> = new Set();
 
 const NO_CANVAS_VIEW: CanvasView = {
   fit: () => {},
+  open: () => {},
   zoomIn: () => {},
   zoomOut: () => {},
   show: () => {},
@@ -144,6 +145,7 @@ function useDialogs(latest: RefObject<EditorContext | null>, onPanel: (panel: Pa
 function canvasOf(handle: RefObject<CanvasHandle>) {
   const view: CanvasView = {
     fit: () => handle.current.view.fit(),
+    open: () => handle.current.view.open(),
     zoomIn: () => handle.current.view.zoomIn(),
     zoomOut: () => handle.current.view.zoomOut(),
     show: (keys, goal) => handle.current.view.show(keys, goal),

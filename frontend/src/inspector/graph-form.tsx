@@ -50,7 +50,7 @@ export function GraphForm() {
           <li>
             <Kbd>A</Kbd> or double-click: type the name of an action
           </li>
-          <li>Drag from an outcome under a card to what shall follow it</li>
+          <li>Drag from an outcome of a card to what shall follow it</li>
           <li>Drop on empty canvas to add the next action there</li>
           <li>
             <Kbd>C</Kbd> draws an arrow by keys alone

@@ -23,7 +23,7 @@ function boxes(graph: Graph): Map<string, MiniatureBox> {
   const keys = [ENTRY, ...graph.actions.map((action) => action.key), EXIT];
   const sizes = new Map(keys.map((key) => [key, key === ENTRY || key === EXIT ? PILL : CARD]));
   const found = new Map<string, MiniatureBox>();
-  for (const [key, [x, y]] of arrange(graph, sizes, "LR")) {
+  for (const [key, [x, y]] of arrange(graph, sizes, "right")) {
     found.set(key, { x, y, ...(sizes.get(key) ?? CARD) });
   }
   return found;

@@ -1,10 +1,6 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
-import * as Y from "yjs";
-import { mapsOf } from "../../graph/document-keys";
-import { addAction, connect } from "../../graph/edit";
-import { readGraph } from "../../graph/read";
-import { align, type Block, distribute, tidied } from "./align";
+import { align, type Block, distribute } from "./align";
 
 const blocks: readonly Block[] = [
   { key: "a", x: 0, y: 0, width: 100, height: 40 },
@@ -36,18 +32,4 @@ test("distributed things have equal gaps, keep their order, and the ends stay", 
       expect(Math.max(...gaps) - Math.min(...gaps)).toBeLessThanOrEqual(some.length);
     }),
   );
-});
-
-test("tidying a part moves nothing else, and the part stays where it was", () => {
-  const doc = new Y.Doc();
-  const keys = ["A", "B", "C", "D"].map((name) => addAction(doc, { name, position: [500, 700] }));
-  connect(doc, keys[0] ?? "", keys[1] ?? "");
-  const graph = readGraph(mapsOf(doc));
-  const places = new Map(graph.actions.map(({ key }) => [key, [500, 700] as const]));
-  const part = new Set(keys.slice(0, 2));
-  const moved = tidied(graph, part, places, new Map());
-  expect(new Set(moved.keys())).toEqual(part);
-  const at = [...moved.values()];
-  expect([Math.min(...at.map(([x]) => x)), Math.min(...at.map(([, y]) => y))]).toEqual([500, 700]);
-  expect(at[0]).not.toEqual(at[1]);
 });

@@ -1,6 +1,6 @@
-/** Aligning, distributing, and tidying a part: from where things stand to where they shall. Pure. */
-import type { Graph, Key, Position } from "../../graph/model";
-import { arrange, type Positions, type Sizes } from "./arrange";
+/** Aligning and distributing: from where things stand to where they shall. Pure. */
+import type { Key, Position } from "../../graph/model";
+import type { Positions } from "./arrange";
 
 export interface Block {
   readonly key: Key;
@@ -57,33 +57,4 @@ export function distribute(blocks: readonly Block[], axis: "x" | "y"): Positions
     next += size(block) + gap;
   }
   return places;
-}
-
-/** Fresh places for a part of the graph; its upper left corner stays where it is. */
-export function tidied(
-  graph: Graph,
-  keys: ReadonlySet<Key>,
-  places: ReadonlyMap<Key, Position>,
-  sizes: Sizes,
-): Positions {
-  const part: Graph = {
-    ...graph,
-    actions: graph.actions.filter(({ key }) => keys.has(key)),
-    relations: graph.relations.filter(({ parent, child }) => keys.has(parent) && keys.has(child)),
-  };
-  const fresh = arrange(part, sizes);
-  const corner = (all: ReadonlyMap<Key, Position>): Position => {
-    const known = [...keys].flatMap((key) => {
-      const at = all.get(key);
-      return at ? [at] : [];
-    });
-    return [Math.min(...known.map(([x]) => x)), Math.min(...known.map(([, y]) => y))];
-  };
-  const [old, now] = [corner(places), corner(fresh)];
-  return new Map(
-    [...keys].flatMap((key): [Key, Position][] => {
-      const at = fresh.get(key);
-      return at ? [[key, [at[0] - now[0] + old[0], at[1] - now[1] + old[1]]]] : [];
-    }),
-  );
 }

@@ -1,10 +1,17 @@
-/** Where things stand: places from the graph, and top-to-bottom ones for what has none. */
-import { Graph as Dagre, layout } from "@dagrejs/dagre";
-import { ENTRY, EXIT, type Graph, type Key, type Position } from "../../graph/model";
-
-export const CARD = { width: 208, height: 104 } as const;
-/** The ends are as wide as cards, so that the same x means the same middle. */
-export const PILL = { width: 208, height: 32 } as const;
+/**
+ * Where things stand: places from the graph, and others until the layout has been told of what has
+ * none. At once and without a library, so that something is drawn; `layout.ts` lays out.
+ */
+import {
+  type Direction,
+  ENTRY,
+  EXIT,
+  type Graph,
+  type Key,
+  type Position,
+  type Relation,
+} from "../../graph/model";
+import { cardLines } from "../../graph/value-text";
 
 interface Size {
   readonly width: number;
@@ -13,46 +20,146 @@ interface Size {
 export type Sizes = ReadonlyMap<Key, Size>;
 export type Positions = Map<Key, Position>;
 
-function sizeOf(key: Key, sizes: Sizes): Size {
-  return sizes.get(key) ?? (key === ENTRY || key === EXIT ? PILL : CARD);
+export const CARD = { width: 208, height: 104 } as const;
+/** The ends, top down: as wide as cards, so that the same x means the same middle. */
+export const PILL = { width: 208, height: 32 } as const;
+/** The ends, left to right: as wide as they look. */
+const SHORT_PILL = { width: 84, height: 32 } as const;
+/** How many parameters a card shows. */
+export const CARD_LINES = 2;
+
+/** Of what `action-card.module.css` sets, px: a card without parameters, and what they add. */
+const HEIGHT = { plain: 68, low: 58, least: 88, lines: 4, line: 17.2 } as const;
+/** Kept free between cards that nobody has laid out. */
+const GAP = { along: 108, across: 56 } as const;
+
+export const pillSize = (direction: Direction): Size => (direction === "right" ? SHORT_PILL : PILL);
+
+/** How large everything will be drawn, before it is. */
+export function estimatedSizes({ actions, direction }: Graph): Map<Key, Size> {
+  const sizes = new Map<Key, Size>([
+    [ENTRY, pillSize(direction)],
+    [EXIT, pillSize(direction)],
+  ]);
+  for (const { key, inputs } of actions) {
+    const lines = cardLines(inputs, CARD_LINES).length;
+    const text = lines === 0 ? 0 : HEIGHT.lines + lines * HEIGHT.line;
+    const height =
+      direction === "right" ? Math.max(HEIGHT.least, HEIGHT.low + text) : HEIGHT.plain + text;
+    sizes.set(key, { width: CARD.width, height: Math.ceil(height) });
+  }
+  return sizes;
 }
 
-/** Fresh places for everything, ranks from entry down to exit. */
+function sizeOf(key: Key, sizes: Sizes, direction: Direction): Size {
+  return sizes.get(key) ?? (key === ENTRY || key === EXIT ? pillSize(direction) : CARD);
+}
+
+/** Everything that stands somewhere, in the order of the file. */
+export function orderOf(graph: Graph): Map<Key, number> {
+  return new Map([ENTRY, ...graph.actions.map(({ key }) => key), EXIT].map((key, i) => [key, i]));
+}
+
+/** The arrows in an order that does not depend on keys, which are random. */
+export function relationsInOrder(graph: Graph, order = orderOf(graph)): Relation[] {
+  const at = (key: Key) => order.get(key) ?? 0;
+  return graph.relations
+    .filter(({ parent, child }) => parent !== child && order.has(parent) && order.has(child))
+    .sort(
+      (a, b) =>
+        at(a.parent) - at(b.parent) ||
+        a.parentOrder - b.parentOrder ||
+        at(a.child) - at(b.child) ||
+        a.listing - b.listing,
+    );
+}
+
+/** What follows what, without the arrows that lead back and those into the exit. */
+export function forward(graph: Graph): Map<Key, Key[]> {
+  const all = new Map<Key, Key[]>([[ENTRY, []]]);
+  for (const { key } of graph.actions) all.set(key, []);
+  for (const { parent, child } of relationsInOrder(graph)) {
+    if (child !== EXIT) all.get(parent)?.push(child);
+  }
+  const next = new Map<Key, Key[]>();
+  const state = new Map<Key, "open" | "done">();
+  for (const start of all.keys()) {
+    const open: [Key, number][] = state.has(start) ? [] : [[start, 0]];
+    while (open.length > 0) {
+      const top = open[open.length - 1];
+      if (top === undefined) break;
+      const [key, i] = top;
+      if (i === 0) {
+        state.set(key, "open");
+        next.set(key, []);
+      }
+      const child = all.get(key)?.[i];
+      top[1] += 1;
+      if (child === undefined) {
+        state.set(key, "done");
+        open.pop();
+      } else if (state.get(child) !== "open") {
+        next.get(key)?.push(child);
+        if (!state.has(child)) open.push([child, 0]);
+      }
+    }
+  }
+  return next;
+}
+
+/** In which rank each thing stands: behind everything that leads to it. */
+export function ranksOf(graph: Graph): Map<Key, number> {
+  const next = forward(graph);
+  const waiting = new Map<Key, number>([...next.keys()].map((key) => [key, 0]));
+  for (const children of next.values()) {
+    for (const child of children) waiting.set(child, (waiting.get(child) ?? 0) + 1);
+  }
+  const ranks = new Map<Key, number>([[ENTRY, 0]]);
+  const ready = [...waiting].filter(([, n]) => n === 0).map(([key]) => key);
+  for (const key of ready) {
+    const rank = ranks.get(key) ?? 1;
+    ranks.set(key, rank);
+    for (const child of next.get(key) ?? []) {
+      ranks.set(child, Math.max(ranks.get(child) ?? 1, rank + 1));
+      const left = (waiting.get(child) ?? 0) - 1;
+      waiting.set(child, left);
+      if (left === 0) ready.push(child);
+    }
+  }
+  ranks.set(EXIT, Math.max(...ranks.values()) + 1);
+  return ranks;
+}
+
+/** Places by rank alone, each rank centred: for miniatures, and until the layout answers. */
 export function arrange(
   graph: Graph,
-  sizes: Sizes = new Map(),
-  direction: "TB" | "LR" = "TB",
+  sizes: Sizes = estimatedSizes(graph),
+  direction: Direction = graph.direction,
 ): Positions {
-  const dagre = new Dagre({ multigraph: true });
-  dagre.setGraph({ rankdir: direction, nodesep: 56, ranksep: 108, marginx: 0, marginy: 0 });
-  dagre.setDefaultEdgeLabel(() => ({}));
-  const keys = [ENTRY, ...graph.actions.map((action) => action.key), EXIT];
-  for (const key of keys) dagre.setNode(key, { ...sizeOf(key, sizes) });
-  graph.relations.forEach(({ parent, child }, i) => {
-    if (parent === child || !dagre.hasNode(parent) || !dagre.hasNode(child)) return;
-    dagre.setEdge(parent, child, { weight: parent === ENTRY ? 3 : 1 }, String(i));
-  });
-  layout(dagre);
+  const rows: Key[][] = [];
+  for (const [key, rank] of ranksOf(graph)) {
+    rows[rank] ??= [];
+    rows[rank].push(key);
+  }
+  const right = direction === "right";
+  const along = ({ width, height }: Size) => (right ? width : height);
+  const across = ({ width, height }: Size) => (right ? height : width);
   const places: Positions = new Map();
-  for (const key of keys) {
-    const { x = 0, y = 0 } = dagre.node(key);
-    const { width, height } = sizeOf(key, sizes);
-    places.set(key, [Math.round(x - width / 2), Math.round(y - height / 2)]);
+  let from = 0;
+  for (const row of rows) {
+    const boxes = (row ?? []).map((key) => [key, sizeOf(key, sizes, direction)] as const);
+    const wide = boxes.reduce((sum, [, size]) => sum + across(size) + GAP.across, -GAP.across);
+    const deep = Math.max(0, ...boxes.map(([, size]) => along(size)));
+    let at = -wide / 2;
+    for (const [key, size] of boxes) {
+      const start = from + (right ? 0 : (deep - along(size)) / 2);
+      const [x, y] = right ? [start, at] : [at, start];
+      places.set(key, [Math.round(x), Math.round(y)]);
+      at += across(size) + GAP.across;
+    }
+    from += deep + GAP.along;
   }
   return places;
-}
-
-/** How far the fresh places of what stands already are from where it stands. */
-function offset(known: Positions, fresh: Positions): Position {
-  let [dx, dy, n] = [0, 0, 0];
-  for (const [key, [x, y]] of known) {
-    const at = fresh.get(key);
-    if (!at) continue;
-    dx += x - at[0];
-    dy += y - at[1];
-    n += 1;
-  }
-  return n === 0 ? [0, 0] : [Math.round(dx / n), Math.round(dy / n)];
 }
 
 function knownPlaces(graph: Graph): Positions {
@@ -61,6 +168,11 @@ function knownPlaces(graph: Graph): Positions {
   if (graph.entryPosition) known.set(ENTRY, graph.entryPosition);
   if (graph.exitPosition) known.set(EXIT, graph.exitPosition);
   return known;
+}
+
+/** Whether no action stands anywhere: a graph to be laid out. */
+export function isUnplaced(graph: Graph): boolean {
+  return graph.actions.length > 0 && graph.actions.every(({ position }) => position === null);
 }
 
 /**
@@ -79,8 +191,69 @@ export function unplaced(graph: Graph, places: ReadonlyMap<Key, Position>): [Key
   });
 }
 
-/** The middle of what an end is tied to; before anything is, it stays over the first action. */
-function middle(graph: Graph, end: Key, places: Positions): number {
+export interface Box extends Size {
+  readonly x: number;
+  readonly y: number;
+}
+
+const AIR = 32; // px, the least between cards
+
+/** The nearest free place from `start`, further and further across the direction. */
+export function freeSpot(
+  start: Position,
+  size: Size,
+  taken: readonly Box[],
+  direction: Direction,
+): Position {
+  let [x, y] = start;
+  const hit = () =>
+    taken.find(
+      (box) =>
+        x < box.x + box.width + AIR &&
+        x + size.width + AIR > box.x &&
+        y < box.y + box.height + AIR &&
+        y + size.height + AIR > box.y,
+    );
+  for (let box = hit(); box !== undefined; box = hit()) {
+    if (direction === "right") y = box.y + box.height + AIR;
+    else x = box.x + box.width + AIR;
+  }
+  return [Math.round(x), Math.round(y)];
+}
+
+/** The place that follows a box in the direction of the graph. */
+export function placeAfter({ x, y, width, height }: Box, direction: Direction): Position {
+  return direction === "right" ? [x + width + GAP.along, y] : [x, y + height + GAP.along];
+}
+
+/** Gives places to actions among others that stand: behind what leads to them, where it is free. */
+function placeLoose(graph: Graph, places: Positions, sizes: Sizes): void {
+  const { direction } = graph;
+  const boxOf = (key: Key): Box | null => {
+    const at = places.get(key);
+    return at ? { x: at[0], y: at[1], ...sizeOf(key, sizes, direction) } : null;
+  };
+  const loose = graph.actions.filter(({ key }) => !places.has(key));
+  if (loose.length === 0) return;
+  const before = new Map<Key, Key[]>();
+  for (const { parent, child } of graph.relations) {
+    before.set(child, [...(before.get(child) ?? []), parent]);
+  }
+  const taken = [...places.keys()].flatMap((key) => boxOf(key) ?? []);
+  const left = Math.min(...taken.map(({ x }) => x));
+  const low = Math.max(...taken.map(({ y, height }) => y + height));
+  for (const { key } of loose) {
+    const [parent] = (before.get(key) ?? []).flatMap((other) => boxOf(other) ?? []);
+    const start: Position = parent ? placeAfter(parent, direction) : [left, low + GAP.across];
+    const at = freeSpot(start, sizeOf(key, sizes, direction), taken, direction);
+    places.set(key, at);
+    taken.push({ x: at[0], y: at[1], ...sizeOf(key, sizes, direction) });
+  }
+}
+
+/** The middle, across the direction, of what an end is tied to; before anything is, of the first. */
+function middle(graph: Graph, end: Key, places: Positions, sizes: Sizes): number {
+  const { direction } = graph;
   const tied = graph.relations.flatMap((r) =>
     end === ENTRY && r.parent === ENTRY
       ? [r.child]
@@ -89,35 +262,40 @@ function middle(graph: Graph, end: Key, places: Positions): number {
         : [],
   );
   const keys = tied.length > 0 ? tied : graph.actions.slice(0, 1).map((action) => action.key);
-  const xs = keys.flatMap((key) => places.get(key)?.[0] ?? []);
-  const sum = xs.reduce((total, x) => total + x, 0);
-  return (xs.length === 0 ? 0 : sum / xs.length) + CARD.width / 2 - PILL.width / 2;
+  const middles = keys.flatMap((key) => {
+    const at = places.get(key);
+    const size = sizeOf(key, sizes, direction);
+    if (!at) return [];
+    return [direction === "right" ? at[1] + size.height / 2 : at[0] + CARD.width / 2];
+  });
+  const mean = middles.reduce((sum, each) => sum + each, 0) / Math.max(1, middles.length);
+  const pill = pillSize(direction);
+  return Math.round(mean - (direction === "right" ? pill.height : pill.width) / 2);
 }
 
 /** Where everything stands. What has a place keeps it. */
-export function positionsOf(graph: Graph, sizes: Sizes = new Map()): Positions {
-  const known = knownPlaces(graph);
-  if (known.size === 0) return arrange(graph, sizes);
-  const places: Positions = new Map(known);
-  if (graph.actions.some((action) => !known.has(action.key))) {
-    const fresh = arrange(graph, sizes);
-    const [dx, dy] = offset(known, fresh);
-    for (const { key } of graph.actions) {
-      const at = fresh.get(key);
-      if (!places.has(key) && at) places.set(key, [at[0] + dx, at[1] + dy]);
-    }
-  }
-  const ys = graph.actions.flatMap(({ key }) => {
+export function positionsOf(graph: Graph, sizes: Sizes = estimatedSizes(graph)): Positions {
+  const places = knownPlaces(graph);
+  if (places.size === 0) return arrange(graph, sizes);
+  placeLoose(graph, places, sizes);
+  const { direction } = graph;
+  const right = direction === "right";
+  const cards = graph.actions.flatMap(({ key }) => {
     const at = places.get(key);
-    return at ? [[at[1], at[1] + sizeOf(key, sizes).height] as const] : [];
+    return at ? [[at, sizeOf(key, sizes, direction)] as const] : [];
   });
-  const top = Math.min(...ys.map(([y]) => y), Number.POSITIVE_INFINITY);
-  const bottom = Math.max(...ys.map(([, y]) => y), Number.NEGATIVE_INFINITY);
-  if (!places.has(ENTRY)) {
-    places.set(ENTRY, [middle(graph, ENTRY, places), Number.isFinite(top) ? top - 92 : 0]);
-  }
-  if (!places.has(EXIT)) {
-    places.set(EXIT, [middle(graph, EXIT, places), Number.isFinite(bottom) ? bottom + 64 : 220]);
-  }
+  const first = Math.min(...cards.map(([[x, y]]) => (right ? x : y)), Number.POSITIVE_INFINITY);
+  const last = Math.max(
+    ...cards.map(([[x, y], { width, height }]) => (right ? x + width : y + height)),
+    Number.NEGATIVE_INFINITY,
+  );
+  const put = (end: Key, along: number) => {
+    if (places.has(end)) return;
+    const across = middle(graph, end, places, sizes);
+    places.set(end, right ? [along, across] : [across, along]);
+  };
+  const empty = cards.length === 0;
+  put(ENTRY, empty ? 0 : right ? first - SHORT_PILL.width - 64 : first - 92);
+  put(EXIT, empty ? 220 : last + 64);
   return places;
 }

@@ -1,5 +1,5 @@
 /** The paths of arrows: down, down a lane beside cards, or back up on one. Pure. */
-import { getBezierPath, Position } from "@xyflow/react";
+import { getBezierPath, getSmoothStepPath, Position } from "@xyflow/react";
 import { anchorOf } from "./label-places";
 
 export interface ArrowPath {
@@ -14,6 +14,8 @@ export interface ArrowEnds {
   readonly sourceY: number;
   readonly targetX: number;
   readonly targetY: number;
+  /** On which side of its card the arrow leaves; below, where nothing is said. */
+  readonly sourcePosition?: Position;
 }
 
 /** Back up on a lane beside the cards, so that loops can be told from the way down. */
@@ -43,11 +45,24 @@ function round(sx: number, sy: number, tx: number, ty: number, lane: number): Ar
   return { path, x: lane, y: (high + low) / 2, anchor: anchorOf(lane, sx, tx) };
 }
 
+/** From the right of a card to the left of another. */
+function sideways({ sourceX, sourceY, targetX, targetY }: ArrowEnds): ArrowPath {
+  const [path, x, y] = getSmoothStepPath({
+    sourceX,
+    sourceY,
+    targetX: targetX - 2,
+    targetY,
+    sourcePosition: Position.Right,
+    targetPosition: Position.Left,
+    borderRadius: 10,
+  });
+  return { path, x, y, anchor: "middle" };
+}
+
 /** The way of an arrow; `lane` is the x of its lane, null where the way down is free. */
-export function arrowPathOf(
-  { sourceX, sourceY, targetX, targetY }: ArrowEnds,
-  lane: number | null,
-): ArrowPath {
+export function arrowPathOf(ends: ArrowEnds, lane: number | null): ArrowPath {
+  const { sourceX, sourceY, targetX, targetY } = ends;
+  if (ends.sourcePosition === Position.Right) return sideways(ends);
   const from = sourceY + 1;
   const to = targetY - 2;
   if (to < from + 8) {

@@ -1,43 +1,52 @@
 import { expect, test } from "vitest";
 import {
   boundsOf,
+  firstViewport,
   isSameViewport,
-  MARGIN,
-  readableViewport,
   viewportShowing,
   wholeViewport,
 } from "./viewport";
 
 const room = { width: 800, height: 640 };
+const AIR = 28;
 const tall = { x: 100, y: -50, width: 600, height: 2000 };
 
 test("the whole is shown where its text can be read", () => {
   const small = { x: 0, y: 0, width: 300, height: 300 };
-  const view = readableViewport(small, room, 150, 0.75);
+  const view = firstViewport(small, room, [150, 0], 0.75, "down");
   expect(view).toEqual(wholeViewport(small, room));
   expect(view.zoom).toBe(1);
 });
 
 test("of a tall graph the top is shown, in the middle, and readable", () => {
-  const view = readableViewport(tall, room, 400, 0.75);
+  const view = firstViewport(tall, room, [400, -40], 0.75, "down");
   expect(view.zoom).toBe(0.75);
-  expect(tall.y * view.zoom + view.y).toBe(MARGIN.top);
+  expect(tall.y * view.zoom + view.y).toBe(AIR);
   expect((tall.x + tall.width / 2) * view.zoom + view.x).toBe(400);
 });
 
 test("a graph that is too wide is centred on its entry, never beyond its edges", () => {
   const wide = { x: 0, y: 0, width: 4000, height: 200 };
-  const inside = readableViewport(wide, room, 2000, 0.75);
+  const inside = firstViewport(wide, room, [2000, 0], 0.75, "down");
   expect(2000 * inside.zoom + inside.x).toBe(400);
-  const edge = readableViewport(wide, room, 60, 0.75);
-  expect(wide.x * edge.zoom + edge.x).toBe(MARGIN.side);
+  const edge = firstViewport(wide, room, [60, 0], 0.75, "down");
+  expect(wide.x * edge.zoom + edge.x).toBe(AIR);
 });
 
-test("the whole fits, however tall it is", () => {
+test("from left to right a graph begins at its left, at the height of its entry", () => {
+  const large = { x: -100, y: 0, width: 4000, height: 3000 };
+  const view = firstViewport(large, room, [-60, 1500], 0.9, "right");
+  expect(large.x * view.zoom + view.x).toBe(AIR);
+  expect(1500 * view.zoom + view.y).toBeCloseTo((room.height - 44) / 2, 0);
+});
+
+test("the whole fits, however tall it is, beside bars and drawers", () => {
   const view = wholeViewport(tall, room);
-  expect((tall.y + tall.height) * view.zoom + view.y).toBeLessThanOrEqual(
-    room.height - MARGIN.bottom + 1,
-  );
+  expect((tall.y + tall.height) * view.zoom + view.y).toBeLessThanOrEqual(room.height - 44);
+  const covered = { left: 0, top: 40, right: 300, bottom: 60 };
+  const beside = wholeViewport(tall, { ...room, covered });
+  expect(tall.y * beside.zoom + beside.y).toBeGreaterThanOrEqual(40 + AIR - 1);
+  expect((tall.x + tall.width) * beside.zoom + beside.x).toBeLessThanOrEqual(room.width - 300);
 });
 
 test("what is in view already moves nothing", () => {
@@ -46,7 +55,7 @@ test("what is in view already moves nothing", () => {
   const view = viewportShowing({ ...card, y: 1500 }, room, { x: 0, y: 0, zoom: 1 });
   expect(view?.zoom).toBe(1);
   expect(1500 + (view?.y ?? 0)).toBeGreaterThan(0);
-  expect(1600 + (view?.y ?? 0)).toBeLessThan(room.height - MARGIN.bottom);
+  expect(1600 + (view?.y ?? 0)).toBeLessThan(room.height - 44);
 });
 
 test("the box is round everything, with sizes where they are known", () => {

@@ -1,4 +1,5 @@
 /** Viewports of the canvas (offset and zoom) that keep text readable. Pure. */
+import type { Direction, Position } from "../../graph/model";
 import type { Positions, Sizes } from "./arrange";
 import { CARD } from "./arrange";
 
@@ -16,16 +17,38 @@ export interface Viewport {
   readonly zoom: number;
 }
 
-interface FrameSize {
-  readonly width: number;
-  readonly height: number;
+/** What lies over the canvas at its edges, px on screen. */
+export interface Insets {
+  readonly left: number;
+  readonly top: number;
+  readonly right: number;
+  readonly bottom: number;
 }
 
-/** Kept free round what is shown, px on screen; the tools lie below. */
-export const MARGIN = { top: 28, bottom: 72, side: 28 } as const;
-/** Below this text on cards is hard to read. */
-export const READABLE = { desktop: 0.75, phone: 0.6 } as const;
+export interface CanvasArea {
+  readonly width: number;
+  readonly height: number;
+  /** What bars and drawers cover of it; the tools, where nothing is said. */
+  readonly covered?: Insets;
+}
+
+/** Kept free round what is shown, px on screen. */
+const AIR = 28;
+const TOOLS: Insets = { left: 0, top: 0, right: 0, bottom: 44 };
+/** From this zoom on all text on cards is at least 11 px on a desktop (9 px of names on a phone). */
+export const READABLE = { desktop: 0.9, phone: 0.6 } as const;
 const LEAST = 0.08;
+
+/** What is left for the graph. */
+function freeOf({ width, height, covered = TOOLS }: CanvasArea): Bounds {
+  const { left, top, right, bottom } = covered;
+  return {
+    x: left + AIR,
+    y: top + AIR,
+    width: Math.max(1, width - left - right - 2 * AIR),
+    height: Math.max(1, height - top - bottom - 2 * AIR),
+  };
+}
 
 /** The box round everything that stands somewhere; null while nothing does. */
 export function boundsOf(places: Positions, sizes: Sizes): Bounds | null {
@@ -43,70 +66,78 @@ export function boundsOf(places: Positions, sizes: Sizes): Bounds | null {
   return box && { x: box[0], y: box[1], width: box[2] - box[0], height: box[3] - box[1] };
 }
 
-function zoomFor(box: Bounds, room: FrameSize): number {
-  const across = (room.width - 2 * MARGIN.side) / Math.max(1, box.width);
-  const down = (room.height - MARGIN.top - MARGIN.bottom) / Math.max(1, box.height);
+function zoomFor(box: Bounds, free: Bounds): number {
+  const across = free.width / Math.max(1, box.width);
+  const down = free.height / Math.max(1, box.height);
   return Math.max(LEAST, Math.min(1, across, down));
 }
 
 /** All of it, however small that is. */
-export function wholeViewport(box: Bounds, room: FrameSize): Viewport {
-  const zoom = zoomFor(box, room);
-  const free = room.height - MARGIN.top - MARGIN.bottom;
+export function wholeViewport(box: Bounds, room: CanvasArea): Viewport {
+  const free = freeOf(room);
+  const zoom = zoomFor(box, free);
   return {
-    x: room.width / 2 - (box.x + box.width / 2) * zoom,
-    y: MARGIN.top + Math.max(0, (free - box.height * zoom) / 2) - box.y * zoom,
+    x: free.x + free.width / 2 - (box.x + box.width / 2) * zoom,
+    y: free.y + free.height / 2 - (box.y + box.height / 2) * zoom,
     zoom,
   };
 }
 
-/**
- * All of it where it can be read so, else its top at the smallest readable zoom. What is too wide
- * is centred on `top`, the entry, as far as its edges allow.
- */
-export function readableViewport(
-  box: Bounds,
-  room: FrameSize,
-  top: number,
-  least: number,
-): Viewport {
-  if (zoomFor(box, room) >= least) return wholeViewport(box, room);
-  const free = room.width - 2 * MARGIN.side;
-  const [left, right] = [
-    MARGIN.side - box.x * least,
-    MARGIN.side + free - (box.x + box.width) * least,
-  ];
-  const fits = box.width * least <= free;
-  const middle = room.width / 2 - (fits ? box.x + box.width / 2 : top) * least;
-  return {
-    x: fits ? middle : Math.min(left, Math.max(right, middle)),
-    y: MARGIN.top - box.y * least,
-    zoom: least,
-  };
+/** The offset of one axis: the middle where all fits, else as near to `goal` as the edges allow. */
+function offset(
+  [from, size]: readonly [number, number],
+  [start, length]: readonly [number, number],
+  zoom: number,
+  goal: number,
+): number {
+  if (size * zoom <= length) return start + length / 2 - (from + size / 2) * zoom;
+  const [first, last] = [start - from * zoom, start + length - (from + size) * zoom];
+  return Math.min(first, Math.max(last, start + length / 2 - goal * zoom));
 }
 
-const AIR = { x: 40, y: 56 } as const; // px kept round what is brought into view
+/**
+ * The view on opening: all of it where it can be read so, else its beginning at the smallest
+ * readable zoom, with the entry (its middle) in view.
+ */
+export function firstViewport(
+  box: Bounds,
+  room: CanvasArea,
+  entry: Position,
+  least: number,
+  direction: Direction,
+): Viewport {
+  const free = freeOf(room);
+  if (zoomFor(box, free) >= least) return wholeViewport(box, room);
+  const right = direction === "right";
+  const x = offset([box.x, box.width], [free.x, free.width], least, right ? box.x : entry[0]);
+  const y = offset([box.y, box.height], [free.y, free.height], least, right ? entry[1] : box.y);
+  return { x, y, zoom: least };
+}
 
 /** The nearest view, at the same zoom, that shows a box; null when it is in view already. */
-export function viewportShowing(box: Bounds, room: FrameSize, now: Viewport): Viewport | null {
-  const dx = shift(box.x * now.zoom + now.x, box.width * now.zoom, room.width, AIR.x);
-  const low = room.height - MARGIN.bottom;
-  const dy = shift(box.y * now.zoom + now.y, box.height * now.zoom, low, AIR.y);
+export function viewportShowing(box: Bounds, room: CanvasArea, now: Viewport): Viewport | null {
+  const { left, top, right, bottom } = room.covered ?? TOOLS;
+  const across = [left, room.width - right] as const;
+  const down = [top, room.height - bottom] as const;
+  const dx = shift(box.x * now.zoom + now.x, box.width * now.zoom, across);
+  const dy = shift(box.y * now.zoom + now.y, box.height * now.zoom, down);
   return dx === 0 && dy === 0 ? null : { x: now.x + dx, y: now.y + dy, zoom: now.zoom };
 }
 
-/** How far a stretch has to move to lie within 0 and `length`; with some air if it has to at all. */
-function shift(from: number, size: number, length: number, air: number): number {
-  if (from >= 0 && from + size <= length) return 0;
-  const free = Math.max(0, length - size);
-  const goal = from < 0 ? Math.min(air, free / 2) : free - Math.min(air, free / 2);
-  return goal - from;
+/** How far a stretch has to move to lie within another; with some air if it has to at all. */
+function shift(from: number, size: number, [start, end]: readonly [number, number]): number {
+  if (from >= start && from + size <= end) return 0;
+  const free = Math.max(0, end - start - size);
+  const air = Math.min(AROUND, free / 2);
+  return (from < start ? start + air : start + free - air) - from;
 }
 
+const AROUND = 44; // px kept round what is brought into view
+
 /** Whether a box can be shown whole at a zoom. */
-export function fitsAt(box: Bounds, room: FrameSize, zoom: number): boolean {
-  const high = room.height - MARGIN.top - MARGIN.bottom;
-  return box.width * zoom <= room.width && box.height * zoom <= high;
+export function fitsAt(box: Bounds, room: CanvasArea, zoom: number): boolean {
+  const free = freeOf(room);
+  return box.width * zoom <= free.width && box.height * zoom <= free.height;
 }
 
 /** The same view, but for what nobody can see. */

@@ -43,9 +43,15 @@ export function candidates(known: readonly NewAction[], search: string): NewActi
   return [...named, ...fresh, ...described];
 }
 
+/** The upper left corner: what an arrow was drawn to is its input. */
+function cornerOf({ graph }: EditorContext, { at: [x, y], from }: AddRequest): Position {
+  return from !== null && graph.direction === "right"
+    ? [x, y - Math.round(CARD.height / 2)]
+    : [x - Math.round(CARD.width / 2), y];
+}
+
 function placed(context: EditorContext, request: AddRequest, template: NewAction): string {
-  const [x, y] = request.at;
-  const position: Position = [x - Math.round(CARD.width / 2), y];
+  const position = cornerOf(context, request);
   return asOneEdit(context.doc, () => {
     const key = addActionAt(context, template, position);
     if (request.from) connect(context.doc, request.from.key, key, request.from.outcome);
@@ -73,7 +79,7 @@ export function QuickAdd({ context, request, known, onClose }: Props) {
     const key = placed(context, request, template);
     context.select([key]);
     if (byKey) context.view.focus(key);
-    context.view.reveal([request.at[0] - CARD.width / 2, request.at[1]]);
+    context.view.reveal(cornerOf(context, request));
     onClose();
   };
   const onKeyDown = (event: React.KeyboardEvent) => {

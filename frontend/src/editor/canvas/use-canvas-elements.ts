@@ -55,6 +55,8 @@ interface CanvasElementsInput {
   select: (ids: Iterable<string>) => void;
   progress: ReadonlyMap<Key, Progress>;
   marks: ProblemMarks;
+  /** Where what has no place stands meanwhile. */
+  laidOut: Positions | null;
 }
 
 /** Where everything stands while people drag it. */
@@ -262,7 +264,7 @@ function useDragging(
 }
 
 export function useCanvasElements(given: CanvasElementsInput) {
-  const { graph, selection, select, progress, marks } = given;
+  const { graph, selection, select, progress, marks, laidOut } = given;
   const people = usePeople();
   const flow: ReactFlowInstance<CanvasNode, Arrow> = useReactFlow<CanvasNode, Arrow>();
   const [sizes, setSizes] = useState<ReadonlyMap<Key, MeasuredSize>>(new Map());
@@ -270,8 +272,8 @@ export function useCanvasElements(given: CanvasElementsInput) {
   const [resized, setResized] = useState<Note | null>(null);
   const [over, setOver] = useState<string | null>(null);
   const rest = useMemo(
-    () => new Map([...positionsOf(graph, sizes), ...notePlaces(graph)]),
-    [graph, sizes],
+    () => new Map([...positionsOf(graph, sizes), ...(laidOut ?? []), ...notePlaces(graph)]),
+    [graph, sizes, laidOut],
   );
   const places = useMemo(() => dragged(rest, people, drag), [rest, people, drag]);
   const others = useChosenByOthers(people);

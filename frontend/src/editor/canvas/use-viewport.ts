@@ -2,19 +2,21 @@
 import type { ReactFlowInstance } from "@xyflow/react";
 import { type RefObject, useCallback, useEffect, useMemo, useRef, useState } from "react";
 import type { Arrow, CanvasNode } from "../../canvas/elements";
-import { CARD, type Positions, type Sizes } from "../../canvas/geometry/arrange";
+import { CARD, type Positions, pillSize, type Sizes } from "../../canvas/geometry/arrange";
 import {
   boundsOf,
+  type CanvasArea,
+  firstViewport,
   fitsAt,
+  type Insets,
   isSameViewport,
   READABLE,
-  readableViewport,
   type Viewport,
   viewportShowing,
   wholeViewport,
 } from "../../canvas/geometry/viewport";
 import type { CanvasView } from "../../edit-actions/editor-context";
-import { ENTRY, type Key, type Position } from "../../graph/model";
+import { type Direction, ENTRY, type Key, type Position } from "../../graph/model";
 import type { Progress } from "../../status/progress";
 
 interface ViewportInput {
@@ -22,6 +24,7 @@ interface ViewportInput {
   frame: RefObject<HTMLDivElement | null>;
   places: Positions;
   sizes: Sizes;
+  direction: Direction;
   phone: boolean;
   /** The graph has been heard of and has something to show. */
   begun: boolean;
@@ -30,6 +33,26 @@ interface ViewportInput {
   run: string | null;
   /** Where the pointer rests over the canvas, on screen. */
   pointer: RefObject<Position | null>;
+}
+
+/** The canvas, and what bars and drawers (`data-covers`: at which side) lie over it. */
+export function roomOf(element: HTMLElement): CanvasArea {
+  const box = element.getBoundingClientRect();
+  const covered = { left: 0, top: 0, right: 0, bottom: 0 };
+  for (const over of document.querySelectorAll<HTMLElement>("[data-covers]")) {
+    const { left, top, right, bottom, width, height } = over.getBoundingClientRect();
+    const apart = left >= box.right || right <= box.left || top >= box.bottom || bottom <= box.top;
+    if (apart || width === 0 || height === 0) continue;
+    const depth = {
+      left: right - box.left,
+      top: bottom - box.top,
+      right: box.right - left,
+      bottom: box.bottom - top,
+    };
+    const side = over.dataset.covers as keyof Insets;
+    covered[side] = Math.max(covered[side], depth[side]);
+  }
+  return { width: element.clientWidth, height: element.clientHeight, covered };
 }
 
 /** How long the view glides, ms; not at all for people who want no motion. */
@@ -63,24 +86,26 @@ function running(progress: ReadonlyMap<Key, Progress>): Key[] {
 }
 
 export function useViewport(given: ViewportInput) {
-  const { flow, frame, places, sizes, phone, begun, progress, run, pointer } = given;
-  const now = useRef({ places, sizes });
-  now.current = { places, sizes };
+  const { flow, frame, places, sizes, direction, phone, begun, progress, run, pointer } = given;
+  const now = useRef({ places, sizes, direction });
+  now.current = { places, sizes, direction };
   const least = phone ? READABLE.phone : READABLE.desktop;
 
   // What was fitted stays fitted while the canvas changes its size, until somebody moves the view.
-  const fitted = useRef<Viewport | null>(null);
+  const fitted = useRef<{ view: Viewport; goal: "first" | "whole" } | null>(null);
   const showAll = useCallback(
-    (duration: number) => {
-      const [box, room] = [boundsOf(now.current.places, now.current.sizes), frame.current];
-      if (box === null || room === null) return;
-      const size = { width: room.clientWidth, height: room.clientHeight };
-      const [x] = now.current.places.get(ENTRY) ?? [box.x + (box.width - CARD.width) / 2];
-      const first = readableViewport(box, size, x + CARD.width / 2, least);
-      // Pressed once more, it shows the rest too.
-      const again = duration > 0 && isSameViewport(first, flow.getViewport());
-      const next = again ? wholeViewport(box, size) : first;
-      fitted.current = again ? null : next;
+    (goal: "first" | "whole", duration: number) => {
+      const { places, sizes, direction } = now.current;
+      const [box, element] = [boundsOf(places, sizes), frame.current];
+      if (box === null || element === null) return;
+      const room = roomOf(element);
+      const [x, y] = places.get(ENTRY) ?? [box.x, box.y];
+      const { width, height } = sizes.get(ENTRY) ?? pillSize(direction);
+      const next =
+        goal === "whole"
+          ? wholeViewport(box, room)
+          : firstViewport(box, room, [x + width / 2, y + height / 2], least, direction);
+      fitted.current = { view: next, goal };
       void flow.setViewport(next, { duration: glide(duration) });
     },
     [flow, frame, least],
@@ -92,7 +117,7 @@ export function useViewport(given: ViewportInput) {
     if (!begun || opened.current) return;
     const timer = setTimeout(() => {
       opened.current = true;
-      showAll(0);
+      showAll("first", 0);
     }, 60);
     return () => clearTimeout(timer);
   }, [begun, showAll]);
@@ -101,7 +126,8 @@ export function useViewport(given: ViewportInput) {
     const room = frame.current;
     if (room === null) return;
     const watch = new ResizeObserver(() => {
-      if (fitted.current && isSameViewport(fitted.current, flow.getViewport())) showAll(0);
+      const last = fitted.current;
+      if (last && isSameViewport(last.view, flow.getViewport())) showAll(last.goal, 0);
     });
     watch.observe(room);
     return () => watch.disconnect();
@@ -116,7 +142,7 @@ export function useViewport(given: ViewportInput) {
       }
       const [box, room] = [boundsOf(some, now.current.sizes), frame.current];
       if (box === null || room === null) return;
-      const size = { width: room.clientWidth, height: room.clientHeight };
+      const size = roomOf(room);
       const here: Viewport = flow.getViewport();
       if (goal === "whole") {
         void flow.setViewport(wholeViewport(box, size), { duration: glide(250) });
@@ -136,20 +162,23 @@ export function useViewport(given: ViewportInput) {
 
   const view = useMemo<CanvasView>(
     () => ({
-      fit: () => showAll(200),
+      fit: () => showAll("whole", 200),
+      open: () => showAll("first", 200),
       zoomIn: () => void flow.zoomIn({ duration: glide(120) }),
       zoomOut: () => void flow.zoomOut({ duration: glide(120) }),
       show: (keys, goal = "middle") => show(keys, goal),
       reveal: ([x, y]) => {
         const room = frame.current;
         if (room === null) return;
-        const size = { width: room.clientWidth, height: room.clientHeight };
+        const size = roomOf(room);
         const next = viewportShowing({ x, y, ...CARD }, size, flow.getViewport());
         if (next !== null) void flow.setViewport(next, { duration: glide(200) });
       },
       middle: (): Position => {
         const box = frame.current?.getBoundingClientRect();
-        const [x, y] = box ? [box.left + box.width / 2, box.top + box.height / 3] : [0, 0];
+        // Room for what follows is kept at the right, or below.
+        const [along, down] = now.current.direction === "right" ? [0.3, 0.4] : [0.5, 1 / 3];
+        const [x, y] = box ? [box.left + box.width * along, box.top + box.height * down] : [0, 0];
         const at = flow.screenToFlowPosition({ x, y });
         return [Math.round(at.x), Math.round(at.y)];
       },

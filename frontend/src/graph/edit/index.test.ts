@@ -14,6 +14,7 @@ import {
 } from "../../testing/edited-graph";
 import { mapsOf, relationId } from "../document-keys";
 import { ENTRY, EXIT, fullName, type Key } from "../model";
+import { readGraph } from "../read";
 import {
   addAction,
   addNote,
@@ -30,6 +31,7 @@ import {
   removeRelation,
   rename,
   renameParameter,
+  setDirection,
   setEntry,
   setExit,
   setField,
@@ -352,4 +354,21 @@ test("undoing everything brings back the beginning", () => {
     }),
     { numRuns: 100 },
   );
+});
+
+test("turning a graph and laying it out anew is one step of undo", () => {
+  const doc = new Y.Doc();
+  const key = addAction(doc, { name: "A", position: [0, 100] });
+  const undo = undoOf(doc);
+  asOneEdit(doc, () => {
+    setDirection(doc, "right");
+    moveActions(doc, [[key, [200, 0]]]);
+  });
+  const now = () => readGraph(mapsOf(doc));
+  expect([now().direction, now().actions[0]?.position]).toEqual(["right", [200, 0]]);
+  undo.undo();
+  expect([now().direction, now().actions[0]?.position]).toEqual(["down", [0, 100]]);
+  undo.redo();
+  setDirection(doc, "down");
+  expect(mapsOf(doc).meta.has("direction")).toBe(false);
 });

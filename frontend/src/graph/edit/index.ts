@@ -10,7 +10,7 @@
 import type * as Y from "yjs";
 import { noteKey, rootOf } from "../document-keys";
 import { newAid } from "../ids";
-import type { JsonText, Key, Position } from "../model";
+import type { Direction, JsonText, Key, Position } from "../model";
 import { asOneEdit, eraseKeys, hasEnd, writeKey } from "./document-writes";
 
 export * from "./actions";
@@ -29,6 +29,14 @@ export function setGraphDescription(doc: Y.Doc, description: string): void {
   asOneEdit(doc, () => {
     writeKey(doc, "meta", "description", description);
     eraseKeys(doc, "meta", "x/graph_description");
+  });
+}
+
+/** Says where what follows is drawn; down is what documents mean that say nothing. */
+export function setDirection(doc: Y.Doc, direction: Direction): void {
+  asOneEdit(doc, () => {
+    if (direction === "down") eraseKeys(doc, "meta", "direction");
+    else writeKey(doc, "meta", "direction", direction);
   });
 }
 

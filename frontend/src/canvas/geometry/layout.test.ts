@@ -1,0 +1,223 @@
+import ELK from "elkjs/lib/elk.bundled.js";
+import fc from "fast-check";
+import { expect, test } from "vitest";
+import {
+  type Action,
+  type Direction,
+  EMPTY_GRAPH,
+  ENGINE_DEFAULTS,
+  ENTRY,
+  ENTRY_CONDITIONS,
+  EXIT,
+  type Graph,
+  type Key,
+  type Parameter,
+  type Relation,
+} from "../../graph/model";
+import { arrange, estimatedSizes, positionsOf, ranksOf } from "./arrange";
+import { layoutRequest, placesIn } from "./layout-graph";
+
+const elk = new ELK();
+
+async function laidOut(graph: Graph) {
+  const request = layoutRequest(graph, new Map());
+  return placesIn(request, await elk.layout(structuredClone(request.root)));
+}
+
+const action = (key: Key, inputs: readonly Parameter[] = []): Action => ({
+  key,
+  name: key,
+  instanceId: 0,
+  type: "sync",
+  actor: "",
+  description: "",
+  inputs,
+  outputs: [],
+  position: null,
+  missing: false,
+  twin: false,
+  extra: [],
+});
+
+const relation = (parent: Key, child: Key): Relation => ({
+  parent,
+  child,
+  listing: 0,
+  conditions: parent === ENTRY ? ENTRY_CONDITIONS : ENGINE_DEFAULTS,
+  required: true,
+  remap: [],
+  only: null,
+  parentOrder: 0,
+  childOrder: 0,
+  parentsExtra: [],
+  childrenExtra: [],
+});
+
+function graphOf(
+  count: number,
+  pairs: readonly (readonly [Key, Key])[],
+  direction: Direction = "right",
+): Graph {
+  const actions = Array.from({ length: count }, (_, i) => action(`a${i}`));
+  const relations = pairs.map(([parent, child]) => relation(parent, child));
+  return { ...EMPTY_GRAPH, direction, actions, relations };
+}
+
+const chain = (count: number, direction: Direction = "right") =>
+  graphOf(
+    count,
+    [
+      [ENTRY, "a0"] as const,
+      ...Array.from({ length: count - 1 }, (_, i) => [`a${i}`, `a${i + 1}`] as const),
+      [`a${count - 1}`, EXIT] as const,
+    ],
+    direction,
+  );
+
+/** How far apart the two nearest cards are; negative when they overlap. */
+function nearest(graph: Graph, places: ReadonlyMap<Key, readonly [number, number]>): number {
+  const sizes = estimatedSizes(graph);
+  const boxes = [...places].map(([key, [x, y]]) => ({ x, y, ...sizes.get(key) }));
+  let least = Number.POSITIVE_INFINITY;
+  for (const [i, a] of boxes.entries()) {
+    for (const b of boxes.slice(i + 1)) {
+      const across = Math.max(b.x - a.x - (a.width ?? 0), a.x - b.x - (b.width ?? 0));
+      const down = Math.max(b.y - a.y - (a.height ?? 0), a.y - b.y - (b.height ?? 0));
+      least = Math.min(least, Math.max(across, down));
+    }
+  }
+  return least;
+}
+
+const parameters = fc.array(
+  fc.constant<Parameter>({ path: "x", text: '{"pvf_type":"number","pvf_value":1}' }),
+  { maxLength: 3 },
+);
+
+const graphs = fc
+  .record({
+    inputs: fc.array(parameters, { minLength: 1, maxLength: 14 }),
+    pairs: fc.array(fc.tuple(fc.nat(14), fc.nat(15)), { maxLength: 26 }),
+    direction: fc.constantFrom<Direction>("right", "down"),
+  })
+  .map(({ inputs, pairs, direction }): Graph => {
+    const keys = inputs.map((_, i) => `a${i}`);
+    const unique = new Map<string, Relation>();
+    for (const [from, to] of pairs) {
+      const parent = from === 14 ? ENTRY : keys[from % keys.length];
+      const child = to === 15 && parent !== ENTRY ? EXIT : keys[to % keys.length];
+      if (parent && child) unique.set(`${parent}>${child}`, relation(parent, child));
+    }
+    const actions = keys.map((key, i) => action(key, inputs[i]));
+    return { ...EMPTY_GRAPH, direction, actions, relations: [...unique.values()] };
+  });
+
+test("cards that are laid out are at least 32 px apart, whatever leads where", async () => {
+  await fc.assert(
+    fc.asyncProperty(graphs, async (graph) => {
+      const places = await laidOut(graph);
+      expect([...places.keys()].sort()).toEqual(
+        [ENTRY, EXIT, ...graph.actions.map(({ key }) => key)].sort(),
+      );
+      expect(nearest(graph, places)).toBeGreaterThanOrEqual(32);
+    }),
+    { numRuns: 60 },
+  );
+});
+
+test("what stands without the layout overlaps nothing either", () => {
+  fc.assert(
+    fc.property(graphs, (graph) => {
+      expect(nearest(graph, arrange(graph))).toBeGreaterThanOrEqual(32);
+    }),
+  );
+});
+
+test("an action without a place finds one that is free, and moves nothing", () => {
+  fc.assert(
+    fc.property(graphs, fc.nat(13), (graph, some) => {
+      const places = arrange(graph);
+      const actions = graph.actions.map((each, i) =>
+        i === some % graph.actions.length ? each : { ...each, position: places.get(each.key) },
+      ) as Action[];
+      const placed: Graph = {
+        ...graph,
+        actions,
+        entryPosition: places.get(ENTRY) ?? null,
+        exitPosition: places.get(EXIT) ?? null,
+      };
+      const now = positionsOf(placed);
+      for (const { key, position } of actions) if (position) expect(now.get(key)).toBe(position);
+      expect(nearest(placed, now)).toBeGreaterThanOrEqual(32);
+    }),
+  );
+});
+
+/** A graph without loops that is short enough to stand in one piece. */
+const short = graphs
+  .map((graph) => {
+    const at = (key: Key) => (key === ENTRY ? -1 : key === EXIT ? 99 : Number(key.slice(1)));
+    const relations = graph.relations.filter(({ parent, child }) => at(parent) < at(child));
+    return { ...graph, relations };
+  })
+  .filter((graph) => Math.max(...ranksOf(graph).values()) < 5);
+
+test("what follows stands in the direction of the graph, the entry first and the exit last", async () => {
+  await fc.assert(
+    fc.asyncProperty(short, async (graph) => {
+      const [places, sizes] = [await laidOut(graph), estimatedSizes(graph)];
+      const right = graph.direction === "right";
+      const from = (key: Key) => places.get(key)?.[right ? 0 : 1] ?? Number.NaN;
+      const to = (key: Key) => from(key) + (sizes.get(key)?.[right ? "width" : "height"] ?? 0);
+      const tied = new Set(graph.relations.flatMap(({ parent, child }) => [parent, child]));
+      for (const { parent, child } of graph.relations) {
+        expect(from(child)).toBeGreaterThanOrEqual(to(parent) + 32);
+      }
+      for (const key of tied) {
+        if (key !== ENTRY) expect(from(key)).toBeGreaterThan(to(ENTRY));
+        if (key !== EXIT) expect(to(key)).toBeLessThan(from(EXIT));
+      }
+    }),
+    { numRuns: 40 },
+  );
+});
+
+test("a loop leads back and does not turn round what it repeats", async () => {
+  const graph = graphOf(3, [
+    [ENTRY, "a0"],
+    ["a0", "a1"],
+    ["a1", "a2"],
+    ["a2", "a0"],
+    ["a2", EXIT],
+  ]);
+  const places = await laidOut(graph);
+  const xs = [ENTRY, "a0", "a1", "a2", EXIT].map((key) => places.get(key)?.[0] ?? Number.NaN);
+  expect(xs).toEqual([...xs].sort((a, b) => a - b));
+});
+
+test.each(["right", "down"] as const)("a long chain is wrapped: %s", async (direction) => {
+  const graph = chain(25, direction);
+  const [places, sizes] = [await laidOut(graph), estimatedSizes(graph)];
+  const right = Math.max(...[...places].map(([key, [x]]) => x + (sizes.get(key)?.width ?? 0)));
+  const low = Math.max(...[...places].map(([key, [, y]]) => y + (sizes.get(key)?.height ?? 0)));
+  expect([right, low].every((length) => length < 1_900)).toBe(true);
+});
+
+test("the same graph is laid out the same, whatever its keys are", async () => {
+  await fc.assert(
+    fc.asyncProperty(graphs, async (graph) => {
+      const renamed = (key: Key) =>
+        key === ENTRY || key === EXIT ? key : `z${99 - Number(key.slice(1))}`;
+      const twin: Graph = {
+        ...graph,
+        actions: graph.actions.map((each) => ({ ...each, key: renamed(each.key) })),
+        relations: graph.relations
+          .map((each) => ({ ...each, parent: renamed(each.parent), child: renamed(each.child) }))
+          .reverse(),
+      };
+      const [one, other] = [await laidOut(graph), await laidOut(twin)];
+      for (const [key, at] of one) expect(other.get(renamed(key))).toEqual(at);
+    }),
+    { numRuns: 20 },
+  );
+});

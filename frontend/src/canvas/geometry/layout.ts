@@ -1,0 +1,65 @@
+/** Lays out a graph with elkjs in a worker of its own, which is loaded when it is first needed. */
+import type { ElkNode } from "elkjs/lib/elk-api";
+import type { Graph } from "../../graph/model";
+import type { Positions, Sizes } from "./arrange";
+import { layoutRequest, placesIn, withoutWrapping } from "./layout-graph";
+
+/** The person did not want to wait for it. */
+export class LayoutLeft extends Error {}
+
+type Ask = (root: ElkNode) => Promise<ElkNode>;
+
+interface Running {
+  readonly ask: Ask;
+  end(): void;
+}
+
+let begun: Promise<Running> | null = null;
+
+async function begin(): Promise<Running> {
+  const [{ default: Elk }, { default: url }] = await Promise.all([
+    import("elkjs/lib/elk-api"),
+    import("elkjs/lib/elk-worker.min.js?url"),
+  ]);
+  const elk = new Elk({ workerFactory: () => new Worker(url) });
+  return { ask: (root) => elk.layout(root), end: () => elk.terminateWorker() };
+}
+
+/** Of what this library cannot wrap it makes one piece. */
+export async function askTwice(ask: Ask, root: ElkNode): Promise<ElkNode> {
+  try {
+    return await ask(root);
+  } catch (error) {
+    const simple = withoutWrapping(root);
+    if (simple === null) throw error;
+    return await ask(simple);
+  }
+}
+
+/** Fresh places for everything, in the direction of the graph. Rejects with `LayoutLeft` when left. */
+export async function layOut(graph: Graph, sizes: Sizes, signal?: AbortSignal): Promise<Positions> {
+  begun ??= begin();
+  const mine = begun;
+  const request = layoutRequest(graph, sizes);
+  let leave = () => {};
+  const left = new Promise<never>((_, reject) => {
+    leave = () => {
+      // Nothing but its end stops a worker that computes.
+      if (begun === mine) begun = null;
+      void mine.then((running) => running.end()).catch(() => {});
+      reject(new LayoutLeft());
+    };
+    signal?.addEventListener("abort", leave, { once: true });
+  });
+  if (signal?.aborted) leave();
+  const answered = mine.then(({ ask }) => askTwice(ask, request.root));
+  // A worker that could not be loaded is asked for again the next time.
+  mine.catch(() => {
+    if (begun === mine) begun = null;
+  });
+  try {
+    return placesIn(request, await Promise.race([answered, left]));
+  } finally {
+    signal?.removeEventListener("abort", leave);
+  }
+}

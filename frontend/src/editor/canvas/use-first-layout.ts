@@ -1,0 +1,50 @@
+/** Lays out a graph in which nothing stands anywhere yet, and writes that down as one edit. */
+import { useEffect, useRef, useState } from "react";
+import { isUnplaced, type Positions } from "../../canvas/geometry/arrange";
+import type { EditorContext } from "../../edit-actions/editor-context";
+import { freshPlaces } from "../../edit-actions/layout";
+import { moveActions } from "../../graph/edit";
+import { usePeople } from "../../sync/use-room";
+
+/** Of several pages that open it at once the others wait for one; their places would be the same. */
+const TURN_MS = 800;
+
+/** The places, for as long as nobody has written any; null before, and where they are not needed. */
+export function useFirstLayout(
+  context: EditorContext,
+  arrived: boolean,
+): { places: Positions | null; pending: boolean } {
+  const loose = arrived && isUnplaced(context.graph);
+  const [places, setPlaces] = useState<Positions | null>(null);
+  const people = usePeople();
+  const now = useRef({ context, people });
+  now.current = { context, people };
+  const gone = useRef(false);
+  useEffect(() => {
+    gone.current = false;
+    return () => {
+      gone.current = true;
+    };
+  }, []);
+  useEffect(() => {
+    if (!loose) return;
+    let asked = true;
+    let timer: ReturnType<typeof setTimeout> | undefined;
+    void freshPlaces(now.current.context.graph).then((found) => {
+      if (!asked || gone.current) return;
+      setPlaces(found ?? new Map());
+      if (found === null) return;
+      const { context, people } = now.current;
+      const earlier = people.filter(({ client }) => client < context.doc.clientID).length;
+      timer = setTimeout(() => {
+        const { doc, graph, mayEdit } = now.current.context;
+        if (mayEdit && isUnplaced(graph)) moveActions(doc, found);
+      }, earlier * TURN_MS);
+    });
+    return () => {
+      asked = false;
+      clearTimeout(timer);
+    };
+  }, [loose]);
+  return { places: loose ? places : null, pending: loose && places === null };
+}
