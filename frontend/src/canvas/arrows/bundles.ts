@@ -1,0 +1,75 @@
+/** Bundles: the outcomes of a relation that get the same response are drawn as one line. Pure. */
+import { relationId } from "../../graph/document-keys";
+import {
+  ENTRY,
+  type Key,
+  PRECONDITIONS,
+  type Precondition,
+  type Relation,
+  type Response,
+} from "../../graph/model";
+import type { PillSize } from "./scene";
+
+/** One line between two cards. */
+export interface Bundle {
+  /** Stays the same while outcomes come and go. */
+  readonly id: string;
+  readonly relation: string;
+  readonly source: Key;
+  readonly target: Key;
+  readonly response: Response;
+  /** In the fixed order of outcomes; empty for a relation that ignores all of them. */
+  readonly outcomes: readonly Precondition[];
+  /** The target does not wait for it. */
+  readonly optional: boolean;
+  /** From the entry: there is only one thing it can say. */
+  readonly entry: boolean;
+}
+
+/**
+ * The lines of a relation. A pair that a file lists twice has two relations, each with lines of its
+ * own, since each is selected and changed for itself.
+ */
+export function bundlesOf(relation: Relation): Bundle[] {
+  const id = relationId(relation);
+  const outcomes = new Map<Response, Precondition[]>();
+  for (const outcome of PRECONDITIONS) {
+    const response = relation.conditions[outcome];
+    if (response === "ignore") continue;
+    outcomes.set(response, [...(outcomes.get(response) ?? []), outcome]);
+  }
+  if (outcomes.size === 0) outcomes.set("ignore", []);
+  return [...outcomes].map(([response, outcomes]) => ({
+    id: `${id}|${response}`,
+    relation: id,
+    source: relation.parent,
+    target: relation.child,
+    response,
+    outcomes,
+    optional: !relation.required,
+    entry: relation.parent === ENTRY,
+  }));
+}
+
+/** What a pill says besides its glyphs: `run` is what is meant when nothing is said. */
+export function pillWord({ response, entry }: Pick<Bundle, "response" | "entry">): string {
+  if (entry || response === "run") return "";
+  return response === "ignore" ? "ignores all" : response;
+}
+
+/** Parts of a pill, px at zoom 1, as `outcome-arrow.module.css` sets them. */
+const PILL_HEIGHT = 20;
+const EDGE = 13;
+const GLYPH = 13;
+const LETTER = 6.6;
+const BADGE = 32;
+
+/** The room that a bundle's pill needs; null where there is nothing to say. */
+export function pillSizeOf(bundle: Bundle, marked: boolean): PillSize | null {
+  const word = pillWord(bundle);
+  const glyphs = bundle.entry ? 0 : bundle.outcomes.length;
+  if (glyphs === 0 && word === "" && !marked) return null;
+  const said = word === "" ? 0 : word.length * LETTER + 3;
+  const width = EDGE + glyphs * GLYPH + said + (marked ? BADGE : 0);
+  return { width: Math.ceil(width), height: PILL_HEIGHT };
+}

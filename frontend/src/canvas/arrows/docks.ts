@@ -1,0 +1,300 @@
+/** Docks: where each line leaves its card, where its pill stands, where it enters the next. Pure. */
+import { type Box, BoxIndex, boxOf, type Scene, type SceneLine, STEP } from "./scene";
+
+/** Along the flow (`u`) and across it (`v`); rows and columns are steps of the grid. */
+export interface Dock {
+  readonly line: SceneLine;
+  /** Where the line leaves the side of its card. */
+  readonly from: { readonly u: number; readonly v: number };
+  /** The line is free to turn from here on. */
+  readonly start: { readonly column: number; readonly row: number };
+  /** From here on it goes straight to the side of the card that it leads to. */
+  readonly end: { readonly column: number; readonly row: number };
+  readonly to: { readonly u: number; readonly v: number };
+  /** Where the pill stands; null where it finds no room beside its card. */
+  readonly pill: Box | null;
+  /** The piece along the card to a pill beyond its corner. */
+  readonly link: Box | null;
+  /** Lines with the same end may lie on each other; so may those with the same start. */
+  readonly sharesStart: string;
+  readonly sharesEnd: string;
+}
+
+/** px from a card to its pill. */
+const PILL_GAP = 8;
+/** px that a pill can move away from its card, to make room for ports. */
+export const PILL_PLAY = 12;
+const AFTER_PILL = 2;
+/** px before a card on which a line goes straight: the head of the arrow and some more. */
+const APPROACH = 16;
+const BESIDE_PILL = 3;
+/** px from a card to the piece of a line that goes along it. */
+export const LINK = 4;
+/** px across that a line without a pill takes beside those that have one. */
+const BARE = 8;
+
+interface End {
+  readonly box: Box & { key: string };
+  /** The rows of the grid that a line may have here, in the middle of the side. */
+  readonly low: number;
+  readonly high: number;
+}
+
+interface Slot {
+  readonly wish: number;
+  readonly weight: number;
+  /** Rows to the slot before. */
+  readonly gap: number;
+}
+
+/**
+ * Distinct rows for slots in their order, as near to what they wish as can be. `low` to `high` is
+ * the side of the card; further rows, as many as `beyond`, cost more. Null when they do not fit.
+ */
+function rowsFor(slots: readonly Slot[], low: number, high: number, beyond: number) {
+  const [first, count] = [low - beyond, high - low + 1 + 2 * beyond];
+  const best: { cost: Float64Array; from: Int32Array }[] = [];
+  for (const [i, { wish, weight, gap }] of slots.entries()) {
+    const cost = new Float64Array(count).fill(Number.POSITIVE_INFINITY);
+    const from = new Int32Array(count).fill(-1);
+    const before = best[i - 1];
+    let cheapest = -1;
+    for (let at = 0; at < count; at += 1) {
+      if (before) {
+        const next = at - gap;
+        if (next >= 0 && (cheapest < 0 || cost_(before, next) < cost_(before, cheapest)))
+          cheapest = next;
+        if (cheapest < 0) continue;
+      }
+      const row = first + at;
+      const outside = Math.max(0, low - row, row - high);
+      const here = weight * Math.abs(row - wish) + 3 * outside;
+      cost[at] = here + (before ? cost_(before, cheapest) : 0);
+      from[at] = cheapest;
+    }
+    best.push({ cost, from });
+  }
+  const last = best.at(-1);
+  if (!last) return [];
+  let at = last.cost.reduce((least, cost, i, all) => (cost < (all[least] ?? 0) ? i : least), 0);
+  if (last.cost[at] === Number.POSITIVE_INFINITY) return null;
+  const rows: number[] = [];
+  for (let i = best.length - 1; i >= 0; i -= 1) {
+    rows.unshift(first + at);
+    at = best[i]?.from[at] ?? 0;
+  }
+  return rows;
+}
+
+const cost_ = ({ cost }: { cost: Float64Array }, at: number) =>
+  cost[at] ?? Number.POSITIVE_INFINITY;
+
+/** Rows for slots; where they do not fit, neighbours share one. */
+function slotRows(slots: readonly Slot[], { low, high }: End, beyond = 0): number[] {
+  const wide = rowsFor(slots, low, high, beyond);
+  if (wide) return wide;
+  const close = rowsFor(
+    slots.map((slot) => ({ ...slot, gap: 1 })),
+    low,
+    high,
+    0,
+  );
+  return close ?? slots.map((_, i) => low + Math.floor((i * (high - low + 1)) / slots.length));
+}
+
+/** A line that is on its way to have docks. */
+interface DockDraft {
+  readonly line: SceneLine;
+  readonly order: number;
+  readonly source: End;
+  readonly target: End;
+  /** It leads back. */
+  readonly back: boolean;
+  into: number;
+}
+
+const center = (end: End) => (end.box.v0 + end.box.v1) / 2;
+
+/** The row on which a line between two cards would be straight; null when there is none. */
+function straightRow(a: End, b: End): number | null {
+  const [low, high] = [Math.max(a.low, b.low), Math.min(a.high, b.high)];
+  return low <= high ? Math.round((low + high) / 2) : null;
+}
+
+/** Lines that lead back to a card in the same row keep to one side: they leave and enter there. */
+const ASIDE = 1e6;
+
+export class DockPlan {
+  private readonly ends = new Map<string, End>();
+  private readonly cards = new BoxIndex<Box & { key: string }>();
+  private readonly pills = new BoxIndex<Box>();
+  private readonly approaches = new BoxIndex<Box>();
+  /** Where lines leave the cards of others. */
+  private readonly exits = new BoxIndex<Box>();
+  private readonly exitOf = new Map<string, Box>();
+  private readonly offset: number;
+  readonly docks: readonly Dock[];
+
+  constructor(scene: Scene) {
+    this.offset = scene.offset;
+    for (const card of scene.cards) {
+      const box = { ...boxOf(card, scene.flow), key: card.key };
+      this.cards.add(box);
+      this.ends.set(card.key, this.endOf(box));
+    }
+    const drafts = scene.lines.flatMap((line, order) => this.draft(line, order) ?? []);
+    for (const [, lines] of grouped(drafts, ({ line }) => line.target)) this.enter(lines);
+    for (const draft of drafts) this.approaches.add(this.approach(draft));
+    for (const key of new Set(drafts.map(({ line }) => line.source))) this.addExit(key);
+    const docks: Dock[] = [];
+    for (const [, lines] of grouped(drafts, ({ line }) => line.source))
+      docks.push(...this.leave(lines, scene.flow));
+    const order = new Map(scene.lines.map(({ id }, i) => [id, i]));
+    this.docks = docks.sort((a, b) => (order.get(a.line.id) ?? 0) - (order.get(b.line.id) ?? 0));
+  }
+
+  private addExit(key: string): void {
+    const box = this.ends.get(key)?.box;
+    if (!box) return;
+    const exit = { ...box, u0: box.u1, u1: box.u1 + APPROACH };
+    this.exitOf.set(key, exit);
+    this.exits.add(exit);
+  }
+
+  /** Where a row of the grid is, px. */
+  v(row: number): number {
+    return row * STEP + this.offset;
+  }
+
+  private endOf(box: Box & { key: string }): End {
+    const side = box.v1 - box.v0;
+    const inset = Math.min(12, side * 0.2);
+    const row = (v: number) => (v - this.offset) / STEP;
+    const [low, high] = [Math.ceil(row(box.v0 + inset)), Math.floor(row(box.v1 - inset))];
+    if (low <= high) return { box, low, high };
+    const middle = Math.round(row((box.v0 + box.v1) / 2));
+    return { box, low: middle, high: middle };
+  }
+
+  private draft(line: SceneLine, order: number): DockDraft | null {
+    const [source, target] = [this.ends.get(line.source), this.ends.get(line.target)];
+    if (!source || !target) return null;
+    const back = target.box.u0 < source.box.u1 + APPROACH;
+    return { line, order, source, target, back, into: 0 };
+  }
+
+  /** The rows on which lines enter one card. */
+  private enter(lines: DockDraft[]): void {
+    const rank = ({ source, target, back }: DockDraft) =>
+      back && straightRow(source, target) !== null ? ASIDE : center(source);
+    lines.sort((a, b) => rank(a) - rank(b) || a.order - b.order);
+    const [first] = lines;
+    if (!first) return;
+    const room = first.target.high - first.target.low + 1;
+    const gap = lines.length * 2 - 1 <= room ? 2 : 1;
+    const middle = Math.round((first.target.low + first.target.high) / 2);
+    const slots = lines.map((draft, i) => {
+      const straight = draft.back ? null : straightRow(draft.source, draft.target);
+      return straight === null
+        ? { wish: middle + (i - (lines.length - 1) / 2) * gap, weight: 1, gap }
+        : { wish: straight, weight: 8, gap };
+    });
+    const rows = slotRows(slots, first.target);
+    for (const [i, draft] of lines.entries()) draft.into = rows[i] ?? middle;
+  }
+
+  private approach(draft: DockDraft): Box {
+    const v = this.v(draft.into);
+    return { u0: endColumn(draft) * STEP, u1: draft.target.box.u0, v0: v, v1: v + 0.1 };
+  }
+
+  /** The rows on which lines leave one card, with their pills. */
+  private leave(lines: DockDraft[], flow: Scene["flow"], docked = true): Dock[] {
+    const rank = ({ source, target, back, into }: DockDraft) =>
+      back && straightRow(source, target) !== null ? ASIDE : back ? center(target) : this.v(into);
+    lines.sort((a, b) => rank(a) - rank(b) || a.order - b.order);
+    const [first] = lines;
+    if (!first) return [];
+    const { source } = first;
+    const middle = Math.round((source.low + source.high) / 2);
+    const across = ({ line: { pill } }: DockDraft) =>
+      pill === null || !docked ? BARE : flow === "right" ? pill.height : pill.width;
+    const gaps = lines.map((draft, i) => {
+      const before = lines[i - 1];
+      const apart = before ? (across(before) + across(draft)) / 2 + BESIDE_PILL : 0;
+      return Math.max(1, Math.ceil(apart / STEP));
+    });
+    const total = gaps.slice(1).reduce((sum, gap) => sum + gap, 0);
+    let at = middle - total / 2;
+    const slots = lines.map((draft, i) => {
+      at += i === 0 ? 0 : (gaps[i] ?? 1);
+      const straight = !draft.back && draft.into >= source.low && draft.into <= source.high;
+      const gap = gaps[i] ?? 1;
+      return straight ? { wish: draft.into, weight: 8, gap } : { wish: at, weight: 1, gap };
+    });
+    const beyond = docked && lines.some(({ line }) => line.pill !== null) ? total : 0;
+    const rows = slotRows(slots, source, beyond);
+    const pills = lines.map(({ line }, i) => {
+      const v = this.v(rows[i] ?? middle);
+      return docked && line.pill ? this.pillBox(source.box.u1, v, line.pill, flow) : null;
+    });
+    // All or none: a line without a pill would leave between those of the others.
+    if (docked && !pills.every((pill) => pill === null || this.isFree(pill, source)))
+      return this.leave(lines, flow, false);
+    if (docked) for (const pill of pills) if (pill) this.pills.add(pill);
+    return lines.map((draft, i) => dockOf(draft, rows[i] ?? middle, pills[i] ?? null, this));
+  }
+
+  private pillBox(side: number, v: number, size: { width: number; height: number }, flow: string) {
+    const [along, across] =
+      flow === "right" ? [size.width, size.height] : [size.height, size.width];
+    const u0 = side + PILL_GAP;
+    return { u0, u1: u0 + along, v0: v - across / 2, v1: v + across / 2 };
+  }
+
+  /** Whether a pill has room, also to move a little, and its line to turn behind it. */
+  private isFree(pill: Box, { box }: End): boolean {
+    const reach = { ...pill, u0: box.u1, u1: (startColumn(pill, box.u1) + 1) * STEP };
+    return (
+      !this.cards.hits(reach, BESIDE_PILL, box) &&
+      !this.exits.hits(reach, BESIDE_PILL, this.exitOf.get(box.key)) &&
+      !this.pills.hits(reach, BESIDE_PILL) &&
+      !this.approaches.hits(reach, BESIDE_PILL)
+    );
+  }
+}
+
+const endColumn = ({ target }: DockDraft) => Math.floor((target.box.u0 - APPROACH) / STEP);
+
+const between = (a: number, b: number) => ({ v0: Math.min(a, b), v1: Math.max(a, b) });
+
+const startColumn = (pill: Box | null, side: number) =>
+  Math.ceil((pill ? pill.u1 + PILL_PLAY + AFTER_PILL : side + 4) / STEP);
+
+function dockOf(draft: DockDraft, row: number, pill: Box | null, plan: Pick<DockPlan, "v">): Dock {
+  const { line, source, target, into } = draft;
+  const side = source.box.u1;
+  const column = startColumn(pill, side);
+  const at = Math.max(source.low, Math.min(source.high, row));
+  return {
+    line,
+    from: { u: side, v: plan.v(at) },
+    start: { column, row },
+    end: { column: endColumn(draft), row: into },
+    to: { u: target.box.u0, v: plan.v(into) },
+    pill,
+    link: at === row ? null : { u0: side, u1: side + LINK, ...between(plan.v(at), plan.v(row)) },
+    sharesStart: `${line.source} ${column} ${row}`,
+    sharesEnd: `${line.target} ${into}`,
+  };
+}
+
+function grouped<T>(items: readonly T[], key: (item: T) => string): Map<string, T[]> {
+  const groups = new Map<string, T[]>();
+  for (const item of items) {
+    const group = groups.get(key(item));
+    if (group) group.push(item);
+    else groups.set(key(item), [item]);
+  }
+  return groups;
+}

@@ -1,0 +1,134 @@
+/** The grid of a scene: which of its points cards and pills keep free, which lines go along which. */
+import { type Box, CLEARANCE, STEP } from "./scene";
+
+/** What stands round a point: how dear it is to pass there. */
+export const FREE = 0;
+export const NEAR = 1;
+export const TIGHT = 2;
+export const BLOCKED = 3;
+
+/** Larger scenes than this keep simple lines: their cards stand very far apart. */
+export const MOST_CELLS = 4_000_000;
+const MARGIN = 24; // steps round everything, for lines that go round it
+const PILL_GAP = 3; // px
+const TOUCHING = 2; // px
+
+export class Raster {
+  readonly width: number;
+  readonly height: number;
+  readonly ground: Uint8Array;
+  /** Lines on the step from a point to the next along the flow, across it, and turns at a point. */
+  readonly along: Uint8Array;
+  readonly across: Uint8Array;
+  readonly turns: Uint8Array;
+  private readonly column0: number;
+  private readonly row0: number;
+  private readonly offset: number;
+
+  private constructor(bounds: Box, offset: number) {
+    this.offset = offset;
+    this.column0 = Math.floor(bounds.u0 / STEP) - MARGIN;
+    this.row0 = Math.floor((bounds.v0 - offset) / STEP) - MARGIN;
+    this.width = Math.ceil(bounds.u1 / STEP) + MARGIN - this.column0 + 1;
+    this.height = Math.ceil((bounds.v1 - offset) / STEP) + MARGIN - this.row0 + 1;
+    const cells = this.width * this.height;
+    this.ground = new Uint8Array(cells);
+    this.along = new Uint8Array(cells);
+    this.across = new Uint8Array(cells);
+    this.turns = new Uint8Array(cells);
+  }
+
+  /** Null when it would be too large. */
+  static of(cards: readonly Box[], pills: readonly Box[], offset: number): Raster | null {
+    const all = [...cards, ...pills];
+    const least = (of: (box: Box) => number) => all.reduce((n, b) => Math.min(n, of(b)), Infinity);
+    const bounds = {
+      u0: least(({ u0 }) => u0),
+      v0: least(({ v0 }) => v0),
+      u1: -least(({ u1 }) => -u1),
+      v1: -least(({ v1 }) => -v1),
+    };
+    const cells = ((bounds.u1 - bounds.u0) / STEP + 50) * ((bounds.v1 - bounds.v0) / STEP + 50);
+    if (!(cells < MOST_CELLS)) return null;
+    const raster = new Raster(bounds, offset);
+    for (const card of cards) {
+      raster.keep(card, CLEARANCE.wish - 0.01, NEAR);
+      raster.keep(card, CLEARANCE.least - 0.01, TIGHT);
+      raster.keep(card, TOUCHING, BLOCKED);
+    }
+    for (const pill of pills) raster.keep(pill, PILL_GAP, BLOCKED);
+    return raster;
+  }
+
+  private keep(box: Box, gap: number, as: number): void {
+    const { first, last, top, bottom } = this.cells(box, gap);
+    for (let row = top; row <= bottom; row += 1) {
+      for (let cell = row * this.width + first; cell <= row * this.width + last; cell += 1) {
+        if ((this.ground[cell] ?? 0) < as) this.ground[cell] = as;
+      }
+    }
+  }
+
+  private cells({ u0, u1, v0, v1 }: Box, gap: number) {
+    return {
+      first: Math.ceil((u0 - gap) / STEP) - this.column0,
+      last: Math.floor((u1 + gap) / STEP) - this.column0,
+      top: Math.ceil((v0 - gap - this.offset) / STEP) - this.row0,
+      bottom: Math.floor((v1 + gap - this.offset) / STEP) - this.row0,
+    };
+  }
+
+  /** Whether a line passes through a box. */
+  hasLine(box: Box, gap: number): boolean {
+    const { first, last, top, bottom } = this.cells(box, gap);
+    for (let row = top; row <= bottom; row += 1) {
+      for (let cell = row * this.width + first; cell <= row * this.width + last; cell += 1) {
+        if (this.isUsed(cell)) return true;
+      }
+    }
+    return false;
+  }
+
+  isUsed(cell: number): boolean {
+    const { along, across, width } = this;
+    return !!(along[cell] || along[cell - 1] || across[cell] || across[cell - width]);
+  }
+
+  /** -1 for a point that is not on the raster. */
+  cellAt(column: number, row: number): number {
+    const [x, y] = [column - this.column0, row - this.row0];
+    return x < 0 || y < 0 || x >= this.width || y >= this.height ? -1 : y * this.width + x;
+  }
+
+  columnOf(cell: number): number {
+    return (cell % this.width) + this.column0;
+  }
+
+  rowOf(cell: number): number {
+    return Math.floor(cell / this.width) + this.row0;
+  }
+
+  /** Whether a line lies on a step between corners. */
+  sharesStep(corners: readonly number[]): boolean {
+    for (let i = 1; i < corners.length; i += 1) {
+      const [a = 0, b = 0] = [corners[i - 1], corners[i]];
+      const level = Math.floor(a / this.width) === Math.floor(b / this.width);
+      const [step, layer] = level ? [1, this.along] : [this.width, this.across];
+      for (let cell = Math.min(a, b); cell < Math.max(a, b); cell += step)
+        if (layer[cell]) return true;
+    }
+    return false;
+  }
+
+  /** Adds or takes away (`by` is -1) a line through corners of the grid. */
+  mark(corners: readonly number[], by: 1 | -1): void {
+    for (let i = 1; i < corners.length; i += 1) {
+      const [a = 0, b = 0] = [corners[i - 1], corners[i]];
+      const level = Math.floor(a / this.width) === Math.floor(b / this.width);
+      const [step, layer] = level ? [1, this.along] : [this.width, this.across];
+      for (let cell = Math.min(a, b); cell < Math.max(a, b); cell += step)
+        layer[cell] = (layer[cell] ?? 0) + by;
+      if (i > 1) this.turns[a] = (this.turns[a] ?? 0) + by;
+    }
+  }
+}

@@ -1,0 +1,181 @@
+/** The way of one line over the grid of a scene: A*, with prices for turns, crossings and sharing. */
+import { BLOCKED, NEAR, type Raster, TIGHT } from "./raster";
+
+/** In steps of the grid. */
+const PRICE = { turn: 3, crossing: 3, near: 0.5, tight: 8, touch: 60, shared: 240 } as const;
+/** A line that finds no way after looking at this many points keeps its simple one. */
+const MOST_STEPS = 400_000;
+
+/** Directions: along the flow, across, back, across the other way; `+ 2` is the opposite. */
+const ALONG = 0;
+
+export class Router {
+  private readonly raster: Raster;
+  private readonly price: Float32Array;
+  private readonly before: Int32Array;
+  /** The search in which a state was seen last, so that nothing has to be cleared. */
+  private readonly seen: Int32Array;
+  private readonly closed: Int32Array;
+  private search = 0;
+  private readonly heap = new Heap();
+
+  constructor(raster: Raster) {
+    this.raster = raster;
+    const states = raster.ground.length * 4;
+    this.price = new Float32Array(states);
+    this.before = new Int32Array(states);
+    this.seen = new Int32Array(states);
+    this.closed = new Int32Array(states);
+  }
+
+  /** The corners of a way that begins and ends along the flow; null when there is none. */
+  route(start: number, end: number): number[] | null {
+    const { ground, width } = this.raster;
+    if (start < 0 || end < 0) return null;
+    this.search += 1;
+    this.heap.clear();
+    const [endX, endY] = [end % width, Math.floor(end / width)];
+    const last = ground.length - width;
+    this.see(start * 4 + ALONG, 0, -1, 0);
+    for (let left = MOST_STEPS; left > 0; left -= 1) {
+      const state = this.heap.pop();
+      if (state < 0) return null;
+      if (this.closed[state] === this.search) continue;
+      this.closed[state] = this.search;
+      const cell = state >> 2;
+      const way = state & 3;
+      if (cell === end && way === ALONG) return this.corners(state);
+      const paid = this.price[state] ?? 0;
+      for (let next = 0; next < 4; next += 1) {
+        if ((next ^ 2) === way) continue;
+        if (cell === end && next === ALONG) {
+          // The last turn, into the straight piece before the card.
+          this.see(cell * 4 + ALONG, paid + this.passing(cell, way, ALONG), state, 0);
+          continue;
+        }
+        const x = cell % width;
+        if ((next === 0 && x === width - 1) || (next === 2 && x === 0)) continue;
+        if ((next === 1 && cell >= last) || (next === 3 && cell < width)) continue;
+        const to = cell + (next === 0 ? 1 : next === 2 ? -1 : next === 1 ? width : -width);
+        const stands = ground[to] ?? 0;
+        if (stands === BLOCKED && to !== end) continue;
+        const here = cell === start && way === next ? 0 : this.passing(cell, way, next);
+        const step = 1 + (stands === TIGHT ? PRICE.tight : stands === NEAR ? PRICE.near : 0);
+        const [dx, dy] = [endX - (to % width), endY - Math.floor(to / width)];
+        const least = Math.abs(dx) + Math.abs(dy) + PRICE.turn * leastTurns(next, dx, dy);
+        this.see(to * 4 + next, paid + here + step + this.sharing(cell, to, next), state, least);
+      }
+    }
+    return null;
+  }
+
+  private see(state: number, price: number, before: number, least: number): void {
+    if (this.closed[state] === this.search) return;
+    if (this.seen[state] === this.search && price >= (this.price[state] ?? 0)) return;
+    this.seen[state] = this.search;
+    this.price[state] = price;
+    this.before[state] = before;
+    this.heap.push(state, price + least);
+  }
+
+  /** What it costs to pass a point: a turn, a line that is crossed, one that would be touched. */
+  private passing(cell: number, way: number, next: number): number {
+    const { turns, along, across, width } = this.raster;
+    const touched = (turns[cell] ?? 0) > 0;
+    if (way !== next) {
+      return PRICE.turn + (touched || this.raster.isUsed(cell) ? PRICE.touch : 0);
+    }
+    if (touched) return PRICE.touch;
+    const crossed = way & 1 ? along[cell] || along[cell - 1] : across[cell] || across[cell - width];
+    return crossed ? PRICE.crossing : 0;
+  }
+
+  private sharing(from: number, to: number, way: number): number {
+    const layer = way & 1 ? this.raster.across : this.raster.along;
+    return layer[Math.min(from, to)] ? PRICE.shared : 0;
+  }
+
+  private corners(state: number): number[] {
+    const cells: number[] = [];
+    for (let at = state; at >= 0; at = this.before[at] ?? -1) cells.push(at >> 2);
+    return straightened(cells.reverse(), this.raster.width);
+  }
+}
+
+/** The turns that are left at least, to arrive along the flow. */
+function leastTurns(way: number, dx: number, dy: number): number {
+  if (way === ALONG) return dx < 0 ? 4 : dy === 0 ? 0 : 2;
+  if (way === 2) return 2;
+  if (dx < 0) return 3;
+  return dy === 0 || (way === 1) === dy > 0 ? 1 : 3;
+}
+
+/** Without the corners at which nothing turns. */
+export function straightened(cells: number[], width: number): number[] {
+  const level = (a: number, b: number) => Math.floor(a / width) === Math.floor(b / width);
+  const kept: number[] = [];
+  for (const cell of cells) {
+    const [a, b] = [kept.at(-2), kept.at(-1)];
+    if (b === cell) continue;
+    if (a !== undefined && b !== undefined && level(a, b) === level(b, cell)) kept.pop();
+    kept.push(cell);
+  }
+  return kept;
+}
+
+/** A binary heap of states; of equal prices which comes first depends on nothing but their order. */
+class Heap {
+  private states = new Int32Array(1 << 14);
+  private keys = new Float64Array(1 << 14);
+  private size = 0;
+
+  clear(): void {
+    this.size = 0;
+  }
+
+  push(state: number, key: number): void {
+    if (this.size === this.states.length) this.grow();
+    const { states, keys } = this;
+    let i = this.size;
+    this.size += 1;
+    while (i > 0) {
+      const up = (i - 1) >> 1;
+      if ((keys[up] ?? 0) <= key) break;
+      keys[i] = keys[up] ?? 0;
+      states[i] = states[up] ?? 0;
+      i = up;
+    }
+    keys[i] = key;
+    states[i] = state;
+  }
+
+  /** The cheapest; -1 when there is none. */
+  pop(): number {
+    if (this.size === 0) return -1;
+    const { states, keys } = this;
+    const first = states[0] ?? -1;
+    this.size -= 1;
+    const [state, key] = [states[this.size] ?? 0, keys[this.size] ?? 0];
+    let i = 0;
+    for (;;) {
+      let down = 2 * i + 1;
+      if (down >= this.size) break;
+      if (down + 1 < this.size && (keys[down + 1] ?? 0) < (keys[down] ?? 0)) down += 1;
+      if ((keys[down] ?? 0) >= key) break;
+      keys[i] = keys[down] ?? 0;
+      states[i] = states[down] ?? 0;
+      i = down;
+    }
+    keys[i] = key;
+    states[i] = state;
+    return first;
+  }
+
+  private grow(): void {
+    const [states, keys] = [this.states, this.keys];
+    this.states = new Int32Array(states.length * 2);
+    this.keys = new Float64Array(keys.length * 2);
+    this.states.set(states);
+    this.keys.set(keys);
+  }
+}

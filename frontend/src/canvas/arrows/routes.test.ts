@@ -1,0 +1,185 @@
+import fc from "fast-check";
+import { expect, test } from "vitest";
+import { faultsOf, looksOf, pillsOf } from "../../testing/line-faults";
+import { layeredScene, seeded, thrownScene } from "../../testing/scenes";
+import { routed, simpleLines } from "./routes";
+import { type Flow, gridOffset, type Scene, STEP } from "./scene";
+
+const FLOWS: readonly Flow[] = ["right", "down"];
+const seed = fc.integer({ min: 0, max: 1e9 });
+const NONE = { behind: 0, onCards: 0, onPills: 0, onLines: 0, slanted: 0 };
+
+const card = (key: string, x: number, y: number) => ({ key, x, y, width: 160, height: 72 });
+const line = (source: string, target: string, width = 26) => ({
+  id: `${source}>${target}`,
+  source,
+  target,
+  pill: { width, height: 20 },
+});
+const scene = (cards: Scene["cards"], lines: Scene["lines"], flow: Flow = "right"): Scene => ({
+  ...{ flow, offset: gridOffset(cards, flow, null), cards, lines },
+});
+
+test("in a graph that is laid out no line passes a card, lies on another, or meets a pill", () => {
+  fc.assert(
+    fc.property(
+      fc.integer({ min: 2, max: 40 }),
+      seed,
+      fc.constantFrom(...FLOWS),
+      (n, seed, flow) => {
+        const given = layeredScene(n, seeded(seed), flow);
+        const { lines } = routed(given);
+        expect(faultsOf(given, lines)).toEqual({ ...NONE, shared: 0 });
+        expect(looksOf(given, lines)).toMatchObject({ simple: 0, hidden: 0 });
+      },
+    ),
+    { numRuns: 30 },
+  );
+});
+
+test("cards anywhere, 32 px apart: no line passes one, no pill lies on a card, pill or line", () => {
+  fc.assert(
+    fc.property(
+      fc.integer({ min: 2, max: 18 }),
+      seed,
+      fc.constantFrom(...FLOWS),
+      (n, seed, flow) => {
+        const given = thrownScene(n, seeded(seed), flow);
+        const { lines } = routed(given);
+        expect(lines.size).toBe(given.lines.length);
+        expect(faultsOf(given, lines)).toMatchObject(NONE);
+        expect(looksOf(given, lines).simple).toBe(0);
+      },
+    ),
+    { numRuns: 60 },
+  );
+});
+
+test("the same scene has the same lines", () => {
+  fc.assert(
+    fc.property(seed, fc.constantFrom(...FLOWS), (seed, flow) => {
+      const given = thrownScene(10, seeded(seed), flow);
+      expect(routed(given).lines).toEqual(routed(structuredClone(given)).lines);
+    }),
+    { numRuns: 15 },
+  );
+});
+
+test("after a move what is routed again is as good, and what has not moved stays", () => {
+  fc.assert(
+    fc.property(seed, fc.constantFrom(...FLOWS), (seed, flow) => {
+      const random = seeded(seed);
+      let given = layeredScene(24, random, flow);
+      let { lines, ways } = routed(given);
+      for (let move = 0; move < 5; move += 1) {
+        const at = Math.floor(random() * given.cards.length);
+        const [dx, dy] = [random() * 30 - 15, random() * 30 - 15].map(Math.round);
+        const cards = given.cards.map((card, i) =>
+          i === at ? { ...card, x: card.x + (dx ?? 0), y: card.y + (dy ?? 0) } : card,
+        );
+        given = { ...given, cards };
+        const next = routed(given, ways);
+        expect(faultsOf(given, next.lines)).toEqual({ ...NONE, shared: 0 });
+        const far = given.lines.filter(({ id }) => next.ways.get(id) === ways.get(id));
+        expect(far.length).toBeGreaterThanOrEqual(given.lines.length - next.searched);
+        ({ lines, ways } = next);
+      }
+      expect(lines.size).toBe(given.lines.length);
+    }),
+    { numRuns: 12 },
+  );
+});
+
+test("nothing is looked for when nothing has moved", () => {
+  const given = layeredScene(30, seeded(4), "right");
+  const first = routed(given);
+  const again = routed(given, first.ways);
+  expect([again.searched, again.lines]).toEqual([0, first.lines]);
+});
+
+test("cards in a row are joined by straight lines in their middle", () => {
+  for (const flow of FLOWS) {
+    const cards = [0, 1, 2].map((i) =>
+      flow === "right" ? card(`c${i}`, i * 260, 7) : card(`c${i}`, 7, i * 180),
+    );
+    const given = scene(cards, [line("c0", "c1"), line("c1", "c2")], flow);
+    for (const { points } of routed(given).lines.values()) {
+      expect(points.length).toBe(2);
+      expect(points[0]?.[flow === "right" ? 1 : 0]).toBe(flow === "right" ? 7 + 36 : 7 + 80);
+    }
+  }
+});
+
+test("a loop leaves at one side, runs back in a lane of its own and enters at the other", () => {
+  const cards = [card("a", 0, 0), card("b", 300, 0), card("c", 600, 0)];
+  const given = scene(cards, [line("a", "b"), line("b", "c"), line("c", "a")]);
+  const { lines } = routed(given);
+  const loop = lines.get("c>a")?.points ?? [];
+  expect([loop[0]?.[0], loop.at(-1)?.[0]]).toEqual([760, 0]);
+  const beyond = loop.filter(([, y]) => y <= -STEP || y >= 72 + STEP);
+  expect(beyond.length).toBe(2);
+  expect(faultsOf(given, lines)).toEqual({ ...NONE, shared: 0 });
+});
+
+test("an action that follows itself has a line round itself", () => {
+  const given = scene([card("a", 0, 0)], [line("a", "a")]);
+  const { lines } = routed(given);
+  expect(lines.get("a>a")?.points.length).toBe(6);
+  expect(faultsOf(given, lines)).toEqual({ ...NONE, shared: 0 });
+});
+
+test("a pill stands beside the card that its line leaves, also where many leave", () => {
+  const cards = [card("a", 0, 200), ...[0, 1, 2, 3, 4].map((i) => card(`t${i}`, 400, i * 110))];
+  const given = scene(
+    cards,
+    cards.slice(1).map(({ key }) => line("a", key, 52)),
+  );
+  const { lines } = routed(given);
+  const pills = [...pillsOf(given, lines).values()];
+  expect(pills.length).toBe(5);
+  for (const pill of pills) expect(pill.x).toBe(168);
+  expect(faultsOf(given, lines)).toEqual({ ...NONE, shared: 0 });
+});
+
+test("more lines than there is room for come together before they enter", () => {
+  const end = { key: "exit", x: 900, y: 300, width: 84, height: 32 };
+  const cards = [0, 1, 2, 3, 4, 5, 6].map((i) => card(`c${i}`, (i % 2) * 300, i * 110));
+  const given = scene(
+    [...cards, end],
+    cards.map(({ key }) => line(key, "exit")),
+  );
+  const { lines } = routed(given);
+  expect(faultsOf(given, lines)).toEqual({ ...NONE, shared: 0 });
+  for (const { points } of lines.values()) {
+    const [x, y] = points.at(-1) ?? [0, 0];
+    expect([x, y > 300 && y < 332]).toEqual([900, true]);
+  }
+});
+
+test("what cannot be routed is drawn simply: cards on each other, cards worlds apart", () => {
+  const pile = scene([card("a", 0, 0), card("b", 10, 10)], [line("a", "b")]);
+  expect(routed(pile).lines.size).toBe(1);
+  const apart = scene([card("a", 0, 0), card("b", 9e6, 9e6)], [line("a", "b")]);
+  expect(routed(apart).lines.get("a>b")?.simple).toBe(true);
+});
+
+test("simple lines begin, end and have their pills where the others do", () => {
+  fc.assert(
+    fc.property(seed, fc.constantFrom(...FLOWS), (seed, flow) => {
+      const given = layeredScene(16, seeded(seed), flow);
+      const simple = simpleLines(given);
+      for (const [id, { points, pill }] of routed(given).lines) {
+        const other = simple.get(id);
+        expect([other?.points[0], other?.points.at(-1)]).toEqual([points[0], points.at(-1)]);
+        if (other?.docked) expect(other.pill).toEqual(pill);
+      }
+      expect(faultsOf(given, simple).slanted).toBe(0);
+    }),
+    { numRuns: 20 },
+  );
+});
+
+test("a line to a card that is not there is not drawn", () => {
+  expect(routed(scene([card("a", 0, 0)], [line("a", "gone")])).lines.size).toBe(0);
+  expect(routed(scene([], [])).lines.size).toBe(0);
+});

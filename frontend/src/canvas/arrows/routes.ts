@@ -1,0 +1,356 @@
+/** The lines of a scene: routed as a whole, or only where something has moved. Pure. */
+import { type Dock, DockPlan, LINK } from "./docks";
+import { BLOCKED, FREE, NEAR, Raster } from "./raster";
+import { Router, straightened } from "./router";
+import {
+  type Box,
+  BoxIndex,
+  boxOf,
+  type Flow,
+  type Point,
+  pointOf,
+  type Scene,
+  STEP,
+} from "./scene";
+
+/** A line as it is drawn. */
+export interface RoutedLine {
+  readonly id: string;
+  /** What it was routed between: while that stays, so may the line. */
+  readonly ends: string;
+  /** From the side of one card to that of the other. */
+  readonly points: readonly Point[];
+  /** The middle of its pill; null where there is none, or no room for it. */
+  readonly pill: Point | null;
+  /** The pill stands beside the card that the line leaves, and can move away from it a little. */
+  readonly docked: boolean;
+  /** Between cards that stand too close, or too far away, for a way of its own. */
+  readonly simple: boolean;
+}
+
+export type LineMap = ReadonlyMap<string, RoutedLine>;
+
+/** A way over the grid, in columns and rows, so that it outlives the raster. */
+interface Way {
+  readonly ends: string;
+  readonly corners: readonly (readonly [column: number, row: number])[];
+  /** How many of its points are nearer to a card than lines wish to be. */
+  readonly near: number;
+}
+
+/** What routing keeps, to route less the next time. */
+export type Ways = ReadonlyMap<string, Way>;
+
+function endsOf({ start, end }: Dock, scene: Scene): string {
+  const from = `${start.column},${start.row}`;
+  return `${scene.flow} ${scene.offset} ${from} ${end.column},${end.row}`;
+}
+
+/** Lines that only know their own ends: to be drawn until those that were routed are there. */
+export function simpleLines(scene: Scene): Map<string, RoutedLine> {
+  const plan = new DockPlan(scene);
+  return new Map(
+    plan.docks.map((dock) => {
+      const points = [...simpleWay(dock)].map(([column, row]) => at(plan, scene.flow, column, row));
+      const ends = endsOf(dock, scene);
+      const docked = dock.pill !== null;
+      const pill = dock.pill ? middleOf(dock.pill, scene.flow) : null;
+      const whole = [...leaving(dock, plan, scene.flow), ...points, arriving(dock, scene.flow)];
+      const { id } = dock.line;
+      return [id, { id, ends, points: straight(whole), pill, docked, simple: true }];
+    }),
+  );
+}
+
+function* simpleWay({ start, end }: Dock): Generator<readonly [number, number]> {
+  yield [start.column, start.row];
+  if (start.column <= end.column) {
+    yield [start.column, end.row];
+  } else {
+    // Back in a lane beside both.
+    const lane = Math.max(start.row, end.row) + 6;
+    yield [start.column, lane];
+    yield [end.column, lane];
+  }
+  yield [end.column, end.row];
+}
+
+const at = (plan: DockPlan, flow: Flow, column: number, row: number) =>
+  pointOf(column * STEP, plan.v(row), flow);
+
+function middleOf({ u0, u1, v0, v1 }: Box, flow: Flow): Point {
+  return pointOf((u0 + u1) / 2, (v0 + v1) / 2, flow);
+}
+
+function leaving({ from, start }: Dock, plan: DockPlan, flow: Flow): Point[] {
+  const v = plan.v(start.row);
+  const first = pointOf(from.u, from.v, flow);
+  // A pill beyond the corner of its card: the line goes along the card to it.
+  return from.v === v
+    ? [first]
+    : [first, pointOf(from.u + LINK, from.v, flow), pointOf(from.u + LINK, v, flow)];
+}
+
+const arriving = ({ to }: Dock, flow: Flow): Point => pointOf(to.u, to.v, flow);
+
+/** Without points at which nothing turns. */
+function straight(points: readonly Point[]): Point[] {
+  const kept: Point[] = [];
+  for (const point of points) {
+    const [a, b] = [kept.at(-2), kept.at(-1)];
+    if (b && b[0] === point[0] && b[1] === point[1]) continue;
+    const through =
+      a && b && ((a[0] === b[0] && b[0] === point[0]) || (a[1] === b[1] && b[1] === point[1]));
+    if (through) kept.pop();
+    kept.push(point);
+  }
+  return kept;
+}
+
+export interface Routed {
+  readonly lines: Map<string, RoutedLine>;
+  readonly ways: Ways;
+  /** How many lines were looked for. */
+  readonly searched: number;
+}
+
+/** All lines of a scene. Of `known` those stay whose ends and surroundings are as they were. */
+export function routed(scene: Scene, known: Ways = new Map()): Routed {
+  const routing = new Routing(scene);
+  return routing.routed(known);
+}
+
+interface Task {
+  readonly dock: Dock;
+  readonly ends: string;
+  readonly start: number;
+  readonly end: number;
+  /** Cells: the corners with the straight pieces at both ends; null when there is no way. */
+  cells: readonly number[] | null;
+  /** The way that was known and still is; null for one that was looked for. */
+  way: Way | null;
+}
+
+/** How often lines that lie on others are looked at again. */
+const ROUNDS = 4;
+
+class Routing {
+  private readonly scene: Scene;
+  private readonly plan: DockPlan;
+  private readonly raster: Raster | null;
+  private readonly cards: Box[];
+  private readonly tasks: Task[];
+  private readonly groups = new Map<string, Set<Task>>();
+
+  constructor(scene: Scene) {
+    this.scene = scene;
+    this.plan = new DockPlan(scene);
+    this.cards = scene.cards.map((card) => boxOf(card, scene.flow));
+    const pills = this.plan.docks.flatMap(({ pill, link }) => [pill, link].flatMap((b) => b ?? []));
+    const raster = Raster.of(this.cards, pills, scene.offset);
+    this.raster = raster;
+    this.tasks = this.plan.docks.map((dock) => ({
+      dock,
+      ends: endsOf(dock, scene),
+      start: raster?.cellAt(dock.start.column, dock.start.row) ?? -1,
+      end: raster?.cellAt(dock.end.column, dock.end.row) ?? -1,
+      cells: null,
+      way: null,
+    }));
+    for (const task of this.tasks) {
+      for (const key of [`> ${task.dock.sharesStart}`, `< ${task.dock.sharesEnd}`]) {
+        const group = this.groups.get(key) ?? new Set();
+        this.groups.set(key, group.add(task));
+      }
+    }
+  }
+
+  routed(known: Ways): Routed {
+    const { raster } = this;
+    if (!raster) return { lines: simpleLines(this.scene), ways: new Map(), searched: 0 };
+    const fresh = this.tasks.filter((task) => !this.keeps(task, known.get(task.dock.line.id)));
+    const length = ({ start, end }: Task) =>
+      Math.abs((start % raster.width) - (end % raster.width)) +
+      Math.abs(Math.floor(start / raster.width) - Math.floor(end / raster.width));
+    // Short ones first: they have the fewest ways to choose from.
+    const order = fresh
+      .map((task, i) => ({ task, i, length: length(task) }))
+      .sort((a, b) => a.length - b.length || a.i - b.i);
+    if (order.length > 0) {
+      const router = new Router(raster);
+      for (const { task } of order) this.search(task, router);
+      // Once more, now that all the others are there.
+      for (const { task } of order) if (!this.isStraight(task)) this.search(task, router);
+      for (let round = 0; round < ROUNDS && this.part(fresh, round, router); round += 1);
+    }
+    return { ...this.drawn(), searched: this.tasks.filter(({ way }) => way === null).length };
+  }
+
+  /** Looks again for ways of lines that lie on others, later with those of the same cards. */
+  private part(fresh: readonly Task[], round: number, router: Router): boolean {
+    if (!fresh.some((task) => this.liesOnOther(task))) return false;
+    const lying = this.tasks.filter((task) => this.liesOnOther(task));
+    const cards = new Set(lying.flatMap(({ dock: { line } }) => [line.source, line.target]));
+    const near = ({ dock: { line } }: Task) => cards.has(line.source) || cards.has(line.target);
+    const others = round === 0 ? [] : this.tasks.filter((t) => !lying.includes(t) && near(t));
+    const together = [...lying, ...others];
+    for (const task of together) this.mark(task, -1);
+    for (const task of together) task.cells = null;
+    if (round % 2 === 0) together.reverse();
+    for (const task of together) this.search(task, router);
+    return true;
+  }
+
+  private liesOnOther(task: Task): boolean {
+    const { raster } = this;
+    if (!raster || task.cells === null) return false;
+    const kin = this.kinOf(task);
+    for (const other of kin) this.mark(other, -1);
+    const found = raster.sharesStep(this.whole(task));
+    for (const other of kin) this.mark(other, 1);
+    return found;
+  }
+
+  private isStraight({ cells }: Task): boolean {
+    return cells !== null && cells.length === 2;
+  }
+
+  /** Takes a way that is known, if nothing stands on it now. */
+  private keeps(task: Task, way: Way | undefined): boolean {
+    const { raster } = this;
+    if (!raster || way?.ends !== task.ends) return false;
+    const corners = way.corners.map(([column, row]) => raster.cellAt(column, row));
+    if (corners.includes(-1) || this.nearness(corners) > way.near) return false;
+    this.put(task, corners, way);
+    if (!this.liesOnOther(task)) return true;
+    this.mark(task, -1);
+    task.cells = null;
+    return false;
+  }
+
+  /** How near to cards a way is; infinite when one stands on it. */
+  private nearness(corners: readonly number[]): number {
+    const { raster } = this;
+    if (!raster) return 0;
+    let near = 0;
+    for (let i = 1; i < corners.length; i += 1) {
+      const [a = 0, b = 0] = [corners[i - 1], corners[i]];
+      const level = Math.floor(a / raster.width) === Math.floor(b / raster.width);
+      const step = level ? 1 : raster.width;
+      for (let cell = Math.min(a, b); cell <= Math.max(a, b); cell += step) {
+        const ground = raster.ground[cell] ?? FREE;
+        if (ground === BLOCKED) return Number.POSITIVE_INFINITY;
+        near += ground === FREE ? 0 : ground === NEAR ? 1 : 16;
+      }
+    }
+    return near;
+  }
+
+  private search(task: Task, router: Router): void {
+    // What may lie on each other is not in each other's way.
+    const kin = this.kinOf(task);
+    for (const other of kin) this.mark(other, -1);
+    task.cells = null;
+    this.put(task, router.route(task.start, task.end), null);
+    for (const other of kin) if (other !== task) this.mark(other, 1);
+  }
+
+  private kinOf(task: Task): Set<Task> {
+    const { sharesStart, sharesEnd } = task.dock;
+    const [first, last] = [this.groups.get(`> ${sharesStart}`), this.groups.get(`< ${sharesEnd}`)];
+    return new Set([...(first ?? []), ...(last ?? [])]);
+  }
+
+  private put(task: Task, cells: readonly number[] | null, way: Way | null): void {
+    task.cells = cells;
+    task.way = way;
+    this.mark(task, 1);
+  }
+
+  private mark(task: Task, by: 1 | -1): void {
+    this.raster?.mark(this.whole(task), by);
+  }
+
+  /** A way with the straight pieces after a pill or card and before the next card. */
+  private whole({ cells, dock }: Task): number[] {
+    const { raster } = this;
+    if (!raster || cells === null) return [];
+    const { start, end, to, from, pill } = dock;
+    const back = start.column - Math.floor((pill?.u1 ?? from.u) / STEP);
+    const side = raster.cellAt(Math.floor(to.u / STEP), end.row);
+    const all = [(cells[0] ?? 0) - back, ...cells];
+    return straightened(side < 0 ? all : [...all, side], raster.width);
+  }
+
+  private drawn(): { lines: Map<string, RoutedLine>; ways: Ways } {
+    const { raster, plan, scene } = this;
+    const lines = new Map<string, RoutedLine>();
+    const ways = new Map<string, Way>();
+    if (!raster) return { lines, ways };
+    const simple = this.tasks.some(({ cells }) => cells === null) ? simpleLines(scene) : null;
+    const loose: { task: Task; points: readonly Point[] }[] = [];
+    for (const task of this.tasks) {
+      const { dock, ends, cells } = task;
+      const { id } = dock.line;
+      const plain = cells === null ? simple?.get(id) : undefined;
+      if (plain) lines.set(id, plain);
+      if (cells === null) continue;
+      const corners = cells.map((cell) => [raster.columnOf(cell), raster.rowOf(cell)] as const);
+      ways.set(id, task.way ?? { ends, corners, near: this.nearness(cells) });
+      const points = straight([
+        ...leaving(dock, plan, scene.flow),
+        ...corners.map(([column, row]) => at(plan, scene.flow, column, row)),
+        arriving(dock, scene.flow),
+      ]);
+      const docked = dock.pill !== null;
+      const pill = dock.pill && middleOf(dock.pill, scene.flow);
+      lines.set(id, { id, ends, points, pill, docked, simple: false });
+      if (!docked && dock.line.pill) loose.push({ task, points });
+    }
+    this.placeLoose(loose, lines, raster);
+    return { lines, ways };
+  }
+
+  /** Pills that had no room beside their cards, on the first piece of their lines that has. */
+  private placeLoose(
+    loose: readonly { task: Task; points: readonly Point[] }[],
+    lines: Map<string, RoutedLine>,
+    raster: Raster,
+  ): void {
+    if (loose.length === 0) return;
+    const taken = new BoxIndex<Box>();
+    for (const card of this.cards) taken.add(card);
+    for (const { pill } of this.plan.docks) if (pill) taken.add(pill);
+    for (const { task, points } of loose) {
+      const line = lines.get(task.dock.line.id);
+      const size = task.dock.line.pill;
+      if (!line || !size) continue;
+      this.mark(task, -1);
+      for (const pill of places(points)) {
+        const box = boxOf(
+          { x: pill[0] - size.width / 2, y: pill[1] - size.height / 2, ...size },
+          this.scene.flow,
+        );
+        if (taken.hits(box, 6) || raster.hasLine(box, 2)) continue;
+        taken.add(box);
+        lines.set(line.id, { ...line, pill });
+        break;
+      }
+      this.mark(task, 1);
+    }
+  }
+}
+
+/** Points of a line at which a pill may stand, from its beginning. */
+function* places(points: readonly Point[]): Generator<Point> {
+  for (let i = 1; i < points.length; i += 1) {
+    const [a, b] = [points[i - 1], points[i]];
+    if (!a || !b) continue;
+    const length = Math.abs(b[0] - a[0]) + Math.abs(b[1] - a[1]);
+    const steps = Math.max(2, Math.floor(length / STEP));
+    for (let step = 1; step < steps; step += 1) {
+      const share = step / steps;
+      yield [a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share];
+    }
+  }
+}

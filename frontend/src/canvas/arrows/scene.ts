@@ -1,0 +1,111 @@
+/** What lines are drawn between: cards that stand, bundles, and the grid on which lines run. Pure. */
+
+/** Where the graph goes: lines leave cards at that side and enter them at the opposite one. */
+export type Flow = "right" | "down";
+
+export interface PillSize {
+  readonly width: number;
+  readonly height: number;
+}
+
+export interface Area extends PillSize {
+  readonly x: number;
+  readonly y: number;
+}
+
+export type Point = readonly [x: number, y: number];
+
+export interface SceneCard extends Area {
+  readonly key: string;
+}
+
+export interface SceneLine {
+  readonly id: string;
+  readonly source: string;
+  readonly target: string;
+  /** The room that its pill needs. */
+  readonly pill: PillSize | null;
+}
+
+/** All of it can be sent to a worker. */
+export interface Scene {
+  readonly flow: Flow;
+  /** Where the grid begins across the flow, 0 to 11 px. */
+  readonly offset: number;
+  readonly cards: readonly SceneCard[];
+  /** In the order in which lines of one card lie beside each other when nothing else decides. */
+  readonly lines: readonly SceneLine[];
+}
+
+/** Lines run on a grid of this step, so that they are this far apart or on each other. */
+export const STEP = 12;
+/** Kept between lines and cards where there is room; a gap of 32 px has a line of the grid. */
+export const CLEARANCE = { wish: 16, least: 10 } as const;
+
+/** A card along and across the flow. */
+export interface Box {
+  readonly u0: number;
+  readonly u1: number;
+  readonly v0: number;
+  readonly v1: number;
+}
+
+export function boxOf({ x, y, width, height }: Area, flow: Flow): Box {
+  return flow === "right"
+    ? { u0: x, u1: x + width, v0: y, v1: y + height }
+    : { u0: y, u1: y + height, v0: x, v1: x + width };
+}
+
+export const pointOf = (u: number, v: number, flow: Flow): Point =>
+  flow === "right" ? [u, v] : [v, u];
+
+/**
+ * Where most cards have their middle across the flow, on the grid: then lines between cards in a
+ * row are straight and leave them in the middle. `before` stays unless another is much better.
+ */
+export function gridOffset(cards: readonly SceneCard[], flow: Flow, before: number | null): number {
+  const counts = new Array<number>(STEP).fill(0);
+  for (const card of cards) {
+    const { v0, v1 } = boxOf(card, flow);
+    const at = (((Math.round((v0 + v1) / 2) % STEP) + STEP) % STEP) | 0;
+    counts[at] = (counts[at] ?? 0) + 1;
+  }
+  const best = counts.indexOf(Math.max(...counts));
+  if (before === null) return best;
+  return (counts[best] ?? 0) > 1.5 * (counts[before] ?? 0) ? best : before;
+}
+
+const CELL = 256; // px, the side of a bucket
+
+/** Boxes by where they are. */
+export class BoxIndex<T extends Box> {
+  private readonly buckets = new Map<string, T[]>();
+
+  add(box: T): void {
+    for (const key of this.keys(box)) {
+      const bucket = this.buckets.get(key);
+      if (bucket) bucket.push(box);
+      else this.buckets.set(key, [box]);
+    }
+  }
+
+  /** Whether anything but what is to be left out comes nearer than `gap` to a box. */
+  hits(box: Box, gap: number, leaveOut?: T): boolean {
+    const wide = { u0: box.u0 - gap, u1: box.u1 + gap, v0: box.v0 - gap, v1: box.v1 + gap };
+    for (const key of this.keys(wide)) {
+      for (const other of this.buckets.get(key) ?? []) {
+        if (other !== leaveOut && overlaps(wide, other)) return true;
+      }
+    }
+    return false;
+  }
+
+  private *keys({ u0, u1, v0, v1 }: Box): Generator<string> {
+    for (let i = Math.floor(u0 / CELL); i <= Math.floor(u1 / CELL); i += 1)
+      for (let j = Math.floor(v0 / CELL); j <= Math.floor(v1 / CELL); j += 1) yield `${i},${j}`;
+  }
+}
+
+export function overlaps(a: Box, b: Box): boolean {
+  return a.u0 < b.u1 && b.u0 < a.u1 && a.v0 < b.v1 && b.v0 < a.v1;
+}
