@@ -122,7 +122,7 @@ test("of a thousand cards and their arrows only what somebody changed is made ag
       ...{ places: positionsOf(graph), selected: new Set<string>() },
       ...{ progress: new Map(), marks: new Map(), measured: new Map() },
     };
-    const around = surroundingsOf(graph, options, before.around);
+    const around = surroundingsOf(graph, before.around);
     return {
       nodes: nodesOf(graph, options, before.nodes),
       edges: keepEqual(before.edges, edgesOf(graph, options, around)),

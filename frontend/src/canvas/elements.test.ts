@@ -41,7 +41,7 @@ const options = (graph: Graph): NodeOptions => ({
 
 test("each outcome that is answered gets its own arrow from its own handle", () => {
   const { graph, a, b } = drawn();
-  const around = surroundingsOf(graph, options(graph), null);
+  const around = surroundingsOf(graph, null);
   const arrows = edgesOf(graph, options(graph), around).filter((edge) => edge.source === a);
   expect(arrows.map((edge) => [edge.sourceHandle, edge.target])).toEqual([
     ["on_true", b],

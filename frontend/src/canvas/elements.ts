@@ -15,16 +15,9 @@ import {
   spokenOutcomes,
 } from "../graph/model";
 import type { Progress } from "../status/progress";
-import { CARD, PILL, type Positions } from "./geometry/arrange";
-import { laneBack, laneFor, MOST_CARDS, type Rectangle } from "./geometry/detours";
-import {
-  alongCurve,
-  alongLane,
-  anchorOf,
-  type LabelRequest,
-  placeLabels,
-  sizeOf,
-} from "./geometry/label-places";
+import { type Bundle, bundlesOf, pillSizeOf } from "./arrows/bundles";
+import { gridOffset, type Scene, type SceneCard } from "./arrows/scene";
+import { CARD, type Positions, pillSize } from "./geometry/arrange";
 import { type NoteNode, noteNodes } from "./notes/note-nodes";
 import { OUTCOMES, outcomeWord } from "./outcome";
 import { type ProblemMark, type ProblemMarks, problemMarkWords } from "./problem-marks";
@@ -53,27 +46,23 @@ export type Arrow = Edge<
     relation: string;
     outcome: Precondition;
     response: Response;
-    /** What the whole relation says; only the first arrow of a relation carries the label. */
+    /** What the whole relation says; only the first arrow of a relation has it. */
     answers: readonly OutcomeResponse[] | null;
     /** What is wrong with the relation; on its first arrow. */
     mark: ProblemMark | null;
-    optional: boolean;
+    /** The line on which it runs, with the other outcomes of the same response. */
+    bundle: Bundle;
+    /** The first of its bundle draws the line, and what the whole bundle says. */
     lead: boolean;
-    /** The x of the lane on which it goes round cards; null: straight down. */
-    lane: number | null;
     entry: boolean;
     lit: boolean;
-    /** Where the label stands; null: in the middle of the way. */
-    label: ArrowLabel | null;
+    /** The outcome of the bundle that came in the parent's last visit. */
+    came: Precondition | null;
+    /** The parent has ended, and with none of the bundle's outcomes. */
+    passed: boolean;
   },
   "outcome"
 >;
-
-interface ArrowLabel {
-  readonly x: number;
-  readonly y: number;
-  readonly anchor: LabelRequest["anchor"];
-}
 
 /** The outcomes that get the same response, together, in the fixed order of outcomes. */
 export function responsesOf(relation: Relation): OutcomeResponse[] {
@@ -182,49 +171,36 @@ function isLit(relation: Relation, outcome: Precondition, options: ArrowOptions)
   return parent !== undefined && `on_${parent.tone}` === outcome;
 }
 
-/**
- * Where cards stand. Empty when there are too many to look for ways round them, and from left to
- * right, where arrows go straight.
- */
-function boxesOf(graph: Graph, options: NodeOptions): Map<Key, Rectangle> {
-  const boxes = new Map<Key, Rectangle>();
-  if (graph.actions.length > MOST_CARDS || graph.direction === "right") return boxes;
+const FARTHEST = 1e7; // px; a file may put a card anywhere
+const END_WIDTH = 84; // px of an end that are seen, in the middle of its place
+
+/** What lines are drawn between. `offset` is that of the scene before. */
+export function sceneOf(
+  graph: Graph,
+  options: Pick<NodeOptions, "places" | "measured" | "marks">,
+  offset: number | null,
+): Scene {
+  const { direction } = graph;
+  const cards: SceneCard[] = [];
+  const pill = pillSize(direction);
   const put = (key: Key, size: { width: number; height: number }) => {
     const at = options.places.get(key);
     const { width = size.width, height = size.height } = options.measured.get(key) ?? {};
-    if (at) boxes.set(key, { x: at[0], y: at[1], width, height });
+    if (!at?.every((coordinate) => Math.abs(coordinate) < FARTHEST)) return;
+    const seen = size === pill ? Math.min(END_WIDTH, width) : width;
+    cards.push({ key, x: at[0] + (width - seen) / 2, y: at[1], width: seen, height });
   };
+  put(ENTRY, pill);
   for (const { key } of graph.actions) put(key, CARD);
-  put(ENTRY, PILL);
-  put(EXIT, PILL);
-  return boxes;
-}
-
-/** Where on the lower edge of a card an arrow begins, from its left. */
-export function outcomeOffset(entry: boolean, outcome: Precondition): number {
-  return entry ? 0.5 : 0.14 + 0.24 * OUTCOMES.indexOf(outcome);
-}
-
-const LANE_WIDTH = 9; // px between the lanes of one relation's outcomes
-
-function laneOf(
-  relation: Relation,
-  outcome: Precondition,
-  boxes: Map<Key, Rectangle>,
-): number | null {
-  const from = boxes.get(relation.parent);
-  const to = boxes.get(relation.child);
-  if (!from || !to || relation.parent === relation.child) return null;
-  const at = OUTCOMES.indexOf(outcome);
-  const share = outcomeOffset(relation.parent === ENTRY, outcome);
-  const start = { x: from.x + from.width * share, y: from.y + from.height };
-  const others = [...boxes]
-    .filter(([key]) => key !== relation.parent && key !== relation.child)
-    .map(([, box]) => box);
-  if (to.y < start.y + 10) return laneBack(from, to, others) - LANE_WIDTH * at;
-  const lane = laneFor(start, { x: to.x + to.width / 2, y: to.y }, others);
-  if (lane === null) return null;
-  return lane + Math.sign(lane - to.x) * LANE_WIDTH * at;
+  put(EXIT, pill);
+  const lines = graph.relations.flatMap((relation) =>
+    bundlesOf(relation).map((bundle, i) => {
+      const marked = i === 0 && options.marks.has(bundle.relation);
+      const { id, source, target } = bundle;
+      return { id, source, target, pill: pillSizeOf(bundle, marked) };
+    }),
+  );
+  return { direction, offset: gridOffset(cards, direction, offset), cards, lines };
 }
 
 function cardWords(action: Action, { progress, marks }: NodeOptions): string {
@@ -253,19 +229,12 @@ function arrowWords(relation: Relation, outcome: Precondition, names: Names): st
 
 /** What arrows have to know of cards: the same as before when it says the same. */
 export interface CardSurroundings {
-  readonly boxes: Map<Key, Rectangle>;
   readonly names: Names;
 }
 
-export function surroundingsOf(
-  graph: Graph,
-  options: NodeOptions,
-  before: CardSurroundings | null,
-): CardSurroundings {
+export function surroundingsOf(graph: Graph, before: CardSurroundings | null): CardSurroundings {
   const names = namesOf(graph);
-  const boxes = boxesOf(graph, options);
-  const same = before !== null && alikeMaps(before.names, names) && alikeMaps(before.boxes, boxes);
-  return same ? before : { boxes, names };
+  return before !== null && alikeMaps(before.names, names) ? before : { names };
 }
 
 function alikeMaps<T>(a: ReadonlyMap<Key, T>, b: ReadonlyMap<Key, T>): boolean {
@@ -277,42 +246,44 @@ function alikeMaps<T>(a: ReadonlyMap<Key, T>, b: ReadonlyMap<Key, T>): boolean {
   return true;
 }
 
-function arrowsOf(
-  relation: Relation,
-  options: ArrowOptions,
-  { boxes, names }: CardSurroundings,
-): Arrow[] {
+function arrowsOf(relation: Relation, options: ArrowOptions, { names }: CardSurroundings): Arrow[] {
   const id = relationId(relation);
   const outcomes = spokenOutcomes(relation.conditions);
   const shown: Precondition[] = outcomes.length > 0 ? outcomes : ["on_true"];
   const entry = relation.parent === ENTRY;
   const mark = options.marks.get(id) ?? null;
   const selected = options.selected.has(id);
-  return shown.map((outcome, i) => ({
-    id: `${id}|${outcome}`,
-    type: "outcome",
-    ariaLabel: arrowWords(relation, outcome, names) + problemMarkWords(i === 0 ? mark : null),
-    source: relation.parent,
-    target: relation.child,
-    sourceHandle: entry ? "start" : outcome,
-    targetHandle: "in",
-    selected,
-    // Where several begin or end, the chosen one is the one whose end can be taken.
-    ...(selected ? { zIndex: 1 } : {}),
-    data: {
-      relation: id,
-      outcome,
-      response: relation.conditions[outcome],
-      answers: i === 0 && !entry ? responsesOf(relation) : null,
-      mark: i === 0 ? mark : null,
-      optional: !relation.required,
-      lead: i === 0,
-      lane: laneOf(relation, outcome, boxes),
-      entry,
-      lit: isLit(relation, outcome, options),
-      label: null,
-    },
-  }));
+  const bundles = bundlesOf(relation);
+  const led = new Set<string>();
+  const ended = `on_${options.progress.get(relation.parent)?.tone}`;
+  return shown.flatMap((outcome, i) => {
+    const response = relation.conditions[outcome];
+    const bundle = bundles.find((each) => each.response === response);
+    if (!bundle) return [];
+    const lead = !led.has(bundle.id);
+    led.add(bundle.id);
+    const came = entry ? null : (bundle.outcomes.find((each) => each === ended) ?? null);
+    const over = !entry && OUTCOMES.some((each) => each === ended);
+    return {
+      id: `${id}|${outcome}`,
+      type: "outcome" as const,
+      ariaLabel: arrowWords(relation, outcome, names) + problemMarkWords(i === 0 ? mark : null),
+      source: relation.parent,
+      target: relation.child,
+      sourceHandle: entry ? "start" : outcome,
+      targetHandle: "in",
+      selected,
+      // Where several begin or end, the chosen one is the one whose end can be taken.
+      ...(selected ? { zIndex: 1 } : {}),
+      data: {
+        ...{ relation: id, outcome, response, bundle, lead, entry, came },
+        answers: i === 0 && !entry ? responsesOf(relation) : null,
+        mark: i === 0 ? mark : null,
+        lit: isLit(relation, outcome, options),
+        passed: over && came === null,
+      },
+    };
+  });
 }
 
 export function edgesOf(
@@ -320,61 +291,9 @@ export function edgesOf(
   options: ArrowOptions,
   around: CardSurroundings,
 ): Arrow[] {
-  const arrows = relations
+  return relations
     .filter(({ parent, child }) => around.names.has(parent) && around.names.has(child))
     .flatMap((relation) => arrowsOf(relation, options, around));
-  return labelled(arrows, around.boxes);
-}
-
-/** The same arrows with places for their labels. */
-function labelled(arrows: Arrow[], boxes: Map<Key, Rectangle>): Arrow[] {
-  const wishes = arrows.flatMap((arrow) => wishOf(arrow, arrows, boxes) ?? []);
-  const places = placeLabels(wishes, [...boxes.values()]);
-  const anchors = new Map(wishes.map(({ id, anchor }) => [id, anchor]));
-  return arrows.map((arrow) => {
-    const at = places.get(arrow.id);
-    const anchor = anchors.get(arrow.id);
-    if (!at || !anchor || !arrow.data) return arrow;
-    const label = { x: Math.round(at.x), y: Math.round(at.y), anchor };
-    return { ...arrow, data: { ...arrow.data, label } };
-  });
-}
-
-function wishOf(
-  arrow: Arrow,
-  arrows: readonly Arrow[],
-  boxes: Map<Key, Rectangle>,
-): LabelRequest | null {
-  const { data, source, target } = arrow;
-  const [from, to] = [boxes.get(source), boxes.get(target)];
-  if (!data || (!data.answers && !data.mark) || !from || !to || source === target) return null;
-  const optional = data.optional ? " · optional" : "";
-  const lines = (data.answers ?? []).map(({ outcomes, response }) => ({
-    text: `${outcomes.map((outcome) => outcomeWord[outcome]).join(" ")} → ${response}${optional}`,
-    signs: outcomes.length,
-  }));
-  const size = sizeOf(lines);
-  const wide = data.mark ? { ...size, width: size.width + 34 } : size;
-  // The label speaks for all arrows of its relation: it stands between them.
-  const shares = arrows
-    .filter((other) => other.data?.relation === data.relation && other.data.lane === null)
-    .map((other) => outcomeOffset(other.data?.entry === true, other.data?.outcome ?? "on_true"));
-  const lead = outcomeOffset(data.entry, data.outcome);
-  const mean = shares.reduce((sum, share) => sum + share, 0) / Math.max(1, shares.length);
-  const start = {
-    x: from.x + from.width * (data.lane === null ? mean : lead),
-    y: from.y + from.height,
-  };
-  const end = { x: to.x + to.width / 2, y: to.y };
-  if (data.lane === null) {
-    if (end.y < start.y + 8) return null;
-    return { id: arrow.id, ...wide, anchor: "middle", points: alongCurve(start, end) };
-  }
-  const down = end.y > start.y;
-  const points = down
-    ? alongLane(data.lane, start.y + 30, end.y - 30)
-    : alongLane(data.lane, start.y + 20, end.y - 20);
-  return { id: arrow.id, ...wide, anchor: anchorOf(data.lane, start.x, end.x), points };
 }
 
 /** `next`, with every element of `before` that says the same in its place. */

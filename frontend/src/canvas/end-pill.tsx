@@ -9,9 +9,10 @@ export const EndPill = memo(function EndPill({
   data,
   selected,
   isConnectable,
+  sourcePosition = Position.Bottom,
+  targetPosition = Position.Top,
 }: NodeProps<EndNode>) {
   const entry = data.end === "entry";
-  const right = data.direction === "right";
   return (
     <div className={style.frame} data-direction={data.direction}>
       <div className={style.pill} data-end={data.end} data-selected={selected || undefined}>
@@ -24,15 +25,7 @@ export const EndPill = memo(function EndPill({
         <Handle
           type={entry ? "source" : "target"}
           id={entry ? "start" : "in"}
-          position={
-            right
-              ? entry
-                ? Position.Right
-                : Position.Left
-              : entry
-                ? Position.Bottom
-                : Position.Top
-          }
+          position={entry ? sourcePosition : targetPosition}
           className={style.handle ?? ""}
           isConnectable={isConnectable}
           role="img"

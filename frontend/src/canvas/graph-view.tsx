@@ -6,11 +6,12 @@ import {
   type NodeTypes,
   ReactFlow,
 } from "@xyflow/react";
-import { useMemo, useState } from "react";
+import { useEffect, useMemo, useState } from "react";
 import type { Graph, Key } from "../graph/model";
 import type { Progress } from "../status/progress";
 import { ActionCard } from "./action-card";
-import { type CanvasNode, edgesOf, nodesOf, surroundingsOf } from "./elements";
+import { LineContext, LineStore } from "./arrows/line-store";
+import { type CanvasNode, edgesOf, nodesOf, sceneOf, surroundingsOf } from "./elements";
 import { EndPill } from "./end-pill";
 import { useLaidOut } from "./geometry/use-laid-out";
 import { NoteCard } from "./notes/note-card";
@@ -45,41 +46,47 @@ export function GraphView({ graph, progress, selected = NONE, label, onSelect }:
   );
   const nodes = useMemo(() => nodesOf(graph, options), [graph, options]);
   const edges = useMemo(
-    () => edgesOf(graph, options, surroundingsOf(graph, options, null)),
+    () => edgesOf(graph, options, surroundingsOf(graph, null)),
     [graph, options],
   );
+  const [lines] = useState(() => new LineStore());
+  useEffect(() => lines.show(sceneOf(graph, options, lines.offset)), [lines, graph, options]);
+  useEffect(() => () => lines.close(), [lines]);
   // It fits what it shows once, on its first drawing.
   if (laidOut === null) return <div aria-busy="true" aria-label={label} role="img" />;
   return (
-    <ReactFlow<CanvasNode>
-      nodes={nodes}
-      edges={edges}
-      nodeTypes={nodeTypes}
-      edgeTypes={edgeTypes}
-      onNodesChange={(changes) => {
-        const sized = changes.filter((change) => change.type === "dimensions");
-        if (sized.length === 0) return;
-        setMeasured((before) => {
-          const next = new Map(before);
-          for (const change of sized) if (change.dimensions) next.set(change.id, change.dimensions);
-          return next;
-        });
-      }}
-      onNodeClick={(_, node) => onSelect?.(node.type === "action" ? node.id : null)}
-      onPaneClick={() => onSelect?.(null)}
-      nodesDraggable={false}
-      nodesConnectable={false}
-      panActivationKeyCode={null} // Space plays the replay
-      edgesFocusable={false}
-      fitView
-      fitViewOptions={{ maxZoom: 1, padding: 0.12 }}
-      minZoom={0.1}
-      maxZoom={2}
-      proOptions={{ hideAttribution: true }}
-      aria-label={label}
-    >
-      <ArrowTips />
-      <Background variant={BackgroundVariant.Dots} gap={20} size={1.4} />
-    </ReactFlow>
+    <LineContext value={lines}>
+      <ReactFlow<CanvasNode>
+        nodes={nodes}
+        edges={edges}
+        nodeTypes={nodeTypes}
+        edgeTypes={edgeTypes}
+        onNodesChange={(changes) => {
+          const sized = changes.filter((change) => change.type === "dimensions");
+          if (sized.length === 0) return;
+          setMeasured((before) => {
+            const next = new Map(before);
+            for (const change of sized)
+              if (change.dimensions) next.set(change.id, change.dimensions);
+            return next;
+          });
+        }}
+        onNodeClick={(_, node) => onSelect?.(node.type === "action" ? node.id : null)}
+        onPaneClick={() => onSelect?.(null)}
+        nodesDraggable={false}
+        nodesConnectable={false}
+        panActivationKeyCode={null} // Space plays the replay
+        edgesFocusable={false}
+        fitView
+        fitViewOptions={{ maxZoom: 1, padding: 0.12 }}
+        minZoom={0.1}
+        maxZoom={2}
+        proOptions={{ hideAttribution: true }}
+        aria-label={label}
+      >
+        <ArrowTips />
+        <Background variant={BackgroundVariant.Dots} gap={20} size={1.4} />
+      </ReactFlow>
+    </LineContext>
   );
 }

@@ -1,96 +1,148 @@
-/** An arrow from one outcome to what answers it, with the relation's answers in words. */
+/** An arrow from an outcome: the first of a bundle draws its line and pill, each its own port. */
 import { BaseEdge, EdgeLabelRenderer, type EdgeProps, useStoreApi } from "@xyflow/react";
-import { memo } from "react";
-import type { Arrow, OutcomeResponse } from "./elements";
-import { arrowPathOf } from "./geometry/arrow-path";
-import { OutcomeSign, outcomeColor, outcomeWord } from "./outcome";
+import { memo, useLayoutEffect, useRef } from "react";
+import { pillWord } from "./arrows/bundles";
+import { PILL_PLAY } from "./arrows/docks";
+import { behindPill, pathOf } from "./arrows/line-path";
+import { useIsOpen, useLine } from "./arrows/line-store";
+import type { RoutedLine } from "./arrows/routes";
+import type { Point } from "./arrows/scene";
+import type { Arrow } from "./elements";
+import { OutcomeSign, outcomeColor } from "./outcome";
 import style from "./outcome-arrow.module.css";
 import { ProblemBadge } from "./problem-badge";
 
-function AnswerLine({ answer, optional }: { answer: OutcomeResponse; optional: boolean }) {
-  return (
-    <span className={style.answer}>
-      {answer.outcomes.map((outcome) => (
-        <span key={outcome} className={style.part} style={{ color: outcomeColor[outcome] }}>
-          <OutcomeSign outcome={outcome} size={10} />
-          {outcomeWord[outcome]}
-        </span>
-      ))}
-      <span className={style.response}>
-        → {answer.response}
-        {optional && " · optional"}
-      </span>
-    </span>
-  );
+type ArrowData = NonNullable<Arrow["data"]>;
+
+/** One outcome colours its line, and so does the one that came; several have none in common. */
+function toneOf({ bundle, entry, came }: ArrowData): keyof typeof TIPS {
+  if (entry) return "edge";
+  if (bundle.response === "ignore") return "ignore";
+  if (came !== null) return came;
+  const [only, ...others] = bundle.outcomes;
+  return only && others.length === 0 ? only : "edge";
 }
 
-const SHIFTS = { left: "-10px", middle: "-50%", right: "calc(-100% + 10px)" } as const;
+/** How far a pill moves away from its card, to make room for ports. */
+function played({ pill, docked, direction }: RoutedLine, open: boolean): Point | null {
+  if (!pill || !docked || !open) return pill;
+  return direction === "right" ? [pill[0] + PILL_PLAY, pill[1]] : [pill[0], pill[1] + PILL_PLAY];
+}
+
+/** From a port to the pill that speaks for it. */
+function stub(line: RoutedLine, x: number, y: number, pill: Point): Point[] {
+  const [side] = line.points;
+  if (line.direction === "right") {
+    const turn = (side?.[0] ?? x) + 15;
+    return [[x - 10, y], [turn, y], [turn, pill[1]], pill];
+  }
+  const turn = (side?.[1] ?? y) + 15;
+  return [[x, y - 10], [x, turn], [pill[0], turn], pill];
+}
 
 export const OutcomeArrow = memo(function OutcomeArrow(props: EdgeProps<Arrow>) {
-  const { id, data, selected } = props;
-  const store = useStoreApi();
-  const { path, ...middle } = arrowPathOf(props, data?.lane ?? null);
-  if (!data) return null;
-  const { x, y, anchor } = data.label ?? middle;
-  const color = data.entry
-    ? "var(--ink3)"
-    : data.response === "ignore"
-      ? "var(--ink4)"
-      : outcomeColor[data.outcome];
-  const dash = data.entry || data.response === "run" ? undefined : "6 4";
+  const { id, data, selected, sourceX, sourceY, targetX, targetY } = props;
+  const group = useRef<SVGGElement>(null);
+  const bundle = data?.bundle.id ?? "";
+  const line = useLine(bundle);
+  const open = useIsOpen(bundle) || selected === true;
+  const [endX, endY] = line?.points.at(-1) ?? [targetX, targetY];
+  const [dx, dy] = line?.direction === "right" ? [0, endY - targetY] : [endX - targetX, 0];
+  useLayoutEffect(() => {
+    // React Direction puts the end that can be taken where the input of the card is.
+    const edge = group.current?.closest<SVGGElement>(".react-flow__edge");
+    edge?.style.setProperty("--end", `${dx}px ${dy}px`);
+  }, [dx, dy]);
+  if (!data || !line) return <g ref={group} />;
+  const pill = played(line, open);
+  const opened = open && line.docked && pill !== null && !data.entry;
   return (
-    <>
-      <BaseEdge
-        id={id}
-        path={path}
-        interactionWidth={22}
-        markerEnd={`url(#tip-${data.entry ? "entry" : data.response === "ignore" ? "ignore" : data.outcome})`}
-        style={{
-          stroke: color,
-          strokeWidth: selected ? 3 : data.lit ? 2.6 : 1.8,
-          ...(dash ? { strokeDasharray: dash } : {}),
-        }}
-      />
-      {(data.answers || data.mark) && (
-        <EdgeLabelRenderer>
-          <button
-            type="button"
-            tabIndex={-1}
-            className={style.label}
-            onClick={() => store.getState().addSelectedEdges([id])}
-            data-selected={selected || undefined}
-            data-plain={(data.answers && isPlain(data.answers)) || undefined}
-            data-relation={data.relation}
-            style={{ transform: `translate(${SHIFTS[anchor]}, -50%) translate(${x}px, ${y}px)` }}
-          >
-            {data.mark && <ProblemBadge mark={data.mark} on="arrow" />}
-            {data.answers && (
-              <span className={style.answers}>
-                {data.answers.map((answer, i) => (
-                  <AnswerLine
-                    key={answer.response}
-                    answer={answer}
-                    optional={data.optional && i === (data.answers?.length ?? 0) - 1}
-                  />
-                ))}
-                {data.answers.length === 0 && <span className={style.response}>ignores all</span>}
-              </span>
-            )}
-          </button>
-        </EdgeLabelRenderer>
+    <g ref={group}>
+      {data.lead && (
+        <BundleLine {...{ id, data, line, pill, opened }} selected={selected === true} />
       )}
-    </>
+      {opened && (
+        <BaseEdge
+          id={`${id}|port`}
+          path={pathOf(stub(line, sourceX, sourceY, pill), 5)}
+          interactionWidth={14}
+          className={style.stub ?? ""}
+          style={{ stroke: outcomeColor[data.outcome], strokeWidth: data.lit ? 2.75 : 2 }}
+        />
+      )}
+      {data.lead && pill && <Pill {...{ id, data, line, pill }} selected={selected === true} />}
+    </g>
   );
 });
 
-/** Only `true → run`: what most arrows say, so it may be quiet. */
-function isPlain(answers: readonly OutcomeResponse[]): boolean {
-  const [only] = answers;
-  return answers.length === 1 && only?.response === "run" && only.outcomes.join() === "on_true";
+interface BundleProps {
+  id: string;
+  data: ArrowData;
+  line: RoutedLine;
+  pill: Point | null;
+  selected: boolean;
+}
+
+function BundleLine({ id, data, line, pill, selected, opened }: BundleProps & { opened: boolean }) {
+  const tone = toneOf(data);
+  const lit = data.lit || data.came !== null;
+  const points = pill && opened ? [pill, ...behindPill(line)] : line.points;
+  return (
+    <BaseEdge
+      id={id}
+      path={pathOf(points)}
+      interactionWidth={22}
+      markerEnd={`url(#tip-${tone})`}
+      className={style.line ?? ""}
+      style={{
+        stroke: TIPS[tone],
+        strokeWidth: lit ? 2.75 : selected ? 2.5 : 1.8,
+        ...(data.passed ? { opacity: 0.38 } : {}),
+        ...(data.bundle.optional ? { strokeDasharray: "5 4" } : {}),
+      }}
+    />
+  );
+}
+
+/** What a bundle says; whoever cannot see it hears it from its arrows. */
+function Pill({ id, data, pill: [x, y], selected }: BundleProps & { pill: Point }) {
+  const store = useStoreApi();
+  const word = pillWord(data.bundle);
+  return (
+    <EdgeLabelRenderer>
+      <div
+        className={style.pill}
+        data-selected={selected || undefined}
+        data-passed={data.passed || undefined}
+        // Once for a relation, whatever it says: who looks for it finds one.
+        data-relation={data.answers || data.entry ? data.relation : undefined}
+        style={{ transform: `translate(-50%, -50%) translate(${x}px, ${y}px)` }}
+      >
+        {data.mark && (
+          // biome-ignore lint/a11y/noStaticElementInteractions: chosen by keys like every arrow
+          // biome-ignore lint/a11y/useKeyWithClickEvents: the arrow itself is chosen by keys
+          <span className={style.mark} onClick={() => store.getState().addSelectedEdges([id])}>
+            <ProblemBadge mark={data.mark} on="arrow" />
+          </span>
+        )}
+        {!data.entry &&
+          data.bundle.outcomes.map((outcome) => (
+            <span key={outcome} className={style.glyph} style={{ color: outcomeColor[outcome] }}>
+              <OutcomeSign outcome={outcome} size={11} />
+            </span>
+          ))}
+        {word !== "" && (
+          <span className={style.word} aria-hidden>
+            {word}
+          </span>
+        )}
+      </div>
+    </EdgeLabelRenderer>
+  );
 }
 
 const TIPS = {
-  entry: "var(--ink3)",
+  edge: "var(--edge)",
   ignore: "var(--ink4)",
   on_true: "var(--true)",
   on_false: "var(--false)",

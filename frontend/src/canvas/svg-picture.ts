@@ -1,22 +1,17 @@
 /** A graph as one SVG picture, drawn from the same elements as the canvas. Pure. */
 
-import { Position as Side } from "@xyflow/react";
 import { type Note, notesOf } from "../graph/edit/notes";
 import type { Direction, Graph, Key, Position, Precondition } from "../graph/model";
 import { cardLines, lineText } from "../graph/value-text";
 import { colorOfName } from "../ui/name-colors";
-import {
-  type Arrow,
-  type CanvasNode,
-  edgesOf,
-  nodesOf,
-  outcomeOffset,
-  surroundingsOf,
-} from "./elements";
+import { type Bundle, bundlesOf, pillWord } from "./arrows/bundles";
+import { pathOf } from "./arrows/line-path";
+import { type LineMap, type RoutedLine, routed } from "./arrows/routes";
+import type { PillSize, Scene } from "./arrows/scene";
+import { type CanvasNode, nodesOf, sceneOf } from "./elements";
 import { CARD, pillSize, type Sizes } from "./geometry/arrange";
-import { type ArrowEnds, arrowPathOf } from "./geometry/arrow-path";
 import { noteColor } from "./notes/note-colors";
-import { OUTCOMES, outcomeColor, outcomeWord } from "./outcome";
+import { OUTCOMES, outcomeColor } from "./outcome";
 import { NO_PROBLEM_MARKS } from "./problem-marks";
 
 export interface SvgPicture {
@@ -59,7 +54,10 @@ export function svgPictureOf(
 
 class Painter {
   private readonly nodes: CanvasNode[];
-  private readonly edges: Arrow[];
+  private readonly bundles: readonly Bundle[];
+  private readonly scene: Scene;
+  private readonly lines: LineMap;
+  private readonly pills: ReadonlyMap<string, PillSize | null>;
   private readonly notes: readonly Note[];
   private readonly sizes: Sizes;
   private readonly direction: Direction;
@@ -82,16 +80,19 @@ class Painter {
       measured: sizes,
     };
     this.nodes = nodesOf(graph, options);
-    this.edges = edgesOf(graph, options, surroundingsOf(graph, options, null));
+    this.bundles = graph.relations.flatMap(bundlesOf);
+    this.scene = sceneOf(graph, options, null);
+    this.lines = routed(this.scene).lines;
+    this.pills = new Map(this.scene.lines.map(({ id, pill }) => [id, pill]));
     this.notes = notesOf(graph);
   }
 
   picture(): SvgPicture {
     const parts = [
       ...this.notes.filter(({ kind }) => kind === "frame").map((note) => this.frame(note)),
-      ...this.edges.map((edge) => this.arrow(edge)),
+      ...this.bundles.map((bundle) => this.line(bundle)),
       ...this.nodes.map((node) => this.node(node)),
-      ...this.edges.map((edge) => this.label(edge)),
+      ...this.bundles.map((bundle) => this.pill(bundle)),
       ...this.notes.filter(({ kind }) => kind === "note").map((note) => this.note(note)),
     ];
     const [left, top, right, bottom] = this.bounds();
@@ -122,19 +123,18 @@ class Painter {
         return [x, y - 12, x + width, y + height + 12];
       }),
       ...this.notes.map(({ at, size }) => [at[0], at[1] - 22, at[0] + size[0], at[1] + size[1]]),
-      ...this.edges.flatMap(({ data }) => {
-        const xs = [data?.lane, data?.label?.x].filter((x) => typeof x === "number");
-        return xs.map((x) => [x - 60, 0, x + 60, 0]);
-      }),
+      ...[...this.lines.values()].flatMap(({ points }) =>
+        points.map(([x, y]) => [x - 6, y - 6, x + 6, y + 6]),
+      ),
     ];
-    const ys = boxes.filter((box) => box[1] !== 0 || box[3] !== 0);
-    const pick = (list: number[][], i: number) => list.map((box) => box[i] ?? 0);
-    return [
-      Math.min(...pick(boxes, 0)),
-      Math.min(...pick(ys, 1)),
-      Math.max(...pick(boxes, 2)),
-      Math.max(...pick(ys, 3)),
-    ].map(Math.round) as [number, number, number, number];
+    const least = (i: number) => boxes.reduce((n, box) => Math.min(n, box[i] ?? n), Infinity);
+    const most = (i: number) => boxes.reduce((n, box) => Math.max(n, box[i] ?? n), -Infinity);
+    return [least(0), least(1), most(2), most(3)].map(Math.round) as [
+      number,
+      number,
+      number,
+      number,
+    ];
   }
 
   private text(words: string, x: number, y: number, more: string): string {
@@ -219,59 +219,45 @@ class Painter {
     );
   }
 
-  private arrow(edge: Arrow): string {
-    const { data } = edge;
-    const [from, to] = [edge.source, edge.target].map((id) => this.nodes.find((n) => n.id === id));
-    if (!data || !from || !to) return "";
-    const source = this.size(from.id, from.type ?? "");
-    const target = this.size(to.id, to.type ?? "");
-    const out = data.entry ? 7 : 11;
-    const right = this.direction === "right";
-    const row = data.entry ? 0 : (OUTCOMES.indexOf(data.outcome) - 1.5) * 22;
-    const ends: ArrowEnds = right
-      ? {
-          sourceX: from.position.x + source.width + out,
-          sourceY: from.position.y + source.height / 2 + row,
-          targetX: to.position.x - 7,
-          targetY: to.position.y + target.height / 2,
-          sourcePosition: Side.Right,
-        }
-      : {
-          sourceX: from.position.x + source.width * outcomeOffset(data.entry, data.outcome),
-          sourceY: from.position.y + source.height + out,
-          targetX: to.position.x + target.width / 2,
-          targetY: to.position.y - 7,
-        };
-    const color = this.paint(
-      data.entry ? "--ink3" : data.response === "ignore" ? "--ink4" : outcomeColor[data.outcome],
-    );
-    const dash = data.entry || data.response === "run" ? "" : ` stroke-dasharray="6 4"`;
-    const { targetX: x, targetY: y } = ends;
+  private colorOf({ entry, response, outcomes: [only, ...others] }: Bundle): string {
+    if (!entry && response === "ignore") return this.paint("--ink4");
+    return this.paint(!entry && only && others.length === 0 ? outcomeColor[only] : "--edge");
+  }
+
+  private line(bundle: Bundle): string {
+    const line = this.lines.get(bundle.id);
+    const [x, y] = line?.points.at(-1) ?? [0, 0];
+    if (!line) return "";
+    const color = this.colorOf(bundle);
+    const dash = bundle.optional ? ` stroke-dasharray="5 4"` : "";
+    const head =
+      line.direction === "right"
+        ? `M${x - 8} ${y - 4.5}L${x} ${y}L${x - 8} ${y + 4.5}Z`
+        : `M${x - 4.5} ${y - 8}L${x} ${y}L${x + 4.5} ${y - 8}Z`;
     return (
-      `<path d="${arrowPathOf(ends, data.lane).path}" fill="none" stroke="${color}" stroke-width="1.8"${dash}/>` +
-      `<path d="${right ? `M${x - 7} ${y - 4.5}L${x + 1} ${y}L${x - 7} ${y + 4.5}Z` : `M${x - 4.5} ${y - 7}L${x} ${y + 1}L${x + 4.5} ${y - 7}Z`}" fill="${color}"/>`
+      `<path d="${pathOf(line.points)}" fill="none" stroke="${color}" stroke-width="1.8"${dash}/>` +
+      `<path d="${head}" fill="${color}"/>`
     );
   }
 
-  private label({ data }: Arrow): string {
-    if (!data?.answers || !data.label) return "";
-    const { x, y, anchor } = data.label;
-    const side = { left: "start", middle: "middle", right: "end" }[anchor];
-    const top = y + 4 - (data.answers.length - 1) * 8.5;
-    return data.answers
-      .map(({ outcomes, response }, i) => {
-        const words = outcomes.map(
-          (o) =>
-            `<tspan fill="${this.paint(outcomeColor[o])}">${SIGNS[o]} ${outcomeWord[o]} </tspan>`,
-        );
-        const last = data.optional && i === (data.answers?.length ?? 0) - 1 ? " · optional" : "";
-        return (
-          `<text x="${x}" y="${top + i * 17}" font-size="11" font-weight="600" text-anchor="${side}" ` +
-          `stroke="${this.paint("--canvas")}" stroke-width="4" paint-order="stroke">${words.join("")}` +
-          `<tspan fill="${this.paint("--ink2")}" font-weight="500">→ ${response}${last}</tspan></text>`
-        );
-      })
-      .join("");
+  private pill(bundle: Bundle): string {
+    const line: RoutedLine | undefined = this.lines.get(bundle.id);
+    const size = this.pills.get(bundle.id);
+    if (!line?.pill || !size) return "";
+    const [x, y] = line.pill;
+    const { width, height } = size;
+    const glyphs = bundle.outcomes
+      .map(
+        (outcome) => `<tspan fill="${this.paint(outcomeColor[outcome])}">${SIGNS[outcome]}</tspan>`,
+      )
+      .join(" ");
+    const word = pillWord(bundle);
+    const said = word === "" ? "" : ` <tspan fill="${this.paint("--ink2")}">${word}</tspan>`;
+    return (
+      `<rect x="${x - width / 2}" y="${y - height / 2}" width="${width}" height="${height}" rx="10" ` +
+      `fill="${this.paint("--raised")}" stroke="${this.paint("--line2")}"/>` +
+      `<text x="${x}" y="${y + 4}" font-size="11" font-weight="600" text-anchor="middle">${glyphs}${said}</text>`
+    );
   }
 
   private frame({ at: [x, y], size: [width, height], text, color }: Note): string {

@@ -148,7 +148,10 @@ export const showJson: EditAction = {
  * The nearest neighbour along arrows: in the direction of the graph to what follows, against it to
  * what comes before, or beside.
  */
-export function neighbour(context: EditorContext, way: "up" | "down" | "left" | "right"): Key | null {
+export function neighbour(
+  context: EditorContext,
+  way: "up" | "down" | "left" | "right",
+): Key | null {
   const { relations, actions, direction } = context.graph;
   const right = direction === "right";
   const [onward, back] = right ? (["right", "left"] as const) : (["down", "up"] as const);

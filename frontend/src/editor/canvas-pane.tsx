@@ -77,6 +77,14 @@ function Emptiness({ waiting, context }: { waiting: boolean; context: EditorCont
   );
 }
 
+function FollowRun({ onFollow }: { onFollow: () => void }) {
+  return (
+    <Button size="compact-sm" leftSection={<IconFocus2 size={15} />} onClick={onFollow}>
+      Follow the run
+    </Button>
+  );
+}
+
 function Inside(props: Props) {
   const { me, canvasHandle, progress, marks, compact, phone, run, writing, record, corner } = props;
   const calm = useEditorContext();
@@ -96,6 +104,7 @@ function Inside(props: Props) {
   const { flow, places, sizes } = canvas;
   const frame = useRef<HTMLDivElement>(null);
   const pointer = useRef<Position | null>(null);
+  const waiting = !arrived || (first.pending && context.graph.actions.length > 1);
   const begun = arrived && context.graph.actions.length > 0 && !first.pending;
   const { view, lost, onPanned, onFollow } = useViewport({
     flow,
@@ -132,10 +141,7 @@ function Inside(props: Props) {
           pointer={pointer}
           writing={writing}
         />
-        <Emptiness
-          waiting={!arrived || (first.pending && context.graph.actions.length > 1)}
-          context={context}
-        />
+        <Emptiness waiting={waiting} context={context} />
         {!compact && (
           <div className={style.robots} data-covers="top">
             <RobotFilter />
@@ -150,11 +156,7 @@ function Inside(props: Props) {
           <Toolbar compact={compact} />
         </div>
         <div className={style.corner}>
-          {lost && (
-            <Button size="compact-sm" leftSection={<IconFocus2 size={15} />} onClick={onFollow}>
-              Follow the run
-            </Button>
-          )}
+          {lost && <FollowRun onFollow={onFollow} />}
           {!context.dryRun && corner}
         </div>
       </div>

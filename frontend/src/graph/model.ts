@@ -27,7 +27,7 @@ export type Response = (typeof RESPONSES)[number];
 /** What a child does for each outcome of its parent. */
 export type Conditions = Readonly<Record<Precondition, Response>>;
 
-const IGNORE_ALL: Conditions = {
+export const IGNORE_ALL: Conditions = {
   on_true: "ignore",
   on_false: "ignore",
   on_error: "ignore",

@@ -18,12 +18,12 @@ export function seeded(seed: number): Random {
 const whole = (random: Random, below: number) => Math.floor(random() * below);
 
 /** Columns of cards, three of ten lines skip some or lead back, one of twenty goes back. */
-export function layeredScene(count: number, random: Random, flow: Scene["flow"]): Scene {
+export function layeredScene(count: number, random: Random, direction: Scene["direction"]): Scene {
   const rows = Math.max(2, Math.round(Math.sqrt(count * 0.6)));
   const columns = Math.ceil(count / rows);
   const cards = Array.from({ length: count }, (_, i): SceneCard => {
     const [column, row] = [Math.floor(i / rows), i % rows];
-    return flow === "right"
+    return direction === "right"
       ? { key: `c${i}`, x: column * 300, y: row * 130 + whole(random, 20), width: 160, height: 70 }
       : { key: `c${i}`, x: row * 270 + whole(random, 20), y: column * 200, width: 208, height: 84 };
   });
@@ -48,14 +48,14 @@ export function layeredScene(count: number, random: Random, flow: Scene["flow"])
     const pill = { width: 26 + 13 * whole(random, 3), height: 20 };
     lines.push({ id: `${source}>${target}`, source, target, pill });
   }
-  return { flow, offset: gridOffset(cards, flow, null), cards, lines };
+  return { direction, offset: gridOffset(cards, direction, null), cards, lines };
 }
 
 /** Cards anywhere, at least `gap` px apart, and lines between any of them. */
 export function thrownScene(
   count: number,
   random: Random,
-  flow: Scene["flow"],
+  direction: Scene["direction"],
   { gap = 32, lines: perCard = 1.3 } = {},
 ): Scene {
   const cards: SceneCard[] = [];
@@ -82,5 +82,5 @@ export function thrownScene(
     const pill = random() < 0.9 ? { width: 26 + whole(random, 60), height: 20 } : null;
     return { id: `l${i}`, source: `c${source}`, target: `c${target}`, pill };
   });
-  return { flow, offset: gridOffset(cards, flow, null), cards, lines };
+  return { direction, offset: gridOffset(cards, direction, null), cards, lines };
 }

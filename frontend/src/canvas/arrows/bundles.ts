@@ -30,7 +30,18 @@ export interface Bundle {
  * The lines of a relation. A pair that a file lists twice has two relations, each with lines of its
  * own, since each is selected and changed for itself.
  */
-export function bundlesOf(relation: Relation): Bundle[] {
+export function bundlesOf(relation: Relation): readonly Bundle[] {
+  const before = known.get(relation);
+  if (before) return before;
+  const bundles = made(relation);
+  known.set(relation, bundles);
+  return bundles;
+}
+
+/** A relation stays the same object until somebody changes it. */
+const known = new WeakMap<Relation, readonly Bundle[]>();
+
+function made(relation: Relation): Bundle[] {
   const id = relationId(relation);
   const outcomes = new Map<Response, Precondition[]>();
   for (const outcome of PRECONDITIONS) {

@@ -1,7 +1,7 @@
 /** Docks: where each line leaves its card, where its pill stands, where it enters the next. Pure. */
-import { type Box, BoxIndex, boxOf, type Scene, type SceneLine, STEP } from "./scene";
+import { BoxIndex, boxOf, type FlowBox, type Scene, type SceneLine, STEP } from "./scene";
 
-/** Along the flow (`u`) and across it (`v`); rows and columns are steps of the grid. */
+/** Along the direction (`u`) and across it (`v`); rows and columns are steps of the grid. */
 export interface Dock {
   readonly line: SceneLine;
   /** Where the line leaves the side of its card. */
@@ -12,9 +12,9 @@ export interface Dock {
   readonly end: { readonly column: number; readonly row: number };
   readonly to: { readonly u: number; readonly v: number };
   /** Where the pill stands; null where it finds no room beside its card. */
-  readonly pill: Box | null;
+  readonly pill: FlowBox | null;
   /** The piece along the card to a pill beyond its corner. */
-  readonly link: Box | null;
+  readonly link: FlowBox | null;
   /** Lines with the same end may lie on each other; so may those with the same start. */
   readonly sharesStart: string;
   readonly sharesEnd: string;
@@ -30,11 +30,13 @@ const APPROACH = 16;
 const BESIDE_PILL = 3;
 /** px from a card to the piece of a line that goes along it. */
 export const LINK = 4;
+/** Nobody can read more pills beside one card. */
+const MOST_DOCKED = 40;
 /** px across that a line without a pill takes beside those that have one. */
 const BARE = 8;
 
 interface End {
-  readonly box: Box & { key: string };
+  readonly box: FlowBox & { key: string };
   /** The rows of the grid that a line may have here, in the middle of the side. */
   readonly low: number;
   readonly high: number;
@@ -126,29 +128,30 @@ const ASIDE = 1e6;
 
 export class DockPlan {
   private readonly ends = new Map<string, End>();
-  private readonly cards = new BoxIndex<Box & { key: string }>();
-  private readonly pills = new BoxIndex<Box>();
-  private readonly approaches = new BoxIndex<Box>();
+  private readonly cards = new BoxIndex<FlowBox & { key: string }>();
+  private readonly pills = new BoxIndex<FlowBox>();
+  private readonly approaches = new BoxIndex<FlowBox>();
   /** Where lines leave the cards of others. */
-  private readonly exits = new BoxIndex<Box>();
-  private readonly exitOf = new Map<string, Box>();
+  private readonly exits = new BoxIndex<FlowBox>();
+  private readonly exitOf = new Map<string, FlowBox>();
   private readonly offset: number;
   readonly docks: readonly Dock[];
 
   constructor(scene: Scene) {
     this.offset = scene.offset;
     for (const card of scene.cards) {
-      const box = { ...boxOf(card, scene.flow), key: card.key };
+      const box = { ...boxOf(card, scene.direction), key: card.key };
       this.cards.add(box);
       this.ends.set(card.key, this.endOf(box));
     }
     const drafts = scene.lines.flatMap((line, order) => this.draft(line, order) ?? []);
-    for (const [, lines] of grouped(drafts, ({ line }) => line.target)) this.enter(lines);
+    for (const [, lines] of grouped(drafts, ({ line }) => line.target))
+      this.enter(lines, scene.direction);
     for (const draft of drafts) this.approaches.add(this.approach(draft));
     for (const key of new Set(drafts.map(({ line }) => line.source))) this.addExit(key);
     const docks: Dock[] = [];
     for (const [, lines] of grouped(drafts, ({ line }) => line.source))
-      docks.push(...this.leave(lines, scene.flow));
+      docks.push(...this.leave(lines, scene.direction));
     const order = new Map(scene.lines.map(({ id }, i) => [id, i]));
     this.docks = docks.sort((a, b) => (order.get(a.line.id) ?? 0) - (order.get(b.line.id) ?? 0));
   }
@@ -166,7 +169,7 @@ export class DockPlan {
     return row * STEP + this.offset;
   }
 
-  private endOf(box: Box & { key: string }): End {
+  private endOf(box: FlowBox & { key: string }): End {
     const side = box.v1 - box.v0;
     const inset = Math.min(12, side * 0.2);
     const row = (v: number) => (v - this.offset) / STEP;
@@ -184,7 +187,7 @@ export class DockPlan {
   }
 
   /** The rows on which lines enter one card. */
-  private enter(lines: DockDraft[]): void {
+  private enter(lines: DockDraft[], direction: Scene["direction"]): void {
     const rank = ({ source, target, back }: DockDraft) =>
       back && straightRow(source, target) !== null ? ASIDE : center(source);
     lines.sort((a, b) => rank(a) - rank(b) || a.order - b.order);
@@ -192,24 +195,37 @@ export class DockPlan {
     if (!first) return;
     const room = first.target.high - first.target.low + 1;
     const gap = lines.length * 2 - 1 <= room ? 2 : 1;
+    // Lines between the same two cards are as far apart as their pills, so that they are straight.
+    const apart = lines.map(({ line }, i) => {
+      const before = lines[i - 1]?.line;
+      return before?.source === line.source
+        ? Math.max(gap, rowsBetween(before, line, direction))
+        : gap;
+    });
+    const fits = apart.slice(1).reduce((sum, rows) => sum + rows, 1) <= room;
     const middle = Math.round((first.target.low + first.target.high) / 2);
     const slots = lines.map((draft, i) => {
       const straight = draft.back ? null : straightRow(draft.source, draft.target);
+      const own = { gap: fits ? (apart[i] ?? gap) : gap };
       return straight === null
-        ? { wish: middle + (i - (lines.length - 1) / 2) * gap, weight: 1, gap }
-        : { wish: straight, weight: 8, gap };
+        ? { wish: middle + (i - (lines.length - 1) / 2) * gap, weight: 1, ...own }
+        : { wish: straight, weight: 8, ...own };
     });
     const rows = slotRows(slots, first.target);
     for (const [i, draft] of lines.entries()) draft.into = rows[i] ?? middle;
   }
 
-  private approach(draft: DockDraft): Box {
+  private approach(draft: DockDraft): FlowBox {
     const v = this.v(draft.into);
     return { u0: endColumn(draft) * STEP, u1: draft.target.box.u0, v0: v, v1: v + 0.1 };
   }
 
   /** The rows on which lines leave one card, with their pills. */
-  private leave(lines: DockDraft[], flow: Scene["flow"], docked = true): Dock[] {
+  private leave(
+    lines: DockDraft[],
+    direction: Scene["direction"],
+    docked = lines.length <= MOST_DOCKED,
+  ): Dock[] {
     const rank = ({ source, target, back, into }: DockDraft) =>
       back && straightRow(source, target) !== null ? ASIDE : back ? center(target) : this.v(into);
     lines.sort((a, b) => rank(a) - rank(b) || a.order - b.order);
@@ -217,12 +233,9 @@ export class DockPlan {
     if (!first) return [];
     const { source } = first;
     const middle = Math.round((source.low + source.high) / 2);
-    const across = ({ line: { pill } }: DockDraft) =>
-      pill === null || !docked ? BARE : flow === "right" ? pill.height : pill.width;
-    const gaps = lines.map((draft, i) => {
-      const before = lines[i - 1];
-      const apart = before ? (across(before) + across(draft)) / 2 + BESIDE_PILL : 0;
-      return Math.max(1, Math.ceil(apart / STEP));
+    const gaps = lines.map(({ line }, i) => {
+      const before = lines[i - 1]?.line;
+      return before ? rowsBetween(before, line, direction) : 1;
     });
     const total = gaps.slice(1).reduce((sum, gap) => sum + gap, 0);
     let at = middle - total / 2;
@@ -236,25 +249,30 @@ export class DockPlan {
     const rows = slotRows(slots, source, beyond);
     const pills = lines.map(({ line }, i) => {
       const v = this.v(rows[i] ?? middle);
-      return docked && line.pill ? this.pillBox(source.box.u1, v, line.pill, flow) : null;
+      return docked && line.pill ? this.pillBox(source.box.u1, v, line.pill, direction) : null;
     });
     // All or none: a line without a pill would leave between those of the others.
     if (docked && !pills.every((pill) => pill === null || this.isFree(pill, source)))
-      return this.leave(lines, flow, false);
+      return this.leave(lines, direction, false);
     if (docked) for (const pill of pills) if (pill) this.pills.add(pill);
     return lines.map((draft, i) => dockOf(draft, rows[i] ?? middle, pills[i] ?? null, this));
   }
 
-  private pillBox(side: number, v: number, size: { width: number; height: number }, flow: string) {
+  private pillBox(
+    side: number,
+    v: number,
+    size: { width: number; height: number },
+    direction: string,
+  ) {
     const [along, across] =
-      flow === "right" ? [size.width, size.height] : [size.height, size.width];
+      direction === "right" ? [size.width, size.height] : [size.height, size.width];
     const u0 = side + PILL_GAP;
     return { u0, u1: u0 + along, v0: v - across / 2, v1: v + across / 2 };
   }
 
   /** Whether a pill has room, also to move a little, and its line to turn behind it. */
-  private isFree(pill: Box, { box }: End): boolean {
-    const reach = { ...pill, u0: box.u1, u1: (startColumn(pill, box.u1) + 1) * STEP };
+  private isFree(pill: FlowBox, { box }: End): boolean {
+    const reach = { ...pill, u0: box.u1, u1: startColumn(pill, box.u1) * STEP };
     return (
       !this.cards.hits(reach, BESIDE_PILL, box) &&
       !this.exits.hits(reach, BESIDE_PILL, this.exitOf.get(box.key)) &&
@@ -264,14 +282,26 @@ export class DockPlan {
   }
 }
 
+/** The rows from one line to the next that leaves the same card, for the sake of their pills. */
+function rowsBetween(a: SceneLine, b: SceneLine, direction: Scene["direction"]): number {
+  const across = ({ pill }: SceneLine) =>
+    pill === null ? BARE : direction === "right" ? pill.height : pill.width;
+  return Math.max(1, Math.ceil(((across(a) + across(b)) / 2 + BESIDE_PILL) / STEP));
+}
+
 const endColumn = ({ target }: DockDraft) => Math.floor((target.box.u0 - APPROACH) / STEP);
 
 const between = (a: number, b: number) => ({ v0: Math.min(a, b), v1: Math.max(a, b) });
 
-const startColumn = (pill: Box | null, side: number) =>
+const startColumn = (pill: FlowBox | null, side: number) =>
   Math.ceil((pill ? pill.u1 + PILL_PLAY + AFTER_PILL : side + 4) / STEP);
 
-function dockOf(draft: DockDraft, row: number, pill: Box | null, plan: Pick<DockPlan, "v">): Dock {
+function dockOf(
+  draft: DockDraft,
+  row: number,
+  pill: FlowBox | null,
+  plan: Pick<DockPlan, "v">,
+): Dock {
   const { line, source, target, into } = draft;
   const side = source.box.u1;
   const column = startColumn(pill, side);

@@ -1,5 +1,5 @@
 /** The grid of a scene: which of its points cards and pills keep free, which lines go along which. */
-import { type Box, CLEARANCE, STEP } from "./scene";
+import { CLEARANCE, type FlowBox, STEP } from "./scene";
 
 /** What stands round a point: how dear it is to pass there. */
 export const FREE = 0;
@@ -8,7 +8,7 @@ export const TIGHT = 2;
 export const BLOCKED = 3;
 
 /** Larger scenes than this keep simple lines: their cards stand very far apart. */
-export const MOST_CELLS = 4_000_000;
+const MOST_CELLS = 4_000_000;
 const MARGIN = 24; // steps round everything, for lines that go round it
 const PILL_GAP = 3; // px
 const TOUCHING = 2; // px
@@ -17,15 +17,15 @@ export class Raster {
   readonly width: number;
   readonly height: number;
   readonly ground: Uint8Array;
-  /** Lines on the step from a point to the next along the flow, across it, and turns at a point. */
-  readonly along: Uint8Array;
-  readonly across: Uint8Array;
-  readonly turns: Uint8Array;
+  /** Lines on the step from a point to the next along the direction, across it, and turns at a point. */
+  readonly along: Uint16Array;
+  readonly across: Uint16Array;
+  readonly turns: Uint16Array;
   private readonly column0: number;
   private readonly row0: number;
   private readonly offset: number;
 
-  private constructor(bounds: Box, offset: number) {
+  private constructor(bounds: FlowBox, offset: number) {
     this.offset = offset;
     this.column0 = Math.floor(bounds.u0 / STEP) - MARGIN;
     this.row0 = Math.floor((bounds.v0 - offset) / STEP) - MARGIN;
@@ -33,15 +33,16 @@ export class Raster {
     this.height = Math.ceil((bounds.v1 - offset) / STEP) + MARGIN - this.row0 + 1;
     const cells = this.width * this.height;
     this.ground = new Uint8Array(cells);
-    this.along = new Uint8Array(cells);
-    this.across = new Uint8Array(cells);
-    this.turns = new Uint8Array(cells);
+    this.along = new Uint16Array(cells);
+    this.across = new Uint16Array(cells);
+    this.turns = new Uint16Array(cells);
   }
 
   /** Null when it would be too large. */
-  static of(cards: readonly Box[], pills: readonly Box[], offset: number): Raster | null {
+  static of(cards: readonly FlowBox[], pills: readonly FlowBox[], offset: number): Raster | null {
     const all = [...cards, ...pills];
-    const least = (of: (box: Box) => number) => all.reduce((n, b) => Math.min(n, of(b)), Infinity);
+    const least = (of: (box: FlowBox) => number) =>
+      all.reduce((n, b) => Math.min(n, of(b)), Infinity);
     const bounds = {
       u0: least(({ u0 }) => u0),
       v0: least(({ v0 }) => v0),
@@ -60,7 +61,7 @@ export class Raster {
     return raster;
   }
 
-  private keep(box: Box, gap: number, as: number): void {
+  private keep(box: FlowBox, gap: number, as: number): void {
     const { first, last, top, bottom } = this.cells(box, gap);
     for (let row = top; row <= bottom; row += 1) {
       for (let cell = row * this.width + first; cell <= row * this.width + last; cell += 1) {
@@ -69,7 +70,7 @@ export class Raster {
     }
   }
 
-  private cells({ u0, u1, v0, v1 }: Box, gap: number) {
+  private cells({ u0, u1, v0, v1 }: FlowBox, gap: number) {
     return {
       first: Math.ceil((u0 - gap) / STEP) - this.column0,
       last: Math.floor((u1 + gap) / STEP) - this.column0,
@@ -79,7 +80,7 @@ export class Raster {
   }
 
   /** Whether a line passes through a box. */
-  hasLine(box: Box, gap: number): boolean {
+  hasLine(box: FlowBox, gap: number): boolean {
     const { first, last, top, bottom } = this.cells(box, gap);
     for (let row = top; row <= bottom; row += 1) {
       for (let cell = row * this.width + first; cell <= row * this.width + last; cell += 1) {

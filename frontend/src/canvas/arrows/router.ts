@@ -6,7 +6,7 @@ const PRICE = { turn: 3, crossing: 3, near: 0.5, tight: 8, touch: 60, shared: 24
 /** A line that finds no way after looking at this many points keeps its simple one. */
 const MOST_STEPS = 400_000;
 
-/** Directions: along the flow, across, back, across the other way; `+ 2` is the opposite. */
+/** Directions: along the direction, across, back, across the other way; `+ 2` is the opposite. */
 const ALONG = 0;
 
 export class Router {
@@ -28,7 +28,7 @@ export class Router {
     this.closed = new Int32Array(states);
   }
 
-  /** The corners of a way that begins and ends along the flow; null when there is none. */
+  /** The corners of a way that begins and ends along the direction; null when there is none. */
   route(start: number, end: number): number[] | null {
     const { ground, width } = this.raster;
     if (start < 0 || end < 0) return null;
@@ -102,7 +102,7 @@ export class Router {
   }
 }
 
-/** The turns that are left at least, to arrive along the flow. */
+/** The turns that are left at least, to arrive along the direction. */
 function leastTurns(way: number, dx: number, dy: number): number {
   if (way === ALONG) return dx < 0 ? 4 : dy === 0 ? 0 : 2;
   if (way === 2) return 2;

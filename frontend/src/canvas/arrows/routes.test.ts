@@ -1,11 +1,12 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
+import type { Direction } from "../../graph/model";
 import { faultsOf, looksOf, pillsOf } from "../../testing/line-faults";
 import { layeredScene, seeded, thrownScene } from "../../testing/scenes";
 import { routed, simpleLines } from "./routes";
-import { type Flow, gridOffset, type Scene, STEP } from "./scene";
+import { gridOffset, type Scene, STEP } from "./scene";
 
-const FLOWS: readonly Flow[] = ["right", "down"];
+const DIRECTIONS: readonly Direction[] = ["right", "down"];
 const seed = fc.integer({ min: 0, max: 1e9 });
 const NONE = { behind: 0, onCards: 0, onPills: 0, onLines: 0, slanted: 0 };
 
@@ -16,8 +17,12 @@ const line = (source: string, target: string, width = 26) => ({
   target,
   pill: { width, height: 20 },
 });
-const scene = (cards: Scene["cards"], lines: Scene["lines"], flow: Flow = "right"): Scene => ({
-  ...{ flow, offset: gridOffset(cards, flow, null), cards, lines },
+const scene = (
+  cards: Scene["cards"],
+  lines: Scene["lines"],
+  direction: Direction = "right",
+): Scene => ({
+  ...{ direction, offset: gridOffset(cards, direction, null), cards, lines },
 });
 
 test("in a graph that is laid out no line passes a card, lies on another, or meets a pill", () => {
@@ -25,9 +30,9 @@ test("in a graph that is laid out no line passes a card, lies on another, or mee
     fc.property(
       fc.integer({ min: 2, max: 40 }),
       seed,
-      fc.constantFrom(...FLOWS),
-      (n, seed, flow) => {
-        const given = layeredScene(n, seeded(seed), flow);
+      fc.constantFrom(...DIRECTIONS),
+      (n, seed, direction) => {
+        const given = layeredScene(n, seeded(seed), direction);
         const { lines } = routed(given);
         expect(faultsOf(given, lines)).toEqual({ ...NONE, shared: 0 });
         expect(looksOf(given, lines)).toMatchObject({ simple: 0, hidden: 0 });
@@ -42,9 +47,9 @@ test("cards anywhere, 32 px apart: no line passes one, no pill lies on a card, p
     fc.property(
       fc.integer({ min: 2, max: 18 }),
       seed,
-      fc.constantFrom(...FLOWS),
-      (n, seed, flow) => {
-        const given = thrownScene(n, seeded(seed), flow);
+      fc.constantFrom(...DIRECTIONS),
+      (n, seed, direction) => {
+        const given = thrownScene(n, seeded(seed), direction);
         const { lines } = routed(given);
         expect(lines.size).toBe(given.lines.length);
         expect(faultsOf(given, lines)).toMatchObject(NONE);
@@ -57,8 +62,8 @@ test("cards anywhere, 32 px apart: no line passes one, no pill lies on a card, p
 
 test("the same scene has the same lines", () => {
   fc.assert(
-    fc.property(seed, fc.constantFrom(...FLOWS), (seed, flow) => {
-      const given = thrownScene(10, seeded(seed), flow);
+    fc.property(seed, fc.constantFrom(...DIRECTIONS), (seed, direction) => {
+      const given = thrownScene(10, seeded(seed), direction);
       expect(routed(given).lines).toEqual(routed(structuredClone(given)).lines);
     }),
     { numRuns: 15 },
@@ -67,9 +72,9 @@ test("the same scene has the same lines", () => {
 
 test("after a move what is routed again is as good, and what has not moved stays", () => {
   fc.assert(
-    fc.property(seed, fc.constantFrom(...FLOWS), (seed, flow) => {
+    fc.property(seed, fc.constantFrom(...DIRECTIONS), (seed, direction) => {
       const random = seeded(seed);
-      let given = layeredScene(24, random, flow);
+      let given = layeredScene(24, random, direction);
       let { lines, ways } = routed(given);
       for (let move = 0; move < 5; move += 1) {
         const at = Math.floor(random() * given.cards.length);
@@ -98,14 +103,16 @@ test("nothing is looked for when nothing has moved", () => {
 });
 
 test("cards in a row are joined by straight lines in their middle", () => {
-  for (const flow of FLOWS) {
+  for (const direction of DIRECTIONS) {
     const cards = [0, 1, 2].map((i) =>
-      flow === "right" ? card(`c${i}`, i * 260, 7) : card(`c${i}`, 7, i * 180),
+      direction === "right" ? card(`c${i}`, i * 260, 7) : card(`c${i}`, 7, i * 180),
     );
-    const given = scene(cards, [line("c0", "c1"), line("c1", "c2")], flow);
+    const given = scene(cards, [line("c0", "c1"), line("c1", "c2")], direction);
     for (const { points } of routed(given).lines.values()) {
       expect(points.length).toBe(2);
-      expect(points[0]?.[flow === "right" ? 1 : 0]).toBe(flow === "right" ? 7 + 36 : 7 + 80);
+      expect(points[0]?.[direction === "right" ? 1 : 0]).toBe(
+        direction === "right" ? 7 + 36 : 7 + 80,
+      );
     }
   }
 });
@@ -165,8 +172,8 @@ test("what cannot be routed is drawn simply: cards on each other, cards worlds a
 
 test("simple lines begin, end and have their pills where the others do", () => {
   fc.assert(
-    fc.property(seed, fc.constantFrom(...FLOWS), (seed, flow) => {
-      const given = layeredScene(16, seeded(seed), flow);
+    fc.property(seed, fc.constantFrom(...DIRECTIONS), (seed, direction) => {
+      const given = layeredScene(16, seeded(seed), direction);
       const simple = simpleLines(given);
       for (const [id, { points, pill }] of routed(given).lines) {
         const other = simple.get(id);

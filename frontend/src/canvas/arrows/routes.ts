@@ -1,21 +1,14 @@
 /** The lines of a scene: routed as a whole, or only where something has moved. Pure. */
+import type { Direction } from "../../graph/model";
 import { type Dock, DockPlan, LINK } from "./docks";
 import { BLOCKED, FREE, NEAR, Raster } from "./raster";
 import { Router, straightened } from "./router";
-import {
-  type Box,
-  BoxIndex,
-  boxOf,
-  type Flow,
-  type Point,
-  pointOf,
-  type Scene,
-  STEP,
-} from "./scene";
+import { BoxIndex, boxOf, type FlowBox, type Point, pointOf, type Scene, STEP } from "./scene";
 
 /** A line as it is drawn. */
 export interface RoutedLine {
   readonly id: string;
+  readonly direction: Direction;
   /** What it was routed between: while that stays, so may the line. */
   readonly ends: string;
   /** From the side of one card to that of the other. */
@@ -43,7 +36,7 @@ export type Ways = ReadonlyMap<string, Way>;
 
 function endsOf({ start, end }: Dock, scene: Scene): string {
   const from = `${start.column},${start.row}`;
-  return `${scene.flow} ${scene.offset} ${from} ${end.column},${end.row}`;
+  return `${scene.direction} ${scene.offset} ${from} ${end.column},${end.row}`;
 }
 
 /** Lines that only know their own ends: to be drawn until those that were routed are there. */
@@ -51,13 +44,30 @@ export function simpleLines(scene: Scene): Map<string, RoutedLine> {
   const plan = new DockPlan(scene);
   return new Map(
     plan.docks.map((dock) => {
-      const points = [...simpleWay(dock)].map(([column, row]) => at(plan, scene.flow, column, row));
+      const points = [...simpleWay(dock)].map(([column, row]) =>
+        at(plan, scene.direction, column, row),
+      );
       const ends = endsOf(dock, scene);
       const docked = dock.pill !== null;
-      const pill = dock.pill ? middleOf(dock.pill, scene.flow) : null;
-      const whole = [...leaving(dock, plan, scene.flow), ...points, arriving(dock, scene.flow)];
+      const pill = dock.pill ? middleOf(dock.pill, scene.direction) : null;
+      const whole = [
+        ...leaving(dock, plan, scene.direction),
+        ...points,
+        arriving(dock, scene.direction),
+      ];
       const { id } = dock.line;
-      return [id, { id, ends, points: straight(whole), pill, docked, simple: true }];
+      return [
+        id,
+        {
+          id,
+          direction: scene.direction,
+          ends,
+          points: straight(whole),
+          pill,
+          docked,
+          simple: true,
+        },
+      ];
     }),
   );
 }
@@ -75,23 +85,23 @@ function* simpleWay({ start, end }: Dock): Generator<readonly [number, number]> 
   yield [end.column, end.row];
 }
 
-const at = (plan: DockPlan, flow: Flow, column: number, row: number) =>
-  pointOf(column * STEP, plan.v(row), flow);
+const at = (plan: DockPlan, direction: Direction, column: number, row: number) =>
+  pointOf(column * STEP, plan.v(row), direction);
 
-function middleOf({ u0, u1, v0, v1 }: Box, flow: Flow): Point {
-  return pointOf((u0 + u1) / 2, (v0 + v1) / 2, flow);
+function middleOf({ u0, u1, v0, v1 }: FlowBox, direction: Direction): Point {
+  return pointOf((u0 + u1) / 2, (v0 + v1) / 2, direction);
 }
 
-function leaving({ from, start }: Dock, plan: DockPlan, flow: Flow): Point[] {
+function leaving({ from, start }: Dock, plan: DockPlan, direction: Direction): Point[] {
   const v = plan.v(start.row);
-  const first = pointOf(from.u, from.v, flow);
+  const first = pointOf(from.u, from.v, direction);
   // A pill beyond the corner of its card: the line goes along the card to it.
   return from.v === v
     ? [first]
-    : [first, pointOf(from.u + LINK, from.v, flow), pointOf(from.u + LINK, v, flow)];
+    : [first, pointOf(from.u + LINK, from.v, direction), pointOf(from.u + LINK, v, direction)];
 }
 
-const arriving = ({ to }: Dock, flow: Flow): Point => pointOf(to.u, to.v, flow);
+const arriving = ({ to }: Dock, direction: Direction): Point => pointOf(to.u, to.v, direction);
 
 /** Without points at which nothing turns. */
 function straight(points: readonly Point[]): Point[] {
@@ -125,8 +135,10 @@ interface Task {
   readonly ends: string;
   readonly start: number;
   readonly end: number;
-  /** Cells: the corners with the straight pieces at both ends; null when there is no way. */
+  /** The corners of its way; null when there is none. */
   cells: readonly number[] | null;
+  /** The same with the straight pieces at its ends. */
+  whole: readonly number[];
   /** The way that was known and still is; null for one that was looked for. */
   way: Way | null;
 }
@@ -138,14 +150,14 @@ class Routing {
   private readonly scene: Scene;
   private readonly plan: DockPlan;
   private readonly raster: Raster | null;
-  private readonly cards: Box[];
+  private readonly cards: FlowBox[];
   private readonly tasks: Task[];
   private readonly groups = new Map<string, Set<Task>>();
 
   constructor(scene: Scene) {
     this.scene = scene;
     this.plan = new DockPlan(scene);
-    this.cards = scene.cards.map((card) => boxOf(card, scene.flow));
+    this.cards = scene.cards.map((card) => boxOf(card, scene.direction));
     const pills = this.plan.docks.flatMap(({ pill, link }) => [pill, link].flatMap((b) => b ?? []));
     const raster = Raster.of(this.cards, pills, scene.offset);
     this.raster = raster;
@@ -156,6 +168,7 @@ class Routing {
       end: raster?.cellAt(dock.end.column, dock.end.row) ?? -1,
       cells: null,
       way: null,
+      whole: [],
     }));
     for (const task of this.tasks) {
       for (const key of [`> ${task.dock.sharesStart}`, `< ${task.dock.sharesEnd}`]) {
@@ -206,7 +219,7 @@ class Routing {
     if (!raster || task.cells === null) return false;
     const kin = this.kinOf(task);
     for (const other of kin) this.mark(other, -1);
-    const found = raster.sharesStep(this.whole(task));
+    const found = raster.sharesStep(task.whole);
     for (const other of kin) this.mark(other, 1);
     return found;
   }
@@ -264,15 +277,16 @@ class Routing {
   private put(task: Task, cells: readonly number[] | null, way: Way | null): void {
     task.cells = cells;
     task.way = way;
+    task.whole = this.wholeOf(task);
     this.mark(task, 1);
   }
 
   private mark(task: Task, by: 1 | -1): void {
-    this.raster?.mark(this.whole(task), by);
+    if (task.cells !== null) this.raster?.mark(task.whole, by);
   }
 
   /** A way with the straight pieces after a pill or card and before the next card. */
-  private whole({ cells, dock }: Task): number[] {
+  private wholeOf({ cells, dock }: Task): number[] {
     const { raster } = this;
     if (!raster || cells === null) return [];
     const { start, end, to, from, pill } = dock;
@@ -298,13 +312,13 @@ class Routing {
       const corners = cells.map((cell) => [raster.columnOf(cell), raster.rowOf(cell)] as const);
       ways.set(id, task.way ?? { ends, corners, near: this.nearness(cells) });
       const points = straight([
-        ...leaving(dock, plan, scene.flow),
-        ...corners.map(([column, row]) => at(plan, scene.flow, column, row)),
-        arriving(dock, scene.flow),
+        ...leaving(dock, plan, scene.direction),
+        ...corners.map(([column, row]) => at(plan, scene.direction, column, row)),
+        arriving(dock, scene.direction),
       ]);
       const docked = dock.pill !== null;
-      const pill = dock.pill && middleOf(dock.pill, scene.flow);
-      lines.set(id, { id, ends, points, pill, docked, simple: false });
+      const pill = dock.pill && middleOf(dock.pill, scene.direction);
+      lines.set(id, { id, direction: scene.direction, ends, points, pill, docked, simple: false });
       if (!docked && dock.line.pill) loose.push({ task, points });
     }
     this.placeLoose(loose, lines, raster);
@@ -318,7 +332,7 @@ class Routing {
     raster: Raster,
   ): void {
     if (loose.length === 0) return;
-    const taken = new BoxIndex<Box>();
+    const taken = new BoxIndex<FlowBox>();
     for (const card of this.cards) taken.add(card);
     for (const { pill } of this.plan.docks) if (pill) taken.add(pill);
     for (const { task, points } of loose) {
@@ -329,7 +343,7 @@ class Routing {
       for (const pill of places(points)) {
         const box = boxOf(
           { x: pill[0] - size.width / 2, y: pill[1] - size.height / 2, ...size },
-          this.scene.flow,
+          this.scene.direction,
         );
         if (taken.hits(box, 6) || raster.hasLine(box, 2)) continue;
         taken.add(box);

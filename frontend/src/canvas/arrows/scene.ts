@@ -1,7 +1,6 @@
 /** What lines are drawn between: cards that stand, bundles, and the grid on which lines run. Pure. */
 
-/** Where the graph goes: lines leave cards at that side and enter them at the opposite one. */
-export type Flow = "right" | "down";
+import type { Direction } from "../../graph/model";
 
 export interface PillSize {
   readonly width: number;
@@ -29,8 +28,9 @@ export interface SceneLine {
 
 /** All of it can be sent to a worker. */
 export interface Scene {
-  readonly flow: Flow;
-  /** Where the grid begins across the flow, 0 to 11 px. */
+  /** Lines leave cards at this side and enter them at the opposite one. */
+  readonly direction: Direction;
+  /** Where the grid begins across the direction, 0 to 11 px. */
   readonly offset: number;
   readonly cards: readonly SceneCard[];
   /** In the order in which lines of one card lie beside each other when nothing else decides. */
@@ -42,31 +42,35 @@ export const STEP = 12;
 /** Kept between lines and cards where there is room; a gap of 32 px has a line of the grid. */
 export const CLEARANCE = { wish: 16, least: 10 } as const;
 
-/** A card along and across the flow. */
-export interface Box {
+/** A card along and across the direction. */
+export interface FlowBox {
   readonly u0: number;
   readonly u1: number;
   readonly v0: number;
   readonly v1: number;
 }
 
-export function boxOf({ x, y, width, height }: Area, flow: Flow): Box {
-  return flow === "right"
+export function boxOf({ x, y, width, height }: Area, direction: Direction): FlowBox {
+  return direction === "right"
     ? { u0: x, u1: x + width, v0: y, v1: y + height }
     : { u0: y, u1: y + height, v0: x, v1: x + width };
 }
 
-export const pointOf = (u: number, v: number, flow: Flow): Point =>
-  flow === "right" ? [u, v] : [v, u];
+export const pointOf = (u: number, v: number, direction: Direction): Point =>
+  direction === "right" ? [u, v] : [v, u];
 
 /**
- * Where most cards have their middle across the flow, on the grid: then lines between cards in a
+ * Where most cards have their middle across the direction, on the grid: then lines between cards in a
  * row are straight and leave them in the middle. `before` stays unless another is much better.
  */
-export function gridOffset(cards: readonly SceneCard[], flow: Flow, before: number | null): number {
+export function gridOffset(
+  cards: readonly SceneCard[],
+  direction: Direction,
+  before: number | null,
+): number {
   const counts = new Array<number>(STEP).fill(0);
   for (const card of cards) {
-    const { v0, v1 } = boxOf(card, flow);
+    const { v0, v1 } = boxOf(card, direction);
     const at = (((Math.round((v0 + v1) / 2) % STEP) + STEP) % STEP) | 0;
     counts[at] = (counts[at] ?? 0) + 1;
   }
@@ -76,36 +80,37 @@ export function gridOffset(cards: readonly SceneCard[], flow: Flow, before: numb
 }
 
 const CELL = 256; // px, the side of a bucket
+const ROW = 2 ** 21; // buckets; of those that are farther apart two may be one, which does no harm
+
+const cellOf = (at: number) => Math.floor(at / CELL);
 
 /** Boxes by where they are. */
-export class BoxIndex<T extends Box> {
-  private readonly buckets = new Map<string, T[]>();
+export class BoxIndex<T extends FlowBox> {
+  private readonly buckets = new Map<number, T[]>();
 
   add(box: T): void {
-    for (const key of this.keys(box)) {
-      const bucket = this.buckets.get(key);
-      if (bucket) bucket.push(box);
-      else this.buckets.set(key, [box]);
+    for (let i = cellOf(box.u0); i <= cellOf(box.u1); i += 1) {
+      for (let j = cellOf(box.v0); j <= cellOf(box.v1); j += 1) {
+        const bucket = this.buckets.get(i * ROW + j);
+        if (bucket) bucket.push(box);
+        else this.buckets.set(i * ROW + j, [box]);
+      }
     }
   }
 
   /** Whether anything but what is to be left out comes nearer than `gap` to a box. */
-  hits(box: Box, gap: number, leaveOut?: T): boolean {
+  hits(box: FlowBox, gap: number, leaveOut?: T): boolean {
     const wide = { u0: box.u0 - gap, u1: box.u1 + gap, v0: box.v0 - gap, v1: box.v1 + gap };
-    for (const key of this.keys(wide)) {
-      for (const other of this.buckets.get(key) ?? []) {
-        if (other !== leaveOut && overlaps(wide, other)) return true;
+    for (let i = cellOf(wide.u0); i <= cellOf(wide.u1); i += 1) {
+      for (let j = cellOf(wide.v0); j <= cellOf(wide.v1); j += 1) {
+        for (const other of this.buckets.get(i * ROW + j) ?? [])
+          if (other !== leaveOut && overlaps(wide, other)) return true;
       }
     }
     return false;
   }
-
-  private *keys({ u0, u1, v0, v1 }: Box): Generator<string> {
-    for (let i = Math.floor(u0 / CELL); i <= Math.floor(u1 / CELL); i += 1)
-      for (let j = Math.floor(v0 / CELL); j <= Math.floor(v1 / CELL); j += 1) yield `${i},${j}`;
-  }
 }
 
-export function overlaps(a: Box, b: Box): boolean {
+function overlaps(a: FlowBox, b: FlowBox): boolean {
   return a.u0 < b.u1 && b.u0 < a.u1 && a.v0 < b.v1 && b.v0 < a.v1;
 }

@@ -13,7 +13,7 @@ import {
 } from "../../graph/model";
 import { cardLines } from "../../graph/value-text";
 
-interface Size {
+export interface Size {
   readonly width: number;
   readonly height: number;
 }
@@ -22,7 +22,7 @@ export type Positions = Map<Key, Position>;
 
 export const CARD = { width: 208, height: 104 } as const;
 /** The ends, top down: as wide as cards, so that the same x means the same middle. */
-export const PILL = { width: 208, height: 32 } as const;
+const PILL = { width: 208, height: 32 } as const;
 /** The ends, left to right: as wide as they look. */
 const SHORT_PILL = { width: 84, height: 32 } as const;
 /** How many parameters a card shows. */

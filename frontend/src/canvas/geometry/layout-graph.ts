@@ -1,6 +1,7 @@
 /** A graph as the layout library wants it, and its answer as places. Pure; `layout.ts` runs it. */
 import type { ElkExtendedEdge, ElkNode, ElkPort, LayoutOptions } from "elkjs/lib/elk-api";
-import { ENTRY, EXIT, type Graph, type Key, PRECONDITIONS, type Relation } from "../../graph/model";
+import { ENTRY, EXIT, type Graph, type Key } from "../../graph/model";
+import { type Bundle, bundlesOf, pillSizeOf } from "../arrows/bundles";
 import {
   CARD,
   estimatedSizes,
@@ -43,32 +44,6 @@ const OPTIONS: LayoutOptions = {
   "elk.spacing.portPort": "4",
 };
 
-/** Arrows that are drawn as one line: its pill is as large as what it says. */
-interface Bundle {
-  readonly parent: Key;
-  readonly child: Key;
-  readonly outcomes: number;
-  readonly word: string;
-}
-
-function bundles(relation: Relation): Bundle[] {
-  const { parent, child, conditions } = relation;
-  if (parent === ENTRY) return [{ parent, child, outcomes: 0, word: "" }];
-  const counts = new Map<string, number>();
-  for (const outcome of PRECONDITIONS) {
-    const word = conditions[outcome];
-    if (word !== "ignore") counts.set(word, (counts.get(word) ?? 0) + 1);
-  }
-  // One that only ignores is drawn too, since it is there.
-  if (counts.size === 0) counts.set("ignore", 1);
-  return [...counts].map(([word, outcomes]) => ({
-    parent,
-    child,
-    outcomes,
-    word: word === "run" ? "" : word,
-  }));
-}
-
 /** Pairs that hold the entry before everything and the exit behind: nothing is drawn of them. */
 function holds(graph: Graph, tied: ReadonlySet<Key>): [Key, Key][] {
   const next = forward(graph);
@@ -82,9 +57,15 @@ function holds(graph: Graph, tied: ReadonlySet<Key>): [Key, Key][] {
     ]);
 }
 
-/** How wide the pill of a bundle is, with what is free beside it. */
-function pillWidth({ outcomes, word }: Bundle): number {
-  return 14 + outcomes * 15 - 4 + (word === "" ? 0 : word.length * 6.3 + 5) + 18;
+/** px before a pill and behind it that its line needs to be free to turn. */
+const BESIDE_PILL = 18;
+
+/** The port of a bundle is as large as its pill, so that there is room for that before any bend. */
+function portSize(bundle: Bundle, right: boolean): Size {
+  const pill = pillSizeOf(bundle, false);
+  if (pill === null) return { width: 1, height: 1 };
+  const { width, height } = pill;
+  return right ? { width: width + BESIDE_PILL, height } : { width, height: height + BESIDE_PILL };
 }
 
 /** About how long it becomes in one piece, px. */
@@ -128,8 +109,8 @@ export function layoutRequest(graph: Graph, measured: Sizes): LayoutRequest {
     if (!measured.has(end)) sizes.set(end, pillSize(graph.direction));
   }
   const order = orderOf(graph);
-  const lines = relationsInOrder(graph, order).flatMap(bundles);
-  const tied = new Set([ENTRY, EXIT, ...lines.flatMap(({ parent, child }) => [parent, child])]);
+  const lines = relationsInOrder(graph, order).flatMap(bundlesOf);
+  const tied = new Set([ENTRY, EXIT, ...lines.flatMap(({ source, target }) => [source, target])]);
   const right = graph.direction === "right";
   const ports = new Map<Key, ElkPort[]>();
   const port = (key: Key, id: string, size: Size, side: string) => {
@@ -138,11 +119,8 @@ export function layoutRequest(graph: Graph, measured: Sizes): LayoutRequest {
     list.push({ id, ...size, layoutOptions: { "elk.port.side": side } });
   };
   const edges = lines.map((line, i): ElkExtendedEdge => {
-    const wide = line.outcomes === 0 ? 1 : Math.round(pillWidth(line));
-    const high = line.outcomes === 0 ? 1 : 20;
-    const pill = right ? { width: wide, height: high } : { width: wide, height: high + 16 };
-    port(line.parent, `o${i}`, pill, right ? "EAST" : "SOUTH");
-    port(line.child, `i${i}`, { width: 1, height: 1 }, right ? "WEST" : "NORTH");
+    port(line.source, `o${i}`, portSize(line, right), right ? "EAST" : "SOUTH");
+    port(line.target, `i${i}`, { width: 1, height: 1 }, right ? "WEST" : "NORTH");
     return { id: `e${i}`, sources: [`o${i}`], targets: [`i${i}`] };
   });
   const held = graph.actions.length <= THOROUGH ? holds(graph, tied) : [];

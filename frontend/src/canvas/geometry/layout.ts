@@ -26,7 +26,7 @@ async function begin(): Promise<Running> {
 }
 
 /** Of what this library cannot wrap it makes one piece. */
-export async function askTwice(ask: Ask, root: ElkNode): Promise<ElkNode> {
+async function askTwice(ask: Ask, root: ElkNode): Promise<ElkNode> {
   try {
     return await ask(root);
   } catch (error) {

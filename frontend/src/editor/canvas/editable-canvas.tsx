@@ -14,6 +14,7 @@ import {
 } from "@xyflow/react";
 import { type MouseEvent, type RefObject, useEffect, useMemo, useRef } from "react";
 import { actionDrag } from "../../canvas/action-drag";
+import { LineContext } from "../../canvas/arrows/line-store";
 import type { Arrow, CanvasNode } from "../../canvas/elements";
 import { CARD } from "../../canvas/geometry/arrange";
 import { edgeTypes, nodeTypes } from "../../canvas/graph-view";
@@ -150,6 +151,10 @@ function useHands(
       const id = edge.data?.relation;
       if (id) context.select(event.shiftKey ? [...context.selection, id] : [id]);
     }),
+    onEdgeMouseEnter: useStableCallback((_: MouseEvent, edge: Arrow) => {
+      canvas.lines.open(edge.data?.bundle.id ?? null);
+    }),
+    onEdgeMouseLeave: useStableCallback(() => canvas.lines.open(null)),
     onNodeClick: useStableCallback((event: MouseEvent) => {
       if (connecting.onClick(event)) return;
       const onNote = (event.target as Element).closest(".react-flow__node-note") !== null;
@@ -289,6 +294,11 @@ export function EditableCanvas({ context, canvas, me, map, onPanned, pointer, wr
       ref={frame}
       className={style.frame}
       onDoubleClick={onDoubleClick}
+      onFocusCapture={(event) => {
+        const edge = event.target.closest<HTMLElement>(".react-flow__edge")?.dataset.id;
+        const focused = canvas.edges.find(({ id }) => id === edge);
+        canvas.lines.open(focused?.data?.bundle.id ?? null);
+      }}
       {...press}
       onPointerDownCapture={(event) => {
         press.onPointerDownCapture(event);
@@ -320,9 +330,11 @@ export function EditableCanvas({ context, canvas, me, map, onPanned, pointer, wr
         presence.tell({ cursor: undefined });
       }}
     >
-      <NoteEditingContext value={noteEditing}>
-        <Drawing context={context} canvas={canvas} me={me} map={map} hands={hands} />
-      </NoteEditingContext>
+      <LineContext value={canvas.lines}>
+        <NoteEditingContext value={noteEditing}>
+          <Drawing context={context} canvas={canvas} me={me} map={map} hands={hands} />
+        </NoteEditingContext>
+      </LineContext>
       {connecting.pending && (
         <PendingHint
           context={context}

@@ -12,11 +12,13 @@ import {
   type SetStateAction,
   useCallback,
   useEffect,
+  useLayoutEffect,
   useMemo,
   useRef,
   useState,
 } from "react";
 import { checkedColor } from "../../api/people";
+import { LineStore } from "../../canvas/arrows/line-store";
 import {
   type Arrow,
   type CanvasNode,
@@ -24,6 +26,7 @@ import {
   edgesOf,
   keepEqual,
   nodesOf,
+  sceneOf,
   surroundingsOf,
 } from "../../canvas/elements";
 import { type Positions, positionsOf, unplaced } from "../../canvas/geometry/arrange";
@@ -119,10 +122,7 @@ function useDrawn(graph: Graph, options: Parameters<typeof nodesOf>[1]) {
     const before = drawn.current.nodes;
     return keepEqual(before, nodesOf(graph, options, before));
   }, [graph, options]);
-  const around = useMemo(
-    () => surroundingsOf(graph, options, drawn.current.around),
-    [graph, options],
-  );
+  const around = useMemo(() => surroundingsOf(graph, drawn.current.around), [graph]);
   const { relations } = graph;
   const edges = useMemo(
     () =>
@@ -133,6 +133,17 @@ function useDrawn(graph: Graph, options: Parameters<typeof nodesOf>[1]) {
     drawn.current = { nodes, edges, around };
   }, [nodes, edges, around]);
   return { nodes, edges };
+}
+
+/** The lines of the arrows, kept in step with what stands where. */
+function useLines(graph: Graph, { places, measured, marks }: Parameters<typeof sceneOf>[1]) {
+  const [lines] = useState(() => new LineStore());
+  useLayoutEffect(
+    () => lines.show(sceneOf(graph, { places, measured, marks }, lines.offset)),
+    [lines, graph, places, measured, marks],
+  );
+  useEffect(() => () => lines.close(), [lines]);
+  return lines;
 }
 
 /** Keeps the selection in step with what React Flow says of it. */
@@ -287,12 +298,13 @@ export function useCanvasElements(given: CanvasElementsInput) {
     [others, places, selected, progress, marks, sizes, resized],
   );
   const drawn = useDrawn(graph, options);
+  const lines = useLines(graph, options);
   const placed = { graph, rest, sizes };
   const onEdgesChange = useSelectionChanges(selection, select);
   const onNodesChange = useNodeChanges(placed, setSizes, setDrag, onEdgesChange);
   const dragging = useDragging(placed, over, setOver, setDrag);
   const hands = { onNodesChange, onEdgesChange, ...dragging };
-  return { flow, ...drawn, places, sizes, setResized, setOver, ...hands };
+  return { flow, lines, ...drawn, places, sizes, setResized, setOver, ...hands };
 }
 
 /** One action that nothing leads to or from can be dropped into an arrow. */

@@ -36,7 +36,7 @@ interface ViewportInput {
 }
 
 /** The canvas, and what bars and drawers (`data-covers`: at which side) lie over it. */
-export function roomOf(element: HTMLElement): CanvasArea {
+function roomOf(element: HTMLElement): CanvasArea {
   const box = element.getBoundingClientRect();
   const covered = { left: 0, top: 0, right: 0, bottom: 0 };
   for (const over of document.querySelectorAll<HTMLElement>("[data-covers]")) {

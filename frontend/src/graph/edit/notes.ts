@@ -104,7 +104,7 @@ interface Sized {
 }
 
 /** Everything whose middle lies in a frame; a frame in a frame with all that is in it. */
-function inFrame(
+export function inFrame(
   frame: Note,
   places: ReadonlyMap<string, Position>,
   sizes: ReadonlyMap<string, Sized>,
