@@ -118,8 +118,9 @@ export async function tidy(page: Page): Promise<void> {
   await expect(page.getByLabel("What happens")).toContainText("arranged");
 }
 
-/** Waits until everything is on disk. */
+/** Waits until everything is on disk, also where things stand in a graph that was opened anew. */
 export async function saved(page: Page): Promise<void> {
+  await expect(page.locator("section[aria-label=Graph] [aria-busy=true]")).toHaveCount(0);
   await expect(page.getByText("Saved", { exact: true })).toBeVisible();
 }
 

@@ -84,7 +84,7 @@ test("edited JSON is marked where it is wrong, applied as one change, and undone
   const id = await open(page);
   await card(page, "Grip").click({ position: { x: 50, y: 30 } });
   await page.getByRole("tab", { name: "JSON" }).click();
-  await expect(json(page)).toContainText('"graph_name": "pick_up"');
+  await expect(json(page)).toContainText('"name": "Grip"');
 
   // Broken: said at its line, and nothing is changed.
   const before = await text(id);

@@ -117,7 +117,7 @@ test("what the page showed live is what the replay shows of that moment", async 
         if (before.length === 3 && !known.includes(String(before))) {
           live.push({ at: at + 100, states: before });
         }
-        return before.every((word) => word.includes("true"));
+        return before.length === 3 && before.every((word) => word.includes("true"));
       },
       { timeout: 20_000, intervals: [50] },
     )

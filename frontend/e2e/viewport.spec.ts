@@ -59,8 +59,10 @@ test("the view follows what runs until the person moves it, and again when asked
   const { page, context, failures } = await product.person(browser, "Ada");
   await page.goto(`${product.url}/graphs/${await product.chain(60)}`);
   await saved(page);
+  await expect(card(page, "Wait", 0)).toBeInViewport();
+  await expect(card(page, "Wait", 5)).not.toBeInViewport();
   await start(page);
-  await expect(card(page, "Wait", 6)).toBeInViewport({ timeout: 30_000 });
+  await expect(card(page, "Wait", 5)).toBeInViewport({ timeout: 30_000 });
   await expect(page.getByRole("list", { name: /Actions of the run/ })).toBeVisible();
 
   await page.getByRole("button", { name: "Hide the lanes" }).click();

@@ -37,7 +37,7 @@ export function GraphView({ graph, progress, selected = NONE, label, onSelect }:
   const [measured, setMeasured] = useState<ReadonlyMap<Key, object>>(new Map());
   const laidOut = useLaidOut(graph);
   const places = useMemo(
-    () => new Map([...(laidOut ?? []), ...notePlaces(graph)]),
+    () => new Map([...(laidOut?.places ?? []), ...notePlaces(graph)]),
     [graph, laidOut],
   );
   const options = useMemo(
@@ -52,11 +52,12 @@ export function GraphView({ graph, progress, selected = NONE, label, onSelect }:
   const [lines] = useState(() => new LineStore());
   useEffect(() => lines.show(sceneOf(graph, options, lines.offset)), [lines, graph, options]);
   useEffect(() => () => lines.close(), [lines]);
-  // It fits what it shows once, on its first drawing.
+  // It fits what it shows once, on its first drawing: of a plain layout, and of the one that follows.
   if (laidOut === null) return <div aria-busy="true" aria-label={label} role="img" />;
   return (
     <LineContext value={lines}>
       <ReactFlow<CanvasNode>
+        key={laidOut.plain ? "plain" : "laid out"}
         nodes={nodes}
         edges={edges}
         nodeTypes={nodeTypes}

@@ -4,27 +4,38 @@ import type { Graph } from "../../graph/model";
 import { arrange, estimatedSizes, isUnplaced, type Positions, positionsOf } from "./arrange";
 import { layOut } from "./layout";
 
-interface Answer {
+interface LaidOut {
   readonly graph: Graph;
   readonly places: Positions;
+  /** Shown until the layout answers. */
+  readonly plain: boolean;
 }
 
-/** Null while the layout is being computed. */
-export function useLaidOut(graph: Graph): Positions | null {
-  const [answer, setAnswer] = useState<Answer | null>(null);
+/** Whoever waits longer for the layout sees a plain one meanwhile. */
+export const LAYOUT_PATIENCE_MS = 400;
+
+/** Null for a moment, while the layout is being computed. */
+export function useLaidOut(graph: Graph): LaidOut | null {
+  const [answer, setAnswer] = useState<LaidOut | null>(null);
   const loose = isUnplaced(graph);
   useEffect(() => {
     if (!loose) return;
     const end = new AbortController();
+    const plain = () => setAnswer({ graph, places: arrange(graph), plain: true });
+    const timer = setTimeout(plain, LAYOUT_PATIENCE_MS);
     layOut(graph, estimatedSizes(graph), end.signal)
       .catch(() => arrange(graph))
       .then((places) => {
-        if (!end.signal.aborted) setAnswer({ graph, places });
+        clearTimeout(timer);
+        if (!end.signal.aborted) setAnswer({ graph, places, plain: false });
       });
-    return () => end.abort();
+    return () => {
+      clearTimeout(timer);
+      end.abort();
+    };
   }, [graph, loose]);
   return useMemo(() => {
-    if (!loose) return positionsOf(graph);
-    return answer?.graph === graph ? answer.places : null;
+    if (!loose) return { graph, places: positionsOf(graph), plain: false };
+    return answer?.graph === graph ? answer : null;
   }, [graph, loose, answer]);
 }

@@ -1,6 +1,7 @@
 /** Lays out a graph in which nothing stands anywhere yet, and writes that down as one edit. */
 import { useEffect, useRef, useState } from "react";
-import { isUnplaced, type Positions } from "../../canvas/geometry/arrange";
+import { arrange, isUnplaced, type Positions } from "../../canvas/geometry/arrange";
+import { LAYOUT_PATIENCE_MS } from "../../canvas/geometry/use-laid-out";
 import type { EditorContext } from "../../edit-actions/editor-context";
 import { freshPlaces } from "../../edit-actions/layout";
 import { moveActions } from "../../graph/edit";
@@ -14,7 +15,12 @@ export function useFirstLayout(
   context: EditorContext,
   arrived: boolean,
 ): { places: Positions | null; pending: boolean } {
-  const loose = arrived && isUnplaced(context.graph);
+  const unplaced = arrived && isUnplaced(context.graph);
+  // Somebody has undone the layout: doing it again would leave them no way back.
+  const stood = useRef(false);
+  if (arrived && !unplaced && context.graph.actions.length > 0) stood.current = true;
+  const loose = unplaced && !stood.current;
+  const plain = useRef<Positions | null>(null);
   const [places, setPlaces] = useState<Positions | null>(null);
   const people = usePeople();
   const now = useRef({ context, people });
@@ -30,20 +36,29 @@ export function useFirstLayout(
     if (!loose) return;
     let asked = true;
     let timer: ReturnType<typeof setTimeout> | undefined;
+    const patience = setTimeout(() => {
+      plain.current = arrange(now.current.context.graph);
+      setPlaces(plain.current);
+    }, LAYOUT_PATIENCE_MS);
     void freshPlaces(now.current.context.graph).then((found) => {
+      clearTimeout(patience);
       if (!asked || gone.current) return;
       setPlaces(found ?? new Map());
       if (found === null) return;
+      if (plain.current !== null) requestAnimationFrame(() => now.current.context.view.open());
       const { context, people } = now.current;
       const earlier = people.filter(({ client }) => client < context.doc.clientID).length;
-      timer = setTimeout(() => {
+      const write = () => {
         const { doc, graph, mayEdit } = now.current.context;
         if (mayEdit && isUnplaced(graph)) moveActions(doc, found);
-      }, earlier * TURN_MS);
+      };
+      if (earlier === 0) write();
+      else timer = setTimeout(write, earlier * TURN_MS);
     });
     return () => {
       asked = false;
       clearTimeout(timer);
+      clearTimeout(patience);
     };
   }, [loose]);
   return { places: loose ? places : null, pending: loose && places === null };
