@@ -201,7 +201,7 @@ test("a parameter is renamed, retyped, limited to values, and a pose is added as
   await page.getByRole("option", { name: '"blue"' }).click();
 
   await page.getByRole("button", { name: "Add", exact: true }).first().click();
-  await page.getByRole("textbox", { name: "Name of the parameter" }).fill("goal");
+  await page.getByRole("combobox", { name: "Name of the parameter" }).fill("goal");
   await page.getByRole("combobox", { name: "Type of the parameter" }).click();
   await page.getByRole("option", { name: "pose" }).click();
   await page.getByRole("button", { name: "Add", exact: true }).nth(1).click();

@@ -61,40 +61,40 @@ test("a one-sided arrow says what it would do, is mended, and the mending is und
   const id = await open(page);
 
   // On the arrow: a badge whose reason is its tooltip and part of the arrow's name.
-  const arrow = page.getByLabel(/^Arrow from Look 0.* Grip 0\. 1 error\. H2: .*abort/).first();
+  const arrow = page.getByLabel(/^Arrow from Look 0.* Grip 0\. 1 wrong\. .*abort.*\(H2\)/).first();
   await expect(arrow).toBeAttached();
-  await expect(page.locator("[title^='H2: Look']").first()).toBeVisible();
-  await expect(page.getByRole("button", { name: /^Start v1: 2 problems/ })).toBeDisabled();
+  await expect(page.locator("[title*='abort'][title$='(H2)']").first()).toBeVisible();
+  await expect(page.getByRole("button", { name: /^Start v1: 2 wrong/ })).toBeDisabled();
 
-  // In the panel: code, consequence, place to jump to, fix.
-  await page.getByTitle("2 keep the graph from starting").click();
-  const first = page.locator("[data-code=H2]").filter({ hasText: "Look → Grip" });
+  // In the panel: consequence, place to jump to, fix, and the code last.
+  await page.getByTitle("2 wrong: this keeps it from starting").click();
+  const first = page.locator("li[data-code=H2]").filter({ hasText: "Look → Grip" });
   await expect(first).toContainText("the engine and every running graph with it abort");
   await first.getByRole("button", { name: "Show Look → Grip" }).click();
   await expect(page.locator("[data-relation][data-selected]")).toHaveCount(1);
   await first.getByRole("button", { name: /^Fix H2/ }).click();
-  await expect(page.locator("[data-code=H2]")).toHaveCount(1);
+  await expect(page.locator("li[data-code=H2]")).toHaveCount(1);
   await saved(page);
   expect(await parents(id)).toEqual({ Look: [], Grip: ["Look"], Drop: [] });
 
   // Undo takes it back, as any edit of the person.
   await page.getByRole("button", { name: "Undo" }).click();
-  await expect(page.locator("[data-code=H2]")).toHaveCount(2);
+  await expect(page.locator("li[data-code=H2]")).toHaveCount(2);
   await saved(page);
   expect(await parents(id)).toEqual({ Look: [], Grip: [], Drop: [] });
 
   // All safe ones are one step.
   await page.getByRole("button", { name: "Fix all 2 safe ones" }).click();
-  await expect(page.locator("[data-code=H2]")).toHaveCount(0);
+  await expect(page.locator("li[data-code=H2]")).toHaveCount(0);
   await saved(page);
   expect(await parents(id)).toEqual({ Look: [], Grip: ["Look"], Drop: ["Look"] });
   await expect(page.getByRole("button", { name: /^Start v1 in the simulator/ })).toBeEnabled();
   await page.getByRole("button", { name: "Undo" }).click();
-  await expect(page.locator("[data-code=H2]")).toHaveCount(2);
+  await expect(page.locator("li[data-code=H2]")).toHaveCount(2);
   // What is left is where things stand: the graph was laid out when it was opened.
   await page.getByRole("button", { name: "Undo" }).click();
   await expect(page.getByRole("button", { name: "Undo" })).toBeDisabled();
-  await expect(page.locator("[data-code=H2]")).toHaveCount(2);
+  await expect(page.locator("li[data-code=H2]")).toHaveCount(2);
   expect(failures).toEqual([]);
   await context.close();
 });
@@ -119,11 +119,12 @@ test("a card with a problem says so in its name, and its details offer the fix",
   });
   await page.goto(`${product.url}/graphs/${id}`);
   await saved(page);
-  const marked = page.locator(".react-flow__node-action[aria-label*='H6: There are two actions']");
+  const marked = page.locator(".react-flow__node-action[aria-label*='There are two actions']");
   await expect(marked).toHaveCount(1);
   await marked.click({ position: { x: 50, y: 30 } });
+  // Under the field that it is about.
   await page
-    .getByRole("region", { name: "Problems of what is selected" })
+    .locator("[data-field$='|number']")
     .getByRole("button", { name: /^Fix H6/ })
     .click();
   await expect(card(page, "Look", 1)).toBeVisible();

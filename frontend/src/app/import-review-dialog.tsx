@@ -2,7 +2,8 @@
 import { Button, Group, Modal, Text } from "@mantine/core";
 import { useSyncExternalStore } from "react";
 import type { ProblemPlace } from "../api/graphs";
-import { bySeverity, countWords } from "../canvas/problem-marks";
+import { countsOf, countWords } from "../graph/problems/problem-kinds";
+import { toldProblems } from "../graph/problems/told-problems";
 import { dialectWords, type ImportUnderReview, importReviews } from "./import-review";
 import style from "./import-review-dialog.module.css";
 
@@ -16,19 +17,18 @@ function Line({ where }: { where: ProblemPlace }) {
 function Problems({ waiting }: { waiting: ImportUnderReview }) {
   // That it is an old form is solved by keeping it.
   const left = waiting.preview.problems.filter(({ code }) => code !== "dialect-old");
-  const problems = bySeverity(left);
+  const problems = toldProblems(left, { actions: [], relations: [] });
   if (problems.length === 0) return null;
-  const error = problems.filter(({ severity }) => severity === "error").length;
   const more = problems.length - MOST_PROBLEMS;
   return (
     <section className={style.part} aria-label="Problems">
-      <h3>{countWords({ error, warning: problems.length - error })} to look at afterwards</h3>
+      <h3>To look at afterwards: {countWords(countsOf(problems)).join(", ")}</h3>
       <ul className={style.problems}>
         {problems.slice(0, MOST_PROBLEMS).map((problem, i) => (
           // biome-ignore lint/suspicious/noArrayIndexKey: the list never changes
-          <li key={i} data-severity={problem.severity}>
-            <b>{problem.code}</b> {problem.message}
-            <Line where={problem.where} />
+          <li key={i} data-kind={problem.kind}>
+            {problem.message}
+            <Line where={problem.problems[0].where} /> <small>{problem.code}</small>
           </li>
         ))}
       </ul>

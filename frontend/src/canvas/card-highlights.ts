@@ -1,15 +1,23 @@
-/** Highlights on cards: whose robot's actions stand out, and how many open threads each has. */
+/** Highlights on cards: whose robot's actions stand out, who gives and takes a value, open threads. */
 import { useSyncExternalStore } from "react";
 import type { Key } from "../graph/model";
+
+/** The actions that give a value, and those that take it. */
+interface TouchedActions {
+  readonly producers: ReadonlySet<Key>;
+  readonly consumers: ReadonlySet<Key>;
+}
 
 interface CardHighlights {
   /** The robot whose actions stand out; null: all. The empty name is that of any robot. */
   readonly robot: string | null;
   /** Open threads by action. */
   readonly openThreads: ReadonlyMap<Key, number>;
+  /** Whom the parameter in focus ties together; null: none is in focus. */
+  readonly touched: TouchedActions | null;
 }
 
-const ALL: CardHighlights = { robot: null, openThreads: new Map() };
+const ALL: CardHighlights = { robot: null, openThreads: new Map(), touched: null };
 
 /** One for the page: there is one canvas. Cards listen for themselves, so that few draw again. */
 class CardHighlightStore {
@@ -42,6 +50,15 @@ export function useIsDimmed(robot: string): boolean {
   return useSyncExternalStore(cardHighlights.subscribe, () => {
     const lit = cardHighlights.now().robot;
     return lit !== null && lit !== robot;
+  });
+}
+
+/** Whether an action gives the value in focus, or takes it. */
+export function useDataRole(key: Key): "gives" | "takes" | undefined {
+  return useSyncExternalStore(cardHighlights.subscribe, () => {
+    const { touched } = cardHighlights.now();
+    if (touched?.producers.has(key)) return "gives";
+    return touched?.consumers.has(key) ? "takes" : undefined;
   });
 }
 

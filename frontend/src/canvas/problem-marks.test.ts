@@ -1,6 +1,7 @@
 import { expect, test } from "vitest";
 import type { Problem } from "../api/graphs";
-import { countWords, problemMarksOf, problemMarkWords } from "./problem-marks";
+import { toldProblems } from "../graph/problems/told-problems";
+import { problemMarksOf, problemMarkWords } from "./problem-marks";
 
 const problem = (
   code: string,
@@ -13,8 +14,11 @@ const problem = (
   message: `about ${code}`,
 });
 
+const marksOf = (problems: readonly Problem[]) =>
+  problemMarksOf(toldProblems(problems, { actions: [], relations: [] }));
+
 test("a problem of an arrow marks the arrow, one of an action its card, one of the graph nothing", () => {
-  const marks = problemMarksOf([
+  const marks = marksOf([
     problem("H2", "error", { relation: "a>b", aid: "a" }),
     problem("name-class", "warning", { aid: "b" }),
     problem("graph-name", "warning", {}),
@@ -22,13 +26,21 @@ test("a problem of an arrow marks the arrow, one of an action its card, one of t
   expect([...marks.keys()]).toEqual(["a>b", "b"]);
 });
 
-test("a mark names every reason, the errors first", () => {
-  const mark = problemMarksOf([
+test("a problem marks every place of which the same is said", () => {
+  const also = [{ relation: "b>c" }];
+  const marks = marksOf([{ ...problem("H3", "warning", { relation: "a>b" }), also }]);
+  expect([...marks.keys()]).toEqual(["a>b", "b>c"]);
+});
+
+test("a mark names every reason with its code last, what is wrong first", () => {
+  const mark = marksOf([
     problem("slow", "warning", { aid: "a" }),
+    problem("type-empty", "error", { aid: "a" }),
     problem("H6", "error", { aid: "a" }),
   ]).get("a");
-  expect(mark?.reasons).toBe("H6: about H6\nslow: about slow");
-  expect(mark && countWords(mark)).toBe("1 error, 1 warning");
-  expect(problemMarkWords(mark)).toBe(". 1 error, 1 warning. H6: about H6 slow: about slow");
+  expect(mark?.reasons).toBe("about H6 (H6)\nabout type-empty (type-empty)\nabout slow (slow)");
+  expect(problemMarkWords(mark)).toBe(
+    ". 1 wrong, 1 to fill in, 1 warning. about H6 (H6) about type-empty (type-empty) about slow (slow)",
+  );
   expect(problemMarkWords(null)).toBe("");
 });

@@ -1,11 +1,11 @@
-/** What is wrong, by where it is drawn: marks for cards and arrows. Pure. */
-import type { Problem } from "../api/graphs";
+/** What is wrong or still to fill in, by where it is drawn: marks for cards and arrows. Pure. */
+import { countsOf, countWords, type ProblemCounts } from "../graph/problems/problem-kinds";
+import type { ToldProblem } from "../graph/problems/told-problems";
+import { otherPlaces } from "../graph/problems/told-problems";
 
 /** The problems of one card or arrow. */
-export interface ProblemMark {
-  readonly error: number;
-  readonly warning: number;
-  /** Code and message of each, the errors first, one a line. */
+export interface ProblemMark extends ProblemCounts {
+  /** What each says, with its code at the end, one a line: what is wrong first. */
   readonly reasons: string;
 }
 
@@ -14,44 +14,27 @@ export type ProblemMarks = ReadonlyMap<string, ProblemMark>;
 
 export const NO_PROBLEM_MARKS: ProblemMarks = new Map();
 
-/** Where on the canvas a problem is: a relation, else an action; null: the graph as a whole. */
-export function markedKeyOf({ where }: Problem): string | null {
-  return where.relation ?? where.aid ?? null;
-}
-
-/** Errors first, then in the order in which the checks found them. */
-export function bySeverity(problems: readonly Problem[]): Problem[] {
-  const rank = ({ severity }: Problem) => (severity === "error" ? 0 : 1);
-  return [...problems].sort((a, b) => rank(a) - rank(b));
-}
-
-export function problemMarksOf(problems: readonly Problem[]): ProblemMarks {
-  const marks = new Map<string, ProblemMark>();
-  for (const problem of bySeverity(problems)) {
-    const line = `${problem.code}: ${problem.message}`;
-    const others = (problem.also ?? []).map(({ relation, aid }) => relation ?? aid ?? null);
-    for (const place of new Set([markedKeyOf(problem), ...others])) {
+export function problemMarksOf(told: readonly ToldProblem[]): ProblemMarks {
+  const places = new Map<string, ToldProblem[]>();
+  for (const each of told) {
+    const others = each.problems.flatMap((problem) => otherPlaces(problem));
+    for (const place of new Set([each.place, ...others])) {
       if (place === null) continue;
-      const { error = 0, warning = 0, reasons = "" } = marks.get(place) ?? {};
-      marks.set(place, {
-        error: error + (problem.severity === "error" ? 1 : 0),
-        warning: warning + (problem.severity === "warning" ? 1 : 0),
-        reasons: reasons === "" ? line : `${reasons}\n${line}`,
-      });
+      const known = places.get(place);
+      if (known) known.push(each);
+      else places.set(place, [each]);
     }
   }
-  return marks;
-}
-
-/** "2 errors, 1 warning". */
-export function countWords({ error, warning }: Pick<ProblemMark, "error" | "warning">): string {
-  const parts: string[] = [];
-  if (error > 0) parts.push(error === 1 ? "1 error" : `${error} errors`);
-  if (warning > 0) parts.push(warning === 1 ? "1 warning" : `${warning} warnings`);
-  return parts.join(", ");
+  return new Map(
+    [...places].map(([place, list]) => {
+      const reasons = list.map(({ message, code }) => `${message} (${code})`).join("\n");
+      return [place, { ...countsOf(list), reasons }];
+    }),
+  );
 }
 
 /** The mark as the end of an accessible name; empty without one. */
 export function problemMarkWords(mark: ProblemMark | null | undefined): string {
-  return mark ? `. ${countWords(mark)}. ${mark.reasons.replaceAll("\n", " ")}` : "";
+  if (!mark) return "";
+  return `. ${countWords(mark).join(", ")}. ${mark.reasons.replaceAll("\n", " ")}`;
 }

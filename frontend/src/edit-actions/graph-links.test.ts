@@ -10,14 +10,23 @@ test("a link names the graph and what is chosen, and leads back to it", () => {
   expect(targetOf(url.search)).toEqual({
     selection: ["AAAAAAAAAAAA", "AAAAAAAAAAAA>BBBBBBBBBBBB;1"],
     problem: null,
+    field: null,
   });
 });
 
-test("a link to a problem leads to its place, or to the list", () => {
-  const here = linkToProblem("g", { code: "H8", where: { aid: "AAAAAAAAAAAA" } }, origin);
-  expect(targetOf(new URL(here).search)).toEqual({ selection: ["AAAAAAAAAAAA"], problem: "H8" });
-  const all = linkToProblem("g", { code: "H6", where: {} }, origin);
-  expect(targetOf(new URL(all).search)).toEqual({ selection: [], problem: "H6" });
+test("a link to a problem leads to its field, its place, or to the list", () => {
+  const place = { where: { aid: "AAAAAAAAAAAA" } };
+  const to = (...given: [Parameters<typeof linkToProblem>[1], string | null]) =>
+    targetOf(new URL(linkToProblem("g", ...given, origin)).search);
+  const selection = ["AAAAAAAAAAAA"];
+  expect(to({ code: "H8", ...place }, null)).toEqual({ selection, problem: "H8", field: null });
+  const field = "in/grip/x";
+  expect(to({ code: "H8", ...place }, field)).toEqual({ selection, problem: "H8", field });
+  expect(to({ code: "H6", where: {} }, null)).toEqual({
+    selection: [],
+    problem: "H6",
+    field: null,
+  });
 });
 
 test("an address without a target, or with too many, does no harm", () => {

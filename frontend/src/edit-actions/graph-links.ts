@@ -17,15 +17,17 @@ export function linkTo(
   return url.href;
 }
 
-/** The address of a problem: what it is about, and its code. */
+/** The address of a problem: what it is about, its code, and the field in which it is. */
 export function linkToProblem(
   graph: string,
   problem: { readonly code: string; readonly where: { aid?: string; relation?: string } },
+  field: string | null = null,
   page: string = pageUrl(),
 ): string {
   const place = problem.where.relation ?? problem.where.aid;
   const url = new URL(linkTo(graph, place === undefined ? [] : [place], page));
   url.searchParams.set("problem", problem.code);
+  if (field !== null) url.searchParams.set("field", field);
   return url.href;
 }
 
@@ -33,14 +35,16 @@ export interface LinkTarget {
   readonly selection: readonly string[];
   /** The panel of problems shall be open. */
   readonly problem: string | null;
+  /** The field of it that shall have the keyboard: `in/grip/x`. */
+  readonly field: string | null;
 }
 
 /** What an address points at; null when it names a graph only. */
 export function targetOf(search: string): LinkTarget | null {
   const query = new URLSearchParams(search);
   const selection = [...query.getAll("action"), ...query.getAll("arrow")].slice(0, 20);
-  const problem = query.get("problem");
-  return selection.length === 0 && problem === null ? null : { selection, problem };
+  const [problem, field] = [query.get("problem"), query.get("field")];
+  return selection.length === 0 && problem === null ? null : { selection, problem, field };
 }
 
 /** Those that are there; an address may be older than a delete. */

@@ -1,9 +1,7 @@
 /** The editor of one graph: list, canvas, details and run strip, arranged for the screen at hand. */
 import { useLocalStorage } from "@mantine/hooks";
-import { type ReactNode, useMemo } from "react";
+import type { ReactNode } from "react";
 import type { Script } from "../api/dry-runs";
-import { type Problems, useProblems } from "../api/graphs";
-import { problemMarksOf } from "../canvas/problem-marks";
 import { useOpenThreadsOnCards, useThreads } from "../comments/use-threads";
 import { scriptOf } from "../dry-run/script";
 import { addActionAt, type EditorContext, freePosition } from "../edit-actions/editor-context";
@@ -11,6 +9,8 @@ import { useShortcuts } from "../edit-actions/shortcuts";
 import { FindBar } from "../find/find-bar";
 import type { NewAction } from "../graph/edit";
 import type { Graph, Key } from "../graph/model";
+import type { ToldProblem } from "../graph/problems/told-problems";
+import { endName } from "../graph/relation-words";
 import { Inspector } from "../inspector/inspector";
 import { Outline } from "../outline/outline";
 import { People } from "../people/people";
@@ -24,7 +24,7 @@ import { QuickAdd } from "./canvas/quick-add";
 import { CanvasPane } from "./canvas-pane";
 import { DeskLayout, PhoneLayout } from "./layouts";
 import { Overlays } from "./menus/overlays";
-import { ProblemCount } from "./problem-count";
+import { blockWords, ProblemCount, useToldProblems } from "./problem-count";
 import { RoomNotices } from "./room-notices";
 import { SaveStatus } from "./save-status";
 import { useRemoteEditAnnouncements, useRunAnnouncements } from "./use-announcements";
@@ -69,15 +69,18 @@ interface Props {
   corner: ReactNode;
 }
 
-function obstacleOf(context: EditorContext, link: RoomLink, problems: Problems | undefined) {
+/** What the check of a moment says. */
+interface Checked {
+  readonly seq: number | undefined;
+  readonly told: readonly ToldProblem[];
+}
+
+function obstacleOf(context: EditorContext, link: RoomLink, checked: Checked) {
   if (link.state !== "live") return "not connected to the editor";
   if (link.unsaved > 0) return "saving";
   if (context.graph.actions.length === 0) return "nothing to run yet";
-  const errors = problems?.problems.filter((problem) => problem.severity === "error").length ?? 0;
-  if (errors > 0 && problems?.seq === link.seq) {
-    return errors === 1 ? "1 problem must be solved" : `${errors} problems must be solved`;
-  }
-  return null;
+  const blocks = checked.seq === link.seq ? blockWords(checked.told) : "";
+  return blocks === "" ? null : blocks;
 }
 
 /** Where one is: the graphs, this one, and what of it is chosen. */
@@ -88,12 +91,12 @@ function crumbsOf(context: EditorContext): Crumb[] {
     { label: "Graphs", to: "/" },
     { label: context.graph.name || "Untitled" },
     ...(action && others.length === 0
-      ? [{ label: `${action.name} ${action.instanceId}`, part: true }]
+      ? [{ label: endName(context.graph, action.key), part: true }]
       : []),
   ];
 }
 
-function useShown(context: EditorContext, link: RoomLink, problems: Problems | undefined): Shown {
+function useShown(context: EditorContext, link: RoomLink, checked: Checked): Shown {
   const wide = useIsWide();
   const phone = useIsPhone();
   const [folded, setFolded] = useLocalStorage({
@@ -107,7 +110,7 @@ function useShown(context: EditorContext, link: RoomLink, problems: Problems | u
   return {
     graph: context.graph,
     seq: link.seq,
-    obstacle: obstacleOf(context, link, problems),
+    obstacle: obstacleOf(context, link, checked),
     selected,
     pick: (aid) => {
       context.select([aid]);
@@ -126,8 +129,7 @@ export function Editor(props: Props) {
   const panels = usePanels();
   const { context, adding, overlay, ...editor } = useEditor(id, panels.onPanel);
   const link = useThrottledLink();
-  const problems = useProblems(id, link.seq).data;
-  const marks = useMemo(() => problemMarksOf(problems?.problems ?? []), [problems]);
+  const { problems, told, marks } = useToldProblems(id, link.seq, context.graph);
   const threads = useThreads();
   useOpenThreadsOnCards(threads);
   useRemoteEditAnnouncements(context.graph, link.seq > 0);
@@ -141,7 +143,7 @@ export function Editor(props: Props) {
     context.view.reveal(at);
     panels.setLeft(false);
   };
-  const shown = useShown(context, link, problems);
+  const shown = useShown(context, link, { seq: problems?.seq, told });
   const { dryRun } = context;
   const stage = (
     <CanvasPane
@@ -173,6 +175,7 @@ export function Editor(props: Props) {
         seq={link.seq}
         panel={editor.panel}
         problems={problems}
+        told={told}
         threads={threads}
       />
     ),
@@ -185,7 +188,7 @@ export function Editor(props: Props) {
         status: (
           <>
             <SaveStatus />
-            <ProblemCount problems={problems} />
+            <ProblemCount told={told} />
             {wide && props.status(shown)}
           </>
         ),

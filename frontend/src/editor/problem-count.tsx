@@ -1,27 +1,64 @@
-/** How many problems the graph has, in words; opens their list. */
-import { IconAlertTriangle } from "@tabler/icons-react";
-import type { Problems } from "../api/graphs";
+/** How much of the graph is wrong and to fill in: the same numbers as in its list, which it opens. */
+import { IconAlertTriangle, IconPencil } from "@tabler/icons-react";
+import { useMemo, useRef } from "react";
+import { useProblems } from "../api/graphs";
+import { problemMarksOf } from "../canvas/problem-marks";
 import { useEditorContext } from "../edit-actions/editor-context";
+import type { Graph } from "../graph/model";
+import { countsOf } from "../graph/problems/problem-kinds";
+import { type ToldProblem, toldProblems } from "../graph/problems/told-problems";
 import style from "./problem-count.module.css";
 
-export function ProblemCount({ problems }: { problems: Problems | undefined }) {
+/** Problems as they are told. The graph counts as it is when they come: its check is of that moment. */
+export function useToldProblems(id: string, seq: number, graph: Graph) {
+  const problems = useProblems(id, seq).data;
+  const now = useRef(graph);
+  now.current = graph;
+  const found = problems?.problems;
+  const told = useMemo(() => toldProblems(found ?? [], now.current), [found]);
+  const marks = useMemo(() => problemMarksOf(told), [told]);
+  return { problems, told, marks };
+}
+
+/** How many of each keep it from starting, in words; empty when nothing does. */
+export function blockWords(told: readonly ToldProblem[]): string {
+  const { wrong, fillIn } = countsOf(told.filter(({ blocks }) => blocks));
+  return [
+    ...(wrong > 0 ? [`${wrong} wrong`] : []),
+    ...(fillIn > 0 ? [`${fillIn} to fill in`] : []),
+  ].join(", ");
+}
+
+export function ProblemCount({ told }: { told: readonly ToldProblem[] }) {
   const { setPanel } = useEditorContext();
-  const count = problems?.problems.length ?? 0;
-  if (count === 0) return null;
-  const errors = problems?.problems.filter((problem) => problem.severity === "error").length ?? 0;
+  const { wrong, fillIn, warnings } = countsOf(told);
+  if (told.length === 0) return null;
+  const blocks = blockWords(told);
   return (
     <button
       type="button"
-      className={style.word}
-      data-worst={errors > 0 ? "error" : "warning"}
+      className={style.counts}
       onClick={() => setPanel("problems")}
       title={
-        errors > 0 ? `${errors} keep the graph from starting` : "Nothing keeps it from starting"
+        blocks === "" ? "Nothing keeps it from starting" : `${blocks}: this keeps it from starting`
       }
     >
-      <IconAlertTriangle size={13} aria-hidden />
-      {count}
-      <span>{count === 1 ? "problem" : "problems"}</span>
+      {wrong > 0 && (
+        <span className={style.count} data-kind="wrong">
+          <IconAlertTriangle size={13} aria-hidden /> {wrong} <span>wrong</span>
+        </span>
+      )}
+      {fillIn > 0 && (
+        <span className={style.count} data-kind="fill-in">
+          <IconPencil size={13} aria-hidden /> {fillIn} <span>to fill in</span>
+        </span>
+      )}
+      {warnings > 0 && (
+        <span className={style.count} data-kind="warning">
+          <IconAlertTriangle size={13} aria-hidden /> {warnings}{" "}
+          <span>{warnings === 1 ? "warning" : "warnings"}</span>
+        </span>
+      )}
     </button>
   );
 }

@@ -5,6 +5,7 @@ import { useSearch } from "wouter";
 import type { EditorContext } from "../edit-actions/editor-context";
 import { present, targetOf } from "../edit-actions/graph-links";
 import { shownKeys } from "../edit-actions/view";
+import { focusField } from "../ui/focus-field";
 
 const SETTLED = 160; // ms after which the canvas has measured its cards and shown the whole
 
@@ -27,6 +28,8 @@ export function useGraphLink(context: EditorContext, begun: boolean): void {
       requestAnimationFrame(() => {
         const keys = shownKeys(now.current);
         if (keys.length > 0) now.current.view.show(keys);
+        const [only] = selection;
+        if (only !== undefined && target.field !== null) focusField(`${only}|${target.field}`);
       });
     }, SETTLED);
     return () => clearTimeout(timer);

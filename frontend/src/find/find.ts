@@ -1,8 +1,8 @@
 /** Finding actions and arrows of a graph by anything that they say. Pure. */
 import type { Problem } from "../api/graphs";
-import { markedKeyOf } from "../canvas/problem-marks";
 import { relationId } from "../graph/document-keys";
 import { ENTRY, EXIT, type Graph, type Key, PRECONDITIONS } from "../graph/model";
+import { placeOf } from "../graph/problems/told-problems";
 import { pathWords, valueText } from "../graph/value-text";
 
 export interface Hit {
@@ -41,7 +41,7 @@ const titleOf = (graph: Graph, key: Key): string => {
 function entriesOf(graph: Graph, problems: readonly Problem[]): SearchEntry[] {
   const wrong = (id: string): Fact[] =>
     problems
-      .filter((problem) => markedKeyOf(problem) === id)
+      .filter((problem) => placeOf(problem) === id)
       .map(({ code, message }) => ({ field: "problem", text: `${code} ${message}` }));
   const names = new Map(graph.actions.map(({ key }) => [key, titleOf(graph, key)]));
   const name = (key: Key) => names.get(key) ?? titleOf(graph, key);

@@ -1,7 +1,7 @@
 /** The panel on the right: properties of what is selected, JSON, problems. */
 import { Tabs } from "@mantine/core";
 import { IconMessageCircle } from "@tabler/icons-react";
-import type { Problem, Problems } from "../api/graphs";
+import type { Problems } from "../api/graphs";
 import { Comments } from "../comments/comments";
 import {
   type EditorContext,
@@ -14,8 +14,10 @@ import { relationId } from "../graph/document-keys";
 import type { Thread } from "../graph/edit/comments";
 import { notesOf } from "../graph/edit/notes";
 import { EXIT } from "../graph/model";
+import { countsOf } from "../graph/problems/problem-kinds";
+import { endName } from "../graph/relation-words";
 import { ActionForm } from "./action-form";
-import { ProblemsContext } from "./fields/field-problems";
+import { ProblemsContext, type Told } from "./fields/field-problems";
 import { SharedField } from "./fields/shared-field";
 import { ViewOnly } from "./fields/view-only";
 import { GraphForm } from "./graph-form";
@@ -26,13 +28,13 @@ import { ProblemList, ProblemsHere } from "./problem-list";
 import { RelationForm } from "./relation-form";
 import { RunConditions } from "./run-conditions";
 
-const NONE: readonly Problem[] = [];
-
 interface Props {
   id: string;
   seq: number;
   panel: Panel;
   problems: Problems | undefined;
+  /** The same as they are told. */
+  told: readonly Told[];
   threads: readonly Thread[];
 }
 
@@ -51,7 +53,7 @@ function title(context: EditorContext): string {
   const count = actions.length + relations.length + notes.length;
   if (count > 1) return `${count} selected`;
   if (note) return note.kind === "frame" ? "Frame" : "Note";
-  if (action) return `${action.name} ${action.instanceId}`;
+  if (action) return endName(context.graph, action.key);
   if (relations.length === 1) return "Arrow";
   return context.selection.has(EXIT) ? "Exit" : "Graph";
 }
@@ -84,11 +86,37 @@ function Properties() {
   return <GraphForm />;
 }
 
-export function Inspector({ id, seq, panel, problems, threads }: Props) {
+/** The two numbers of the top bar; warnings where there is nothing else. */
+function ProblemsTab({ told }: { told: readonly Told[] }) {
+  const { wrong, fillIn, warnings } = countsOf(told);
+  return (
+    <span className={style.tabWords}>
+      Problems
+      {wrong > 0 && (
+        <span className={style.count} data-kind="wrong">
+          {wrong}
+          <span className="visually-hidden"> wrong</span>
+        </span>
+      )}
+      {fillIn > 0 && (
+        <span className={style.count} data-kind="fill-in">
+          {fillIn}
+          <span className="visually-hidden"> to fill in</span>
+        </span>
+      )}
+      {warnings > 0 && (
+        <span className={style.count} data-kind="warning">
+          {warnings}
+          <span className="visually-hidden"> {warnings === 1 ? "warning" : "warnings"}</span>
+        </span>
+      )}
+    </span>
+  );
+}
+
+export function Inspector({ id, seq, panel, problems, told, threads }: Props) {
   const context = useEditorContext();
   const open = threads.filter((thread) => !thread.resolved).length;
-  const count = problems?.problems.length ?? 0;
-  const errors = problems?.problems.some((problem) => problem.severity === "error") ?? false;
   return (
     <Tabs
       value={panel}
@@ -108,18 +136,13 @@ export function Inspector({ id, seq, panel, problems, threads }: Props) {
           </span>
         </Tabs.Tab>
         <Tabs.Tab value="problems">
-          Problems{" "}
-          {count > 0 && (
-            <span className={style.count} data-worst={errors ? "error" : "warning"}>
-              {count}
-            </span>
-          )}
+          <ProblemsTab told={told} />
         </Tabs.Tab>
       </Tabs.List>
       <Tabs.Panel value="details" className={style.panel ?? ""}>
         <ViewOnly>
-          <ProblemsHere problems={problems} />
-          <ProblemsContext value={problems?.problems ?? NONE}>
+          <ProblemsHere told={told} />
+          <ProblemsContext value={told}>
             <Properties />
           </ProblemsContext>
         </ViewOnly>
@@ -133,7 +156,7 @@ export function Inspector({ id, seq, panel, problems, threads }: Props) {
         <Comments threads={threads} />
       </Tabs.Panel>
       <Tabs.Panel value="problems" className={style.panel ?? ""}>
-        <ProblemList problems={problems} seq={seq} />
+        <ProblemList problems={problems} told={told} seq={seq} />
       </Tabs.Panel>
     </Tabs>
   );

@@ -1,24 +1,24 @@
-/** What is wrong with the graph, what it would do, where, and what mends it. */
+/** What is wrong with the graph, what is still to fill in, and what may go wrong: where, and what mends it. */
 import { ActionIcon, Button, Tooltip } from "@mantine/core";
-import { notifications } from "@mantine/notifications";
 import { IconCircleCheck, IconLink, IconTool } from "@tabler/icons-react";
-import type { Problem, Problems } from "../api/graphs";
-import { bySeverity, markedKeyOf } from "../canvas/problem-marks";
+import { useMemo } from "react";
+import type { Problems } from "../api/graphs";
 import { copyLinkTo } from "../edit-actions/clipboard";
 import { type EditorContext, useEditorContext } from "../edit-actions/editor-context";
 import { linkToProblem } from "../edit-actions/graph-links";
 import { relationId } from "../graph/document-keys";
-import {
-  ABOUT,
-  applyExamples,
-  applyFix,
-  applySafeFixes,
-  exampleFixes,
-  fixOf,
-  safeFixes,
-} from "../graph/edit/fixes";
+import { applyExamples, applySafeFixes, exampleFixes, safeFixes } from "../graph/edit/fixes";
 import type { Graph } from "../graph/model";
+import { dataFlowOf } from "../graph/parameters/data-flow";
+import type { ProblemKind } from "../graph/problems/problem-kinds";
 import { endName } from "../graph/relation-words";
+import { pathWords } from "../graph/value-text";
+import { focusField } from "../ui/focus-field";
+import { fieldOfTold, firstField, type Told } from "./fields/field-problems";
+import { ProblemNote, tellNothingLeft } from "./fields/problem-note";
+import { NumberField } from "./parameters/number-rows";
+import { ParameterValueField } from "./parameters/parameter-field";
+import { DataFlowContext } from "./parameters/use-data-lights";
 import style from "./problem-list.module.css";
 
 /** Where a problem is, as a person would say it; empty for the graph as a whole. */
@@ -30,141 +30,190 @@ function placeWords(graph: Graph, place: string | null): string {
   return action ? endName(graph, action.key) : "";
 }
 
-/** Shows the place of a problem on the canvas and selects it. */
-function jump(context: EditorContext, place: string): void {
+/** Shows the place of a problem on the canvas and goes to its field; to its card where it has none. */
+function jump(context: EditorContext, told: Told, place: string): void {
   context.select([place]);
   context.view.show(place.split(">").map((end) => end.split(";")[0] ?? end));
+  const field = firstField(told);
+  if (field === null) return;
+  context.setPanel("details");
+  focusField(`${place}|${field}`);
 }
 
-function tellNothing(): void {
-  notifications.show({ message: "There was nothing left to fix.", autoClose: 4_000 });
+/** What is to fill in, to be written right here: numbers of one thing in a row. */
+function Values({ told }: { told: Told }) {
+  const { graph, mayEdit } = useEditorContext();
+  const action = graph.actions.find(({ key }) => key === told.place);
+  if (!action || !mayEdit || told.kind !== "fill-in") return null;
+  const open = action.inputs.filter(({ path }) => told.inputs.includes(path));
+  if (open.length === 0) return null;
+  if (open.some(({ path }) => path !== told.group)) {
+    return (
+      <div className={style.row}>
+        {open.map((parameter) => (
+          <NumberField
+            key={parameter.path}
+            action={action}
+            side="in"
+            letter={parameter.path.slice(parameter.path.lastIndexOf("/") + 1)}
+            parameter={parameter}
+          />
+        ))}
+      </div>
+    );
+  }
+  return open.map((parameter) => (
+    <div key={parameter.path} className={style.value} data-unwritten>
+      <ParameterValueField action={action} side="in" parameter={parameter} label={null} />
+    </div>
+  ));
 }
 
-function ProblemItem({ problem, jumps }: { problem: Problem; jumps: boolean }) {
+function ProblemItem({ told }: { told: Told }) {
   const context = useEditorContext();
-  const place = markedKeyOf(problem);
+  const { place } = told;
   const words = placeWords(context.graph, place);
-  const fix = fixOf(problem);
-  const severity = problem.severity === "error" ? "Error" : "Warning";
+  const field = fieldOfTold(told);
   return (
-    <li className={style.problem} data-severity={problem.severity} data-code={problem.code}>
+    <li className={style.problem} data-kind={told.kind} data-code={told.code}>
       <div className={style.head}>
-        <b className={style.code}>{problem.code}</b>
-        <span className={style.severity}>{severity}</span>
-        {jumps && place !== null && words !== "" && (
+        {place !== null && words !== "" ? (
           <button
             type="button"
             className={style.jump}
-            onClick={() => jump(context, place)}
-            aria-label={`Show ${words}`}
+            onClick={() => jump(context, told, place)}
+            aria-label={`Show ${words}${told.group === null ? "" : `, ${pathWords(told.group)}`}`}
           >
             {words}
           </button>
+        ) : (
+          <span className={style.graph}>Graph</span>
         )}
         <Tooltip label="Copy a link to this problem">
           <ActionIcon
             size="sm"
             ml="auto"
             disabled={false}
-            aria-label={`Copy a link to ${problem.code}`}
-            onClick={() => void copyLinkTo(linkToProblem(context.id, problem))}
+            aria-label={`Copy a link to ${told.code}`}
+            onClick={() => void copyLinkTo(linkToProblem(context.id, told.problems[0], field))}
           >
             <IconLink size={14} aria-hidden />
           </ActionIcon>
         </Tooltip>
       </div>
-      <p>{problem.message}</p>
-      {fix !== null && context.mayEdit && (
-        <Button
-          size="compact-sm"
-          mt={6}
-          leftSection={<IconTool size={14} aria-hidden />}
-          aria-label={`Fix ${problem.code}: ${ABOUT[fix].words}`}
-          onClick={() => {
-            if (!applyFix(context.doc, problem)) tellNothing();
-          }}
-        >
-          {ABOUT[fix].words}
-        </Button>
-      )}
+      <ProblemNote told={told} />
+      <Values told={told} />
     </li>
   );
 }
 
-function Items({ problems, jumps }: { problems: readonly Problem[]; jumps: boolean }) {
-  return (
-    <ul className={style.items}>
-      {problems.map((problem, i) => (
-        <ProblemItem
-          key={`${problem.code} ${problem.where.path ?? ""} ${markedKeyOf(problem) ?? i}`}
-          problem={problem}
-          jumps={jumps}
-        />
-      ))}
-    </ul>
-  );
-}
+const TITLES: Readonly<Record<ProblemKind, string>> = {
+  wrong: "Wrong",
+  "fill-in": "To fill in",
+  warning: "Warnings: it may go wrong",
+};
 
-/** The problems of what is selected, with it. */
-export function ProblemsHere({ problems }: { problems: Problems | undefined }) {
-  const { selection } = useEditorContext();
-  const here = bySeverity(problems?.problems ?? []).filter((problem) => {
-    const place = markedKeyOf(problem);
-    return place !== null && selection.has(place);
-  });
-  if (here.length === 0 || selection.size > 1) return null;
+function Part({ kind, told }: { kind: ProblemKind; told: readonly Told[] }) {
+  const here = told.filter((each) => each.kind === kind);
+  if (here.length === 0) return null;
   return (
-    <section className={style.here} aria-label="Problems of what is selected">
-      <Items problems={here} jumps={false} />
+    <section className={style.part} data-kind={kind} aria-label={TITLES[kind]}>
+      <h3>
+        {TITLES[kind]} <span className={style.number}>{here.length}</span>
+      </h3>
+      <ul className={style.items}>
+        {here.map((each) => (
+          <ProblemItem key={each.id} told={each} />
+        ))}
+      </ul>
     </section>
   );
 }
 
-interface Props {
-  problems: Problems | undefined;
-  seq: number;
+/** The problems of what is selected that have no field of their own in its form. */
+export function ProblemsHere({ told }: { told: readonly Told[] }) {
+  const { selection, graph } = useEditorContext();
+  const [place, ...others] = selection;
+  const action = graph.actions.find(({ key }) => key === place);
+  const shown = (field: string | null): boolean => {
+    if (field === null) return false;
+    const [side, path] = [field.slice(0, field.indexOf("/")), field.slice(field.indexOf("/") + 1)];
+    if (side !== "in" && side !== "out") return true;
+    const list = side === "in" ? action?.inputs : action?.outputs;
+    return list?.some((each) => `${each.path}/`.startsWith(`${path}/`)) ?? false;
+  };
+  const here = told.filter((each) => each.place === place && !shown(fieldOfTold(each)));
+  if (place === undefined || here.length === 0 || others.length > 0) return null;
+  return (
+    <section className={style.here} aria-label="Problems of what is selected">
+      {here.map((each) => (
+        <ProblemNote key={each.id} told={each} />
+      ))}
+    </section>
+  );
 }
 
-export function ProblemList({ problems, seq }: Props) {
-  const context = useEditorContext();
-  if (!problems) return <p className={style.checked}>Checking …</p>;
-  const order = bySeverity(problems.problems);
-  const safe = safeFixes(order).length;
-  const examples = exampleFixes(order).length;
+/** Mends many at once, each as one step of undo. */
+function FixAll({ problems }: { problems: Problems["problems"] }) {
+  const { doc, mayEdit } = useEditorContext();
+  const safe = safeFixes(problems).length;
+  const examples = exampleFixes(problems).length;
+  if (!mayEdit) return null;
   return (
-    <div className={style.list}>
-      {order.length === 0 && (
-        <p className={style.none}>
-          <IconCircleCheck size={18} aria-hidden /> No problem found.
-        </p>
-      )}
-      {safe > 1 && context.mayEdit && (
+    <>
+      {safe > 1 && (
         <Button
           fullWidth
           mb="sm"
           leftSection={<IconTool size={15} aria-hidden />}
           title="Everything that can be mended without losing what was drawn. One undo takes it back."
           onClick={() => {
-            if (applySafeFixes(context.doc, order) === 0) tellNothing();
+            if (applySafeFixes(doc, problems) === 0) tellNothingLeft();
           }}
         >
           Fix all {safe} safe ones
         </Button>
       )}
-      {examples > 1 && context.mayEdit && (
+      {examples > 1 && (
         <Button
           fullWidth
           mb="sm"
           leftSection={<IconTool size={15} aria-hidden />}
           title="The examples of old files become the values that a robot acts on. Look at them afterwards; one undo takes it back."
           onClick={() => {
-            if (applyExamples(context.doc, order) === 0) tellNothing();
+            if (applyExamples(doc, problems) === 0) tellNothingLeft();
           }}
         >
           Take all {examples} examples as values
         </Button>
       )}
-      <Items problems={order} jumps />
+    </>
+  );
+}
+
+interface Props {
+  problems: Problems | undefined;
+  told: readonly Told[];
+  seq: number;
+}
+
+export function ProblemList({ problems, told, seq }: Props) {
+  const { graph } = useEditorContext();
+  const flow = useMemo(() => dataFlowOf(graph), [graph]);
+  if (!problems) return <p className={style.checked}>Checking …</p>;
+  return (
+    <div className={style.list}>
+      {told.length === 0 && (
+        <p className={style.none}>
+          <IconCircleCheck size={18} aria-hidden /> No problem found.
+        </p>
+      )}
+      <FixAll problems={problems.problems} />
+      <DataFlowContext value={flow}>
+        <Part kind="wrong" told={told} />
+        <Part kind="fill-in" told={told} />
+        <Part kind="warning" told={told} />
+      </DataFlowContext>
       <p className={style.checked}>
         Checked at moment {problems.seq}
         {problems.seq < seq && `, now ${seq}: checking again …`}

@@ -17,6 +17,10 @@ interface Props {
   description?: string;
   mono?: boolean;
   rightSection?: TextInputProps["rightSection"];
+  rightSectionWidth?: number;
+  leftSection?: TextInputProps["leftSection"];
+  /** Where the label is no text. */
+  ariaLabel?: string;
   disabled?: boolean;
   autoFocus?: boolean;
   inputMode?: "decimal" | "text";
@@ -60,6 +64,7 @@ export function DraftInput(props: Props) {
     value: shown,
     error: wrong === null ? undefined : wrong + kept,
     onBlur: leave,
+    ...(props.ariaLabel === undefined ? {} : { "aria-label": props.ariaLabel }),
     ...(props.placeholder === undefined ? {} : { placeholder: props.placeholder }),
     ...(props.description === undefined ? {} : { description: props.description }),
     ...(props.disabled === undefined ? {} : { disabled: props.disabled }),
@@ -90,6 +95,8 @@ export function DraftInput(props: Props) {
       {...shared}
       {...(props.inputMode ? { inputMode: props.inputMode } : {})}
       rightSection={props.rightSection}
+      {...(props.rightSectionWidth ? { rightSectionWidth: props.rightSectionWidth } : {})}
+      {...(props.leftSection ? { leftSection: props.leftSection, leftSectionWidth: 24 } : {})}
       onChange={(event) => change(event.currentTarget.value)}
       onKeyDown={(event) => {
         onEscape(event);

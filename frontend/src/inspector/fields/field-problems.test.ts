@@ -1,6 +1,7 @@
 import { expect, test } from "vitest";
 import type { Problem } from "../../api/graphs";
-import { fieldOfProblem, problemsAt } from "./field-problems";
+import { toldProblems } from "../../graph/problems/told-problems";
+import { fieldOfProblem, firstField, toldAt } from "./field-problems";
 
 const problem = (path: string, where: object = {}): Problem => ({
   code: "P1",
@@ -8,6 +9,7 @@ const problem = (path: string, where: object = {}): Problem => ({
   message: "",
   where: { path, ...where },
 });
+const told = (...problems: Problem[]) => toldProblems(problems, { actions: [], relations: [] });
 
 test.each([
   ["/graph_name", "name"],
@@ -27,6 +29,13 @@ test("a field has the problems of its own thing only, errors first", () => {
   const mild = problem("/actions/0/name", { aid: "a" });
   const bad: Problem = { ...mild, severity: "error" };
   const other = problem("/actions/1/name", { aid: "b" });
-  expect(problemsAt([mild, other, bad], "a", "name")).toEqual([bad, mild]);
-  expect(problemsAt([problem("/graph_name")], "graph", "name")).toHaveLength(1);
+  const found = toldAt(told(mild, other, bad), "a", "name");
+  expect(found.flatMap(({ problems }) => problems)).toEqual([bad, mild]);
+  expect(toldAt(told(problem("/graph_name")), "graph", "name")).toHaveLength(1);
+});
+
+test("what is to fill in leads to the first field that has no value", () => {
+  const path = "/actions/0/input_parameters/at/x";
+  const [first] = told({ ...problem(path, { aid: "a" }), code: "H8" });
+  expect(first && firstField(first)).toBe("in/at/x");
 });

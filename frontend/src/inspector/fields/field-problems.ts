@@ -1,10 +1,12 @@
-/** Which field of a form a problem is about, so that it is marked there. */
+/** Which field of a form a problem is about, so that it is said there. */
 import { createContext } from "react";
 import type { Problem } from "../../api/graphs";
-import { bySeverity, markedKeyOf } from "../../canvas/problem-marks";
+import type { ToldProblem } from "../../graph/problems/told-problems";
+
+export type Told = ToldProblem<Problem>;
 
 /** The problems of the open graph, for the fields of its forms. */
-export const ProblemsContext = createContext<readonly Problem[]>([]);
+export const ProblemsContext = createContext<readonly Told[]>([]);
 
 const MEMBERS: Readonly<Record<string, string>> = {
   name: "name",
@@ -21,7 +23,7 @@ const MEMBERS: Readonly<Record<string, string>> = {
 };
 
 /** The name of the field, as forms give it; null where no field stands for it. */
-export function fieldOfProblem({ where }: Problem): string | null {
+export function fieldOfProblem({ where }: Pick<Problem, "where">): string | null {
   const parts = (where.path ?? "").split("/").slice(1);
   const sides = { input_parameters: "in", output_parameters: "out" } as const;
   for (const [i, part] of parts.entries()) {
@@ -34,9 +36,18 @@ export function fieldOfProblem({ where }: Problem): string | null {
   return MEMBERS[parts.at(-1) ?? ""] ?? null;
 }
 
-/** What is wrong with one field of one thing, the errors first. */
-export function problemsAt(problems: readonly Problem[], of: string, field: string): Problem[] {
-  return bySeverity(problems).filter(
-    (problem) => (markedKeyOf(problem) ?? "graph") === of && fieldOfProblem(problem) === field,
-  );
+/** The field under which it is said: that of the whole where it is about several of one thing. */
+export function fieldOfTold({ group, problems }: Told): string | null {
+  return group === null ? fieldOfProblem(problems[0]) : `in/${group}`;
+}
+
+/** What is said of one field of one thing. */
+export function toldAt(told: readonly Told[], of: string, field: string): Told[] {
+  return told.filter((each) => (each.place ?? "graph") === of && fieldOfTold(each) === field);
+}
+
+/** Where a problem of a thing shows: the first field of it, else the thing alone. */
+export function firstField(told: Told): string | null {
+  const [input] = told.inputs;
+  return input === undefined ? fieldOfTold(told) : `in/${input}`;
 }

@@ -1,9 +1,9 @@
-/** A field that several people may write in: who has the caret there, and what is wrong there. */
-import { IconAlertTriangle } from "@tabler/icons-react";
+/** A field that several people may write in: who has the caret there, and what is said of it. */
 import { type FocusEvent, type ReactNode, use, useEffect, useRef } from "react";
 import { onePerId, PersonSign } from "../../people/people";
 import { useEditors, usePersonColors, useRoom } from "../../sync/use-room";
-import { ProblemsContext, problemsAt } from "./field-problems";
+import { ProblemsContext, toldAt } from "./field-problems";
+import { ProblemNote } from "./problem-note";
 import style from "./shared-field.module.css";
 
 interface Props {
@@ -18,6 +18,7 @@ const WRITABLE = "input, textarea, [contenteditable=true]";
 export function SharedField({ of, field, children }: Props) {
   const { presence } = useRoom();
   const id = `${of}|${field}`;
+  const told = toldAt(use(ProblemsContext), of, field);
   const here = useRef(false);
   const leave = useRef(() => {});
   leave.current = () => {
@@ -33,27 +34,19 @@ export function SharedField({ of, field, children }: Props) {
   useEffect(() => () => leave.current(), []);
   return (
     // biome-ignore lint/a11y/noStaticElementInteractions: only hears of the field inside
-    <div className={style.field} onFocus={come} onBlur={() => leave.current()}>
+    <div
+      className={style.field}
+      data-field={id}
+      data-kind={told[0]?.kind}
+      onFocus={come}
+      onBlur={() => leave.current()}
+    >
       {children}
       <Writers id={id} />
-      <Wrong of={of} field={field} />
+      {told.map((each) => (
+        <ProblemNote key={each.id} told={each} />
+      ))}
     </div>
-  );
-}
-
-/** What is wrong here; the whole sentence stands above the form too. */
-function Wrong({ of, field }: { of: string; field: string }) {
-  const here = problemsAt(use(ProblemsContext), of, field);
-  const [worst] = here;
-  if (worst === undefined) return null;
-  return (
-    <p className={style.wrong} data-severity={worst.severity}>
-      <IconAlertTriangle size={12} aria-hidden />
-      <span title={here.map(({ message }) => message).join("\n")}>
-        {[...new Set(here.map(({ code }) => code))].join(", ")}
-        <span className="visually-hidden">: {here.map(({ message }) => message).join(" ")}</span>
-      </span>
-    </p>
   );
 }
 

@@ -1,39 +1,30 @@
-/** One parameter as a form field that fits its type. */
-import { ActionIcon, SegmentedControl, Select, Tooltip } from "@mantine/core";
-import { IconAdjustments, IconBackspace, IconLock } from "@tabler/icons-react";
-import { type ReactNode, useState } from "react";
+/** One parameter: what it is called, its value or what gives it, and what else it is. */
+import { ActionIcon, Tooltip } from "@mantine/core";
+import { IconAdjustments, IconLock } from "@tabler/icons-react";
+import { type ReactNode, use, useState } from "react";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import type { ParameterSide } from "../../graph/document-keys";
 import { setParameter } from "../../graph/edit";
-import type { Key, Parameter } from "../../graph/model";
+import type { Action, Parameter } from "../../graph/model";
+import { type InputGiver, readValue, takenGivers } from "../../graph/parameters/data-flow";
+import { outputChoices } from "../../graph/parameters/output-choices";
+import type { ParameterValue } from "../../graph/parameters/values";
 import { pathWords } from "../../graph/value-text";
-import { DraftInput } from "../../ui/draft-input";
 import style from "../inspector.module.css";
+import flowStyle from "./data-flow.module.css";
+import { GiverChips } from "./given-value";
+import { OutputPicker } from "./output-picker";
 import { ParameterSettings } from "./parameter-settings";
-import {
-  complaint,
-  type ParameterValue,
-  parameterValueOf,
-  shown,
-  typed,
-  withValue,
-} from "./parameter-values";
+import { ParameterInput } from "./parameter-value";
+import { DataFlowContext, useDataLights } from "./use-data-lights";
 
 interface Props {
-  owner: Key;
+  action: Action;
   side: ParameterSide;
   parameter: Parameter;
   /** What it is called within its group. */
   name: string;
-  /** The others of its side. */
-  others: readonly Parameter[];
 }
-
-const hints: Partial<Record<string, string>> = {
-  strings: "one text on each line",
-  numbers: "one number on each line",
-  bools: "true or false on each line",
-};
 
 interface LabelProps {
   name: string;
@@ -78,130 +69,116 @@ function Label({ name, fullName, field, open, onOpen }: LabelProps) {
   );
 }
 
-export function ParameterField({ owner, side, parameter, name, others }: Props) {
-  const { doc } = useEditorContext();
-  const [open, setOpen] = useState(false);
-  const field = parameterValueOf(parameter.text);
-  const label: ReactNode = (
-    <Label
-      name={name}
-      fullName={pathWords(parameter.path)}
-      field={field}
-      open={open}
-      onOpen={() => setOpen(!open)}
-    />
-  );
+interface InputProps {
+  action: Action;
+  parameter: Parameter;
+  label: ReactNode;
+  givers: readonly InputGiver[];
+}
+
+/** What gives it, in the place of its field; a value of its own holds until then. */
+function Given({ action, parameter, label, givers }: InputProps) {
+  const renamed = givers.some((giver) => giver.renamed);
   return (
-    <div className={style.parameter}>
-      <Value
-        label={label}
-        name={pathWords(parameter.path)}
-        field={field}
-        parameter={parameter}
-        write={(change) => setParameter(doc, owner, side, parameter.path, change)}
-      />
-      {open && (
-        <ParameterSettings
-          owner={owner}
-          side={side}
-          parameter={parameter}
-          others={others}
-          onClose={() => setOpen(false)}
-        />
-      )}
+    <div>
+      <div>{label}</div>
+      <div className={flowStyle.given} data-given>
+        <GiverChips givers={givers} path={parameter.path} />
+        <Picker action={action} parameter={parameter} givers={givers} renamed={renamed} />
+      </div>
     </div>
   );
 }
 
-interface ValueProps {
-  label: ReactNode;
-  name: string;
-  field: ParameterValue;
-  parameter: Parameter;
-  write: (change: (now: string) => string) => void;
+interface PickerProps extends Omit<InputProps, "label"> {
+  renamed: boolean;
 }
 
-/** The value, as the form field that fits its type. */
-function Value({ label, name, field, parameter, write }: ValueProps) {
-  if (field.native === null) {
-    return (
-      <DraftInput
-        label={label}
-        mono
-        lines
-        value={parameter.text}
-        check={(draft) => {
-          try {
-            JSON.parse(draft);
-            return null;
-          } catch {
-            return "This is no JSON.";
-          }
-        }}
-        onCommit={(draft) => write(() => draft)}
-      />
-    );
-  }
-  if (field.native === "bool") {
-    const value = field.value === "true" || field.value === "false" ? field.value : "";
-    return (
-      <fieldset className={style.fieldset}>
-        <legend>{label}</legend>
-        <SegmentedControl
-          fullWidth
-          size="xs"
-          aria-label={name}
-          data={[
-            { value: "true", label: "true" },
-            { value: "false", label: "false" },
-            { value: "", label: "not given" },
-          ]}
-          value={value}
-          onChange={(next) => write((now) => withValue(now, next === "" ? null : next))}
-        />
-      </fieldset>
-    );
-  }
-  if (field.allowed.length > 0 && (field.native === "string" || field.native === "number")) {
-    return (
-      <Select
-        label={label}
-        aria-label={name}
-        placeholder="Choose a value"
-        clearable
-        data={field.allowed.map((item) => ({ value: item, label: item }))}
-        value={field.value}
-        onChange={(next) => write((now) => withValue(now, next))}
-      />
-    );
-  }
-  const native = field.native;
+function Picker({ action, parameter, givers, renamed }: PickerProps) {
+  const { graph } = useEditorContext();
   return (
-    <DraftInput
-      label={label}
-      mono={native !== "string" && native !== "strings"}
-      lines={native === "strings" || native === "numbers" || native === "bools"}
-      value={shown(field)}
-      inputMode={native === "number" ? "decimal" : "text"}
-      placeholder={hints[native] ?? (field.value === null ? "no value: comes from an output" : "")}
-      check={(draft) => complaint(field, draft)}
-      onCommit={(draft) => {
-        const result = typed(native, draft);
-        if ("ok" in result) write((now) => withValue(now, result.ok));
-      }}
-      rightSection={
-        native === "string" && field.value !== null ? (
-          <Tooltip label="No value: let an output fill it">
-            <ActionIcon
-              size="sm"
-              aria-label={`Take the value of ${name} away`}
-              onClick={() => write((now) => withValue(now, null))}
-            >
-              <IconBackspace size={14} />
-            </ActionIcon>
-          </Tooltip>
+    <OutputPicker
+      owner={action.key}
+      paths={[parameter.path]}
+      name={pathWords(parameter.path)}
+      choices={() => outputChoices(graph, action, parameter.path, givers)}
+      renamed={renamed}
+    />
+  );
+}
+
+/** The field of a value; at its end an input has the outputs that it can come from. */
+export function ParameterValueField({
+  action,
+  side,
+  parameter,
+  label,
+}: Omit<Props, "name"> & { label: ReactNode }) {
+  const { doc } = useEditorContext();
+  const flow = use(DataFlowContext);
+  const field = readValue(parameter);
+  const givers = side === "in" ? takenGivers(flow.get(action.key)?.get(parameter.path)) : [];
+  const given = givers.length > 0;
+  const input = (
+    <ParameterInput
+      label={given ? "" : label}
+      name={pathWords(parameter.path)}
+      field={field}
+      parameter={parameter}
+      write={(change) => setParameter(doc, action.key, side, parameter.path, change)}
+      end={
+        side === "in" && !given && !field.locked ? (
+          <Picker action={action} parameter={parameter} givers={givers} renamed={false} />
         ) : null
       }
     />
+  );
+  if (!given) return input;
+  return (
+    <>
+      <Given action={action} parameter={parameter} label={label} givers={givers} />
+      {field.value !== null && (
+        <div className={flowStyle.until}>
+          Until it comes:
+          {input}
+        </div>
+      )}
+    </>
+  );
+}
+
+export function ParameterField({ action, side, parameter, name }: Props) {
+  const [open, setOpen] = useState(false);
+  const flow = use(DataFlowContext);
+  const field = readValue(parameter);
+  const lights = useDataLights(flow, action.key, side, [parameter.path]);
+  const list = side === "in" ? action.inputs : action.outputs;
+  const unwritten = side === "in" && field.required && field.value === null;
+  return (
+    <div className={style.parameter} data-unwritten={unwritten || undefined} {...lights}>
+      <ParameterValueField
+        action={action}
+        side={side}
+        parameter={parameter}
+        label={
+          <Label
+            name={name}
+            fullName={pathWords(parameter.path)}
+            field={field}
+            open={open}
+            onOpen={() => setOpen(!open)}
+          />
+        }
+      />
+      {open && (
+        <ParameterSettings
+          owner={action.key}
+          side={side}
+          parameter={parameter}
+          others={list.filter((other) => other !== parameter)}
+          onClose={() => setOpen(false)}
+        />
+      )}
+    </div>
   );
 }

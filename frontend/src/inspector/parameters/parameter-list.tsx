@@ -1,17 +1,23 @@
 /** The inputs or outputs of an action, and a way to add one. */
-import { Button, Group, Select, TextInput } from "@mantine/core";
+import { Autocomplete, Button, Group, Select } from "@mantine/core";
 import { IconPlus } from "@tabler/icons-react";
-import { useState } from "react";
+import { useMemo, useState } from "react";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import type { ParameterSide } from "../../graph/document-keys";
 import { addParameter, asOneEdit } from "../../graph/edit";
-import type { Action } from "../../graph/model";
+import type { Action, Parameter } from "../../graph/model";
+import { dataFlowOf } from "../../graph/parameters/data-flow";
+import { blocksOf, type ParameterBlock } from "../../graph/parameters/groups";
+import { nameSuggestions } from "../../graph/parameters/names";
+import { pathFrom, taken } from "../../graph/parameters/paths";
+import { fresh, GROUPS, TYPES } from "../../graph/parameters/values";
 import { pathWords } from "../../graph/value-text";
+import { SectionCounts } from "../fields/section-counts";
 import { SharedField } from "../fields/shared-field";
 import style from "../inspector.module.css";
+import { NumberRows } from "./number-rows";
 import { ParameterField } from "./parameter-field";
-import { type Family, families, pathFrom, taken } from "./parameter-path";
-import { fresh, GROUPS, TYPES } from "./parameter-values";
+import { DataFlowContext } from "./use-data-lights";
 
 interface AddProps {
   action: Action;
@@ -19,9 +25,18 @@ interface AddProps {
   onDone: () => void;
 }
 
+function Suggestion({ name, why }: { name: string; why: string | undefined }) {
+  return (
+    <span className={style.suggestion}>
+      {name} <small>{why}</small>
+    </span>
+  );
+}
+
 function AddParameter({ action, side, onDone }: AddProps) {
-  const { doc } = useEditorContext();
+  const { doc, graph } = useEditorContext();
   const [name, setName] = useState("");
+  const suggestions = nameSuggestions(graph, action, side);
   const [type, setType] = useState<string>("string");
   const path = pathFrom(name);
   const list = side === "in" ? action.inputs : action.outputs;
@@ -45,19 +60,35 @@ function AddParameter({ action, side, onDone }: AddProps) {
       }}
     >
       <Group gap="xs" wrap="nowrap" align="start">
-        <TextInput
+        <Autocomplete
           autoFocus
+          size="sm"
           aria-label="Name of the parameter"
           placeholder="name, or group.name"
           value={name}
           error={wrong ?? undefined}
-          onChange={(event) => setName(event.currentTarget.value)}
+          data={suggestions.map((each) => each.name)}
+          limit={20}
+          renderOption={({ option }) => (
+            <Suggestion
+              name={option.value}
+              why={suggestions.find((each) => each.name === option.value)?.why}
+            />
+          )}
+          onChange={setName}
+          onOptionSubmit={(picked) =>
+            setType(suggestions.find((each) => each.name === picked)?.type ?? type)
+          }
+          comboboxProps={{ width: 220, position: "bottom-start" }}
           flex={1}
         />
         <Select
           aria-label="Type of the parameter"
           data={[
-            { group: "One value", items: [...TYPES] },
+            {
+              group: "One value",
+              items: [...new Set([...TYPES, ...(GROUPS[type] ? [] : [type])])],
+            },
             { group: "A group of numbers", items: Object.keys(GROUPS) },
           ]}
           value={type}
@@ -77,25 +108,48 @@ function AddParameter({ action, side, onDone }: AddProps) {
   );
 }
 
+interface BlockProps {
+  action: Action;
+  side: ParameterSide;
+  block: ParameterBlock;
+}
+
+function Block({ action, side, block }: BlockProps) {
+  if (block.kind === "rows") return <NumberRows action={action} side={side} block={block} />;
+  const field = (parameter: Parameter, prefix: string) => (
+    <SharedField key={parameter.path} of={action.key} field={`${side}/${parameter.path}`}>
+      <ParameterField
+        action={action}
+        side={side}
+        parameter={parameter}
+        name={pathWords(parameter.path.slice(prefix.length))}
+      />
+    </SharedField>
+  );
+  if (block.kind === "single") return field(block.parameter, "");
+  return (
+    <fieldset className={style.group}>
+      <legend>{pathWords(block.prefix.slice(0, -1))}</legend>
+      {block.members.map((parameter) => field(parameter, block.prefix))}
+    </fieldset>
+  );
+}
+
+const keyOf = (block: ParameterBlock): string =>
+  block.kind === "single"
+    ? block.parameter.path
+    : `${block.prefix} ${block.kind === "group" ? block.members[0]?.path : ""}`;
+
 export function ParameterList({ action, side }: { action: Action; side: ParameterSide }) {
+  const { graph } = useEditorContext();
   const [adding, setAdding] = useState(false);
   const list = side === "in" ? action.inputs : action.outputs;
-  const fields = ({ prefix, members }: Family) =>
-    members.map((parameter) => (
-      <SharedField key={parameter.path} of={action.key} field={`${side}/${parameter.path}`}>
-        <ParameterField
-          owner={action.key}
-          side={side}
-          parameter={parameter}
-          name={pathWords(parameter.path.slice(prefix.length))}
-          others={list.filter((other) => other !== parameter)}
-        />
-      </SharedField>
-    ));
+  const flow = useMemo(() => dataFlowOf(graph), [graph]);
   return (
     <section className={style.section}>
       <div className={style.heading}>
         <h3>{side === "in" ? "Parameters" : "Outputs"}</h3>
+        <SectionCounts of={action.key} side={side} />
         <Button
           size="compact-xs"
           variant="subtle"
@@ -105,16 +159,11 @@ export function ParameterList({ action, side }: { action: Action; side: Paramete
           Add
         </Button>
       </div>
-      {families(list).map((family) =>
-        family.prefix === "" ? (
-          fields(family)
-        ) : (
-          <fieldset key={`${family.prefix} ${family.members[0]?.path}`} className={style.group}>
-            <legend>{pathWords(family.prefix.slice(0, -1))}</legend>
-            {fields(family)}
-          </fieldset>
-        ),
-      )}
+      <DataFlowContext value={flow}>
+        {blocksOf(list).map((block) => (
+          <Block key={keyOf(block)} action={action} side={side} block={block} />
+        ))}
+      </DataFlowContext>
       {list.length === 0 && !adding && (
         <p className={style.hint}>{side === "in" ? "Takes none." : "Gives none."}</p>
       )}

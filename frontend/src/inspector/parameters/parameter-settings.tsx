@@ -5,10 +5,7 @@ import { useEditorContext } from "../../edit-actions/editor-context";
 import type { ParameterSide } from "../../graph/document-keys";
 import { removeParameter, renameParameter, setParameter } from "../../graph/edit";
 import type { Key, Parameter } from "../../graph/model";
-import { pathWords } from "../../graph/value-text";
-import { DraftInput } from "../../ui/draft-input";
-import style from "../inspector.module.css";
-import { pathFrom, taken } from "./parameter-path";
+import { pathFrom, taken } from "../../graph/parameters/paths";
 import {
   allowedLines,
   parameterValueOf,
@@ -17,7 +14,10 @@ import {
   withLock,
   withRequired,
   withType,
-} from "./parameter-values";
+} from "../../graph/parameters/values";
+import { pathWords } from "../../graph/value-text";
+import { DraftInput } from "../../ui/draft-input";
+import style from "../inspector.module.css";
 
 interface Props {
   owner: Key;

@@ -4,7 +4,6 @@ import { mapsOf } from "../../graph/document-keys";
 import { addAction } from "../../graph/edit";
 import type { Action } from "../../graph/model";
 import { readGraph } from "../../graph/read";
-import { families, pathFrom, taken } from "./parameter-path";
 import { misfit, passed, sources, targets } from "./remap-choices";
 
 const parameter = (path: string, type: string, more = "") => ({
@@ -64,18 +63,4 @@ test("what is called and typed the same is carried over by itself", () => {
   const [look, grip] = two();
   expect(passed(look, grip, [])).toEqual(["colour"]);
   expect(passed(look, grip, [{ source: "colour", target: "n" }])).toEqual([]);
-});
-
-test("members of a group stand together, and a name inside another is refused", () => {
-  const list = ["a", "pose/x", "pose/y", "b", "pose/z"].map((path) => parameter(path, "number"));
-  expect(families(list).map(({ prefix, members }) => [prefix, members.length])).toEqual([
-    ["", 1],
-    ["pose/", 2],
-    ["", 1],
-    ["pose/", 1],
-  ]);
-  expect(taken(list, pathFrom("pose.w"))).toBeNull();
-  expect(taken(list, pathFrom("pose"))).toContain("group");
-  expect(taken(list, pathFrom("a.b"))).toContain("group");
-  expect(taken(list, "a")).toContain("of this name");
 });

@@ -1,7 +1,7 @@
 /** Which output of an action can reach which input of the next, and why not. Pure. */
 import { flatName } from "../../graph/document-keys";
 import type { Action, Parameter, Remap } from "../../graph/model";
-import { parameterValueOf } from "./parameter-values";
+import { parameterValueOf } from "../../graph/parameters/values";
 
 /** One end of a renaming as a choice; `reason` says why it cannot be chosen. */
 export interface RemapChoice {

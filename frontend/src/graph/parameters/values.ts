@@ -1,5 +1,5 @@
 /** Parameter values by their type: from JSON text to what is typed, and back. Pure. */
-import { memberText, withMember } from "../../graph/json-members";
+import { memberText, withMember } from "../json-members";
 
 export const TYPES = ["string", "number", "bool", "strings", "numbers", "bools"] as const;
 export type PvfType = (typeof TYPES)[number];

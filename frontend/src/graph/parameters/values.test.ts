@@ -11,7 +11,7 @@ import {
   withRequired,
   withType,
   withValue,
-} from "./parameter-values";
+} from "./values";
 
 test("a number keeps the spelling in which it was typed", () => {
   const text = withValue('{"pvf_type": "number"}', "5.0");

@@ -1,0 +1,84 @@
+/** What is wrong, what is only not written yet, and what may go wrong. Pure. */
+
+interface CheckedPlace {
+  readonly aid?: string;
+  readonly relation?: string;
+  readonly path?: string;
+}
+
+/** What of a checked problem is needed here. */
+export interface CheckedProblem {
+  readonly code: string;
+  readonly severity: "error" | "warning";
+  readonly message: string;
+  readonly where: CheckedPlace;
+  /** Other places of which the same is said. */
+  readonly also?: readonly CheckedPlace[];
+  readonly fix?: string | null;
+}
+
+/** `wrong`: certain harm, or a mistake. `fill-in`: still to be written. `warning`: may go wrong. */
+export type ProblemKind = "wrong" | "fill-in" | "warning";
+
+/** Codes that say that something has not been written or connected so far. */
+const UNWRITTEN: ReadonlySet<string> = new Set([
+  "empty",
+  "graph-name-empty",
+  "graph-name-missing",
+  "name-empty",
+  "no-entry",
+  "no-exit",
+  "type-empty",
+  "type-missing",
+  "unreachable",
+]);
+
+/** Mistakes whose harm no engine notices, so that checks call them warnings. */
+const MISTAKES: ReadonlySet<string> = new Set([
+  "parameter-allowed",
+  "parameter-inside",
+  "remap-target",
+  "wrong-side",
+]);
+
+/** An input to which the check asks for a value: its path; null for any other problem. */
+export function inputOf({ code, where }: CheckedProblem): string | null {
+  if (code !== "H7" && code !== "H8") return null;
+  const [, path] = /^\/actions\/\d+\/input_parameters\/(.+)$/.exec(where.path ?? "") ?? [];
+  return path ?? null;
+}
+
+/** `misfits`: whether arrows bring the input something that it cannot take, which is a mistake. */
+export function kindOf(
+  problem: CheckedProblem,
+  misfits: (aid: string, path: string) => boolean = () => false,
+): ProblemKind {
+  const input = inputOf(problem);
+  const { aid } = problem.where;
+  if (input !== null) return aid !== undefined && misfits(aid, input) ? "wrong" : "fill-in";
+  if (UNWRITTEN.has(problem.code)) return "fill-in";
+  return problem.severity === "error" || MISTAKES.has(problem.code) ? "wrong" : "warning";
+}
+
+/** How many things there are of each kind. */
+export interface ProblemCounts {
+  readonly wrong: number;
+  readonly fillIn: number;
+  readonly warnings: number;
+}
+
+export const NO_PROBLEMS: ProblemCounts = { wrong: 0, fillIn: 0, warnings: 0 };
+
+export function countsOf(told: readonly { readonly kind: ProblemKind }[]): ProblemCounts {
+  const of = (kind: ProblemKind) => told.filter((each) => each.kind === kind).length;
+  return { wrong: of("wrong"), fillIn: of("fill-in"), warnings: of("warning") };
+}
+
+/** "1 wrong", "3 to fill in", "2 warnings": those that there are, in this order. */
+export function countWords({ wrong, fillIn, warnings }: ProblemCounts): string[] {
+  return [
+    ...(wrong > 0 ? [`${wrong} wrong`] : []),
+    ...(fillIn > 0 ? [`${fillIn} to fill in`] : []),
+    ...(warnings > 0 ? [warnings === 1 ? "1 warning" : `${warnings} warnings`] : []),
+  ];
+}

@@ -1,0 +1,115 @@
+/** Problems as people are told them: one thing once, however many fields it has. Pure. */
+
+import type { Graph, Key } from "../model";
+import { type DataFlow, dataFlowOf } from "../parameters/data-flow";
+import { groupOf } from "../parameters/groups";
+import { pathWords } from "../value-text";
+import { type CheckedProblem, inputOf, kindOf, type ProblemKind } from "./problem-kinds";
+
+export interface ToldProblem<P extends CheckedProblem = CheckedProblem> {
+  /** The same for the same thing, however often it is checked. */
+  readonly id: string;
+  readonly kind: ProblemKind;
+  /** Whether it keeps the graph from starting. */
+  readonly blocks: boolean;
+  readonly code: string;
+  /** What is said, without the code. */
+  readonly message: string;
+  /** What it is about: id of the arrow, else key of the action; null: the graph as a whole. */
+  readonly place: string | null;
+  /** What of an action's inputs is to fill in, by the path of the whole; null for anything else. */
+  readonly group: string | null;
+  /** Inputs without a value, by path: they can be written where it is told. */
+  readonly inputs: readonly string[];
+  /** All of the check that it stands for, at least one. */
+  readonly problems: readonly [P, ...P[]];
+}
+
+/** Where on the canvas a problem is: a relation, else an action; null: the graph as a whole. */
+export function placeOf({ where }: Pick<CheckedProblem, "where">): string | null {
+  return where.relation ?? where.aid ?? null;
+}
+
+interface Gathered<P extends CheckedProblem> {
+  id: string;
+  kind: ProblemKind;
+  group: string | null;
+  problems: [P, ...P[]];
+}
+
+const ORDER: Readonly<Record<ProblemKind, number>> = { wrong: 0, "fill-in": 1, warning: 2 };
+
+/** "x", "x and y", "x, y and z". */
+function listed(words: readonly string[]): string {
+  return words.length < 2 ? words.join("") : `${words.slice(0, -1).join(", ")} and ${words.at(-1)}`;
+}
+
+/** What is said of inputs that have no value. */
+function unwrittenWords(group: string, paths: readonly string[], code: string): string {
+  const end = code === "H7" ? "or the graph never starts" : "or it never runs";
+  const what = pathWords(group);
+  const parts = paths.map((path) => pathWords(path.slice(group.length + 1)));
+  const [only] = paths;
+  if (only === group) return `${what} is still to fill in, ${end}.`;
+  return `${what}: ${listed(parts)} still to fill in, ${end}.`;
+}
+
+function told<P extends CheckedProblem>({
+  id,
+  kind,
+  group,
+  problems,
+}: Gathered<P>): ToldProblem<P> {
+  const [first] = problems;
+  const inputs = group === null ? [] : problems.flatMap((each) => inputOf(each) ?? []);
+  return {
+    id,
+    kind,
+    blocks: problems.some(({ severity }) => severity === "error"),
+    code: first.code,
+    message: group === null ? first.message : unwrittenWords(group, inputs, first.code),
+    place: placeOf(first),
+    group,
+    inputs,
+    problems,
+  };
+}
+
+/** Whether every giver of an input brings what it cannot take. */
+function misfitsIn(flow: DataFlow) {
+  return (aid: Key, path: string): boolean => {
+    const givers = flow.get(aid)?.get(path) ?? [];
+    return givers.length > 0 && givers.every(({ misfit }) => misfit !== null);
+  };
+}
+
+/** What is wrong, then what is to fill in, then what may go wrong; of each what blocks comes first. */
+export function toldProblems<P extends CheckedProblem>(
+  problems: readonly P[],
+  graph: Pick<Graph, "actions" | "relations">,
+  flow: DataFlow = dataFlowOf(graph),
+): ToldProblem<P>[] {
+  const misfits = misfitsIn(flow);
+  const actions = new Map(graph.actions.map((action) => [action.key, action]));
+  const found = new Map<string, Gathered<P>>();
+  for (const problem of problems) {
+    const kind = kindOf(problem, misfits);
+    const { aid } = problem.where;
+    const input = kind === "fill-in" && aid !== undefined ? inputOf(problem) : null;
+    const list = actions.get(aid ?? "")?.inputs ?? [];
+    const group = input === null ? null : groupOf(list, input);
+    // What has the same words at the same place is one thing, whichever lines of the file it is in.
+    const what = group === null ? problem.message : `in/${group}`;
+    const id = `${kind} ${problem.code} ${placeOf(problem) ?? ""} ${what}`;
+    const known = found.get(id);
+    if (known) known.problems.push(problem);
+    else found.set(id, { id, kind, group, problems: [problem] });
+  }
+  const rank = ({ kind, blocks }: ToldProblem) => 2 * ORDER[kind] + (blocks ? 0 : 1);
+  return [...found.values()].map(told).sort((a, b) => rank(a) - rank(b));
+}
+
+/** Places other than its own of which the same is said. */
+export function otherPlaces(problem: Pick<CheckedProblem, "also">): string[] {
+  return (problem.also ?? []).flatMap((where) => placeOf({ where }) ?? []);
+}
