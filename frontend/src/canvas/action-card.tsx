@@ -9,7 +9,7 @@ import { StateLabel } from "../status/state-label";
 import { colorOfName } from "../ui/name-colors";
 import { stopwatch, useNow } from "../ui/times";
 import style from "./action-card.module.css";
-import { useIsDimmed, useOpenThreadCount } from "./card-highlights";
+import { useDataRole, useIsDimmed, useOpenThreadCount } from "./card-highlights";
 import type { CardNode } from "./elements";
 import { CARD_LINES } from "./geometry/arrange";
 import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "./outcome";
@@ -46,6 +46,7 @@ export const ActionCard = memo(function ActionCard({
   const color = colorOfName(action.actor);
   const dim = useIsDimmed(action.actor);
   const talk = useOpenThreadCount(action.key);
+  const role = useDataRole(action.key);
   return (
     <div
       className={style.card}
@@ -55,6 +56,7 @@ export const ActionCard = memo(function ActionCard({
       data-tone={progress?.tone}
       data-ghost={action.missing || undefined}
       data-dim={dim || undefined}
+      data-flow={role}
       data-direction={direction}
     >
       <Handle

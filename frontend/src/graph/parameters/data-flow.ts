@@ -26,7 +26,7 @@ export interface InputGiver {
 }
 
 /** The givers of each input, by the input's path; inputs that nobody gives are left out. */
-export type InputGivers = ReadonlyMap<string, readonly InputGiver[]>;
+type InputGivers = ReadonlyMap<string, readonly InputGiver[]>;
 /** The same for every action that has any. */
 export type DataFlow = ReadonlyMap<Key, InputGivers>;
 

@@ -45,7 +45,7 @@ export function remapFor(remap: readonly Remap[], ties: readonly Tie[]): Remap[]
 }
 
 /** The actions from which arrows lead to one, however far. */
-export function before(relations: readonly Relation[], key: Key): ReadonlySet<Key> {
+function before(relations: readonly Relation[], key: Key): ReadonlySet<Key> {
   const parents = new Map<Key, Key[]>();
   for (const { parent, child } of relations) {
     parents.set(child, [...(parents.get(child) ?? []), parent]);

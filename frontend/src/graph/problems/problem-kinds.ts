@@ -67,8 +67,6 @@ export interface ProblemCounts {
   readonly warnings: number;
 }
 
-export const NO_PROBLEMS: ProblemCounts = { wrong: 0, fillIn: 0, warnings: 0 };
-
 export function countsOf(told: readonly { readonly kind: ProblemKind }[]): ProblemCounts {
   const of = (kind: ProblemKind) => told.filter((each) => each.kind === kind).length;
   return { wrong: of("wrong"), fillIn: of("fill-in"), warnings: of("warning") };
