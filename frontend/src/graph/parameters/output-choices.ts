@@ -62,13 +62,13 @@ function before(relations: readonly Relation[], key: Key): ReadonlySet<Key> {
   return found;
 }
 
-interface Ways {
+interface Arrivals {
   readonly action: Action;
   readonly direct: ReadonlyMap<Key, Relation>;
   readonly earlier: ReadonlySet<Key>;
 }
 
-function waysTo({ relations }: Pick<Graph, "relations">, action: Action): Ways {
+function waysTo({ relations }: Pick<Graph, "relations">, action: Action): Arrivals {
   const arriving = relations.filter(
     (relation) => relation.child === action.key && handsOver(relation),
   );
@@ -79,7 +79,7 @@ function waysTo({ relations }: Pick<Graph, "relations">, action: Action): Ways {
 const flatNames = (list: readonly Parameter[]): string[] => list.map(({ path }) => flatName(path));
 
 /** What renaming would do to what the arrow brings already; null when nothing. */
-function harm({ action }: Ways, parent: Action, relation: Relation, ties: readonly Tie[]) {
+function harm({ action }: Arrivals, parent: Action, relation: Relation, ties: readonly Tie[]) {
   const [outputs, inputs] = [flatNames(parent.outputs), flatNames(action.inputs)];
   for (const { output, input } of ties) {
     const known = relation.remap.find(({ source }) => source === output);
@@ -98,7 +98,7 @@ function harm({ action }: Ways, parent: Action, relation: Relation, ties: readon
 }
 
 /** Why none of these outputs of an action can be taken; null when they can. */
-function reasonOf(ways: Ways, parent: Action, ties: readonly Tie[]): string | null {
+function reasonOf(ways: Arrivals, parent: Action, ties: readonly Tie[]): string | null {
   if (parent.missing) return "is not there";
   const find = (list: readonly Parameter[], name: string) =>
     list.find(({ path }) => flatName(path) === name);
@@ -123,7 +123,7 @@ type Given = readonly { readonly parent: Key; readonly output: string }[];
 
 function choiceOf(
   graph: Graph,
-  ways: Ways,
+  ways: Arrivals,
   parent: Action,
   given: Given,
   what: Pick<OutputChoice, "output" | "type" | "ties">,
