@@ -139,7 +139,7 @@ export async function start(page: Page): Promise<void> {
 export async function give(page: Page, to: string, name: string, value: string): Promise<void> {
   await card(page, to).click({ position: { x: 50, y: 30 } });
   await page.getByRole("button", { name: "Add", exact: true }).first().click();
-  const field = page.getByRole("textbox", { name: "Name of the parameter" });
+  const field = page.getByRole("combobox", { name: "Name of the parameter" });
   await field.fill(name);
   await field.press("Enter");
   const input = page.getByRole("textbox", { name: new RegExp(`^${name}`) });

@@ -302,7 +302,7 @@ test("a decision that is led to the end ends either way, and what runs beside it
   }
   await pick(page, ["Answer", 0]);
   await page.getByRole("button", { name: "Add", exact: true }).nth(1).click();
-  const field = page.getByRole("textbox", { name: "Name of the parameter" });
+  const field = page.getByRole("combobox", { name: "Name of the parameter" });
   await field.fill("said");
   await field.press("Enter");
   await page.getByRole("button", { name: "Tidy", exact: true }).click();
@@ -337,7 +337,7 @@ test("a graph with a loop and a renamed output is built from nothing", async ({ 
       .getByRole("button", { name: "Add", exact: true })
       .nth(side === "in" ? 0 : 1)
       .click();
-    const field = page.getByRole("textbox", { name: "Name of the parameter" });
+    const field = page.getByRole("combobox", { name: "Name of the parameter" });
     await field.fill(called);
     await field.press("Enter");
   };

@@ -152,7 +152,7 @@ test("what somebody changed while one typed is asked about, never written over",
   await expect(asked).toContainText("Somebody changed Grip 0");
   await expect(card(ada.page, "Grip")).toContainText("left arm");
   await asked.getByRole("button", { name: "Theirs, and the rest of mine" }).click();
-  await expect(card(ada.page, "Grip")).toContainText("target.x = 0.75");
+  await expect(card(ada.page, "Grip")).toContainText("target0.75 ?");
   await expect(card(ada.page, "Grip")).toContainText("left arm");
   expect([...ada.failures, ...mari.failures]).toEqual([]);
   await ada.context.close();

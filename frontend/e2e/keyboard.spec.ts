@@ -56,7 +56,7 @@ async function goTo(page: Page, name: string): Promise<void> {
 async function number(page: Page, section: number, name: string): Promise<void> {
   await tabTo(page, page.getByRole("button", { name: "Add", exact: true }).nth(section));
   await page.keyboard.press("Enter");
-  const field = page.getByRole("textbox", { name: "Name of the parameter" });
+  const field = page.getByRole("combobox", { name: "Name of the parameter" });
   await expect(field).toBeFocused();
   await page.keyboard.type(name);
   await choose(page, page.getByRole("combobox", { name: "Type of the parameter" }), "number");
@@ -257,7 +257,7 @@ test("a dry-run is played by keys and records nothing", async ({ browser }) => {
   await expect(bar).toContainText("The graph ends: true", { timeout: 15_000 });
   await bar.getByRole("button", { name: "Close the dry-run" }).click();
   await expect(bar).toBeHidden();
-  await expect(card(page, "Wait", 0)).toContainText("idle");
+  await expect(card(page, "Wait", 0)).not.toContainText(/true|running|waits/);
   const runs = await product.ask<unknown[]>(`/api/runs?graph=${id}`, {}, product.runnerUrl);
   expect(runs).toEqual([]);
   const { seq } = await product.ask<{ seq: number }>(`/api/graphs/${id}`);

@@ -64,7 +64,7 @@ test("a graph is made in the outline", async ({ browser }) => {
     .getByText("Take 0")
     .tap();
   await page.getByRole("button", { name: "Add", exact: true }).first().tap();
-  await page.getByRole("textbox", { name: "Name of the parameter" }).fill("force");
+  await page.getByRole("combobox", { name: "Name of the parameter" }).fill("force");
   await page.locator("form").getByRole("button", { name: "Add", exact: true }).tap();
   const force = page.getByRole("textbox", { name: /^force/ });
   await force.fill("gentle");

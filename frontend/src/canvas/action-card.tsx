@@ -2,7 +2,7 @@
 import { IconGhost2, IconMessageCircle } from "@tabler/icons-react";
 import { Handle, type NodeProps, Position } from "@xyflow/react";
 import { memo } from "react";
-import { cardLines, lineText } from "../graph/value-text";
+import { cardRows } from "../graph/parameters/card-rows";
 import { durationText } from "../status/durations";
 import type { Progress } from "../status/progress";
 import { StateLabel } from "../status/state-label";
@@ -10,15 +10,14 @@ import { colorOfName } from "../ui/name-colors";
 import { stopwatch, useNow } from "../ui/times";
 import style from "./action-card.module.css";
 import { useDataRole, useIsDimmed, useOpenThreadCount } from "./card-highlights";
+import { CardLines } from "./card-lines";
 import type { CardNode } from "./elements";
-import { CARD_LINES } from "./geometry/arrange";
+import { CARD_LINES, cardSize } from "./geometry/arrange";
 import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "./outcome";
 import { ProblemBadge } from "./problem-badge";
 
-function ProgressLine({ progress }: { progress: Progress | null }) {
-  const going = progress?.since != null;
-  const now = useNow(1000, going);
-  if (progress === null) return <StateLabel tone="idle" word="idle" />;
+function ProgressLine({ progress }: { progress: Progress }) {
+  const now = useNow(1000, progress.since !== null);
   const parts: string[] = [];
   const took = durationText(progress);
   if (progress.since !== null) parts.push(stopwatch(now - progress.since));
@@ -26,7 +25,10 @@ function ProgressLine({ progress }: { progress: Progress | null }) {
   if (progress.visits > 1) parts.push(`${progress.visits}×`);
   const more = parts.join(" · ");
   return (
-    <StateLabel tone={progress.tone} word={progress.word} {...(more === "" ? {} : { more })} />
+    <div className={style.state} title={progress.inferred ? "Inferred, not seen" : undefined}>
+      <StateLabel tone={progress.tone} word={progress.word} {...(more === "" ? {} : { more })} />
+      {progress.inferred && <span className={style.inferred}>inferred</span>}
+    </div>
   );
 }
 
@@ -40,9 +42,11 @@ export const ActionCard = memo(function ActionCard({
   selected,
   isConnectable,
 }: NodeProps<CardNode>) {
-  const { action, progress, mark, other, direction } = data;
+  const { action, progress, mark, other, direction, givers } = data;
   const right = direction === "right";
-  const lines = cardLines(action.inputs, CARD_LINES);
+  const rows = cardRows(action.inputs, givers, progress?.inputs);
+  const says = progress !== null || action.missing;
+  const { height } = cardSize(action, direction);
   const color = colorOfName(action.actor);
   const dim = useIsDimmed(action.actor);
   const talk = useOpenThreadCount(action.key);
@@ -50,7 +54,7 @@ export const ActionCard = memo(function ActionCard({
   return (
     <div
       className={style.card}
-      style={{ "--c": color, "--other": other ?? undefined } as React.CSSProperties}
+      style={{ height, "--c": color, "--other": other ?? undefined } as React.CSSProperties}
       data-other={other === null ? undefined : true}
       data-selected={selected || undefined}
       data-tone={progress?.tone}
@@ -82,26 +86,16 @@ export const ActionCard = memo(function ActionCard({
           {action.missing && <IconGhost2 size={13} aria-hidden />}
           {action.name}
         </b>
-        <span className={style.instance}>{action.instanceId}</span>
+        {action.instanceId > 0 && <span className={style.instance}>{action.instanceId}</span>}
       </div>
-      {action.missing ? (
-        <div className={style.hint}>named by an arrow, but not there</div>
-      ) : (
-        <ProgressLine progress={progress} />
-      )}
-      {lines.length > 0 && (
-        <div className={style.lines}>
-          {lines.map((line) => (
-            <div
-              key={line.name}
-              title={lineText(line)}
-              data-open={line.value === null || undefined}
-            >
-              {lineText(line)}
-            </div>
-          ))}
-        </div>
-      )}
+      {action.missing && <div className={style.hint}>named by an arrow, but not there</div>}
+      {!action.missing && progress && <ProgressLine progress={progress} />}
+      <CardLines
+        rows={rows}
+        most={says ? CARD_LINES - 1 : CARD_LINES}
+        selected={selected}
+        inferred={progress?.inferred ?? false}
+      />
       {OUTCOMES.map((outcome, i) => (
         <Handle
           key={outcome}

@@ -14,6 +14,7 @@ import {
   type Response,
   spokenOutcomes,
 } from "../graph/model";
+import { dataFlowOf, type InputGivers } from "../graph/parameters/data-flow";
 import type { Progress } from "../status/progress";
 import { type Bundle, bundlesOf, pillSizeOf } from "./arrows/bundles";
 import { gridOffset, type Scene, type SceneCard } from "./arrows/scene";
@@ -30,6 +31,8 @@ export type CardNode = Node<
     /** The colour of somebody else who has it selected. */
     other: string | null;
     direction: Direction;
+    /** Which outputs reach its inputs. */
+    givers: InputGivers | undefined;
   },
   "action"
 >;
@@ -113,7 +116,7 @@ function place(key: Key, options: NodeOptions, direction: Direction) {
 /** The card of an action: the same as before when nothing that it shows has changed. */
 function cardOf(
   action: Action,
-  direction: Direction,
+  { direction, givers }: Pick<CardNode["data"], "direction" | "givers">,
   options: NodeOptions,
   before: CanvasNode | undefined,
 ): CardNode {
@@ -124,6 +127,7 @@ function cardOf(
     mark: options.marks.get(action.key) ?? null,
     other: options.others?.get(action.key) ?? null,
     direction,
+    givers,
   };
   const same =
     before?.type === "action" &&
@@ -132,6 +136,7 @@ function cardOf(
     before.data.mark === data.mark &&
     before.data.other === data.other &&
     before.data.direction === direction &&
+    before.data.givers === givers &&
     before.position.x === x &&
     before.position.y === y &&
     before.selected === options.selected.has(action.key) &&
@@ -148,6 +153,7 @@ export function nodesOf(
   before: readonly CanvasNode[] = [],
 ): CanvasNode[] {
   const known = new Map(before.map((node) => [node.id, node]));
+  const flow = dataFlowOf(graph);
   const ends = ([ENTRY, EXIT] as const).map(
     (end): EndNode => ({
       ...place(end, options, graph.direction),
@@ -158,7 +164,12 @@ export function nodesOf(
     }),
   );
   const cards = graph.actions.map((action) =>
-    cardOf(action, graph.direction, options, known.get(action.key)),
+    cardOf(
+      action,
+      { direction: graph.direction, givers: flow.get(action.key) },
+      options,
+      known.get(action.key),
+    ),
   );
   const notes = noteNodes(graph, options);
   return [...notes.frames, ...ends, ...cards, ...notes.notes];

@@ -2,14 +2,14 @@
 
 import { type Note, notesOf } from "../graph/edit/notes";
 import type { Direction, Graph, Key, Position, Precondition } from "../graph/model";
-import { cardLines, lineText } from "../graph/value-text";
+import { cardRows } from "../graph/parameters/card-rows";
 import { colorOfName } from "../ui/name-colors";
 import { type Bundle, bundlesOf, pillWord } from "./arrows/bundles";
 import { pathOf } from "./arrows/line-path";
 import { type LineMap, type RoutedLine, routed } from "./arrows/routes";
 import type { PillSize, Scene } from "./arrows/scene";
 import { type CanvasNode, nodesOf, sceneOf } from "./elements";
-import { CARD, pillSize, type Sizes } from "./geometry/arrange";
+import { CARD, CARD_LINES, pillSize, type Sizes } from "./geometry/arrange";
 import { noteColor } from "./notes/note-colors";
 import { OUTCOMES, outcomeColor } from "./outcome";
 import { NO_PROBLEM_MARKS } from "./problem-marks";
@@ -152,14 +152,16 @@ class Painter {
     const robot = this.paint(colorOfName(action.actor));
     const ink = `fill="${this.paint("--ink")}"`;
     const dash = action.missing ? ` stroke-dasharray="5 4"` : "";
-    const lines = cardLines(action.inputs, 2).map((line, i) =>
-      this.text(
-        fitted(lineText(line), width - 30, 6.7),
-        x + 16,
-        y + 46 + i * 16,
-        `fill="${this.paint("--ink2")}" font-family="${MONO}" font-size="11"`,
-      ),
-    );
+    const lines = cardRows(action.inputs, data.givers)
+      .slice(0, CARD_LINES)
+      .map(({ name, kind, text }, i) =>
+        this.text(
+          fitted(`${name} ${kind === "from" ? "← " : ""}${text}`, width - 30, 6.7),
+          x + 16,
+          y + 46 + i * 16,
+          `fill="${this.paint("--ink2")}" font-family="${MONO}" font-size="11"`,
+        ),
+      );
     const tag = fitted(action.actor, 75, 6.4);
     return [
       `<rect x="${x}" y="${y}" width="${width}" height="${height}" rx="12" fill="${this.paint("--raised")}" stroke="${this.paint("--line2")}"${dash}/>`,

@@ -17,6 +17,8 @@ export interface Progress {
   atMost: number | null;
   visits: number;
   inferred: boolean;
+  /** The values with which the last visit ran, as the engine reported them: JSON texts by flat name. */
+  inputs?: Readonly<Record<string, string>>;
   message: string | null;
 }
 
@@ -103,6 +105,7 @@ export function progressOf(action: ActionRun, run: Run, unsure: boolean): Progre
     ...(last ? visitDuration(last) : { took: null, atMost: null }),
     visits: action.visits.length,
     inferred: last?.how === "inferred",
+    ...(last?.inputs ? { inputs: last.inputs } : {}),
     message: action.messages.at(-1)?.text ?? null,
   };
 }

@@ -3,6 +3,7 @@
  * none. At once and without a library, so that something is drawn; `layout.ts` lays out.
  */
 import {
+  type Action,
   type Direction,
   ENTRY,
   EXIT,
@@ -11,7 +12,7 @@ import {
   type Position,
   type Relation,
 } from "../../graph/model";
-import { cardLines } from "../../graph/value-text";
+import { cardRows } from "../../graph/parameters/card-rows";
 
 export interface Size {
   readonly width: number;
@@ -25,30 +26,32 @@ export const CARD = { width: 208, height: 104 } as const;
 const PILL = { width: 208, height: 32 } as const;
 /** The ends, left to right: as wide as they look. */
 const SHORT_PILL = { width: 84, height: 32 } as const;
-/** How many parameters a card shows. */
-export const CARD_LINES = 2;
+/** How many parameters a card shows at rest; in a run its state stands in the place of the last. */
+export const CARD_LINES = 3;
 
 /** Of what `action-card.module.css` sets, px: a card without parameters, and what they add. */
-const HEIGHT = { plain: 68, low: 58, least: 88, lines: 4, line: 17.2 } as const;
+const HEIGHT = { plain: 68, low: 58, least: 88, lines: 4, line: 18 } as const;
 /** Kept free between cards that nobody has laid out. */
 const GAP = { along: 108, across: 56 } as const;
 
 export const pillSize = (direction: Direction): Size => (direction === "right" ? SHORT_PILL : PILL);
 
+/** How large the card of an action is: the same at rest, in a run and when it is selected. */
+export function cardSize({ inputs }: Pick<Action, "inputs">, direction: Direction): Size {
+  const lines = Math.min(CARD_LINES - 1, cardRows(inputs).length);
+  const text = lines === 0 ? 0 : HEIGHT.lines + lines * HEIGHT.line;
+  const height =
+    direction === "right" ? Math.max(HEIGHT.least, HEIGHT.low + text) : HEIGHT.plain + text;
+  return { width: CARD.width, height };
+}
+
 /** How large everything will be drawn, before it is. */
 export function estimatedSizes({ actions, direction }: Graph): Map<Key, Size> {
-  const sizes = new Map<Key, Size>([
+  return new Map<Key, Size>([
     [ENTRY, pillSize(direction)],
     [EXIT, pillSize(direction)],
+    ...actions.map((action) => [action.key, cardSize(action, direction)] as const),
   ]);
-  for (const { key, inputs } of actions) {
-    const lines = cardLines(inputs, CARD_LINES).length;
-    const text = lines === 0 ? 0 : HEIGHT.lines + lines * HEIGHT.line;
-    const height =
-      direction === "right" ? Math.max(HEIGHT.least, HEIGHT.low + text) : HEIGHT.plain + text;
-    sizes.set(key, { width: CARD.width, height: Math.ceil(height) });
-  }
-  return sizes;
 }
 
 function sizeOf(key: Key, sizes: Sizes, direction: Direction): Size {

@@ -26,7 +26,7 @@ export interface InputGiver {
 }
 
 /** The givers of each input, by the input's path; inputs that nobody gives are left out. */
-type InputGivers = ReadonlyMap<string, readonly InputGiver[]>;
+export type InputGivers = ReadonlyMap<string, readonly InputGiver[]>;
 /** The same for every action that has any. */
 export type DataFlow = ReadonlyMap<Key, InputGivers>;
 
@@ -101,8 +101,18 @@ function giversOf(
   return givers;
 }
 
-/** What reaches whom in a graph. */
+const flows = new WeakMap<Graph["actions"], { relations: Graph["relations"]; flow: DataFlow }>();
+
+/** What reaches whom in a graph; worked out once for each state of it. */
 export function dataFlowOf({ actions, relations }: Pick<Graph, "actions" | "relations">): DataFlow {
+  const known = flows.get(actions);
+  if (known?.relations === relations) return known.flow;
+  const flow = flowOf(actions, relations);
+  flows.set(actions, { relations, flow });
+  return flow;
+}
+
+function flowOf(actions: Graph["actions"], relations: Graph["relations"]): DataFlow {
   const byKey = new Map(actions.map((action) => [action.key, action]));
   const arriving = new Map<Key, Relation[]>();
   for (const relation of relations) {
