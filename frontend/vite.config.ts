@@ -6,10 +6,9 @@ const editor = process.env.ACTION_ASSISTANT_EDITOR ?? "http://127.0.0.1:8000";
 
 /** Vendor code in few files that change seldom, so that an upgrade of ours leaves them cached. */
 const vendors: { name: string; test: RegExp }[] = [
-  { name: "react", test: /node_modules\/(react|react-dom|scheduler)\// },
+  { name: "react", test: /node_modules\/(react|react-dom|scheduler|use-sync-external-store)\// },
   { name: "canvas", test: /node_modules\/(@xyflow|d3-|classcat|zustand)/ },
   { name: "sync", test: /node_modules\/(yjs|y-protocols|lib0)\// },
-  { name: "interface", test: /node_modules\/(@mantine|@floating-ui|@tabler|react-|@tanstack)/ },
 ];
 
 export default defineConfig({
@@ -18,6 +17,7 @@ export default defineConfig({
   base: "./",
   build: {
     outDir: "dist",
+    manifest: true,
     target: "es2022",
     // Fonts inlined as data: would be refused by the Content-Security-Policy.
     assetsInlineLimit: 0,

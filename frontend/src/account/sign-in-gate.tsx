@@ -24,9 +24,12 @@ import {
 } from "../api/session";
 import { sessionEnd } from "../api/session-end";
 import { PersonContext } from "../api/use-person";
-import { Invitation } from "./invitation";
-import { SignIn } from "./sign-in";
-import { SignInBar } from "./sign-in-bar";
+import { lazyPart } from "../ui/parts/lazy-part";
+import { PartBoundary } from "../ui/parts/part-boundary";
+
+const SignIn = lazyPart(() => import("./sign-in").then((part) => part.SignIn));
+const Invitation = lazyPart(() => import("./invitation").then((part) => part.Invitation));
+const SignInBar = lazyPart(() => import("./sign-in-bar").then((part) => part.SignInBar));
 
 type Gate =
   | { at: "knocking" }
@@ -145,15 +148,27 @@ export function SignInGate({ children }: { children: ReactNode }) {
   );
   if (gate.at === "knocking") return <div aria-busy="true" />;
   if (gate.at === "invited") {
-    return <Invitation key={gate.key.text} link={gate.key} invited={gate.invited} onOpen={letIn} />;
+    return (
+      <PartBoundary>
+        <Invitation key={gate.key.text} link={gate.key} invited={gate.invited} onOpen={letIn} />
+      </PartBoundary>
+    );
   }
   if (hold === null) {
-    return <SignIn why={gate.at === "outside" ? gate.why : ""} onOpen={letIn} />;
+    return (
+      <PartBoundary>
+        <SignIn why={gate.at === "outside" ? gate.why : ""} onOpen={letIn} />
+      </PartBoundary>
+    );
   }
   return (
     <PersonContext value={hold}>
       {children}
-      {ended && <SignInBar onOpen={letIn} />}
+      {ended && (
+        <PartBoundary>
+          <SignInBar onOpen={letIn} />
+        </PartBoundary>
+      )}
     </PersonContext>
   );
 }

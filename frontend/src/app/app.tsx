@@ -1,8 +1,7 @@
 /** The page: theme, data, session, routes. */
 import { MantineProvider } from "@mantine/core";
-import { Notifications } from "@mantine/notifications";
 import { QueryClient, QueryClientProvider } from "@tanstack/react-query";
-import type { ReactNode } from "react";
+import { type ReactNode, useEffect, useState, useSyncExternalStore } from "react";
 import { Route, Router, Switch } from "wouter";
 import { NamePrompt } from "../account/name-prompt";
 import { SignInGate } from "../account/sign-in-gate";
@@ -14,20 +13,24 @@ import { actionDrag } from "../canvas/action-drag";
 import { UnansweredStartNotice } from "../runs/start/unanswered-start-notice";
 import { StopNotice } from "../runs/stop/stop-notice";
 import { LiveRegion } from "../ui/announcer";
+import { lazyPart } from "../ui/parts/lazy-part";
+import { OverlayBoundary } from "../ui/parts/part-boundary";
 import { DragPreview } from "../ui/pointer-drag";
 import { theme, variables } from "../ui/theme";
+import type { Crumb } from "../ui/top-bar";
 import { DropFiles } from "./drop-files";
-import { GraphScreen } from "./graph-screen";
-import { ImportReviewDialog } from "./import-review-dialog";
-import { NotFound } from "./not-found";
+import { importReviews } from "./import-review";
 import {
   CompareScreen,
+  GraphScreen,
   HomeScreen,
   RobotsScreen,
   RunScreen,
   RunsScreen,
+  Screen,
   StatisticsScreen,
-} from "./screens";
+} from "./lazy-screens";
+import { NotFound } from "./not-found";
 
 const client = new QueryClient({
   defaultOptions: {
@@ -48,27 +51,83 @@ function LiveConnection({ children }: { children: ReactNode }) {
   );
 }
 
+const Messages = lazyPart(() => import("../ui/parts/messages").then((part) => part.Messages));
+const ImportReviewDialog = lazyPart(() =>
+  import("./import-review-dialog").then((part) => part.ImportReviewDialog),
+);
+
+/** Once something had to be looked at, the dialog stays: it goes out of sight by itself. */
+function ImportReview() {
+  const [asked, setAsked] = useState(false);
+  const waits = useSyncExternalStore(importReviews.subscribe, importReviews.now) !== null;
+  useEffect(() => setAsked((was) => was || waits), [waits]);
+  return <OverlayBoundary>{asked && <ImportReviewDialog />}</OverlayBoundary>;
+}
+
+const graphs: Crumb = { label: "Graphs", to: "/" };
+const runs: Crumb = { label: "Runs", to: "/runs" };
+
+function Screens() {
+  return (
+    <Switch>
+      <Route path="/">
+        <Screen crumbs={[{ label: "Graphs" }]}>
+          <HomeScreen />
+        </Screen>
+      </Route>
+      <Route path="/graphs/:id">
+        {({ id }) => (
+          <Screen crumbs={[graphs]} key={id}>
+            <GraphScreen id={id} />
+          </Screen>
+        )}
+      </Route>
+      <Route path="/robots">
+        <Screen crumbs={[graphs, { label: "Robots" }]}>
+          <RobotsScreen />
+        </Screen>
+      </Route>
+      <Route path="/runs">
+        <Screen crumbs={[graphs, { label: "Runs" }]}>
+          <RunsScreen />
+        </Screen>
+      </Route>
+      <Route path="/runs/compare">
+        <Screen crumbs={[graphs, runs]}>
+          <CompareScreen />
+        </Screen>
+      </Route>
+      <Route path="/runs/statistics">
+        <Screen crumbs={[graphs, runs]}>
+          <StatisticsScreen />
+        </Screen>
+      </Route>
+      <Route path="/runs/:id">
+        {({ id }) => (
+          <Screen crumbs={[graphs, runs]} key={id}>
+            <RunScreen id={id} />
+          </Screen>
+        )}
+      </Route>
+      <Route component={NotFound} />
+    </Switch>
+  );
+}
+
 export function App() {
   return (
     <MantineProvider theme={theme} cssVariablesResolver={variables} defaultColorScheme="auto">
-      <Notifications position="bottom-right" zIndex={350} />
+      <OverlayBoundary>
+        <Messages />
+      </OverlayBoundary>
       <QueryClientProvider client={client}>
         <Router base={basePath}>
           <SignInGate>
             <LiveConnection>
               <DropFiles>
-                <Switch>
-                  <Route path="/" component={HomeScreen} />
-                  <Route path="/graphs/:id">{({ id }) => <GraphScreen key={id} id={id} />}</Route>
-                  <Route path="/robots" component={RobotsScreen} />
-                  <Route path="/runs" component={RunsScreen} />
-                  <Route path="/runs/compare" component={CompareScreen} />
-                  <Route path="/runs/statistics" component={StatisticsScreen} />
-                  <Route path="/runs/:id">{({ id }) => <RunScreen key={id} id={id} />}</Route>
-                  <Route component={NotFound} />
-                </Switch>
+                <Screens />
                 <NamePrompt />
-                <ImportReviewDialog />
+                <ImportReview />
                 <StopNotice />
                 <UnansweredStartNotice />
                 <DragPreview carrier={actionDrag} />

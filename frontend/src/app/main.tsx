@@ -3,12 +3,14 @@ import "@fontsource-variable/inter/index.css";
 import "@fontsource-variable/jetbrains-mono/index.css";
 import "@mantine/core/styles.css";
 import "@mantine/notifications/styles.css";
-import "@xyflow/react/dist/style.css";
 import "../ui/tokens.css";
 import "../ui/base.css";
 import { StrictMode } from "react";
 import { createRoot } from "react-dom/client";
 import { App } from "./app";
+import { preloadAt, preloadWhenIdle } from "./lazy-screens";
+
+void preloadAt(location.pathname).then(preloadWhenIdle);
 
 const root = document.getElementById("root");
 if (root === null) throw new Error("index.html has no #root");

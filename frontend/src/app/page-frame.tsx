@@ -4,9 +4,10 @@ import { IconHistory, IconRobot, IconShare } from "@tabler/icons-react";
 import { memo, type ReactNode, useState } from "react";
 import { Link } from "wouter";
 import { AccountMenu } from "../account/account-menu";
-import { ShareDialog } from "../account/share-dialog";
 import { useMay } from "../api/use-person";
 import { StopButton } from "../runs/stop/stop-button";
+import { lazyPart } from "../ui/parts/lazy-part";
+import { OverlayBoundary } from "../ui/parts/part-boundary";
 import { type Crumb, TopBar } from "../ui/top-bar";
 import { useStableCallback } from "../ui/use-stable-callback";
 import style from "./page-frame.module.css";
@@ -32,7 +33,9 @@ interface WayProps {
 
 // The bar is drawn with the graph; what of it is always the same is not.
 const Account = memo(AccountMenu);
-const Sharing = memo(ShareDialog);
+const Sharing = memo(
+  lazyPart(() => import("../account/share-dialog").then((part) => part.ShareDialog)),
+);
 
 const Way = memo(function Way({ to, icon: Icon, name, tight }: WayProps) {
   return (
@@ -54,7 +57,8 @@ const Way = memo(function Way({ to, icon: Icon, name, tight }: WayProps) {
 
 export function PageBar({ crumbs, status, actions, start, graph, at }: Props) {
   const mayShare = useMay("share");
-  const [sharing, setSharing] = useState(false);
+  // Null until it was asked for: from then on it stays, and gives the focus back when it closes.
+  const [sharing, setSharing] = useState<boolean | null>(null);
   const share = useStableCallback(() => setSharing(true));
   const closeSharing = useStableCallback(() => setSharing(false));
   const tight = Boolean(start);
@@ -81,7 +85,11 @@ export function PageBar({ crumbs, status, actions, start, graph, at }: Props) {
               Share
             </Button>
           )}
-          {mayShare && <Sharing opened={sharing} onClose={closeSharing} />}
+          {mayShare && (
+            <OverlayBoundary>
+              {sharing !== null && <Sharing opened={sharing} onClose={closeSharing} />}
+            </OverlayBoundary>
+          )}
         </>
       }
       account={<Account onShare={mayShare ? share : null} />}

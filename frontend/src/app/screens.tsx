@@ -1,29 +1,20 @@
-/** The screens around the features: home, runs, one run. */
+/** The screens that look back: runs, one run, two beside each other, statistics. */
 import { useLocation } from "wouter";
 import { useVersions } from "../api/graphs";
-import { Home } from "../library/home";
 import { ComparePage } from "../review/compare-page";
 import type { RepeatActions } from "../review/run/run-menu";
 import { RunPage } from "../review/run/run-page";
 import { RunsPage } from "../review/runs-page";
 import { StatisticsPage } from "../review/statistics-page";
-import { RobotsPage } from "../robots/robots-page";
-import { StartDialog } from "../runs/start/start-dialog";
 import { nextLabel } from "../runs/start/use-start";
-import { useNewGraphs } from "./new-graphs";
+import { lazyPart } from "../ui/parts/lazy-part";
+import { OverlayBoundary } from "../ui/parts/part-boundary";
 import { PageBar, PageFrame } from "./page-frame";
 import { useTitle } from "./use-title";
 
-export function HomeScreen() {
-  const { create, choose } = useNewGraphs();
-  useTitle("Graphs");
-  return (
-    <PageFrame>
-      <PageBar crumbs={[{ label: "Graphs" }]} />
-      <Home onNew={create} onImport={choose} />
-    </PageFrame>
-  );
-}
+const StartDialog = lazyPart(() =>
+  import("../runs/start/start-dialog").then((part) => part.StartDialog),
+);
 
 export function RunsScreen() {
   useTitle("Runs");
@@ -53,28 +44,16 @@ function Again({ engines, onClose, ...what }: RepeatActions & { onClose: () => v
   const [, go] = useLocation();
   const versions = useVersions(what.graph).data ?? [];
   return (
-    <StartDialog
-      {...what}
-      label={nextLabel(versions, what.seq)}
-      chosen={engines}
-      onChosen={() => undefined}
-      onStarted={([first]) => first && go(`/runs/${first.id}`)}
-      onClose={onClose}
-    />
-  );
-}
-
-export function RobotsScreen() {
-  const { take } = useNewGraphs();
-  useTitle("Robots");
-  const onImport = (text: string, name: string) => {
-    void take([new File([text], `${name}.umrf.graph.json`, { type: "application/json" })]);
-  };
-  return (
-    <PageFrame>
-      <PageBar at="robots" crumbs={[{ label: "Graphs", to: "/" }, { label: "Robots" }]} />
-      <RobotsPage onImport={onImport} />
-    </PageFrame>
+    <OverlayBoundary>
+      <StartDialog
+        {...what}
+        label={nextLabel(versions, what.seq)}
+        chosen={engines}
+        onChosen={() => undefined}
+        onStarted={([first]) => first && go(`/runs/${first.id}`)}
+        onClose={onClose}
+      />
+    </OverlayBoundary>
   );
 }
 

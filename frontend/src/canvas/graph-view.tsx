@@ -18,6 +18,7 @@ import { NoteCard } from "./notes/note-card";
 import { notePlaces } from "./notes/note-nodes";
 import { ArrowTips, OutcomeArrow } from "./outcome-arrow";
 import { NO_PROBLEM_MARKS } from "./problem-marks";
+import "@xyflow/react/dist/style.css";
 import "./canvas.css";
 
 export const nodeTypes: NodeTypes = { action: ActionCard, end: EndPill, note: NoteCard };

@@ -12,15 +12,18 @@ import { useFollowedView } from "../people/use-followed-view";
 import type { Progress } from "../status/progress";
 import { useGraph, useLinkPart } from "../sync/use-room";
 import { Empty } from "../ui/empty";
+import { lazyPart } from "../ui/parts/lazy-part";
+import { PartBoundary } from "../ui/parts/part-boundary";
 import { EditableCanvas } from "./canvas/editable-canvas";
 import { useCanvasElements } from "./canvas/use-canvas-elements";
 import { useFirstLayout } from "./canvas/use-first-layout";
 import { useViewport } from "./canvas/use-viewport";
 import style from "./canvas-pane.module.css";
-import { DryRunBar } from "./dry-run-bar";
 import { Toolbar } from "./menus/toolbar";
 import type { EditorState } from "./use-editor";
 import { useGraphLink } from "./use-graph-link";
+
+const DryRunBar = lazyPart(() => import("./dry-run-bar").then((part) => part.DryRunBar));
 
 interface Props {
   me: string;
@@ -160,7 +163,11 @@ function Inside(props: Props) {
           {!context.dryRun && corner}
         </div>
       </div>
-      {context.dryRun && <DryRunBar context={context} run={context.dryRun} record={record} />}
+      {context.dryRun && (
+        <PartBoundary>
+          <DryRunBar context={context} run={context.dryRun} record={record} />
+        </PartBoundary>
+      )}
     </div>
   );
 }

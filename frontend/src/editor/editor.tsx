@@ -1,22 +1,22 @@
 /** The editor of one graph: list, canvas, details and run strip, arranged for the screen at hand. */
 import { useLocalStorage } from "@mantine/hooks";
-import type { ReactNode } from "react";
+import type { ComponentProps, ReactNode } from "react";
 import type { Script } from "../api/dry-runs";
 import { useOpenThreadsOnCards, useThreads } from "../comments/use-threads";
 import { scriptOf } from "../dry-run/script";
 import { addActionAt, type EditorContext, freePosition } from "../edit-actions/editor-context";
 import { useShortcuts } from "../edit-actions/shortcuts";
-import { FindBar } from "../find/find-bar";
 import type { NewAction } from "../graph/edit";
 import type { Graph, Key } from "../graph/model";
 import type { ToldProblem } from "../graph/problems/told-problems";
 import { endName } from "../graph/relation-words";
 import { Inspector } from "../inspector/inspector";
-import { Outline } from "../outline/outline";
 import { People } from "../people/people";
 import type { Progress } from "../status/progress";
 import type { RoomLink } from "../sync/room-connection";
 import { useThrottledLink } from "../sync/use-room";
+import { lazyPart } from "../ui/parts/lazy-part";
+import { OverlayBoundary, PartBoundary } from "../ui/parts/part-boundary";
 import type { Crumb } from "../ui/top-bar";
 import { useIsPhone, useIsWide } from "../ui/use-screen-size";
 import { EditorContextProvider } from "./canvas/note-links";
@@ -30,6 +30,9 @@ import { SaveStatus } from "./save-status";
 import { useRemoteEditAnnouncements, useRunAnnouncements } from "./use-announcements";
 import { useEditor } from "./use-editor";
 import { usePanels } from "./use-panels";
+
+const FindBar = lazyPart(() => import("../find/find-bar").then((part) => part.FindBar));
+const Outline = lazyPart(() => import("../outline/outline").then((part) => part.Outline));
 
 /** What the page around the editor may want to know. */
 export interface Shown {
@@ -122,6 +125,22 @@ function useShown(context: EditorContext, link: RoomLink, checked: Checked): Sho
   };
 }
 
+function OutlinePane(props: ComponentProps<typeof Outline>) {
+  return (
+    <PartBoundary>
+      <Outline {...props} />
+    </PartBoundary>
+  );
+}
+
+function FindPane(props: ComponentProps<typeof FindBar>) {
+  return (
+    <OverlayBoundary>
+      <FindBar {...props} />
+    </OverlayBoundary>
+  );
+}
+
 export function Editor(props: Props) {
   const { id, known, progress } = props;
   const wide = useIsWide();
@@ -165,9 +184,9 @@ export function Editor(props: Props) {
     panels,
     stage,
     strip,
-    outline: <Outline progress={progress} />,
+    outline: <OutlinePane progress={progress} />,
     find: editor.isFindOpen && (
-      <FindBar problems={problems?.problems ?? []} onClose={editor.closeFind} />
+      <FindPane problems={problems?.problems ?? []} onClose={editor.closeFind} />
     ),
     details: (
       <Inspector

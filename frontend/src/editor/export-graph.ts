@@ -1,7 +1,6 @@
 /** Taking a graph away as a file: UMRF as the server writes it, or a picture of the canvas. */
 import { notifications } from "@mantine/notifications";
 import { serverPath } from "../api/page-url";
-import { svgPictureOf } from "../canvas/svg-picture";
 import type { EditorContext, ExportFormat } from "../edit-actions/editor-context";
 
 const LARGEST = 8_000; // px of a PNG's longer side; browsers refuse much more
@@ -61,6 +60,7 @@ export async function exportGraph(context: EditorContext, format: ExportFormat):
     return;
   }
   try {
+    const { svgPictureOf } = await import("../canvas/svg-picture");
     const colors = getComputedStyle(document.documentElement);
     const picture = svgPictureOf(context.graph, context.positions(), context.sizes(), (token) =>
       colors.getPropertyValue(token).trim(),

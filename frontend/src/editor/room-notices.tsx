@@ -1,9 +1,8 @@
 /** Notices of the room over the canvas: what happened to edits, each with what one can do. */
-import { Button, CloseButton, Modal, Text } from "@mantine/core";
+import { Button, CloseButton } from "@mantine/core";
 import { IconArchive, IconHistory, IconInfoCircle, IconLock, IconUsers } from "@tabler/icons-react";
-import { type ReactNode, useState } from "react";
+import { type ReactNode, useCallback, useEffect, useState } from "react";
 import type { ConnectionNotice } from "../sync/graph-connection";
-import type { OtherPerson } from "../sync/indexed-db";
 import { otherPeopleWait } from "../sync/unsaved-reasons";
 import {
   useGraphPart,
@@ -11,10 +10,16 @@ import {
   useMyName,
   useNotice,
   useOthersWaiting,
+  useStrandedEdits,
 } from "../sync/use-room";
+import { lazyPart } from "../ui/parts/lazy-part";
+import { OverlayBoundary } from "../ui/parts/part-boundary";
 import style from "./room-notices.module.css";
-import { StrandedEditsDialog, useStrandedEditsDialog } from "./stranded-edits-dialog";
-import { saveChanges } from "./stranded-edits-file";
+
+const OthersDialog = lazyPart(() => import("./others-dialog").then((part) => part.OthersDialog));
+const StrandedEditsDialog = lazyPart(() =>
+  import("./stranded-edits-dialog").then((part) => part.StrandedEditsDialog),
+);
 
 const words: Record<ConnectionNotice, string> = {
   "went-back":
@@ -56,14 +61,11 @@ function ReadOnly() {
 }
 
 function Others() {
-  const { others, read, forget } = useOthersWaiting();
+  const waiting = useOthersWaiting();
   const graph = useGraphPart(({ name }) => name);
-  const [shown, setShown] = useState(false);
-  const [sure, setSure] = useState<string | null>(null);
-  const said = otherPeopleWait(others);
+  const [shown, setShown] = useState<boolean | null>(null);
+  const said = otherPeopleWait(waiting.others);
   if (said === null) return null;
-  const name = (other: OtherPerson) => other.name || "a guest";
-  const save = async (other: OtherPerson) => saveChanges(graph, name(other), await read(other.id));
   return (
     <Say
       icon={<IconUsers size={16} />}
@@ -74,39 +76,34 @@ function Others() {
       }
     >
       {said}
-      <Modal
-        opened={shown}
-        onClose={() => setShown(false)}
-        title="Changes of others on this device"
-        closeButtonProps={{ "aria-label": "Close" }}
-        centered
-      >
-        <Text>
-          They are sent when the person signs in here again, and never under another name.
-        </Text>
-        <ul className={style.others}>
-          {others.map((other) => (
-            <li key={other.id}>
-              <b>{name(other)}</b>
-              <span>{other.waiting === 1 ? "1 change" : `${other.waiting} changes`}</span>
-              <Button size="compact-sm" onClick={() => save(other)}>
-                Save as a file
-              </Button>
-              {sure === other.id ? (
-                <Button size="compact-sm" color="red" onClick={() => forget(other.id)}>
-                  Discard for good
-                </Button>
-              ) : (
-                <Button size="compact-sm" onClick={() => setSure(other.id)}>
-                  Discard
-                </Button>
-              )}
-            </li>
-          ))}
-        </ul>
-      </Modal>
+      <OverlayBoundary>
+        {shown !== null && (
+          <OthersDialog
+            graph={graph}
+            waiting={waiting}
+            opened={shown}
+            onClose={() => setShown(false)}
+          />
+        )}
+      </OverlayBoundary>
     </Say>
   );
+}
+
+/** Whether the dialog is open: for each choice at first, until the person puts it off. */
+function useStrandedEditsDialog() {
+  const choice = useStrandedEdits();
+  const [later, setLater] = useState(false);
+  // biome-ignore lint/correctness/useExhaustiveDependencies: another choice is asked about anew
+  useEffect(() => setLater(false), [choice?.stranded]);
+  return {
+    any: choice !== null,
+    edits: choice?.stranded.edits ?? 0,
+    waits: choice !== null && later,
+    open: !later,
+    putOff: useCallback(() => setLater(true), []),
+    takeUp: useCallback(() => setLater(false), []),
+  };
 }
 
 export function RoomNotices() {
@@ -143,7 +140,11 @@ export function RoomNotices() {
         )}
         <Others />
       </div>
-      <StrandedEditsDialog by={by} open={choosing.open} onLater={choosing.putOff} />
+      <OverlayBoundary>
+        {choosing.any && (
+          <StrandedEditsDialog by={by} open={choosing.open} onLater={choosing.putOff} />
+        )}
+      </OverlayBoundary>
     </>
   );
 }

@@ -1,6 +1,6 @@
 /** What to do about edits that wait on a history which the server has left: take, drop, or save. */
 import { Button, Checkbox, Group, Modal, Text } from "@mantine/core";
-import { useCallback, useEffect, useMemo, useState } from "react";
+import { useMemo, useState } from "react";
 import { type ChangedField, changesOf, type GraphChange, onlyChanges } from "../graph/changes";
 import { mapsOf } from "../graph/document-keys";
 import {
@@ -225,19 +225,4 @@ export function StrandedEditsDialog({
       {choice && <Body key={choice.stranded.at} choice={choice} by={by} onLater={onLater} />}
     </Modal>
   );
-}
-
-/** Whether the dialog is open: for each choice at first, until the person puts it off. */
-export function useStrandedEditsDialog() {
-  const choice = useStrandedEdits();
-  const [later, setLater] = useState(false);
-  // biome-ignore lint/correctness/useExhaustiveDependencies: another choice is asked about anew
-  useEffect(() => setLater(false), [choice?.stranded]);
-  return {
-    edits: choice?.stranded.edits ?? 0,
-    waits: choice !== null && later,
-    open: !later,
-    putOff: useCallback(() => setLater(true), []),
-    takeUp: useCallback(() => setLater(false), []),
-  };
 }

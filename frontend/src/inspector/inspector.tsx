@@ -2,7 +2,6 @@
 import { Tabs } from "@mantine/core";
 import { IconMessageCircle } from "@tabler/icons-react";
 import type { Problems } from "../api/graphs";
-import { Comments } from "../comments/comments";
 import {
   type EditorContext,
   type Panel,
@@ -16,17 +15,23 @@ import { notesOf } from "../graph/edit/notes";
 import { EXIT } from "../graph/model";
 import { countsOf } from "../graph/problems/problem-kinds";
 import { endName } from "../graph/relation-words";
-import { ActionForm } from "./action-form";
+import { lazyPart } from "../ui/parts/lazy-part";
+import { PartBoundary } from "../ui/parts/part-boundary";
 import { ProblemsContext, type Told } from "./fields/field-problems";
 import { SharedField } from "./fields/shared-field";
 import { ViewOnly } from "./fields/view-only";
-import { GraphForm } from "./graph-form";
 import style from "./inspector.module.css";
-import { JsonView } from "./json/json-view";
-import { NoteForm } from "./note-form";
-import { ProblemList, ProblemsHere } from "./problem-list";
-import { RelationForm } from "./relation-form";
-import { RunConditions } from "./run-conditions";
+
+const forms = () => import("./forms");
+const ActionForm = lazyPart(() => forms().then((part) => part.ActionForm));
+const GraphForm = lazyPart(() => import("./graph-form").then((part) => part.GraphForm));
+const NoteForm = lazyPart(() => forms().then((part) => part.NoteForm));
+const RelationForm = lazyPart(() => forms().then((part) => part.RelationForm));
+const RunConditions = lazyPart(() => forms().then((part) => part.RunConditions));
+const ProblemList = lazyPart(() => import("./problem-list").then((part) => part.ProblemList));
+const ProblemsHere = lazyPart(() => import("./problem-list").then((part) => part.ProblemsHere));
+const Comments = lazyPart(() => import("../comments/comments").then((part) => part.Comments));
+const JsonView = lazyPart(() => import("./json/json-view").then((part) => part.JsonView));
 
 interface Props {
   id: string;
@@ -141,22 +146,34 @@ export function Inspector({ id, seq, panel, problems, told, threads }: Props) {
       </Tabs.List>
       <Tabs.Panel value="details" className={style.panel ?? ""}>
         <ViewOnly>
-          <ProblemsHere told={told} />
+          {context.selection.size === 1 && (
+            <PartBoundary waiting={null}>
+              <ProblemsHere told={told} />
+            </PartBoundary>
+          )}
           <ProblemsContext value={told}>
-            <Properties />
+            <PartBoundary>
+              <Properties />
+            </PartBoundary>
           </ProblemsContext>
         </ViewOnly>
       </Tabs.Panel>
       <Tabs.Panel value="json" className={style.panel ?? ""} data-fill>
         <SharedField of="graph" field="json">
-          <JsonView graph={id} seq={seq} />
+          <PartBoundary>
+            <JsonView graph={id} seq={seq} />
+          </PartBoundary>
         </SharedField>
       </Tabs.Panel>
       <Tabs.Panel value="comments" className={style.panel ?? ""}>
-        <Comments threads={threads} />
+        <PartBoundary>
+          <Comments threads={threads} />
+        </PartBoundary>
       </Tabs.Panel>
       <Tabs.Panel value="problems" className={style.panel ?? ""}>
-        <ProblemList problems={problems} told={told} seq={seq} />
+        <PartBoundary>
+          <ProblemList problems={problems} told={told} seq={seq} />
+        </PartBoundary>
       </Tabs.Panel>
     </Tabs>
   );

@@ -1,5 +1,5 @@
 /** Graphs as cards: searched, sorted, by label; each says how it is and who is in it. */
-import { Select, TextInput } from "@mantine/core";
+import { NativeSelect, TextInput } from "@mantine/core";
 import { useLocalStorage } from "@mantine/hooks";
 import { IconAlertTriangle, IconSearch } from "@tabler/icons-react";
 import { useMemo, useState } from "react";
@@ -12,12 +12,17 @@ import { runEndText, runLabel } from "../status/progress";
 import { StateLabel } from "../status/state-label";
 import { Empty } from "../ui/empty";
 import { colorOfName, initials } from "../ui/name-colors";
+import { lazyPart } from "../ui/parts/lazy-part";
+import { PartBoundary } from "../ui/parts/part-boundary";
 import { ago, instant, useNow } from "../ui/times";
 import style from "./graph-cards.module.css";
 import { GraphMenu } from "./graph-menu";
-import { GraphPreview } from "./graph-preview";
 import { allLabels, type GraphOrder, lastRuns, ORDERS, selectGraphs } from "./graph-selection";
 import home from "./home.module.css";
+
+/** Decoration, and the reading and laying out of graphs with it: the list is there without. */
+const GraphPreview = lazyPart(() => import("./graph-preview").then((part) => part.GraphPreview));
+const nothing = () => null;
 
 const FEW = 4; // robots or labels on a card
 
@@ -76,7 +81,9 @@ function GraphCard({ graph, names, last }: GraphCardProps) {
     <article className={home.card}>
       <Link to={`/graphs/${graph.id}`} className={home.open}>
         <div className={home.preview}>
-          <GraphPreview graph={graph.id} seq={graph.seq} />
+          <PartBoundary frame={nothing}>
+            <GraphPreview graph={graph.id} seq={graph.seq} />
+          </PartBoundary>
           <People people={people} />
         </div>
         <div className={home.body}>
@@ -158,12 +165,12 @@ export function GraphCards({ graphs }: { graphs: readonly GraphSummary[] }) {
             ))}
           </fieldset>
         )}
-        <Select
+        <NativeSelect
           className={style.order ?? ""}
           aria-label="Sort by"
           data={Object.entries(ORDERS).map(([value, words]) => ({ value, label: words }))}
           value={order}
-          onChange={(next) => setOrder((next ?? "changed") as GraphOrder)}
+          onChange={(event) => setOrder(event.currentTarget.value as GraphOrder)}
         />
       </search>
       <p className="visually-hidden" role="status">

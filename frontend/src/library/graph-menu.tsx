@@ -1,5 +1,5 @@
 /** What can be done to a graph as a whole: rename, duplicate, export, delete and bring back. */
-import { Button, Group, Menu, Modal, TextInput } from "@mantine/core";
+import { Button, Menu } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconCopy, IconDots, IconPencil, IconShare3, IconTrash } from "@tabler/icons-react";
 import { type QueryClient, useQueryClient } from "@tanstack/react-query";
@@ -15,6 +15,8 @@ import {
 import { errorText } from "../api/http";
 import { serverPath } from "../api/page-url";
 import { useMay } from "../api/use-person";
+import { lazyPart } from "../ui/parts/lazy-part";
+import { OverlayBoundary } from "../ui/parts/part-boundary";
 import style from "./home.module.css";
 
 /** "x copy", "x copy 2" …: the first that no graph is called. */
@@ -61,47 +63,12 @@ function offerBack(client: QueryClient, graph: GraphSummary): void {
   });
 }
 
-interface RenameProps {
-  graph: GraphSummary;
-  onClose: () => void;
-}
-
-function Rename({ graph, onClose }: RenameProps) {
-  const client = useQueryClient();
-  const [name, setName] = useState(graph.name);
-  const fits = name.trim() !== "" && name.trim() !== graph.name;
-  const save = async () => {
-    const work = () => renameGraph(graph.id, name.trim());
-    if (await attempt(client, "Not renamed", work)) onClose();
-  };
-  return (
-    <form
-      onSubmit={(event) => {
-        event.preventDefault();
-        if (fits) void save();
-      }}
-    >
-      <TextInput
-        label="Name of the graph"
-        value={name}
-        data-autofocus
-        onFocus={(event) => event.currentTarget.select()}
-        onChange={(event) => setName(event.currentTarget.value)}
-      />
-      <Group justify="flex-end" mt="md">
-        <Button onClick={onClose}>Cancel</Button>
-        <Button type="submit" variant="filled" disabled={!fits}>
-          Rename
-        </Button>
-      </Group>
-    </form>
-  );
-}
+const RenameDialog = lazyPart(() => import("./rename-dialog").then((part) => part.RenameDialog));
 
 export function GraphMenu({ graph, names }: { graph: GraphSummary; names: readonly string[] }) {
   const client = useQueryClient();
   const mayEdit = useMay("edit");
-  const [renaming, setRenaming] = useState(false);
+  const [renaming, setRenaming] = useState<boolean | null>(null);
   const duplicate = () =>
     attempt(client, "Not duplicated", () => duplicateGraph(graph.id, copyName(graph.name, names)));
   const remove = async () => {
@@ -150,15 +117,16 @@ export function GraphMenu({ graph, names }: { graph: GraphSummary; names: readon
           </Menu.Item>
         </Menu.Dropdown>
       </Menu>
-      <Modal
-        opened={renaming}
-        onClose={() => setRenaming(false)}
-        title={`Rename ${graph.name}`}
-        closeButtonProps={{ "aria-label": "Close" }}
-        centered
-      >
-        <Rename graph={graph} onClose={() => setRenaming(false)} />
-      </Modal>
+      <OverlayBoundary>
+        {renaming !== null && (
+          <RenameDialog
+            graph={graph}
+            opened={renaming}
+            onClose={() => setRenaming(false)}
+            onRename={(name) => attempt(client, "Not renamed", () => renameGraph(graph.id, name))}
+          />
+        )}
+      </OverlayBoundary>
     </>
   );
 }

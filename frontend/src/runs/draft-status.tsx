@@ -3,9 +3,12 @@ import { useMemo } from "react";
 import type { Run } from "../api/runs";
 import { differences } from "../graph/meaning";
 import type { Graph } from "../graph/model";
+import { lazyPart } from "../ui/parts/lazy-part";
+import { PartBoundary } from "../ui/parts/part-boundary";
 import style from "./draft-status.module.css";
-import { ModifyRun } from "./modify-run";
 import { useRunningGraph } from "./use-running-graph";
+
+const ModifyRun = lazyPart(() => import("./modify-run").then((part) => part.ModifyRun));
 
 interface Props {
   run: Run | null;
@@ -29,14 +32,16 @@ export function DraftStatus({ run, label, graph, seq, settle, obstacle }: Props)
     <span className={style.word} data-differs={found.length > 0 || undefined}>
       {found.length > 0 ? "Draft differs from running" : "Running"} <i>{label}</i>
       {found.length > 0 && (
-        <ModifyRun
-          run={run}
-          label={label}
-          found={found}
-          seq={seq}
-          settle={settle}
-          obstacle={obstacle}
-        />
+        <PartBoundary waiting={null}>
+          <ModifyRun
+            run={run}
+            label={label}
+            found={found}
+            seq={seq}
+            settle={settle}
+            obstacle={obstacle}
+          />
+        </PartBoundary>
       )}
     </span>
   );

@@ -1,21 +1,5 @@
 /** The Mantine theme, from the tokens of the design. */
-import {
-  ActionIcon,
-  Button,
-  type CSSVariablesResolver,
-  createTheme,
-  Kbd,
-  type MantineColorsTuple,
-  Menu,
-  Modal,
-  NumberInput,
-  Popover,
-  Select,
-  Tabs,
-  Textarea,
-  TextInput,
-  Tooltip,
-} from "@mantine/core";
+import { type CSSVariablesResolver, createTheme, type MantineColorsTuple } from "@mantine/core";
 
 const dark: MantineColorsTuple = [
   "#e8ebf1",
@@ -69,19 +53,21 @@ export const theme = createTheme({
   cursorType: "pointer",
   respectReducedMotion: true,
   focusRing: "auto",
+  // Without the components themselves: each page would load all of them.
   components: {
-    Button: Button.extend({ defaultProps: { ...small, variant: "default" } }),
-    ActionIcon: ActionIcon.extend({ defaultProps: { variant: "subtle", color: "gray" } }),
-    TextInput: TextInput.extend({ defaultProps: small }),
-    Textarea: Textarea.extend({ defaultProps: small }),
-    NumberInput: NumberInput.extend({ defaultProps: small }),
-    Select: Select.extend({ defaultProps: { ...small, allowDeselect: false } }),
-    Tooltip: Tooltip.extend({ defaultProps: { openDelay: 350, withArrow: true, fz: "xs" } }),
-    Menu: Menu.extend({ defaultProps: { shadow: "md", position: "bottom-end" } }),
-    Popover: Popover.extend({ defaultProps: { shadow: "md" } }),
-    Modal: Modal.extend({ defaultProps: { centered: true, radius: "lg" } }),
-    Tabs: Tabs.extend({ styles: { tab: { padding: "0.7rem 0.625rem 0.6rem" } } }),
-    Kbd: Kbd.extend({ defaultProps: { size: "xs" } }),
+    Button: { defaultProps: { ...small, variant: "default" } },
+    ActionIcon: { defaultProps: { variant: "subtle", color: "gray" } },
+    TextInput: { defaultProps: small },
+    Textarea: { defaultProps: small },
+    NativeSelect: { defaultProps: small },
+    NumberInput: { defaultProps: small },
+    Select: { defaultProps: { ...small, allowDeselect: false } },
+    Tooltip: { defaultProps: { openDelay: 350, withArrow: true, fz: "xs" } },
+    Menu: { defaultProps: { shadow: "md", position: "bottom-end" } },
+    Popover: { defaultProps: { shadow: "md" } },
+    Modal: { defaultProps: { centered: true, radius: "lg" } },
+    Tabs: { styles: { tab: { padding: "0.7rem 0.625rem 0.6rem" } } },
+    Kbd: { defaultProps: { size: "xs" } },
   },
 });
 

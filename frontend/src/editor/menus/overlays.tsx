@@ -1,10 +1,16 @@
 /** What opens over the editor, one at a time: menus, the palette, dialogs of single edit actions. */
 
 import type { EditorContext, Overlay } from "../../edit-actions/editor-context";
-import { ArrowDialog, RetargetDialog } from "./arrow-dialog";
-import { CommandPalette } from "./command-palette";
-import { ContextMenu } from "./context-menu";
-import { ShortcutSheet } from "./shortcut-sheet";
+import { lazyPart } from "../../ui/parts/lazy-part";
+import { OverlayBoundary } from "../../ui/parts/part-boundary";
+
+const ArrowDialog = lazyPart(() => import("./arrow-dialog").then((part) => part.ArrowDialog));
+const RetargetDialog = lazyPart(() => import("./arrow-dialog").then((part) => part.RetargetDialog));
+const CommandPalette = lazyPart(() =>
+  import("./command-palette").then((part) => part.CommandPalette),
+);
+const ContextMenu = lazyPart(() => import("./context-menu").then((part) => part.ContextMenu));
+const ShortcutSheet = lazyPart(() => import("./shortcut-sheet").then((part) => part.ShortcutSheet));
 
 interface Props {
   context: EditorContext;
@@ -12,7 +18,15 @@ interface Props {
   onClose: () => void;
 }
 
-export function Overlays({ context, overlay, onClose }: Props) {
+export function Overlays(props: Props) {
+  return (
+    <OverlayBoundary>
+      <Opened {...props} />
+    </OverlayBoundary>
+  );
+}
+
+function Opened({ context, overlay, onClose }: Props) {
   if (overlay === null) return null;
   switch (overlay.kind) {
     case "arrow":

@@ -1,7 +1,7 @@
 /** The graph as UMRF JSON: in step with what is selected, and a way to edit it. */
 import { ActionIcon, Button, CopyButton, Kbd, Skeleton, Tooltip } from "@mantine/core";
 import { IconAlertTriangle, IconCheck, IconCopy } from "@tabler/icons-react";
-import { lazy, type ReactNode, Suspense, useMemo, useState } from "react";
+import { type ReactNode, useMemo, useState } from "react";
 import type { KeyChange } from "../../api/graphs";
 import { errorText } from "../../api/http";
 import { printedKeys } from "../../edit-actions/edit-action";
@@ -10,13 +10,17 @@ import {
   selectedRelations,
   useEditorContext,
 } from "../../edit-actions/editor-context";
+import { lazyPart } from "../../ui/parts/lazy-part";
+import { PartBoundary } from "../../ui/parts/part-boundary";
 import type { JsonError } from "./json-editor";
 import { actionAt, rangeOf, rangeOfArrow } from "./json-positions";
 import { applyTextChanges, collisions, places } from "./json-rewrite";
 import style from "./json-view.module.css";
 import { useJson, type Verdict } from "./use-json";
 
-const JsonEditor = lazy(() => import("./json-editor"));
+const JsonEditor = lazyPart(() => import("./json-editor").then((part) => part.default), {
+  heavy: true,
+});
 const NO_FAULTS: readonly JsonError[] = [];
 
 function faultsOf(verdict: Verdict): readonly JsonError[] {
@@ -174,7 +178,7 @@ export function JsonView({ graph, seq }: { graph: string; seq: number }) {
           )}
         </CopyButton>
       </div>
-      <Suspense fallback={<Skeleton height="100%" />}>
+      <PartBoundary>
         <JsonEditor
           text={text}
           readOnly={!context.mayEdit}
@@ -184,7 +188,7 @@ export function JsonView({ graph, seq }: { graph: string; seq: number }) {
           onLine={follow}
           onApply={apply}
         />
-      </Suspense>
+      </PartBoundary>
       {foot}
     </div>
   );

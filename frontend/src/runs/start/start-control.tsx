@@ -7,9 +7,12 @@ import { errorText } from "../../api/http";
 import { openRuns, useLive } from "../../api/live/use-live";
 import { SIMULATOR } from "../../api/robots";
 import { HoldButton } from "../../ui/hold-button";
+import { lazyPart } from "../../ui/parts/lazy-part";
+import { OverlayBoundary } from "../../ui/parts/part-boundary";
 import style from "./start-control.module.css";
-import { StartDialog } from "./start-dialog";
 import { lastEngines, nextLabel, notifyFailure, useStart } from "./use-start";
+
+const StartDialog = lazyPart(() => import("./start-dialog").then((part) => part.StartDialog));
 
 interface Props {
   graph: string;
@@ -80,15 +83,17 @@ export function StartControl({ graph, name, seq, settle, obstacle, compact = fal
         <IconChevronDown size={16} aria-hidden />
       </ActionIcon>
       {asking !== null && (
-        <StartDialog
-          graph={graph}
-          name={name}
-          seq={asking}
-          label={nextLabel(versions, asking)}
-          chosen={engines}
-          onChosen={setEngines}
-          onClose={() => setAsking(null)}
-        />
+        <OverlayBoundary>
+          <StartDialog
+            graph={graph}
+            name={name}
+            seq={asking}
+            label={nextLabel(versions, asking)}
+            chosen={engines}
+            onChosen={setEngines}
+            onClose={() => setAsking(null)}
+          />
+        </OverlayBoundary>
       )}
     </span>
   );

@@ -92,7 +92,7 @@ def _load(folder: Path) -> dict[str, File]:
             path.read_bytes(), path.suffix, lasting="assets" in path.parts
         )
         for path in folder.rglob("*")
-        if path.is_file()
+        if path.is_file() and not path.relative_to(folder).parts[0].startswith(".")
     }
 
 

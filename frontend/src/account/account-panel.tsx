@@ -1,0 +1,124 @@
+/** One's own name, light or dark, and the way out. */
+import {
+  Button,
+  Group,
+  SegmentedControl,
+  Stack,
+  Text,
+  TextInput,
+  useMantineColorScheme,
+} from "@mantine/core";
+import { IconDeviceDesktop, IconLogout, IconMoon, IconShare, IconSun } from "@tabler/icons-react";
+import { useState } from "react";
+import { errorText } from "../api/http";
+import { useLive } from "../api/live/use-live";
+import { ROLE_WORDS, rememberedName, signOut } from "../api/session";
+import { usePerson } from "../api/use-person";
+
+const schemes = [
+  { value: "light", label: <IconSun size={15} aria-label="Light" /> },
+  { value: "dark", label: <IconMoon size={15} aria-label="Dark" /> },
+  { value: "auto", label: <IconDeviceDesktop size={15} aria-label="Like the system" /> },
+];
+
+function Appearance() {
+  const { colorScheme, setColorScheme } = useMantineColorScheme();
+  return (
+    <div>
+      <Text size="sm" mb={4}>
+        Appearance
+      </Text>
+      <SegmentedControl
+        fullWidth
+        size="xs"
+        data={schemes}
+        value={colorScheme}
+        onChange={(value) => setColorScheme(value as "light" | "dark" | "auto")}
+      />
+    </div>
+  );
+}
+
+interface Props {
+  /** For who may: the bar of a narrow screen has no room for a button of its own. */
+  onShare: (() => void) | null;
+  onClose: () => void;
+}
+
+export function AccountPanel({ onShare, onClose }: Props) {
+  const { person, rename } = usePerson();
+  const { runner } = useLive();
+  const [name, setName] = useState(rememberedName() || person.name);
+  const [problem, setProblem] = useState("");
+  const save = async () => {
+    try {
+      await rename(name.trim());
+      onClose();
+    } catch (error) {
+      setProblem(errorText(error));
+    }
+  };
+  const leave = async () => {
+    try {
+      await signOut(runner);
+      location.reload();
+    } catch (error) {
+      setProblem(errorText(error));
+    }
+  };
+  return (
+    <form
+      onSubmit={(event) => {
+        event.preventDefault();
+        void save();
+      }}
+    >
+      <Stack gap="sm">
+        <Group gap="sm" align="end" wrap="nowrap">
+          <TextInput
+            label="Your name"
+            value={name}
+            maxLength={60}
+            error={problem || undefined}
+            onChange={(event) => setName(event.currentTarget.value)}
+            data-autofocus
+            flex={1}
+          />
+          <Button type="submit" disabled={name.trim() === "" || name === person.name}>
+            Save
+          </Button>
+        </Group>
+        {person.role !== "owner" && (
+          <Text size="sm" c="dimmed">
+            You are here as {person.role}: you may {ROLE_WORDS[person.role]}.
+          </Text>
+        )}
+        {onShare !== null && (
+          <Button
+            leftSection={<IconShare size={15} aria-hidden />}
+            onClick={() => {
+              onClose();
+              onShare();
+            }}
+          >
+            Share with others …
+          </Button>
+        )}
+        {!window.isSecureContext && (
+          <Text size="sm" c="dimmed">
+            This page came without TLS: reading the clipboard by a button, and opening without a
+            server, need <code>--tls</code>.
+          </Text>
+        )}
+        <Appearance />
+        <Button
+          variant="default"
+          leftSection={<IconLogout size={15} aria-hidden />}
+          onClick={() => void leave()}
+        >
+          Sign out
+        </Button>
+      </Stack>
+    </form>
+  );
+}

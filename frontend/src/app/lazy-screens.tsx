@@ -1,0 +1,61 @@
+/** Screens whose code is loaded when they are opened, the one at hand first and others when idle. */
+import type { ReactNode } from "react";
+import { basePath } from "../api/page-url";
+import { type LazyPart, lazyPart, preloadParts } from "../ui/parts/lazy-part";
+import { PartBoundary } from "../ui/parts/part-boundary";
+import type { Crumb } from "../ui/top-bar";
+import { PageBar, PageFrame } from "./page-frame";
+
+const review = () => import("./screens");
+
+export const HomeScreen = lazyPart(() => import("./home-screen").then((part) => part.HomeScreen));
+export const GraphScreen = lazyPart(() =>
+  import("./graph-screen").then((part) => part.GraphScreen),
+);
+export const RobotsScreen = lazyPart(() =>
+  import("./robots-screen").then((part) => part.RobotsScreen),
+);
+export const RunsScreen = lazyPart(() => review().then((part) => part.RunsScreen));
+export const RunScreen = lazyPart(() => review().then((part) => part.RunScreen));
+export const CompareScreen = lazyPart(() => review().then((part) => part.CompareScreen));
+export const StatisticsScreen = lazyPart(() => review().then((part) => part.StatisticsScreen));
+
+/** By how the path begins below the page's root; the last one is whatever is left. */
+const PLACES: readonly (readonly [start: string, part: Pick<LazyPart<never>, "preload">])[] = [
+  ["/graphs/", GraphScreen],
+  ["/runs", RunsScreen],
+  ["/robots", RobotsScreen],
+  ["/", HomeScreen],
+];
+
+/** Asks for the screen at this address before anything is drawn, or known of who is here. */
+export function preloadAt(path: string): Promise<void> {
+  const below = path.startsWith(basePath) ? path.slice(basePath.length) : path;
+  const [, part] = PLACES.find(([start]) => below.startsWith(start)) ?? ["", HomeScreen];
+  return part.preload();
+}
+
+/** Others follow one by one while nothing else is to be done; not where data is to be saved. */
+export async function preloadWhenIdle(): Promise<void> {
+  const { connection } = navigator as { connection?: { saveData?: boolean } };
+  if (!connection?.saveData) await preloadParts(idle);
+}
+
+function idle(): Promise<void> {
+  return new Promise((resolve) => {
+    // Safari has no such thing.
+    if (typeof requestIdleCallback === "undefined") setTimeout(resolve, 500);
+    else requestIdleCallback(() => resolve());
+  });
+}
+
+/** A screen under its bar: STOP is there before the screen is, and when it never comes. */
+export function Screen({ crumbs, children }: { crumbs: readonly Crumb[]; children: ReactNode }) {
+  const frame = (notice: ReactNode) => (
+    <PageFrame>
+      <PageBar crumbs={crumbs} />
+      <main>{notice}</main>
+    </PageFrame>
+  );
+  return <PartBoundary frame={frame}>{children}</PartBoundary>;
+}

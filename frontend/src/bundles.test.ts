@@ -1,0 +1,70 @@
+/** How much code each page loads before it can be used, by the build of `npm run build` in `dist`. */
+import { readFileSync } from "node:fs";
+import { resolve } from "node:path";
+import { gzipSync } from "node:zlib";
+import { expect, test } from "vitest";
+
+const DIST = resolve(import.meta.dirname, "../dist");
+
+interface Chunk {
+  readonly file: string;
+  readonly imports?: readonly string[];
+  readonly dynamicImports?: readonly string[];
+}
+
+/** What Vite wrote about its build. Without one nothing can be said, and that is no success. */
+function built(): Readonly<Record<string, Chunk>> {
+  try {
+    return JSON.parse(readFileSync(resolve(DIST, ".vite/manifest.json"), "utf8"));
+  } catch (error) {
+    throw new Error("The page is not built: run `make setup`, or `npm run build` in frontend/.", {
+      cause: error,
+    });
+  }
+}
+
+/** A chunk and all that has to be there before it runs. */
+function needed(manifest: Readonly<Record<string, Chunk>>, ...from: string[]): Chunk[] {
+  const found = new Map<string, Chunk>();
+  const add = (key: string) => {
+    const chunk = manifest[key];
+    if (chunk === undefined) throw new Error(`The build has no ${key}`);
+    if (found.has(key)) return;
+    found.set(key, chunk);
+    for (const next of chunk.imports ?? []) add(next);
+  };
+  for (const key of from) add(key);
+  return [...found.values()];
+}
+
+/** As servers send it, in kB of 1000 bytes. */
+function sizeOf(chunk: Chunk): number {
+  return gzipSync(readFileSync(resolve(DIST, chunk.file)), { level: 9 }).length / 1000;
+}
+
+/** What places cards is loaded when somebody asks for it. */
+const isLayout = (chunk: Chunk) => /\/layout-/.test(chunk.file);
+
+/** kB of JavaScript, gzipped. Who needs more makes something else wait: see `lazyPart`. */
+const BUDGETS: readonly (readonly [page: string, most: number, entries: readonly string[]])[] = [
+  ["the list of graphs", 180, ["src/app/home-screen.tsx"]],
+  ["the editor", 345, ["src/app/graph-screen.tsx"]],
+  ["robots", 210, ["src/app/robots-screen.tsx"]],
+];
+
+test.each(BUDGETS)("%s needs at most %i kB of JavaScript", (_, most, entries) => {
+  const chunks = needed(built(), "index.html", ...entries).filter((chunk) => !isLayout(chunk));
+  const sizes = chunks.map((chunk) => [Math.round(sizeOf(chunk) * 10) / 10, chunk.file] as const);
+  const sum = sizes.reduce((all, [size]) => all + size, 0);
+  const largest = sizes.sort(([a], [b]) => b - a).map(([size, file]) => `${size} ${file}`);
+  expect(sum, `${sum.toFixed(1)} kB:\n${largest.join("\n")}`).toBeLessThanOrEqual(most);
+});
+
+test("what is heavy and seldom used is loaded by nobody who has not asked for it", () => {
+  const manifest = built();
+  const pages = Object.keys(manifest).filter((key) => /^src\/app\/.*screens?\.tsx$/.test(key));
+  const loaded = needed(manifest, "index.html", ...pages).map(({ file }) => file);
+  expect(pages.length).toBeGreaterThan(3);
+  const heavy = /json-editor|start-dialog|share-dialog|elk/;
+  expect(loaded.filter((file) => heavy.test(file))).toEqual([]);
+});

@@ -1,0 +1,5 @@
+/** The forms of what can be selected, which are loaded together. */
+export { ActionForm } from "./action-form";
+export { NoteForm } from "./note-form";
+export { RelationForm } from "./relation-form";
+export { RunConditions } from "./run-conditions";

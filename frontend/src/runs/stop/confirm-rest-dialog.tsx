@@ -1,0 +1,71 @@
+/** Ends a run by a person's word, and says first what that means. */
+import { Button, Modal, Text, TextInput } from "@mantine/core";
+import { IconEye } from "@tabler/icons-react";
+import { useMutation } from "@tanstack/react-query";
+import { useState } from "react";
+import { errorText } from "../../api/http";
+import { useLive } from "../../api/live/use-live";
+import { confirmRest, type Run } from "../../api/runs";
+import { HoldButton } from "../../ui/hold-button";
+import { notifyFailure } from "../start/use-start";
+import style from "./confirm-rest-dialog.module.css";
+
+const SHORTEST = 3; // characters, as the runner asks for
+
+interface Props {
+  run: Run;
+  opened: boolean;
+  onClose: () => void;
+}
+
+export function ConfirmRestDialog({ run, opened, onClose }: Props) {
+  const { runner } = useLive();
+  const [how, setHow] = useState("");
+  const confirm = useMutation({
+    mutationFn: () => confirmRest(runner ?? "", run.id, how.trim()),
+    onSuccess: onClose,
+    onError: (error) => notifyFailure("Not confirmed", errorText(error)),
+  });
+  const said = how.trim().length >= SHORTEST;
+  return (
+    <Modal
+      opened={opened}
+      onClose={onClose}
+      title={`Is ${run.engine} at rest?`}
+      closeButtonProps={{ "aria-label": "Close" }}
+      zIndex={300}
+    >
+      <Text size="sm">
+        Nothing that the engine says can show whether run {run.number} of {run.graph_name} has come
+        to rest: {(run.unconfirmed ?? "it does not answer").replace(/\.$/, "")}.
+      </Text>
+      <Text size="sm" mt="xs">
+        Only somebody who has looked at the robot can end this. Until then nothing is started there.
+      </Text>
+      <TextInput
+        mt="md"
+        data-autofocus
+        label="How did you see that nothing moves?"
+        placeholder="I stand beside it; its motors are off"
+        maxLength={500}
+        value={how}
+        onChange={(event) => setHow(event.currentTarget.value)}
+      />
+      <Text size="xs" c="dimmed" mt="xs">
+        Your name, the time and these words are kept with the run. It counts as ended in error,
+        without a proof.
+      </Text>
+      <footer className={style.foot}>
+        <Button onClick={onClose}>Cancel</Button>
+        <HoldButton
+          icon={<IconEye size={14} aria-hidden />}
+          label={confirm.isPending ? "Confirming …" : "Hold to confirm"}
+          name={said ? `Confirm that run ${run.number} is at rest` : "Say how you saw it first"}
+          question={`Has ${run.engine} come to rest, and have you seen it?`}
+          disabled={!said || confirm.isPending}
+          onHeld={() => confirm.mutate()}
+        />
+      </footer>
+    </Modal>
+  );
+}
