@@ -50,6 +50,8 @@ export default defineConfig({
     trace: process.env.CI ? "on-first-retry" : "retain-on-failure",
     screenshot: "only-on-failure",
     actionTimeout: 15_000,
+    // It would keep the page anew for each of them; offline.spec.ts is about it.
+    serviceWorkers: "block",
     launchOptions,
   },
   projects: [

@@ -1,4 +1,8 @@
+import { createHash } from "node:crypto";
+import { readdirSync, readFileSync } from "node:fs";
+import { resolve } from "node:path";
 import react from "@vitejs/plugin-react";
+import type { Plugin } from "vite";
 import { defineConfig } from "vitest/config";
 
 // `npm run dev` forwards what the page asks of its server to an editor on this machine.
@@ -11,8 +15,42 @@ const vendors: { name: string; test: RegExp }[] = [
   { name: "sync", test: /node_modules\/(yjs|y-protocols|lib0)\// },
 ];
 
+const PUBLIC = resolve(import.meta.dirname, "public");
+/** Fonts of scripts that few graphs are written in are kept when they are first shown. */
+const SELDOM = /-(cyrillic|greek|vietnamese|latin)(-ext)?-wght.*woff2$/;
+const OFTEN = /-latin-wght.*woff2$/;
+
+/** Names this version of the page in it, and tells the service worker of what it consists. */
+function pageVersion(): Plugin {
+  return {
+    name: "page-version",
+    apply: "build",
+    enforce: "post",
+    generateBundle(_, bundle) {
+      const page = bundle["index.html"];
+      const worker = bundle["service-worker.js"];
+      if (page?.type !== "asset" || worker?.type !== "chunk")
+        throw new Error("no page, or no worker");
+      const parts = Object.keys(bundle).filter((name) => name.startsWith("assets/"));
+      const more = readdirSync(PUBLIC);
+      const hash = createHash("sha256").update(`${page.source}\n${worker.code}`);
+      for (const name of [...parts].sort()) hash.update(name);
+      for (const name of more) hash.update(readFileSync(resolve(PUBLIC, name)));
+      const version = hash.digest("hex").slice(0, 16);
+      const files = [...parts.filter((name) => !SELDOM.test(name) || OFTEN.test(name)), ...more];
+      page.source = String(page.source).replace(
+        'name="build" content=""',
+        `name="build" content="${version}"`,
+      );
+      worker.code = worker.code
+        .replaceAll("__VERSION__", JSON.stringify(version))
+        .replaceAll("__FILES__", JSON.stringify(files));
+    },
+  };
+}
+
 export default defineConfig({
-  plugins: [react()],
+  plugins: [react(), pageVersion()],
   // The server writes the path at which a proxy shows the page into index.html.
   base: "./",
   build: {
@@ -21,7 +59,18 @@ export default defineConfig({
     target: "es2022",
     // Fonts inlined as data: would be refused by the Content-Security-Policy.
     assetsInlineLimit: 0,
-    rolldownOptions: { output: { codeSplitting: { groups: vendors } } },
+    rolldownOptions: {
+      input: {
+        index: resolve(import.meta.dirname, "index.html"),
+        "service-worker": resolve(import.meta.dirname, "src/offline/service-worker.ts"),
+      },
+      output: {
+        codeSplitting: { groups: vendors },
+        // A worker reaches as far as the folder it lies in.
+        entryFileNames: ({ name }) =>
+          name === "service-worker" ? "[name].js" : "assets/[name]-[hash].js",
+      },
+    },
   },
   server: {
     port: 5173,

@@ -187,3 +187,47 @@ test("100 edits without a network and those of others meet: nothing is lost, and
   await ada.context.close();
   await mari.context.close();
 });
+
+test("the page opens without a server, with what the device keeps, and says what cannot be done", async ({
+  browser,
+}) => {
+  const ada = await product.person(browser, "Ada", { serviceWorkers: "allow" });
+  const graph = await newGraph("kept");
+  await enter(ada.page, graph);
+  await add(ada.page, "Before");
+  await saved(ada.page);
+  await ada.page.evaluate(() => navigator.serviceWorker.ready);
+  await expect.poll(() => ada.page.evaluate(() => caches.keys())).toHaveLength(1);
+  await ada.page.close();
+  await product.kill();
+
+  const page = await ada.context.newPage();
+  const asked: string[] = [];
+  page.on("request", (request) => asked.push(`${request.method()} ${request.url()}`));
+  await page.goto(`${product.url}/`);
+  await expect(page.getByText(/robots cannot be started or stopped from here now/i)).toBeVisible();
+  await page
+    .getByRole("region", { name: "On this device" })
+    .getByRole("link", { name: "kept" })
+    .click();
+  await expect(card(page, "Before")).toBeVisible();
+  await add(page, "While");
+  await offline(page, 1);
+  await expect(page.getByRole("button", { name: /^Start v1: not connected/ })).toBeDisabled();
+  await page.getByRole("button", { name: /^Stop everything/ }).click();
+  await expect(page.getByText(/NOT SENT|MAY REACH NOBODY/).first()).toBeVisible();
+  await page.screenshot({ path: test.info().outputPath("offline.png") });
+  expect(asked.filter((each) => /POST.*\/api\/runs/.test(each))).toEqual([]);
+  const kept = await page.evaluate(async () => {
+    const stores = await Promise.all((await caches.keys()).map((name) => caches.open(name)));
+    const all = await Promise.all(stores.map((store) => store.keys()));
+    return all.flat().map(({ url }) => new URL(url).pathname);
+  });
+  expect(kept.filter((path) => /^\/(api|runner|healthz|schema)/.test(path))).toEqual([]);
+
+  await product.start();
+  await saved(page);
+  expect(await stored(graph)).toEqual(["Before", "While"]);
+  await expect(page.getByText(/robots cannot be started/i)).toBeHidden();
+  await ada.context.close();
+});

@@ -37,6 +37,7 @@ const LAYERS: Readonly<Record<string, readonly string[]>> = {
   graph: [],
   ui: [],
   api: ["graph"],
+  offline: ["api"],
   status: ["graph", "ui", "api"],
   canvas: ["graph", "ui", "api", "status"],
   sync: ["graph", "api"],
@@ -54,7 +55,7 @@ const LAYERS: Readonly<Record<string, readonly string[]>> = {
   robots: ["ui", "api", "status"],
   library: ["graph", "ui", "api", "status", "canvas"],
   account: ["ui", "api"],
-  app: ["graph", "ui", "api", "status", "canvas", "sync", "editor"].concat([
+  app: ["graph", "ui", "api", "status", "offline", "canvas", "sync", "editor"].concat([
     "runs",
     "review",
     "robots",

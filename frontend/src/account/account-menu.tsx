@@ -1,6 +1,6 @@
 /** The way to one's own name and appearance. */
 import { Avatar, Popover, Text, UnstyledButton } from "@mantine/core";
-import { useState } from "react";
+import { type ComponentProps, useState } from "react";
 import { useKnownColors } from "../api/people";
 import { usePerson } from "../api/use-person";
 import { initials } from "../ui/name-colors";
@@ -9,8 +9,9 @@ import { PartBoundary } from "../ui/parts/part-boundary";
 
 const AccountPanel = lazyPart(() => import("./account-panel").then((part) => part.AccountPanel));
 
-/** `onShare` for who may: the bar of a narrow screen has no room for a button of its own. */
-export function AccountMenu({ onShare }: { onShare: (() => void) | null }) {
+type Props = Pick<ComponentProps<typeof AccountPanel>, "onShare" | "onLeave">;
+
+export function AccountMenu({ onShare, onLeave }: Props) {
   const { person } = usePerson();
   const colorOf = useKnownColors([person.id]);
   const [open, setOpen] = useState(false);
@@ -31,7 +32,7 @@ export function AccountMenu({ onShare }: { onShare: (() => void) | null }) {
       </Popover.Target>
       <Popover.Dropdown>
         <PartBoundary>
-          <AccountPanel onShare={onShare} onClose={() => setOpen(false)} />
+          <AccountPanel onShare={onShare} onLeave={onLeave} onClose={() => setOpen(false)} />
         </PartBoundary>
       </Popover.Dropdown>
     </Popover>

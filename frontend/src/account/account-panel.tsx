@@ -43,9 +43,11 @@ interface Props {
   /** For who may: the bar of a narrow screen has no room for a button of its own. */
   onShare: (() => void) | null;
   onClose: () => void;
+  /** Before the page goes: what of this person is to leave the device. */
+  onLeave: (person: string) => Promise<void>;
 }
 
-export function AccountPanel({ onShare, onClose }: Props) {
+export function AccountPanel({ onShare, onClose, onLeave }: Props) {
   const { person, rename } = usePerson();
   const { runner } = useLive();
   const [name, setName] = useState(rememberedName() || person.name);
@@ -61,6 +63,7 @@ export function AccountPanel({ onShare, onClose }: Props) {
   const leave = async () => {
     try {
       await signOut(runner);
+      await onLeave(person.id);
       location.reload();
     } catch (error) {
       setProblem(errorText(error));

@@ -8,7 +8,7 @@ import {
   useState,
   useSyncExternalStore,
 } from "react";
-import { errorText, Refusal } from "../api/http";
+import { errorText, isOutcomeUnknown, Refusal } from "../api/http";
 import {
   type Credential,
   credentialIn,
@@ -18,6 +18,8 @@ import {
   type Person,
   readInvitation,
   rememberedName,
+  rememberedPerson,
+  rememberPerson,
   renamePerson,
   takeCredential,
   takeFarewell,
@@ -26,6 +28,7 @@ import { sessionEnd } from "../api/session-end";
 import { PersonContext } from "../api/use-person";
 import { lazyPart } from "../ui/parts/lazy-part";
 import { PartBoundary } from "../ui/parts/part-boundary";
+import { OfflineBar } from "./offline-bar";
 
 const SignIn = lazyPart(() => import("./sign-in").then((part) => part.SignIn));
 const Invitation = lazyPart(() => import("./invitation").then((part) => part.Invitation));
@@ -35,16 +38,22 @@ type Gate =
   | { at: "knocking" }
   | { at: "outside"; why: string }
   | { at: "invited"; key: Credential; invited: InvitationPreview }
-  | { at: "inside"; person: Person; visit: number };
+  /** `offline`: no server has said who this is; it is who was here last. */
+  | { at: "inside"; person: Person; visit: number; offline?: true };
 
 async function knock(): Promise<Gate> {
   const key = takeCredential();
+  const before = rememberedPerson();
   try {
     if (key?.kind === "invitation") return await knockInvited(key);
-    const person = key === null ? await currentPerson() : await openSession(key);
+    const person = key === null ? await known(before) : await openSession(key);
     return { at: "inside", person, visit: 0 };
   } catch (error) {
+    if (key === null && before !== null && isOutcomeUnknown(error)) {
+      return { at: "inside", person: before, visit: 0, offline: true };
+    }
     const refused = error instanceof Refusal && error.details.status === 401;
+    if (refused && key === null) rememberPerson(null);
     if (refused && isWithdrawn(error)) return { at: "outside", why: WITHDRAWN };
     if (refused && key === null) return { at: "outside", why: takeFarewell() };
     const strange = refused && key?.kind === "token";
@@ -54,6 +63,11 @@ async function knock(): Promise<Gate> {
     };
   }
 }
+
+const PATIENCE = 5_000; // ms until a device shows what it keeps
+
+/** Who is signed in. Where it is known who was here last, a silent server is not waited for. */
+const known = (before: Person | null) => currentPerson(before === null ? undefined : PATIENCE);
 
 /** Who has given a name in this browser before goes straight in; else that is asked first. */
 async function knockInvited(key: Credential): Promise<Gate> {
@@ -83,6 +97,40 @@ function inside(gate: Gate, person: Person): Gate & { at: "inside" } {
 const stay = (gate: Gate, next: Gate): Gate =>
   gate.at === "inside" && next.at === "outside" ? gate : next;
 
+interface SessionLooks {
+  readonly on: boolean;
+  /** The page has no session, or does not know of one: whoever is found is let in. */
+  readonly wanting: boolean;
+  onFound(person: Person): void;
+  putOut(): void;
+}
+
+/** SessionLooks now and then who is signed in: another tab of this browser may sign in or out at any time. */
+function useLooks({ on, wanting, onFound, putOut }: SessionLooks): void {
+  useEffect(() => {
+    if (!on) return;
+    const look = () =>
+      void currentPerson().then(wanting ? onFound : () => {}, (error) => {
+        if (isWithdrawn(error)) putOut();
+      });
+    let wait = wanting ? 3_000 : 30_000;
+    let timer: ReturnType<typeof setTimeout>;
+    const goOn = () => {
+      timer = setTimeout(goOn, wait);
+      // Nobody else may come for hours: whoever comes back to this page is let in at once.
+      if (wanting) wait = Math.min(2 * wait, 10_000);
+      look();
+    };
+    if (wanting) goOn();
+    else timer = setTimeout(goOn, wait);
+    window.addEventListener("focus", look);
+    return () => {
+      clearTimeout(timer);
+      window.removeEventListener("focus", look);
+    };
+  }, [on, wanting, onFound, putOut]);
+}
+
 export function SignInGate({ children }: { children: ReactNode }) {
   const [gate, setGate] = useState<Gate>({ at: "knocking" });
   useEffect(() => {
@@ -91,7 +139,10 @@ export function SignInGate({ children }: { children: ReactNode }) {
       void knock().then((next) => {
         if (gone) return;
         if (next.at === "inside") sessionEnd.clear();
-        setGate((now) => (next.at === "inside" ? inside(now, next.person) : stay(now, next)));
+        setGate((now) => {
+          if (next.at !== "inside") return stay(now, next);
+          return next.offline && now.at !== "inside" ? next : inside(now, next.person);
+        });
       });
     // A fresh link pasted into the same tab changes only the fragment.
     const onHash = () => {
@@ -118,29 +169,15 @@ export function SignInGate({ children }: { children: ReactNode }) {
     [client],
   );
   const ended = useSyncExternalStore(sessionEnd.subscribe, sessionEnd.now);
+  const offline = gate.at === "inside" && gate.offline === true;
+  const putOut = useCallback(() => {
+    rememberPerson(null);
+    setGate({ at: "outside", why: WITHDRAWN });
+  }, []);
+  useLooks({ on: gate.at === "inside", wanting: ended || offline, onFound: letIn, putOut });
   useEffect(() => {
-    if (gate.at !== "inside") return;
-    // Another tab of this browser may sign in or out at any time.
-    const look = () =>
-      void currentPerson().then(ended ? letIn : () => {}, (error) => {
-        if (isWithdrawn(error)) setGate({ at: "outside", why: WITHDRAWN });
-      });
-    let wait = ended ? 3_000 : 30_000;
-    let timer: ReturnType<typeof setTimeout>;
-    const goOn = () => {
-      timer = setTimeout(goOn, wait);
-      // Nobody else may come for hours: whoever comes back to this page is let in at once.
-      if (ended) wait = Math.min(2 * wait, 10_000);
-      look();
-    };
-    if (ended) goOn();
-    else timer = setTimeout(goOn, wait);
-    window.addEventListener("focus", look);
-    return () => {
-      clearTimeout(timer);
-      window.removeEventListener("focus", look);
-    };
-  }, [gate.at, ended, letIn]);
+    if (gate.at === "inside" && !gate.offline) rememberPerson(gate.person);
+  }, [gate]);
   const hold = useMemo(
     () =>
       gate.at === "inside" ? { person: gate.person, visit: gate.visit, rename: takeName } : null,
@@ -164,6 +201,7 @@ export function SignInGate({ children }: { children: ReactNode }) {
   return (
     <PersonContext value={hold}>
       {children}
+      {offline && <OfflineBar />}
       {ended && (
         <PartBoundary>
           <SignInBar onOpen={letIn} />

@@ -1,5 +1,5 @@
 import { afterEach, expect, test, vi } from "vitest";
-import { signOut, takeFarewell } from "./session";
+import { rememberedPerson, rememberPerson, signOut, takeFarewell } from "./session";
 
 const RUNNER = "http://lab:8001";
 const answer = (status: number) => () => Promise.resolve(new Response(null, { status }));
@@ -16,11 +16,13 @@ function servers(editor: () => Promise<Response>, runner: () => Promise<Response
 }
 
 const store = new Map<string, string>();
-vi.stubGlobal("sessionStorage", {
+const storage = {
   getItem: (key: string) => store.get(key) ?? null,
   setItem: (key: string, value: string) => store.set(key, value),
   removeItem: (key: string) => store.delete(key),
-});
+};
+vi.stubGlobal("sessionStorage", storage);
+vi.stubGlobal("localStorage", storage);
 
 afterEach(() => store.clear());
 
@@ -59,4 +61,18 @@ test("where neither could the page stays as it is", async () => {
   servers(away, away);
   await expect(signOut(RUNNER)).rejects.toThrow("The editor could not end this session");
   expect(takeFarewell()).toBe("");
+});
+
+test("who was here last may see what the device keeps, until they sign out", async () => {
+  expect(rememberedPerson()).toBeNull();
+  const ada = { id: "p", name: "Ada", role: "editor" } as const;
+  rememberPerson(ada);
+  expect(rememberedPerson()).toEqual(ada);
+  servers(answer(204), answer(204));
+  await signOut(RUNNER);
+  expect(rememberedPerson()).toBeNull();
+  for (const odd of ["no JSON", "{}", '{"id":"p","name":"Ada","role":"king"}', "[]"]) {
+    store.set("aa.person", odd);
+    expect(rememberedPerson()).toBeNull();
+  }
 });

@@ -1,5 +1,6 @@
 /** Who this browser is: trades the token of the link for a cookie. */
 import { errorText, fetchJson, Refusal } from "./http";
+import { ROLE_WORDS } from "./roles";
 import type { EditorApi } from "./schema/editor";
 
 export { may, type Permission, ROLE_WORDS, type Role } from "./roles";
@@ -38,6 +39,30 @@ export function rememberedName(): string {
   return localStorage.getItem(NAME_KEY) ?? "";
 }
 
+const PERSON_KEY = "aa.person";
+
+/** Whose pages this device may show while no server answers; null when nobody is signed in here. */
+export function rememberedPerson(): Person | null {
+  try {
+    const kept: unknown = JSON.parse(localStorage.getItem(PERSON_KEY) ?? "null");
+    return isPerson(kept) ? kept : null;
+  } catch {
+    return null;
+  }
+}
+
+function isPerson(kept: unknown): kept is Person {
+  if (typeof kept !== "object" || kept === null) return false;
+  const { id, name, role } = kept as Partial<Record<keyof Person, unknown>>;
+  return typeof id === "string" && typeof name === "string" && String(role) in ROLE_WORDS;
+}
+
+/** Null: from now on nobody is shown anything here without a server. */
+export function rememberPerson(person: Person | null): void {
+  if (person === null) localStorage.removeItem(PERSON_KEY);
+  else localStorage.setItem(PERSON_KEY, JSON.stringify(person));
+}
+
 type SessionAnswer = EditorApi["SignedIn"];
 /** What a link invites to, and by whom. */
 export type InvitationPreview = EditorApi["Invited"];
@@ -54,8 +79,8 @@ export async function openSession(key: Credential, name = rememberedName()): Pro
 }
 
 /** Who the cookie says we are. Throws a `Refusal` with status 401 without one. */
-export async function currentPerson(): Promise<Person> {
-  return (await fetchJson<SessionAnswer>("/api/session")).person;
+export async function currentPerson(timeoutMs = 20_000): Promise<Person> {
+  return (await fetchJson<SessionAnswer>("/api/session", { timeoutMs })).person;
 }
 
 const FAREWELL_KEY = "aa.farewell";
@@ -69,6 +94,7 @@ export async function signOut(runner: string | undefined): Promise<void> {
     runner === undefined ? lostRunner() : endSession("The runner", runner),
   ]);
   if (editor.status === "rejected" && other.status === "rejected") throw editor.reason;
+  rememberPerson(null);
   const failed = [editor, other].find((each) => each.status === "rejected");
   if (failed !== undefined) sessionStorage.setItem(FAREWELL_KEY, errorText(failed.reason));
 }

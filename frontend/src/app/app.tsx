@@ -10,6 +10,7 @@ import { LiveProvider } from "../api/live/use-live";
 import { basePath } from "../api/page-url";
 import { usePerson } from "../api/use-person";
 import { actionDrag } from "../canvas/action-drag";
+import { NewVersionNotice } from "../offline/new-version-notice";
 import { UnansweredStartNotice } from "../runs/start/unanswered-start-notice";
 import { StopNotice } from "../runs/stop/stop-notice";
 import { LiveRegion } from "../ui/announcer";
@@ -131,6 +132,7 @@ export function App() {
                 <StopNotice />
                 <UnansweredStartNotice />
                 <DragPreview carrier={actionDrag} />
+                <NewVersionNotice />
                 <LiveRegion />
               </DropFiles>
             </LiveConnection>

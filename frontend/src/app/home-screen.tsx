@@ -1,8 +1,12 @@
 /** The first screen: every graph. */
 import { Home } from "../library/home";
+import { lazyPart } from "../ui/parts/lazy-part";
+import { PartBoundary } from "../ui/parts/part-boundary";
 import { useNewGraphs } from "./new-graphs";
 import { PageBar, PageFrame } from "./page-frame";
 import { useTitle } from "./use-title";
+
+const KeptGraphs = lazyPart(() => import("./kept-graphs").then((part) => part.KeptGraphs));
 
 export function HomeScreen() {
   const { create, choose } = useNewGraphs();
@@ -10,7 +14,15 @@ export function HomeScreen() {
   return (
     <PageFrame>
       <PageBar crumbs={[{ label: "Graphs" }]} />
-      <Home onNew={create} onImport={choose} />
+      <Home
+        onNew={create}
+        onImport={choose}
+        kept={
+          <PartBoundary>
+            <KeptGraphs />
+          </PartBoundary>
+        }
+      />
     </PageFrame>
   );
 }

@@ -7,10 +7,11 @@ import "../ui/tokens.css";
 import "../ui/base.css";
 import { StrictMode } from "react";
 import { createRoot } from "react-dom/client";
+import { keepPage } from "../offline/page-version";
 import { App } from "./app";
 import { preloadAt, preloadWhenIdle } from "./lazy-screens";
 
-void preloadAt(location.pathname).then(preloadWhenIdle);
+void preloadAt(location.pathname).then(preloadWhenIdle).then(keepPage);
 
 const root = document.getElementById("root");
 if (root === null) throw new Error("index.html has no #root");

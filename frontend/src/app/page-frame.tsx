@@ -12,6 +12,11 @@ import { type Crumb, TopBar } from "../ui/top-bar";
 import { useStableCallback } from "../ui/use-stable-callback";
 import style from "./page-frame.module.css";
 
+const leave = async (person: string) => {
+  const { leaveDevice } = await import("../sync/kept-graphs");
+  await leaveDevice(person);
+};
+
 interface Props {
   crumbs: readonly Crumb[];
   status?: ReactNode;
@@ -92,7 +97,7 @@ export function PageBar({ crumbs, status, actions, start, graph, at }: Props) {
           )}
         </>
       }
-      account={<Account onShare={mayShare ? share : null} />}
+      account={<Account onShare={mayShare ? share : null} onLeave={leave} />}
       start={start}
       stop={<StopButton {...(graph === undefined ? {} : { graph })} />}
     />

@@ -6,6 +6,7 @@ import { useOpenThreadsOnCards, useThreads } from "../comments/use-threads";
 import { scriptOf } from "../dry-run/script";
 import { addActionAt, type EditorContext, freePosition } from "../edit-actions/editor-context";
 import { useShortcuts } from "../edit-actions/shortcuts";
+import { FindBar } from "../find/find-bar";
 import type { NewAction } from "../graph/edit";
 import type { Graph, Key } from "../graph/model";
 import type { ToldProblem } from "../graph/problems/told-problems";
@@ -16,7 +17,7 @@ import type { Progress } from "../status/progress";
 import type { RoomLink } from "../sync/room-connection";
 import { useThrottledLink } from "../sync/use-room";
 import { lazyPart } from "../ui/parts/lazy-part";
-import { OverlayBoundary, PartBoundary } from "../ui/parts/part-boundary";
+import { PartBoundary } from "../ui/parts/part-boundary";
 import type { Crumb } from "../ui/top-bar";
 import { useIsPhone, useIsWide } from "../ui/use-screen-size";
 import { EditorContextProvider } from "./canvas/note-links";
@@ -31,7 +32,6 @@ import { useRemoteEditAnnouncements, useRunAnnouncements } from "./use-announcem
 import { useEditor } from "./use-editor";
 import { usePanels } from "./use-panels";
 
-const FindBar = lazyPart(() => import("../find/find-bar").then((part) => part.FindBar));
 const Outline = lazyPart(() => import("../outline/outline").then((part) => part.Outline));
 
 /** What the page around the editor may want to know. */
@@ -133,14 +133,6 @@ function OutlinePane(props: ComponentProps<typeof Outline>) {
   );
 }
 
-function FindPane(props: ComponentProps<typeof FindBar>) {
-  return (
-    <OverlayBoundary>
-      <FindBar {...props} />
-    </OverlayBoundary>
-  );
-}
-
 export function Editor(props: Props) {
   const { id, known, progress } = props;
   const wide = useIsWide();
@@ -186,7 +178,7 @@ export function Editor(props: Props) {
     strip,
     outline: <OutlinePane progress={progress} />,
     find: editor.isFindOpen && (
-      <FindPane problems={problems?.problems ?? []} onClose={editor.closeFind} />
+      <FindBar problems={problems?.problems ?? []} onClose={editor.closeFind} />
     ),
     details: (
       <Inspector

@@ -1,6 +1,7 @@
 /** The first page: every graph, and how to begin. */
 import { Button, Skeleton } from "@mantine/core";
 import { IconAlertTriangle, IconFileImport, IconPlus } from "@tabler/icons-react";
+import type { ReactNode } from "react";
 import { useGraphs } from "../api/graphs";
 import { errorText } from "../api/http";
 import { useMay } from "../api/use-person";
@@ -11,6 +12,8 @@ import style from "./home.module.css";
 interface Props {
   onNew: () => void;
   onImport: () => void;
+  /** What the device has while the list cannot be read. */
+  kept: ReactNode;
 }
 
 function Skeletons() {
@@ -30,7 +33,7 @@ function Skeletons() {
   );
 }
 
-export function Home({ onNew, onImport }: Props) {
+export function Home({ onNew, onImport, kept }: Props) {
   const mayEdit = useMay("edit");
   const graphs = useGraphs();
   const list = graphs.data ?? [];
@@ -58,9 +61,12 @@ export function Home({ onNew, onImport }: Props) {
         </div>
         {graphs.isPending && <Skeletons />}
         {graphs.isError && (
-          <Empty icon={<IconAlertTriangle size={22} />} title="The list cannot be read">
-            {errorText(graphs.error)}
-          </Empty>
+          <>
+            <Empty icon={<IconAlertTriangle size={22} />} title="The list cannot be read">
+              {errorText(graphs.error)}
+            </Empty>
+            {kept}
+          </>
         )}
         {graphs.isSuccess && list.length === 0 && (
           <Empty

@@ -61,12 +61,25 @@ export interface OtherPerson {
   readonly waiting: number;
 }
 
+/** A graph that opens without a server. */
+export interface KeptGraph {
+  readonly graph: string;
+  /** Milliseconds since 1970. */
+  readonly usedAt: number;
+  /** How many edits wait. */
+  readonly waiting: number;
+}
+
 export interface EditStore {
   /** What is kept, of all histories, the last used one at the end. */
   read(owner: CopyOwner): Promise<readonly StoredCopy[]>;
   write(owner: CopyOwner, epoch: string, batch: StoreWrite): Promise<void>;
   /** Lets go of everything kept of one epoch, edits that wait included. */
   forget(owner: CopyOwner, epoch: string): Promise<void>;
+  /** The graphs of which this person has a copy here, the last used first. */
+  graphs(person: string): Promise<readonly KeptGraph[]>;
+  /** Lets go of this person's copies in which nothing waits. */
+  leave(person: string): Promise<void>;
   /** The others with edits of this graph that wait here. */
   others(owner: CopyOwner): Promise<readonly OtherPerson[]>;
 }
@@ -143,6 +156,24 @@ export function indexedDbStore(factory: IDBFactory | undefined = globalThis.inde
       const work = (await database()).transaction(["copies", "known", "waiting"], "readwrite");
       remove(work, [owner.graph, owner.person.id, epoch]);
       await finished(work);
+    },
+    async graphs(person) {
+      const work = (await database()).transaction(["copies", "waiting"]);
+      const copies = (await answer(work.objectStore("copies").getAll())) as Copy[];
+      const waiting = await answer(work.objectStore("waiting").getAllKeys());
+      return keptOf(copies, waiting as unknown as CopyKey[], person);
+    },
+    async leave(person) {
+      const work = (await database()).transaction(["copies", "known", "waiting"], "readwrite");
+      const done = finished(work);
+      const copies = (await answer(work.objectStore("copies").getAll())) as Copy[];
+      const keys = (await answer(work.objectStore("waiting").getAllKeys())) as unknown as CopyKey[];
+      const busy = busyPlaces(keys);
+      for (const copy of copies) {
+        const place: CopyKey = [copy.graph, copy.person, copy.epoch];
+        if (copy.person === person && !busy.has(JSON.stringify(place))) remove(work, place);
+      }
+      await done;
     },
     async others(owner) {
       const work = (await database()).transaction(["copies", "waiting"]);
@@ -246,9 +277,7 @@ async function prune(database: IDBDatabase, owner: CopyOwner, most: number): Pro
   const done = finished(work);
   const copies = (await answer(work.objectStore("copies").getAll())) as Copy[];
   const keys = (await answer(work.objectStore("waiting").getAllKeys())) as unknown as CopyKey[];
-  const busy = new Set(
-    keys.map(([graph, person, epoch]) => JSON.stringify([graph, person, epoch])),
-  );
+  const busy = busyPlaces(keys);
   const idle = copies
     .sort((a, b) => b.usedAt - a.usedAt)
     .filter(({ graph, person, epoch }) => {
@@ -257,6 +286,26 @@ async function prune(database: IDBDatabase, owner: CopyOwner, most: number): Pro
     });
   for (const { graph, person, epoch } of idle.slice(most)) remove(work, [graph, person, epoch]);
   await done;
+}
+
+/** The copies in which something waits. */
+function busyPlaces(waiting: readonly CopyKey[]): ReadonlySet<string> {
+  return new Set(waiting.map(([graph, person, epoch]) => JSON.stringify([graph, person, epoch])));
+}
+
+/** Each graph once, whatever histories are kept of it. */
+function keptOf(
+  copies: readonly Copy[],
+  waiting: readonly CopyKey[],
+  person: string,
+): readonly KeptGraph[] {
+  const found = new Map<string, KeptGraph>();
+  for (const { graph, usedAt } of copies.filter((copy) => copy.person === person)) {
+    const count = waiting.filter(([of, whose]) => of === graph && whose === person).length;
+    const latest = Math.max(usedAt, found.get(graph)?.usedAt ?? 0);
+    found.set(graph, { graph, usedAt: latest, waiting: count });
+  }
+  return [...found.values()].sort((a, b) => b.usedAt - a.usedAt);
 }
 
 function remove(work: IDBTransaction, place: CopyKey): void {

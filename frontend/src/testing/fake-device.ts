@@ -61,6 +61,18 @@ export class FakeEditStore implements EditStore {
       .map((e) => ({ ...e.person, waiting: e.waiting.size }));
   }
 
+  async graphs(person: string) {
+    this.check();
+    const own = this.entries.filter((e) => e.person.id === person);
+    return own.map((e) => ({ graph: e.graph, usedAt: 0, waiting: e.waiting.size })).reverse();
+  }
+
+  async leave(person: string): Promise<void> {
+    this.check();
+    const stay = this.entries.filter((e) => e.person.id !== person || e.waiting.size > 0);
+    this.entries.splice(0, this.entries.length, ...stay);
+  }
+
   /** How many edits wait here. */
   get waiting(): number {
     return this.entries.reduce((sum, entry) => sum + entry.waiting.size, 0);

@@ -1,7 +1,6 @@
 /** The command palette: every edit action with its shortcut, and every place to go to. */
-import { Modal } from "@mantine/core";
 import { IconRouteSquare2, IconSquareRounded } from "@tabler/icons-react";
-import { useMemo, useRef } from "react";
+import { useEffect, useMemo, useRef } from "react";
 import { useLocation } from "wouter";
 import { useGraphs } from "../../api/graphs";
 import { EDIT_ACTIONS } from "../../edit-actions/all";
@@ -10,6 +9,7 @@ import type { EditorContext } from "../../edit-actions/editor-context";
 import { FirstShortcut } from "../../edit-actions/shortcut-keys";
 import { colorOfName } from "../../ui/name-colors";
 import { matching, type Option, PickList } from "../../ui/pick-list";
+import style from "./command-palette.module.css";
 
 const MOST = 60;
 /** Names of edit actions that were done from here, the last first. */
@@ -56,6 +56,12 @@ export function CommandPalette({
   onClose: () => void;
 }) {
   const [, go] = useLocation();
+  const shown = useRef<HTMLDialogElement>(null);
+  useEffect(() => {
+    const dialog = shown.current;
+    dialog?.showModal();
+    return () => dialog?.close(); // gives the focus back
+  }, []);
   const graphs = useGraphs().data;
   // Counted once: the order shall not change under the person's hands.
   const first = useRef(context);
@@ -91,17 +97,13 @@ export function CommandPalette({
     }
   };
   return (
-    <Modal
-      opened
-      onClose={onClose}
-      withCloseButton={false}
-      centered={false}
-      yOffset="12vh"
-      size="lg"
-      padding="sm"
-      transitionProps={{ duration: 80 }}
-      overlayProps={{ backgroundOpacity: 0.3 }}
+    // The browser's own dialog: one types at once, so it cannot wait for a library.
+    <dialog
+      ref={shown}
+      className={style.palette}
       aria-label="Commands"
+      onCancel={onClose}
+      onPointerDown={(event) => event.target === event.currentTarget && onClose()}
     >
       <PickList
         label="Find a command, an action or a graph"
@@ -111,6 +113,6 @@ export function CommandPalette({
         none="Nothing is called so."
         take="do it"
       />
-    </Modal>
+    </dialog>
   );
 }

@@ -3,12 +3,10 @@
 import type { EditorContext, Overlay } from "../../edit-actions/editor-context";
 import { lazyPart } from "../../ui/parts/lazy-part";
 import { OverlayBoundary } from "../../ui/parts/part-boundary";
+import { CommandPalette } from "./command-palette";
 
 const ArrowDialog = lazyPart(() => import("./arrow-dialog").then((part) => part.ArrowDialog));
 const RetargetDialog = lazyPart(() => import("./arrow-dialog").then((part) => part.RetargetDialog));
-const CommandPalette = lazyPart(() =>
-  import("./command-palette").then((part) => part.CommandPalette),
-);
 const ContextMenu = lazyPart(() => import("./context-menu").then((part) => part.ContextMenu));
 const ShortcutSheet = lazyPart(() => import("./shortcut-sheet").then((part) => part.ShortcutSheet));
 

@@ -1,6 +1,6 @@
 // @vitest-environment jsdom
 import { MantineProvider } from "@mantine/core";
-import { act } from "react";
+import { act, type ComponentType } from "react";
 import { createRoot } from "react-dom/client";
 import { afterEach, beforeAll, expect, test, vi } from "vitest";
 import { lazyPart, preloadParts } from "./lazy-part";
@@ -16,7 +16,7 @@ afterEach(() => vi.restoreAllMocks());
 const Word = ({ word }: { word: string }) => <p>{word}</p>;
 
 /** Draws a part as a page does; what is written then. */
-async function drawn(Part: typeof Word): Promise<string> {
+async function drawn(Part: ComponentType<{ word: string }>): Promise<string> {
   const place = document.createElement("div");
   const root = createRoot(place);
   await act(async () =>

@@ -13,6 +13,7 @@ from litestar.types import ASGIApp, HTTPScope, Receive, Scope, Send
 
 _NOT_PAGES: Final = ("/api/", "/runner/", "/schema", "/healthz", "/readyz", "/metrics")
 _COMPRESSED: Final = frozenset({".html", ".js", ".css", ".svg", ".json", ".webmanifest"})
+_MEDIA: Final = {**mimetypes.types_map, ".webmanifest": "application/manifest+json"}
 _UNBUILT: Final = b"""<!doctype html><meta charset="utf-8"><title>Page not built</title>
 <p>The page has not been built. Run <code>make setup</code> in the folder of the source code.</p>
 """
@@ -97,7 +98,7 @@ def _load(folder: Path) -> dict[str, File]:
 
 
 def _file(body: bytes, suffix: str, *, lasting: bool) -> File:
-    media = mimetypes.types_map.get(suffix, "application/octet-stream")
+    media = _MEDIA.get(suffix, "application/octet-stream")
     if suffix in {".html", ".js", ".css"}:
         media += "; charset=utf-8"
     zipped = gzip.compress(body, mtime=0) if suffix in _COMPRESSED and len(body) > 1000 else b""

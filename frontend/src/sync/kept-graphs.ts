@@ -1,0 +1,41 @@
+/** The graphs that this device keeps, with their names: for a list when no server gives one. */
+import * as Y from "yjs";
+import { rootOf } from "../graph/document-keys";
+import { browserStore, type EditStore, type KeptGraph } from "./indexed-db";
+
+export interface NamedGraph extends KeptGraph {
+  /** "" where it has none. */
+  readonly name: string;
+}
+
+/** Rejects where the browser stores nothing. */
+export async function keptGraphs(
+  person: string,
+  store: EditStore = browserStore(),
+): Promise<readonly NamedGraph[]> {
+  const named: NamedGraph[] = [];
+  for (const kept of await store.graphs(person)) {
+    const owner = { graph: kept.graph, person: { id: person, name: "" } };
+    const copy = (await store.read(owner)).at(-1);
+    if (copy === undefined) continue;
+    const doc = new Y.Doc();
+    const updates = [...copy.known, ...copy.waiting.map(({ update }) => update)];
+    for (const update of updates) Y.applyUpdate(doc, update);
+    const name = rootOf(doc, "meta").get("name");
+    named.push({ ...kept, name: typeof name === "string" ? name : "" });
+    doc.destroy();
+  }
+  return named;
+}
+
+/** Whoever signs out leaves no copy behind; edits that no server has stay until they come again. */
+export async function leaveDevice(
+  person: string,
+  store: EditStore = browserStore(),
+): Promise<void> {
+  try {
+    await store.leave(person);
+  } catch (error) {
+    console.warn("Copies of graphs stay on this device:", error);
+  }
+}
