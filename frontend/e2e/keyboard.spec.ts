@@ -281,3 +281,31 @@ test("a dry-run is played by keys and records nothing", async ({ browser }) => {
   expect(failures).toEqual([]);
   await context.close();
 });
+
+test("keys of one's own work at once, STOP's cannot be had, and the graph prints as itself", async ({
+  browser,
+}) => {
+  const { page, context } = await product.person(browser, "Ada");
+  await page.goto(`${product.url}/graphs/${await product.chain(2)}`);
+  await saved(page);
+  await page.keyboard.press("?");
+  const pencil = page.getByRole("button", { name: "Other keys for Show the outline" });
+  await pencil.focus();
+  await page.keyboard.press("Enter");
+  await page.keyboard.press("Control+.");
+  // STOP heard it, and nobody else did.
+  await expect(page.getByRole("button", { name: /^Press the new keys/ })).toBeFocused();
+  await page.keyboard.press("Control+Shift+y");
+  await page.keyboard.press("Escape");
+  await expect(page.getByRole("dialog")).toHaveCount(0);
+  await page.keyboard.press("Control+Shift+Y");
+  await expect(page.getByRole("treegrid")).toBeVisible();
+  await page.evaluate(() => dispatchEvent(new Event("beforeprint")));
+  const paper = page.locator("body > [data-print]");
+  await expect(paper.locator("svg text", { hasText: "Wait" })).toHaveCount(2);
+  await expect(paper).toContainText("never published");
+  expect((await page.pdf({ preferCSSPageSize: true })).length).toBeGreaterThan(5_000);
+  await page.evaluate(() => dispatchEvent(new Event("afterprint")));
+  await expect(paper).toHaveCount(0);
+  await context.close();
+});

@@ -2,6 +2,7 @@
 
 import { type Note, notesOf } from "../graph/edit/notes";
 import type { Direction, Graph, Key, Position, Precondition } from "../graph/model";
+import { spokenNote } from "../graph/note-links";
 import { cardRows } from "../graph/parameters/card-rows";
 import { colorOfName } from "../ui/name-colors";
 import { type Bundle, bundlesOf, pillWord } from "./arrows/bundles";
@@ -278,7 +279,7 @@ class Painter {
   private note({ at: [x, y], size: [width, height], text, color }: Note): string {
     const ink = this.paint(noteColor[color]);
     const most = Math.max(1, Math.floor((height - 16) / 17));
-    const lines = wrapped(text, width - 24, 6.6).slice(0, most);
+    const lines = wrapped(spokenNote(text), width - 24, 6.6).slice(0, most);
     const spans = lines.map(
       (line, i) => `<tspan x="${x + 12}" y="${y + 22 + i * 17}">${escaped(line)}</tspan>`,
     );

@@ -60,5 +60,6 @@ export const EDIT_ACTIONS: readonly EditAction[] = [
   graph.exportUmrf,
   graph.exportSvg,
   graph.exportPng,
+  graph.print,
   graph.copyLink,
 ];

@@ -34,9 +34,9 @@ export function labelOf(editAction: EditAction, context: EditorContext): string 
     : editAction.label;
 }
 
-const onMac = typeof navigator !== "undefined" && /Mac|iP(hone|ad)/.test(navigator.platform);
+export const onMac = typeof navigator !== "undefined" && /Mac|iP(hone|ad)/.test(navigator.platform);
 
-interface Pressed {
+export interface Pressed {
   readonly key: string;
   readonly ctrlKey: boolean;
   readonly metaKey: boolean;

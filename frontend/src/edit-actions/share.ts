@@ -1,6 +1,12 @@
 /** Edit actions for the whole graph: export it, copy a link to it. */
 
-import { IconDownload, IconLink, IconPhoto, IconVectorTriangle } from "@tabler/icons-react";
+import {
+  IconDownload,
+  IconLink,
+  IconPhoto,
+  IconPrinter,
+  IconVectorTriangle,
+} from "@tabler/icons-react";
 import { copyLinkTo } from "./clipboard";
 import type { EditAction } from "./edit-action";
 import { linkTo } from "./graph-links";
@@ -35,6 +41,17 @@ export const exportPng: EditAction = {
   icon: IconPhoto,
   also: "picture image download",
   run: (context) => context.download("png"),
+};
+
+export const print: EditAction = {
+  ...graph,
+  name: "print",
+  label: "Print or PDF",
+  shortcuts: [],
+  icon: IconPrinter,
+  also: "paper export",
+  // After the menu is closed: what is printed is the page of that moment.
+  run: () => void setTimeout(() => window.print(), 0),
 };
 
 export const copyLink: EditAction = {

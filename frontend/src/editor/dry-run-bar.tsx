@@ -19,7 +19,7 @@ import * as editActions from "../edit-actions/dry-run-actions";
 import type { EditAction } from "../edit-actions/edit-action";
 import { labelOf } from "../edit-actions/edit-action";
 import { type EditorContext, selectedActions } from "../edit-actions/editor-context";
-import { FirstShortcut } from "../edit-actions/shortcut-keys";
+import { FirstShortcut } from "../edit-actions/keys/shortcut-keys";
 import { fullName } from "../graph/model";
 import { endName } from "../graph/relation-words";
 import style from "./dry-run-bar.module.css";

@@ -5,7 +5,7 @@ import type { Script } from "../api/dry-runs";
 import { useOpenThreadsOnCards, useThreads } from "../comments/use-threads";
 import { scriptOf } from "../dry-run/script";
 import { addActionAt, type EditorContext, freePosition } from "../edit-actions/editor-context";
-import { useShortcuts } from "../edit-actions/shortcuts";
+import { useShortcuts } from "../edit-actions/keys/shortcuts";
 import { FindBar } from "../find/find-bar";
 import type { NewAction } from "../graph/edit";
 import type { Graph, Key } from "../graph/model";

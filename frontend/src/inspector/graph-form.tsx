@@ -1,7 +1,8 @@
 /** The properties of the graph itself, and how to begin. */
 import { Kbd, TagsInput } from "@mantine/core";
-import { printedKeys } from "../edit-actions/edit-action";
+import { palette, showShortcuts } from "../edit-actions/all";
 import { useEditorContext } from "../edit-actions/editor-context";
+import { FirstShortcut } from "../edit-actions/keys/shortcut-keys";
 import { setGraphDescription, setGraphName } from "../graph/edit";
 import { DraftInput } from "../ui/draft-input";
 import { SharedField } from "./fields/shared-field";
@@ -60,8 +61,8 @@ export function GraphForm() {
           </li>
           <li>Select a card or an arrow to see what it says</li>
           <li>
-            <Kbd>{printedKeys("Mod+k")[0]}</Kbd> <Kbd>K</Kbd> finds every command, <Kbd>?</Kbd>{" "}
-            shows the keys
+            <FirstShortcut editAction={palette} /> finds every command,{" "}
+            <FirstShortcut editAction={showShortcuts} /> shows the keys
           </li>
         </ul>
       </section>

@@ -42,6 +42,15 @@ export function ago(at: number, now: number): string {
   return day(at, now);
 }
 
+/** `22 Nov 2026`: of papers, which are read on any day. */
+export function dateText(at: number): string {
+  return new Date(at).toLocaleDateString(undefined, {
+    day: "numeric",
+    month: "short",
+    year: "numeric",
+  });
+}
+
 /** `today`, `yesterday`, `Mon 3 Nov`. */
 export function day(at: number, now: number): string {
   const midnight = (t: number) => new Date(t).setHours(0, 0, 0, 0);

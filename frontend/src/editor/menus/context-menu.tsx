@@ -9,7 +9,7 @@ import {
   selectedNotes,
   selectedRelations,
 } from "../../edit-actions/editor-context";
-import { FirstShortcut } from "../../edit-actions/shortcut-keys";
+import { FirstShortcut } from "../../edit-actions/keys/shortcut-keys";
 import style from "./context-menu.module.css";
 
 /** What can be done with the selection, in groups. */

@@ -4,6 +4,7 @@ import type { EditorContext, Overlay } from "../../edit-actions/editor-context";
 import { lazyPart } from "../../ui/parts/lazy-part";
 import { OverlayBoundary } from "../../ui/parts/part-boundary";
 import { CommandPalette } from "./command-palette";
+import { GraphPrint } from "./graph-print";
 
 const ArrowDialog = lazyPart(() => import("./arrow-dialog").then((part) => part.ArrowDialog));
 const RetargetDialog = lazyPart(() => import("./arrow-dialog").then((part) => part.RetargetDialog));
@@ -18,9 +19,12 @@ interface Props {
 
 export function Overlays(props: Props) {
   return (
-    <OverlayBoundary>
-      <Opened {...props} />
-    </OverlayBoundary>
+    <>
+      <GraphPrint context={props.context} />
+      <OverlayBoundary>
+        <Opened {...props} />
+      </OverlayBoundary>
+    </>
   );
 }
 

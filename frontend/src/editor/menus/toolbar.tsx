@@ -25,7 +25,7 @@ import {
   labelOf,
 } from "../../edit-actions/edit-action";
 import { useEditorContext } from "../../edit-actions/editor-context";
-import { FirstShortcut } from "../../edit-actions/shortcut-keys";
+import { FirstShortcut } from "../../edit-actions/keys/shortcut-keys";
 import { useStableCallback } from "../../ui/use-stable-callback";
 import style from "./toolbar.module.css";
 

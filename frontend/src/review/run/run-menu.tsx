@@ -8,6 +8,7 @@ import {
   IconDownload,
   IconPlayerPlay,
   IconPlayerTrackNext,
+  IconPrinter,
   IconRepeat,
   IconShieldCheck,
 } from "@tabler/icons-react";
@@ -105,6 +106,12 @@ function HandOver({ runner, run }: Props) {
           {label}
         </Menu.Item>
       ))}
+      <Menu.Item
+        leftSection={<IconPrinter size={15} aria-hidden />}
+        onClick={() => setTimeout(() => window.print(), 0)}
+      >
+        Record on paper (print or PDF)
+      </Menu.Item>
     </>
   );
 }

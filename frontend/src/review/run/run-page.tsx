@@ -30,6 +30,7 @@ import { type RepeatActions, RunMenu } from "./run-menu";
 import { PinRun, RunNotes } from "./run-notes";
 import style from "./run-page.module.css";
 import { RunParameters } from "./run-parameters";
+import { RunPrint } from "./run-print";
 import { useVersionLabel } from "./use-version-label";
 
 export interface RunBarParts {
@@ -148,6 +149,7 @@ interface AboutRunProps {
 function AboutRun({ runner, newest, replay, label, marks, selected, onSelect }: AboutRunProps) {
   return (
     <aside className={style.side} aria-label="About the run">
+      <RunPrint run={newest} version={label} by={authorName(newest.author)} />
       <Tabs defaultValue="events" keepMounted={false} className={style.tabs ?? ""}>
         <Tabs.List>
           <Tabs.Tab value="events">Events</Tabs.Tab>

@@ -1,10 +1,11 @@
 /** Keyboard shortcuts of edit actions, where nobody is typing; and the clipboard's own events. */
 import { useLocalStorage } from "@mantine/hooks";
 import { useEffect, useRef } from "react";
-import { EDIT_ACTIONS } from "./all";
-import { copiedSelection, pasteText, rememberCopied } from "./clipboard";
-import { editActionFor, isEnabled } from "./edit-action";
-import type { EditorContext } from "./editor-context";
+import { EDIT_ACTIONS } from "../all";
+import { copiedSelection, pasteText, rememberCopied } from "../clipboard";
+import { type EditAction, editActionFor, isEnabled } from "../edit-action";
+import type { EditorContext } from "../editor-context";
+import { useOwnShortcuts, withOwn } from "./own-shortcuts";
 
 /** Whether single letters are shortcuts: speech input types letters by itself. */
 export function useSingleKeys() {
@@ -24,8 +25,8 @@ function isTaken(target: EventTarget | null): boolean {
 }
 
 /** The way out of a form works in the form, and so does what no field has a use for. */
-function worksInForms(event: KeyboardEvent): boolean {
-  const editAction = editActionFor(EDIT_ACTIONS, event, false);
+function worksInForms(event: KeyboardEvent, editActions: readonly EditAction[]): boolean {
+  const editAction = editActionFor(editActions, event, false);
   const free = ["to-canvas", "palette", "find", "export"].includes(editAction?.name ?? "");
   return free && document.querySelector("[role=dialog]") === null;
 }
@@ -56,9 +57,12 @@ export function useShortcuts(context: EditorContext): void {
   const now = useRef(context);
   now.current = context;
   const [singles] = useSingleKeys();
+  const own = useOwnShortcuts(EDIT_ACTIONS);
   useEffect(() => {
+    const editActions = withOwn(EDIT_ACTIONS, own);
     const onKey = (event: KeyboardEvent) => {
-      if (event.defaultPrevented || (isTaken(event.target) && !worksInForms(event))) return;
+      if (event.defaultPrevented) return;
+      if (isTaken(event.target) && !worksInForms(event, editActions)) return;
       if (MOVING.has(event.key) && !isOnCanvas(event.target)) return;
       if (event.key === "/" && singles) {
         event.preventDefault();
@@ -70,7 +74,7 @@ export function useShortcuts(context: EditorContext): void {
         addAtPointer(now.current);
         return;
       }
-      const editAction = editActionFor(EDIT_ACTIONS, event, singles);
+      const editAction = editActionFor(editActions, event, singles);
       if (editAction === null || editAction.event !== undefined) return;
       // A button does what Enter does to it.
       if (event.key === "Enter" && event.target instanceof HTMLButtonElement) return;
@@ -93,7 +97,7 @@ export function useShortcuts(context: EditorContext): void {
       window.removeEventListener("keydown", onCanvasKey, { capture: true });
       window.removeEventListener("keydown", onKey);
     };
-  }, [singles]);
+  }, [singles, own]);
   useClipboard(now);
 }
 

@@ -1,7 +1,9 @@
 /** The first shortcut of an edit action, as it is printed on keys. */
 import { Kbd } from "@mantine/core";
-import style from "../editor/menus/toolbar.module.css";
-import { type EditAction, printedKeys } from "./edit-action";
+import style from "../../editor/menus/toolbar.module.css";
+import { EDIT_ACTIONS } from "../all";
+import { type EditAction, printedKeys } from "../edit-action";
+import { useOwnShortcuts } from "./own-shortcuts";
 
 export function ShortcutKeys({ shortcut }: { shortcut: string }) {
   return (
@@ -14,6 +16,7 @@ export function ShortcutKeys({ shortcut }: { shortcut: string }) {
 }
 
 export function FirstShortcut({ editAction }: { editAction: EditAction }) {
-  const [first] = editAction.shortcuts;
+  const own = useOwnShortcuts(EDIT_ACTIONS);
+  const [first] = own[editAction.name] ?? editAction.shortcuts;
   return first === undefined ? null : <ShortcutKeys shortcut={first} />;
 }
