@@ -18,6 +18,7 @@ import { dataFlowOf, type InputGivers } from "../graph/parameters/data-flow";
 import type { Progress } from "../status/progress";
 import { type Bundle, bundlesOf, pillSizeOf } from "./arrows/bundles";
 import { gridOffset, type Scene, type SceneCard } from "./arrows/scene";
+import { expectedCard, expectedEnd } from "./card-handles";
 import { CARD, type Positions, pillSize } from "./geometry/arrange";
 import { type NoteNode, noteNodes } from "./notes/note-nodes";
 import { OUTCOMES, outcomeWord } from "./outcome";
@@ -99,9 +100,14 @@ const SIDES = {
   down: { sourcePosition: Side.Bottom, targetPosition: Side.Top },
 } as const;
 
-function place(key: Key, options: NodeOptions, direction: Direction) {
+function place(
+  key: Key,
+  options: NodeOptions,
+  direction: Direction,
+  expected: ReturnType<typeof expectedCard>,
+) {
   const [x, y] = options.places.get(key) ?? [0, 0];
-  const measured = options.measured.get(key);
+  const measured = options.measured.get(key) ?? expected.measured;
   const selected = options.selected.has(key);
   return {
     id: key,
@@ -109,7 +115,8 @@ function place(key: Key, options: NodeOptions, direction: Direction) {
     selected,
     zIndex: selected ? 1 : 0,
     ...SIDES[direction],
-    ...(measured ? { measured } : {}),
+    measured,
+    handles: expected.handles,
   };
 }
 
@@ -129,6 +136,7 @@ function cardOf(
     direction,
     givers,
   };
+  const expected = expectedCard(action, direction);
   const same =
     before?.type === "action" &&
     before.data.action === action &&
@@ -140,10 +148,10 @@ function cardOf(
     before.position.x === x &&
     before.position.y === y &&
     before.selected === options.selected.has(action.key) &&
-    before.measured === options.measured.get(action.key);
+    before.measured === (options.measured.get(action.key) ?? expected.measured);
   if (same) return before;
   const ariaLabel = cardWords(action, options);
-  return { ...place(action.key, options, direction), type: "action", ariaLabel, data };
+  return { ...place(action.key, options, direction, expected), type: "action", ariaLabel, data };
 }
 
 /** `before`: what was drawn last; it is looked at first, since of many cards few change at once. */
@@ -156,7 +164,7 @@ export function nodesOf(
   const flow = dataFlowOf(graph);
   const ends = ([ENTRY, EXIT] as const).map(
     (end): EndNode => ({
-      ...place(end, options, graph.direction),
+      ...place(end, options, graph.direction, expectedEnd(end, graph.direction)),
       type: "end",
       ariaLabel: end === ENTRY ? "Entry of the graph" : "Exit of the graph",
       data: { end: end as "entry" | "exit", direction: graph.direction, progress: null },
