@@ -178,6 +178,16 @@ def test_a_loop_is_told_once_that_it_must_take_time() -> None:
     assert "H5" not in found(graph)
 
 
+@pytest.mark.parametrize(("said", "told"), [(True, False), (False, True), ("yes", True)])
+def test_a_loop_of_an_action_that_is_said_to_take_time_is_none_without_time(
+    said: object, told: bool
+) -> None:
+    back = {"name": "B", "required": False, "conditions": ["on_false -> ignore", *SAFE]}
+    slow = action("A", parents=[back], children=["B"], gui_attributes={"takes_time": said})
+    graph = file(slow, action("B", parents=["A"], children=["A"]))
+    assert ("H5" in found(graph)) is told
+
+
 @pytest.mark.parametrize("response", ["stop", "pause", "restart"])
 def test_a_response_that_does_nothing_leaves_the_graph_running_for_ever(response: str) -> None:
     ask = {"name": "A", "conditions": [f"on_false -> {response}", *SAFE]}

@@ -7,7 +7,8 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import Final
 
 from action_assistant.umrf.checks.places import Subject
-from action_assistant.umrf.model import Key, Precondition, Relation
+from action_assistant.umrf.json.text import parse_small
+from action_assistant.umrf.model import Action, Key, Precondition, Relation
 
 #: How an action that runs can end; `on_stopped` needs somebody who stops it.
 ENDS: Final[tuple[Precondition, ...]] = ("on_true", "on_false", "on_error")
@@ -43,7 +44,7 @@ def check_instant_loops(
 
     for loop in loops(subject, goes_round):
         members = [subject.actions[key] for key in loop if key in runs]
-        if len(members) < len(loop):
+        if len(members) < len(loop) or any(map(_takes_time, members)):
             continue
         names = [member.full_name for member in members]
         shown = ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
@@ -52,6 +53,12 @@ def check_instant_loops(
             "milliseconds and obeys no stop any more; let at least one take some time."
         )
         subject.report("H5", "warning", message, action=members[0])
+
+
+def _takes_time(action: Action) -> bool:
+    """Whether somebody has said so: `"takes_time": true` in its `gui_attributes` (decision 56)."""
+    attributes = parse_small(dict(action.extra).get("gui_attributes", "null"))
+    return isinstance(attributes, dict) and attributes.get("takes_time") is True
 
 
 def _leading_to(subject: Subject, keys: set[Key]) -> set[Key]:
