@@ -39,7 +39,7 @@ async function add(page: Page, name: string): Promise<void> {
   await page.getByRole("button", { name: "Add an action" }).tap();
   await page.getByRole("combobox", { name: "Name of an action" }).fill(name);
   await page.getByRole("option", { name: `New action “${name}”` }).tap();
-  await expect(page.getByRole("row", { name: new RegExp(`^${name} 0`) })).toBeVisible();
+  await expect(page.getByRole("row", { name: new RegExp(`^${name} `) })).toBeVisible();
 }
 
 test("a graph is made in the outline", async ({ browser }) => {
@@ -51,17 +51,25 @@ test("a graph is made in the outline", async ({ browser }) => {
   await add(page, "Spot");
   await add(page, "Take");
 
-  await menu(page, "Entry", /Start with/);
-  await choose(page, "Run", "Spot");
+  // The graph starts with what was added first.
+  await expect(page.getByRole("button", { name: "run Spot" })).toBeVisible();
   await menu(page, "Spot", /Connect/);
   await choose(page, "Run", "Take");
-  await expect(page.getByRole("row", { name: /run Take/ })).toBeVisible();
+  await expect(page.getByRole("button", { name: "When true: run Take" })).toBeVisible();
   await menu(page, "Take", /Connect/);
   await choose(page, "Run", "Exit: the graph ends");
+  // A chip for each bundle of outcomes, with everything that can be done to it.
+  await page.getByRole("button", { name: "When true: run Take" }).tap();
+  await page.getByRole("menuitem", { name: "Another response …" }).tap();
+  await page.getByRole("option", { name: "stop", exact: true }).tap();
+  await page.getByRole("button", { name: "When true: stop Take" }).tap();
+  await page.getByRole("menuitem", { name: "Another response …" }).tap();
+  await page.getByRole("option", { name: "run", exact: true }).tap();
 
   await page
-    .getByRole("row", { name: /^Take 0/ })
-    .getByText("Take 0")
+    .getByRole("row", { name: /^Take / })
+    .getByText("Take", { exact: true })
+    .first()
     .tap();
   await page.getByRole("button", { name: "Add", exact: true }).first().tap();
   await page.getByRole("combobox", { name: "Name of the parameter" }).fill("force");
@@ -84,10 +92,11 @@ test("a graph is made in the outline", async ({ browser }) => {
   await context.close();
 });
 
-test("STOP stands alone at the bottom and everything is large enough for a finger", async ({
+test("STOP is at one place, apart from Start, and everything is large enough for a finger", async ({
   browser,
 }) => {
   const { page, context } = await product.person(browser, "Ada", PHONE);
+  const home = await page.getByRole("button", { name: /^Stop / }).boundingBox();
   await page.goto(`${product.url}/graphs/${await product.chain(12)}`);
   await saved(page);
   for (const name of ["Canvas", "Outline", "Details", "Run"]) {
@@ -95,6 +104,10 @@ test("STOP stands alone at the bottom and everything is large enough for a finge
     const stop = await page.getByRole("button", { name: /^Stop / }).boundingBox();
     expect(stop?.height).toBeGreaterThanOrEqual(60);
     expect((stop?.y ?? 0) + (stop?.height ?? 0)).toBeGreaterThan(820);
+    expect(stop).toEqual(home);
+    const begin = await page.getByRole("button", { name: /^Start v1/ }).boundingBox();
+    // More than two fingers beside each other.
+    expect((stop?.x ?? 0) - (begin?.x ?? 0) - (begin?.width ?? 0)).toBeGreaterThan(80);
     const small = await page.evaluate(() => {
       const found: string[] = [];
       for (const each of document.querySelectorAll<HTMLElement>("main button, header button")) {
@@ -108,10 +121,10 @@ test("STOP stands alone at the bottom and everything is large enough for a finge
     expect(small, name).toEqual([]);
   }
 
-  await pane(page, "Run");
   const start = page.getByRole("button", { name: /^Start v1 in the simulator/ });
   await expect(start).toBeEnabled();
   await press(page, start, 900);
+  await pane(page, "Run");
   await expect(page.locator('[data-tone="run"]').first()).toBeVisible();
   await page.getByRole("button", { name: /^Stop / }).tap();
   await expect(page.getByText(/stopped/).first()).toBeVisible();

@@ -8,7 +8,7 @@ import {
   IconNote,
   IconPlayerPlay,
 } from "@tabler/icons-react";
-import { memo, useId, useState } from "react";
+import { memo, type ReactNode, useId, useState } from "react";
 import { checkedColor } from "../api/people";
 import { useOpenThreadCount } from "../canvas/card-highlights";
 import { noteColor } from "../canvas/notes/note-colors";
@@ -50,7 +50,7 @@ export interface RowHandlers {
   done(said: string | null): void;
 }
 
-function Talk({ of }: { of: string }) {
+export function Talk({ of }: { of: string }) {
   const count = useOpenThreadCount(of);
   if (count === 0) return null;
   return (
@@ -61,7 +61,7 @@ function Talk({ of }: { of: string }) {
   );
 }
 
-function Others({ people }: { people: readonly PersonHere[] }) {
+export function Others({ people }: { people: readonly PersonHere[] }) {
   return people.map(({ id, name, color }) => (
     <span
       key={id}
@@ -75,7 +75,7 @@ function Others({ people }: { people: readonly PersonHere[] }) {
   ));
 }
 
-function Words({ row, progress, name }: Pick<Props, "row" | "progress" | "name">) {
+export function Words({ row, progress, name }: Pick<Props, "row" | "progress" | "name">) {
   switch (row.kind) {
     case "entry":
       return (
@@ -137,12 +137,24 @@ interface RowActionsProps {
   label: string;
   mayEdit: boolean;
   handlers: RowHandlers;
+  /** What the button shows instead of three dots. */
+  chip?: { readonly look: string; readonly words: ReactNode };
 }
 
 /** The menu itself is made when it is first opened: there may be thousands of rows. */
-function RowActions({ row, active, label, mayEdit, handlers }: RowActionsProps) {
+export function RowActions(props: RowActionsProps) {
+  const { row, active, label, mayEdit, handlers, chip } = props;
   const [opened, setOpened] = useState<boolean | null>(null);
-  const button = (
+  const button = chip ? (
+    <button
+      type="button"
+      className={chip.look}
+      tabIndex={active ? 0 : -1}
+      onClick={() => setOpened(!opened)}
+    >
+      {chip.words}
+    </button>
+  ) : (
     <ActionIcon
       size={32}
       className={style.more ?? ""}
@@ -178,12 +190,12 @@ const keyWords = (key: string): string =>
 
 const noteWord = ({ kind }: Note) => (kind === "frame" ? "Frame" : "Note");
 
-function colorOf(row: OutlineItem): string {
+export function colorOf(row: OutlineItem): string {
   if (row.kind === "note") return noteColor[row.note.color];
   return row.kind === "action" ? colorOfName(row.action.actor) : "transparent";
 }
 
-function labelOf(row: OutlineItem, name: string): string {
+export function labelOf(row: OutlineItem, name: string): string {
   switch (row.kind) {
     case "entry":
       return "Entry";

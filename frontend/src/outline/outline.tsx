@@ -9,7 +9,7 @@ import { IconListTree, IconPlus } from "@tabler/icons-react";
 import { useCallback, useEffect, useMemo, useRef, useState } from "react";
 import { useHighlightedRobot } from "../canvas/card-highlights";
 import { useEditorContext } from "../edit-actions/editor-context";
-import { ENTRY, type Key } from "../graph/model";
+import { ENTRY, type Graph, type Key } from "../graph/model";
 import type { Progress } from "../status/progress";
 import { useSelectedByOthers } from "../sync/use-room";
 import { announcer } from "../ui/announcer";
@@ -17,17 +17,25 @@ import { Empty } from "../ui/empty";
 import { useIsPhone } from "../ui/use-screen-size";
 import style from "./outline.module.css";
 import { OutlineRow, type RowHandlers } from "./outline-row";
+import { PhoneRow } from "./phone-row";
 import { RobotFilter } from "./robot-filter";
 import { moveRow, type RowAction, removeRow, rowActionFor } from "./row-actions";
 import type { RowEditKind } from "./row-edit";
-import { namesOf, type OutlineItem, rowsOf, subjectOf } from "./rows";
+import { type BundleRow, bundlesOf, namesOf, type OutlineItem, rowsOf, subjectOf } from "./rows";
 
 const MANY = 40; // actions; above that the rows begin closed
 
 interface Edited {
-  readonly id: string;
+  readonly row: OutlineItem;
   readonly change: RowEditKind;
 }
+
+const closed = () => false;
+const NO_BUNDLES: readonly BundleRow[] = [];
+
+/** Whether what is edited is this row, or a bundle that is shown in it. */
+const isOf = (edited: Edited | null, row: OutlineItem): boolean =>
+  edited !== null && (edited.row.id === row.id || edited.row.parent === row.id);
 
 /** Which rows are open: those that a person opened or closed, else by how many there are. */
 function useOpen(actions: number) {
@@ -75,11 +83,11 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
   const others = useSelectedByOthers();
   const { isOpen, flip } = useOpen(graph.actions.length);
   const rows = useMemo(() => {
-    const all = rowsOf(graph, isOpen);
+    const all = rowsOf(graph, phone ? closed : isOpen);
     if (robot === null) return all;
     const lit = new Set(graph.actions.filter(({ actor }) => actor === robot).map(({ key }) => key));
     return all.filter((row) => row.kind === "entry" || lit.has(ownerOf(row)));
-  }, [graph, isOpen, robot]);
+  }, [graph, isOpen, robot, phone]);
   const names = useMemo(() => namesOf(graph), [graph]);
   const [active, setActive] = useState<string>(ENTRY);
   const [edited, setEdited] = useState<Edited | null>(null);
@@ -135,7 +143,7 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
         break;
       default:
         setActive(row.id);
-        setEdited({ id: row.id, change: rowAction.name });
+        setEdited({ row, change: rowAction.name });
     }
   };
   const onKey = (event: React.KeyboardEvent) => {
@@ -183,6 +191,7 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
     if (!phone) return context.openAdd();
     context.openAdd({ screen: middle, at: [0, 140 * graph.actions.length], from: null });
   };
+  const shown = { rows, at, selection, progress, edited, names, others, mayEdit, handlers };
   return (
     <div className={style.outline}>
       <div className={style.robots}>
@@ -204,22 +213,7 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
           tabIndex={-1}
           onKeyDown={onKey}
         >
-          <tbody>
-            {rows.map((row, i) => (
-              <OutlineRow
-                key={row.id}
-                row={row}
-                active={i === at}
-                selected={selection.has(subjectOf(row))}
-                progress={row.kind === "action" ? (progress.get(row.action.key) ?? null) : null}
-                change={edited?.id === row.id ? edited.change : null}
-                name={names.get(nameKey(row)) ?? ""}
-                others={others.get(subjectOf(row))}
-                mayEdit={mayEdit}
-                handlers={handlers}
-              />
-            ))}
-          </tbody>
+          <tbody>{phone ? <PhoneRows {...shown} graph={graph} /> : <Rows {...shown} />}</tbody>
         </table>
       )}
       {mayEdit && (
@@ -236,6 +230,65 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
       )}
     </div>
   );
+}
+
+interface ShownRows {
+  rows: readonly OutlineItem[];
+  /** The row that the keyboard is at. */
+  at: number;
+  selection: ReadonlySet<string>;
+  progress: ReadonlyMap<Key, Progress>;
+  edited: Edited | null;
+  names: ReadonlyMap<Key, string>;
+  others: ReturnType<typeof useSelectedByOthers>;
+  mayEdit: boolean;
+  handlers: RowHandlers;
+}
+
+const progressOf = (row: OutlineItem, progress: ShownRows["progress"]): Progress | null =>
+  row.kind === "action" ? (progress.get(row.action.key) ?? null) : null;
+
+function Rows({ rows, at, selection, progress, edited, ...props }: ShownRows) {
+  const { names, others, mayEdit, handlers } = props;
+  return rows.map((row, i) => (
+    <OutlineRow
+      key={row.id}
+      row={row}
+      active={i === at}
+      selected={selection.has(subjectOf(row))}
+      progress={progressOf(row, progress)}
+      change={edited?.row.id === row.id ? edited.change : null}
+      name={names.get(nameKey(row)) ?? ""}
+      others={others.get(subjectOf(row))}
+      mayEdit={mayEdit}
+      handlers={handlers}
+    />
+  ));
+}
+
+function PhoneRows({ graph, rows, at, selection, ...props }: ShownRows & { graph: Graph }) {
+  const { progress, edited, names, others, mayEdit, handlers } = props;
+  const bundles = useMemo(() => bundlesOf(graph), [graph]);
+  const order = useMemo(() => new Map(rows.map(({ id }, i) => [id, i])), [rows]);
+  return rows.map((row, i) => {
+    const own = bundles.get(row.id) ?? NO_BUNDLES;
+    return (
+      <PhoneRow
+        key={row.id}
+        row={row}
+        bundles={own}
+        active={i === at}
+        selected={[row, ...own].some((each) => selection.has(subjectOf(each)))}
+        progress={progressOf(row, progress)}
+        edited={isOf(edited, row) ? edited : null}
+        names={names}
+        order={order}
+        others={others.get(subjectOf(row))}
+        mayEdit={mayEdit}
+        handlers={handlers}
+      />
+    );
+  });
 }
 
 const DETAILS: RowAction = { name: "details", label: "Details", key: "Enter", changes: false };

@@ -2,11 +2,18 @@
 
 import type { EditorContext } from "../edit-actions/editor-context";
 import { relationId } from "../graph/document-keys";
-import { removeActions, removeNotes, removeRelation, setResponse, swapOrder } from "../graph/edit";
-import { ENTRY, type Key, spokenOutcomes } from "../graph/model";
+import {
+  asOneEdit,
+  removeActions,
+  removeNotes,
+  removeRelation,
+  setResponse,
+  swapOrder,
+} from "../graph/edit";
+import { ENTRY, type Key, type Precondition, spokenOutcomes } from "../graph/model";
 import { endName } from "../graph/relation-words";
 import type { RowEditKind } from "./row-edit";
-import type { OutlineItem } from "./rows";
+import type { BundleRow, OutlineItem } from "./rows";
 
 export interface RowAction {
   readonly name: RowEditKind | "delete" | "up" | "down" | "details" | "comments";
@@ -58,6 +65,11 @@ export function rowActionFor(
   return rowActionsOf(row).find((rowAction) => rowAction.key === key) ?? null;
 }
 
+/** After which outcomes a row says what it says. */
+export function outcomesOf(row: BundleRow): readonly Precondition[] {
+  return row.bundled?.length ? row.bundled : [row.outcome];
+}
+
 /** Takes a row away: an action with its arrows, or what one outcome says to one target. */
 export function removeRow(context: EditorContext, row: OutlineItem): string {
   if (row.kind === "action") {
@@ -71,11 +83,12 @@ export function removeRow(context: EditorContext, row: OutlineItem): string {
   }
   if (row.kind !== "target") return "";
   const id = relationId(row.relation);
-  const others = spokenOutcomes(row.relation.conditions).filter(
-    (outcome) => outcome !== row.outcome,
-  );
+  const own = outcomesOf(row);
+  const others = spokenOutcomes(row.relation.conditions).filter((each) => !own.includes(each));
   if (others.length > 0 && row.relation.parent !== ENTRY) {
-    setResponse(context.doc, id, row.outcome, "ignore");
+    asOneEdit(context.doc, () => {
+      for (const outcome of own) setResponse(context.doc, id, outcome, "ignore");
+    });
   } else removeRelation(context.doc, id);
   return `The arrow to ${endName(context.graph, row.relation.child)} is deleted`;
 }

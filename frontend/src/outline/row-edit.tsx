@@ -4,11 +4,12 @@ import { useState } from "react";
 import { OUTCOMES, outcomeWord } from "../canvas/outcome";
 import { type EditorContext, useEditorContext } from "../edit-actions/editor-context";
 import { relationId } from "../graph/document-keys";
-import { connect, rename, retarget, setEntry, setResponse } from "../graph/edit";
+import { asOneEdit, connect, rename, retarget, setEntry, setResponse } from "../graph/edit";
 import { changeNote } from "../graph/edit/notes";
 import { ENTRY, EXIT, type Precondition, RESPONSES, type Response } from "../graph/model";
 import { endName } from "../graph/relation-words";
 import style from "./outline.module.css";
+import { outcomesOf } from "./row-actions";
 import type { OutlineItem } from "./rows";
 
 export type RowEditKind = "rename" | "connect" | "response" | "target";
@@ -103,13 +104,18 @@ function Pick({ row, change, onDone }: Props) {
   const response = change === "response";
   const pick = (next: string | null) => {
     if (next === null) return onDone(null);
+    const own = outcomesOf(row);
     if (response) {
-      setResponse(context.doc, id, row.outcome, next as Response);
-      return onDone(`When ${outcomeWord[row.outcome]}: ${next} ${name}`);
+      asOneEdit(context.doc, () => {
+        for (const outcome of own) setResponse(context.doc, id, outcome, next as Response);
+      });
+      const when = own.map((outcome) => outcomeWord[outcome]).join(" or ");
+      return onDone(`When ${when}: ${next} ${name}`);
     }
-    if (retarget(context.doc, id, row.outcome, { child: next }) === null) {
-      return onDone("It cannot lead there");
-    }
+    const moved = asOneEdit(context.doc, () =>
+      own.map((outcome) => retarget(context.doc, id, outcome, { child: next })),
+    );
+    if (moved.includes(null)) return onDone("It cannot lead there");
     onDone(`The arrow leads to ${endName(context.graph, next)}`);
   };
   return (

@@ -6,7 +6,7 @@ import { addAction, connect, setEntry, setExit, setResponse } from "../graph/edi
 import { writeNote } from "../graph/edit/notes";
 import { type Graph, PRECONDITIONS } from "../graph/model";
 import { readGraph } from "../graph/read";
-import { inOrder, type OutlineItem, rowsOf } from "./rows";
+import { bundlesOf, inOrder, leadingNowhere, type OutlineItem, rowsOf } from "./rows";
 
 const read = (doc: Y.Doc) => readGraph(mapsOf(doc));
 const all = () => true;
@@ -91,6 +91,55 @@ test("every row has its place in the tree, whatever is drawn", () => {
         expect(siblings[row.at - 1]).toBe(row);
         if (row.parent !== null) expect(ids.indexOf(row.parent)).toBeLessThan(ids.indexOf(row.id));
       }
+    }),
+  );
+});
+
+test("outcomes that say the same to the same action are one bundle", () => {
+  const doc = new Y.Doc();
+  const [look, grip, call] = ["Look", "Grip", "Call"].map((name) => addAction(doc, { name }));
+  if (!look || !grip || !call) throw new Error("not added");
+  setEntry(doc, look);
+  connect(doc, look, grip);
+  connect(doc, look, call, "on_false");
+  connect(doc, look, call, "on_error");
+  const stops = connect(doc, grip, look) ?? "";
+  setResponse(doc, stops, "on_false", "stop");
+  const graph = read(doc);
+  const said = (key: string) =>
+    bundlesOf(graph)
+      .get(key)
+      ?.map((row) => [row.bundled?.join(" "), words(graph, row)]);
+  expect(said("entry")).toEqual([["", "run Look"]]);
+  expect(said(look)).toEqual([
+    ["on_true", "run Grip"],
+    ["on_false on_error", "run Call"],
+  ]);
+  expect(said(grip)).toEqual([
+    ["on_true", "run Look"],
+    ["on_false", "stop Look"],
+  ]);
+  expect(leadingNowhere(bundlesOf(graph).get(grip) ?? [])).toEqual(["on_error"]);
+  expect(leadingNowhere([])).toEqual(["on_true", "on_false", "on_error"]);
+});
+
+test("every outcome that is answered is in exactly one bundle", () => {
+  const arrow = fc.tuple(fc.nat(2), fc.nat(2), fc.nat(3), fc.constantFrom("run", "stop", "pause"));
+  fc.assert(
+    fc.property(fc.array(arrow, { maxLength: 12 }), (arrows) => {
+      const doc = new Y.Doc();
+      const keys = [0, 1, 2].map((n) => addAction(doc, { name: `A${n}` }));
+      for (const [from, to, outcome, response] of arrows) {
+        const id = connect(doc, keys[from] ?? "", keys[to] ?? "", PRECONDITIONS[outcome]);
+        if (id) setResponse(doc, id, PRECONDITIONS[outcome] ?? "on_true", response);
+      }
+      const graph = read(doc);
+      const bundles = [...bundlesOf(graph).values()].flat();
+      const spoken = graph.relations.flatMap((relation) =>
+        PRECONDITIONS.filter((outcome) => relation.conditions[outcome] !== "ignore"),
+      );
+      expect(bundles.flatMap(({ bundled = [] }) => bundled)).toHaveLength(spoken.length);
+      expect(new Set(bundles.map(({ id }) => id)).size).toBe(bundles.length);
     }),
   );
 });

@@ -35,6 +35,8 @@ export type OutlineItem = OutlinePosition &
         readonly relation: Relation;
         readonly outcome: Precondition;
         readonly response: Response;
+        /** All outcomes that say the same to the same action, where these are one row. */
+        readonly bundled?: readonly Precondition[];
       }
     | { readonly kind: "note"; readonly note: Note }
   );
@@ -151,6 +153,48 @@ function targets(
     outcome,
     response: relation.conditions[outcome],
   }));
+}
+
+export type BundleRow = Extract<OutlineItem, { kind: "target" }>;
+
+/** What follows each action, one row for each arrow and response: outcomes that say the same are one. */
+export function bundlesOf(graph: Graph): ReadonlyMap<Key, readonly BundleRow[]> {
+  const all = [...childrenOf(graph)];
+  return new Map(all.map(([parent, after]) => [parent, bundled(parent, after)]));
+}
+
+function bundled(parent: Key, after: readonly Relation[]): BundleRow[] {
+  const bundles = after.flatMap((relation) => {
+    if (parent === ENTRY) return [{ relation, response: "run" as const, outcomes: [] }];
+    const spoken = PRECONDITIONS.filter((outcome) => relation.conditions[outcome] !== "ignore");
+    // An arrow that ignores everything can be found and changed all the same.
+    if (spoken.length === 0) return [{ relation, response: "ignore" as const, outcomes: [] }];
+    const responses = [...new Set(spoken.map((outcome) => relation.conditions[outcome]))];
+    return responses.map((response) => ({
+      relation,
+      response,
+      outcomes: spoken.filter((outcome) => relation.conditions[outcome] === response),
+    }));
+  });
+  return bundles.map(({ relation, response, outcomes }, i) => ({
+    kind: "target",
+    id: `${relationId(relation)}|${response}`,
+    level: 2,
+    parent,
+    open: null,
+    at: i + 1,
+    of: bundles.length,
+    relation,
+    outcome: outcomes[0] ?? "on_true",
+    bundled: outcomes,
+    response,
+  }));
+}
+
+/** The ends of an action after which nothing happens; being stopped is meant to be one. */
+export function leadingNowhere(bundles: readonly BundleRow[]): Precondition[] {
+  const spoken = new Set(bundles.flatMap(({ bundled = [] }) => bundled));
+  return (["on_true", "on_false", "on_error"] as const).filter((outcome) => !spoken.has(outcome));
 }
 
 /** What people call every end of the graph: with the number only where the name is not enough. */
