@@ -57,7 +57,7 @@ test("an old file is cancelled and leaves nothing, or kept and opens", async ({ 
   ).toBeVisible();
   expect(await count()).toBe(before);
   // Stop can be pressed while the dialog asks.
-  await page.locator("button[aria-label^='Stop everything']").click({ trial: true });
+  await page.locator("button", { hasText: "Stop everything" }).click({ trial: true });
   await dialog.getByRole("button", { name: "Cancel", exact: true }).click();
   await expect(dialog).toBeHidden();
   expect(await count()).toBe(before);

@@ -112,7 +112,7 @@ test("two people build, run and review a graph; kill -9 loses nothing", async ()
       await product.start();
     }
     await mari.page.goto(`${product.url}/runs`);
-    await mari.page.getByRole("link", { name: /untitled/ }).click();
+    await mari.page.getByRole("link", { name: /task_1/ }).click();
     await expect(mari.page.getByText(/Ada/).first()).toBeVisible();
     await expect(mari.page.getByText(/finished/i).first()).toBeVisible();
     await mari.page.screenshot({ path: test.info().outputPath(`history-${again}.png`) });

@@ -1,4 +1,4 @@
-/** Asks for a name, once, where it covers nothing. */
+/** Asks for a name, once, in the flow of the first page: it covers nothing. */
 import { Button, CloseButton, TextInput } from "@mantine/core";
 import { useState } from "react";
 import { errorText } from "../api/http";
@@ -7,10 +7,12 @@ import { usePerson } from "../api/use-person";
 import style from "./name-prompt.module.css";
 
 const SUGGESTION = "Operator";
+/** "Not now" holds until the page is opened anew. */
+let putOff = false;
 
 export function NamePrompt() {
   const { person, rename } = usePerson();
-  const [open, setOpen] = useState(() => rememberedName() === "" && person.name === "");
+  const [open, setOpen] = useState(() => !putOff && rememberedName() === "" && person.name === "");
   const [name, setName] = useState(person.name || SUGGESTION);
   const [problem, setProblem] = useState("");
   if (!open) return null;
@@ -32,6 +34,7 @@ export function NamePrompt() {
       }}
     >
       <TextInput
+        className={style.name ?? ""}
         label="What should others see you as?"
         value={name}
         maxLength={60}
@@ -42,7 +45,14 @@ export function NamePrompt() {
       <Button type="submit" variant="filled" disabled={name.trim() === ""}>
         Save
       </Button>
-      <CloseButton aria-label="Not now" onClick={() => setOpen(false)} />
+      <CloseButton
+        className={style.later ?? ""}
+        aria-label="Not now"
+        onClick={() => {
+          putOff = true;
+          setOpen(false);
+        }}
+      />
     </form>
   );
 }

@@ -20,6 +20,7 @@ export type Problems = EditorApi["Problems"];
 export const queryKeys = {
   config: ["config"] as const,
   graphs: ["graphs"] as const,
+  deleted: ["deleted graphs"] as const,
   graph: (id: string) => ["graphs", id] as const,
   problems: (id: string, seq: number) => ["graphs", id, "problems", seq] as const,
   versions: (id: string) => ["graphs", id, "versions"] as const,
@@ -41,6 +42,15 @@ export function useGraphs() {
     queryKey: queryKeys.graphs,
     queryFn: ({ signal }) => fetchJson<GraphSummary[]>("/api/graphs", { signal }),
     refetchInterval: 8_000,
+  });
+}
+
+/** Graphs that were deleted and can be brought back, those that changed last first. */
+export function useDeletedGraphs(wanted: boolean) {
+  return useQuery({
+    enabled: wanted,
+    queryKey: queryKeys.deleted,
+    queryFn: ({ signal }) => fetchJson<GraphSummary[]>("/api/graphs?deleted=true", { signal }),
   });
 }
 
@@ -166,6 +176,9 @@ export function versionName(versions: readonly Version[] | undefined, id: string
   return version.label || `v${versions.length - at}`;
 }
 
-export function refreshGraphs(client: QueryClient): Promise<void> {
-  return client.invalidateQueries({ queryKey: queryKeys.graphs, exact: true });
+export async function refreshGraphs(client: QueryClient): Promise<void> {
+  await Promise.all([
+    client.invalidateQueries({ queryKey: queryKeys.graphs, exact: true }),
+    client.invalidateQueries({ queryKey: queryKeys.deleted }),
+  ]);
 }

@@ -3,7 +3,6 @@ import { MantineProvider } from "@mantine/core";
 import { QueryClient, QueryClientProvider } from "@tanstack/react-query";
 import { type ReactNode, useEffect, useState, useSyncExternalStore } from "react";
 import { Route, Router, Switch } from "wouter";
-import { NamePrompt } from "../account/name-prompt";
 import { SignInGate } from "../account/sign-in-gate";
 import { Refusal } from "../api/http";
 import { LiveProvider } from "../api/live/use-live";
@@ -127,7 +126,6 @@ export function App() {
             <LiveConnection>
               <DropFiles>
                 <Screens />
-                <NamePrompt />
                 <ImportReview />
                 <StopNotice />
                 <UnansweredStartNotice />

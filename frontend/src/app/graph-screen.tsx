@@ -113,6 +113,7 @@ function Inside({ id }: { id: string }) {
             settle={settle}
             obstacle={shown.obstacle}
             compact={shown.compact}
+            thumb={shown.phone}
           />
         )
       }

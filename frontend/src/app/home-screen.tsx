@@ -1,4 +1,5 @@
 /** The first screen: every graph. */
+import { NamePrompt } from "../account/name-prompt";
 import { Home } from "../library/home";
 import { lazyPart } from "../ui/parts/lazy-part";
 import { PartBoundary } from "../ui/parts/part-boundary";
@@ -17,6 +18,7 @@ export function HomeScreen() {
       <Home
         onNew={create}
         onImport={choose}
+        greeting={<NamePrompt />}
         kept={
           <PartBoundary>
             <KeptGraphs />

@@ -8,6 +8,7 @@ import {
   type GraphSummary,
   importGraph,
   previewGraph,
+  queryKeys,
   refreshGraphs,
 } from "../api/graphs";
 import { errorPlace, errorText } from "../api/http";
@@ -38,6 +39,11 @@ function chooseFiles(): Promise<File[]> {
   });
 }
 
+/** "task_1", "task_2" …: the first that no graph is called. A name that can be said and found. */
+export function freshName(taken: readonly string[]): string {
+  for (let n = 1; ; n += 1) if (!taken.includes(`task_${n}`)) return `task_${n}`;
+}
+
 export interface NewGraphs {
   create: () => void;
   choose: () => void;
@@ -49,7 +55,8 @@ export function useNewGraphs(): NewGraphs {
   const [, go] = useLocation();
   const create = useCallback(async () => {
     try {
-      const graph = await createGraph("untitled");
+      const known = client.getQueryData<readonly GraphSummary[]>(queryKeys.graphs) ?? [];
+      const graph = await createGraph(freshName(known.map(({ name }) => name)));
       void refreshGraphs(client);
       go(`/graphs/${graph.id}`);
     } catch (error) {

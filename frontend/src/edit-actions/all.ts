@@ -10,7 +10,6 @@ import * as look from "./view";
 
 export * from "./arrange";
 export * from "./draw";
-export { dryRun } from "./dry-run-actions";
 export * from "./notes";
 export * from "./share";
 export * from "./view";

@@ -28,7 +28,7 @@ import {
   unsetExit,
 } from "../graph/edit";
 import { clipOf, paste } from "../graph/edit/clip";
-import { type Action, ENTRY, EXIT } from "../graph/model";
+import { type Action, ENTRY, EXIT, type Key } from "../graph/model";
 import { copyText } from "../ui/copy-text";
 import { copiedSelection, pasteText, readText, rememberCopied } from "./clipboard";
 import type { EditAction } from "./edit-action";
@@ -162,6 +162,7 @@ export const undo: EditAction = {
   icon: IconArrowBackUp,
   changes: true,
   enabled: (context) => context.canUndo,
+  idle: "There is nothing of yours to undo.",
   run: (context) => context.undo.undo(),
 };
 
@@ -173,6 +174,7 @@ export const redo: EditAction = {
   icon: IconArrowForwardUp,
   changes: true,
   enabled: (context) => context.canRedo,
+  idle: "There is nothing to redo.",
   run: (context) => context.undo.redo(),
 };
 
@@ -201,6 +203,13 @@ export const selectNone: EditAction = {
   run: (context) => context.select([]),
 };
 
+/** Where a chain goes on: at the end of the one arrow that is selected, as after drawing it. */
+function drawnLast(context: EditorContext): Key | null {
+  const [arrow, ...others] = selectedRelations(context);
+  if (arrow === undefined || others.length > 0) return null;
+  return arrow.child === EXIT ? arrow.parent : arrow.child;
+}
+
 export const connectTo: EditAction = {
   name: "connect",
   label: "Draw an arrow …",
@@ -212,7 +221,7 @@ export const connectTo: EditAction = {
   enabled: anyAction,
   run: (context) => {
     const [first, ...others] = selectedActions(context);
-    const from = context.selection.has(ENTRY) ? ENTRY : (first?.key ?? null);
+    const from = context.selection.has(ENTRY) ? ENTRY : (first?.key ?? drawnLast(context));
     const to = context.selection.has(EXIT) ? EXIT : (others[0]?.key ?? null);
     context.openOverlay({ kind: "arrow", from, to });
   },

@@ -19,6 +19,8 @@ export interface EditAction {
   /** Other words that people look for it by. */
   readonly also?: string;
   enabled(context: EditorContext): boolean;
+  /** What is said to who asks for it by its key while there is nothing to do. */
+  readonly idle?: string;
   run(context: EditorContext): void;
 }
 

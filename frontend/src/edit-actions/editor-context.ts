@@ -4,7 +4,14 @@ import type * as Y from "yjs";
 import { CARD, freeSpot, placeAfter, unplaced } from "../canvas/geometry/arrange";
 import type { DryRun } from "../dry-run/use-dry-run";
 import { relationId } from "../graph/document-keys";
-import { addAction, asOneEdit, moveActions, type NewAction } from "../graph/edit";
+import {
+  addAction,
+  asOneEdit,
+  isUndrawn,
+  moveActions,
+  type NewAction,
+  setEntry,
+} from "../graph/edit";
 import { notesOf, placeNotes, withContents } from "../graph/edit/notes";
 import type { Action, Graph, Key, Position, Precondition, Relation } from "../graph/model";
 
@@ -154,10 +161,16 @@ export function freePosition(context: EditorContext): Position {
   return freeFrom(context, [x - CARD.width / 2, y]);
 }
 
-/** Adds an action by hand: everything else stays where it is drawn. Answers its key. */
+/**
+ * Adds an action by hand: everything else stays where it is drawn. The first one of a graph is what
+ * the graph starts with. Answers its key.
+ */
 export function addActionAt(context: EditorContext, action: NewAction, position: Position): Key {
   return asOneEdit(context.doc, () => {
+    const first = isUndrawn(context.doc);
     moveActions(context.doc, unplaced(context.graph, context.positions()));
-    return addAction(context.doc, { ...action, position });
+    const key = addAction(context.doc, { ...action, position });
+    if (first) setEntry(context.doc, key);
+    return key;
   });
 }

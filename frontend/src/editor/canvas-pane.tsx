@@ -1,5 +1,5 @@
 /** The canvas with its tools, and what it says while it is empty. */
-import { Button, Skeleton } from "@mantine/core";
+import { Button, Kbd, Skeleton } from "@mantine/core";
 import { IconFocus2, IconRouteAltLeft } from "@tabler/icons-react";
 import { ReactFlowProvider } from "@xyflow/react";
 import { type ReactNode, useEffect, useMemo, useRef } from "react";
@@ -14,6 +14,7 @@ import { useGraph, useLinkPart } from "../sync/use-room";
 import { Empty } from "../ui/empty";
 import { lazyPart } from "../ui/parts/lazy-part";
 import { PartBoundary } from "../ui/parts/part-boundary";
+import { useHasFingersOnly } from "../ui/use-screen-size";
 import { EditableCanvas } from "./canvas/editable-canvas";
 import { useCanvasElements } from "./canvas/use-canvas-elements";
 import { useFirstLayout } from "./canvas/use-first-layout";
@@ -44,6 +45,7 @@ interface Props {
 
 /** What is said while there is nothing to see. */
 function Emptiness({ waiting, context }: { waiting: boolean; context: EditorContext }) {
+  const fingers = useHasFingersOnly();
   if (waiting) {
     return (
       <div className={style.waiting} aria-busy="true">
@@ -73,8 +75,15 @@ function Emptiness({ waiting, context }: { waiting: boolean; context: EditorCont
           </Button>
         }
       >
-        Double-click the canvas, press <b>A</b>, or drag an action from the list. Then drag from
-        Entry to it, and from its outcomes to what follows.
+        {fingers
+          ? "Tap Add, type a name. Then tap an outcome of its card and what follows."
+          : "Double-click the canvas, or drag an action from the list. Then drag from its outcomes to what follows."}
+        {!fingers && (
+          <>
+            {" "}
+            By keyboard: <Kbd>A</Kbd> adds, <Kbd>C</Kbd> draws an arrow.
+          </>
+        )}
       </Empty>
     </div>
   );

@@ -7,7 +7,7 @@ import { scriptOf } from "../dry-run/script";
 import { addActionAt, type EditorContext, freePosition } from "../edit-actions/editor-context";
 import { useShortcuts } from "../edit-actions/keys/shortcuts";
 import { FindBar } from "../find/find-bar";
-import type { NewAction } from "../graph/edit";
+import { type NewAction, setGraphName } from "../graph/edit";
 import type { Graph, Key } from "../graph/model";
 import type { ToldProblem } from "../graph/problems/told-problems";
 import { endName } from "../graph/relation-words";
@@ -24,6 +24,7 @@ import { EditorContextProvider } from "./canvas/note-links";
 import { QuickAdd } from "./canvas/quick-add";
 import { CanvasPane } from "./canvas-pane";
 import { DeskLayout, PhoneLayout } from "./layouts";
+import { DryRunButton } from "./menus/dry-run-button";
 import { Overlays } from "./menus/overlays";
 import { blockWords, ProblemCount, useToldProblems } from "./problem-count";
 import { RoomNotices } from "./room-notices";
@@ -43,6 +44,8 @@ export interface Shown {
   selected: string | null;
   pick: (aid: string) => void;
   compact: boolean;
+  /** One thing at a time, for one hand. */
+  phone: boolean;
   /** The strip shows its head only. Null where it has a place of its own. */
   folded: boolean | null;
   fold: (folded: boolean) => void;
@@ -92,7 +95,12 @@ function crumbsOf(context: EditorContext): Crumb[] {
   const action = context.graph.actions.find(({ key }) => key === only);
   return [
     { label: "Graphs", to: "/" },
-    { label: context.graph.name || "Untitled" },
+    {
+      label: context.graph.name || "Untitled",
+      ...(context.mayEdit && {
+        rename: (name: string) => setGraphName(context.doc, name),
+      }),
+    },
     ...(action && others.length === 0
       ? [{ label: endName(context.graph, action.key), part: true }]
       : []),
@@ -120,6 +128,7 @@ function useShown(context: EditorContext, link: RoomLink, checked: Checked): Sho
       context.view.show([aid]);
     },
     compact: !wide,
+    phone,
     folded: phone ? null : folded,
     fold: setFolded,
   };
@@ -130,6 +139,16 @@ function OutlinePane(props: ComponentProps<typeof Outline>) {
     <PartBoundary>
       <Outline {...props} />
     </PartBoundary>
+  );
+}
+
+/** What comes before a start stands beside it. */
+function withDryRun(start: ReactNode): ReactNode {
+  return (
+    <>
+      <DryRunButton />
+      {start}
+    </>
   );
 }
 
@@ -204,15 +223,15 @@ export function Editor(props: Props) {
           </>
         ),
         actions: <People me={props.me} />,
-        start: phone ? null : props.start(shown),
+        start: phone ? null : withDryRun(props.start(shown)),
       })}
       {phone ? (
-        <PhoneLayout {...parts} start={() => props.start(shown)} />
+        <PhoneLayout {...parts} dry={dryRun !== null} start={() => props.start(shown)} />
       ) : (
         <DeskLayout {...parts} wide={wide} list={() => props.list(place)} />
       )}
       <RoomNotices />
-      <Overlays context={context} overlay={overlay} onClose={editor.closeOverlay} />
+      <Overlays context={context} known={known} overlay={overlay} onClose={editor.closeOverlay} />
       {adding && (
         <QuickAdd context={context} request={adding} known={known} onClose={editor.closeAdd} />
       )}

@@ -1,9 +1,10 @@
 /** Where the parts of the editor stand: one at a time on a phone, else around the canvas. */
 import { ActionIcon, SegmentedControl } from "@mantine/core";
 import { IconLayoutSidebar, IconLayoutSidebarRight } from "@tabler/icons-react";
-import { type ReactNode, useSyncExternalStore } from "react";
+import { type ReactNode, useEffect, useSyncExternalStore } from "react";
 import { actionDrag } from "../canvas/action-drag";
 import style from "./editor.module.css";
+import { DryRunButton } from "./menus/dry-run-button";
 import type { EditorSidePanel, Pane, Panels } from "./use-panels";
 
 const SIDES = [
@@ -28,9 +29,18 @@ interface Parts {
   status: () => ReactNode;
 }
 
-export function PhoneLayout(props: Parts & { start: () => ReactNode }) {
-  const { panels, outline, stage, find, details, strip, start, status } = props;
+interface PhoneParts extends Parts {
+  /** A dry-run is open: it is on the canvas. */
+  dry: boolean;
+  start: () => ReactNode;
+}
+
+export function PhoneLayout(props: PhoneParts) {
+  const { panels, outline, stage, find, details, strip, start, status, dry } = props;
   const { pane, setPane } = panels;
+  useEffect(() => {
+    if (dry) setPane("canvas");
+  }, [dry, setPane]);
   return (
     <main className={style.phone}>
       <SegmentedControl
@@ -47,11 +57,15 @@ export function PhoneLayout(props: Parts & { start: () => ReactNode }) {
         {pane === "details" && <div className={style.sheet}>{details}</div>}
         {pane === "run" && (
           <div className={style.sheet}>
-            <div className={style.start}>{start()}</div>
             <div className={style.status}>{status()}</div>
             {strip}
           </div>
         )}
+      </div>
+      {/* Start is at the left, STOP at the right, and Dry-run keeps thumbs from meeting both. */}
+      <div className={style.reach} role="toolbar" aria-label="Run">
+        {start()}
+        <DryRunButton stacked />
       </div>
     </main>
   );

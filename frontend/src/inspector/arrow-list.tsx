@@ -99,7 +99,7 @@ export function ArrowList({ action }: { action: Action }) {
   return (
     <section className={style.section}>
       <div className={style.heading}>
-        <h3>What follows</h3>
+        <h2>What follows</h2>
         <Button
           size="compact-xs"
           variant="subtle"

@@ -1,10 +1,11 @@
 /** The properties of the graph itself, and how to begin. */
-import { Kbd, TagsInput } from "@mantine/core";
-import { palette, showShortcuts } from "../edit-actions/all";
+import { TagsInput } from "@mantine/core";
+import { add, connectTo, palette, removeSelection, showShortcuts, undo } from "../edit-actions/all";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { FirstShortcut } from "../edit-actions/keys/shortcut-keys";
 import { setGraphDescription, setGraphName } from "../graph/edit";
 import { DraftInput } from "../ui/draft-input";
+import { useHasFingersOnly } from "../ui/use-screen-size";
 import { SharedField } from "./fields/shared-field";
 import style from "./inspector.module.css";
 import { graphLabels, setLabels } from "./labels";
@@ -45,27 +46,47 @@ export function GraphForm() {
       </p>
       <section className={style.section}>
         <div className={style.heading}>
-          <h3>Drawing</h3>
+          <h2>Drawing</h2>
         </div>
-        <ul className={style.tips}>
-          <li>
-            <Kbd>A</Kbd> or double-click: type the name of an action
-          </li>
-          <li>Drag from an outcome of a card to what shall follow it</li>
-          <li>Drop on empty canvas to add the next action there</li>
-          <li>
-            <Kbd>C</Kbd> draws an arrow by keys alone
-          </li>
-          <li>
-            <Kbd>Del</Kbd> deletes, <Kbd>Ctrl</Kbd> <Kbd>Z</Kbd> takes back what you did
-          </li>
-          <li>Select a card or an arrow to see what it says</li>
-          <li>
-            <FirstShortcut editAction={palette} /> finds every command,{" "}
-            <FirstShortcut editAction={showShortcuts} /> shows the keys
-          </li>
-        </ul>
+        <Tips />
       </section>
     </div>
+  );
+}
+
+/** How to draw, for what one points with. */
+function Tips() {
+  if (useHasFingersOnly()) {
+    return (
+      <ul className={style.tips}>
+        <li>Tap + and type the name of an action</li>
+        <li>Tap an outcome of a card, then what shall follow it</li>
+        <li>A finger that rests on a card shows what can be done with it</li>
+        <li>Two fingers move and zoom</li>
+        <li>Tap a card or an arrow to see what it says</li>
+      </ul>
+    );
+  }
+  return (
+    <ul className={style.tips}>
+      <li>
+        <FirstShortcut editAction={add} /> or double-click: type the name of an action
+      </li>
+      <li>Drag from an outcome of a card to what shall follow it</li>
+      <li>Drop on empty canvas to add the next action there</li>
+      <li>
+        <FirstShortcut editAction={connectTo} /> draws an arrow by keys alone, once more goes on
+        from its end
+      </li>
+      <li>
+        <FirstShortcut editAction={removeSelection} /> deletes, <FirstShortcut editAction={undo} />{" "}
+        takes back what you did
+      </li>
+      <li>Select a card or an arrow to see what it says</li>
+      <li>
+        <FirstShortcut editAction={palette} /> finds every command,{" "}
+        <FirstShortcut editAction={showShortcuts} /> shows the keys
+      </li>
+    </ul>
   );
 }

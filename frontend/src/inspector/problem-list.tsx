@@ -118,9 +118,9 @@ function Part({ kind, told }: { kind: ProblemKind; told: readonly Told[] }) {
   if (here.length === 0) return null;
   return (
     <section className={style.part} data-kind={kind} aria-label={TITLES[kind]}>
-      <h3>
+      <h2>
         {TITLES[kind]} <span className={style.number}>{here.length}</span>
-      </h3>
+      </h2>
       <ul className={style.items}>
         {here.map((each) => (
           <ProblemItem key={each.id} told={each} />

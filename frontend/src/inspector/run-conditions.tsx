@@ -10,7 +10,7 @@ export function RunConditions({ of, title }: { of: Key; title: string }) {
   return (
     <section className={style.section}>
       <div className={style.heading}>
-        <h3>{title}</h3>
+        <h2>{title}</h2>
       </div>
       <div className={style.say}>
         <div>

@@ -108,7 +108,7 @@ export function GraphMenu({ graph, names }: { graph: GraphSummary; names: readon
             Export as UMRF
           </Menu.Item>
           <Menu.Item
-            color="red"
+            c="var(--error)"
             leftSection={<IconTrash size={15} />}
             disabled={!mayEdit}
             onClick={() => void remove()}

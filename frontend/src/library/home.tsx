@@ -6,6 +6,7 @@ import { useGraphs } from "../api/graphs";
 import { errorText } from "../api/http";
 import { useMay } from "../api/use-person";
 import { Empty } from "../ui/empty";
+import { DeletedGraphs } from "./deleted-graphs";
 import { GraphCards } from "./graph-cards";
 import style from "./home.module.css";
 
@@ -14,6 +15,8 @@ interface Props {
   onImport: () => void;
   /** What the device has while the list cannot be read. */
   kept: ReactNode;
+  /** Before the graphs: what is asked of who comes for the first time. */
+  greeting?: ReactNode;
 }
 
 function Skeletons() {
@@ -33,7 +36,7 @@ function Skeletons() {
   );
 }
 
-export function Home({ onNew, onImport, kept }: Props) {
+export function Home({ onNew, onImport, kept, greeting }: Props) {
   const mayEdit = useMay("edit");
   const graphs = useGraphs();
   const list = graphs.data ?? [];
@@ -59,6 +62,7 @@ export function Home({ onNew, onImport, kept }: Props) {
             </div>
           )}
         </div>
+        {greeting}
         {graphs.isPending && <Skeletons />}
         {graphs.isError && (
           <>
@@ -86,6 +90,11 @@ export function Home({ onNew, onImport, kept }: Props) {
           </Empty>
         )}
         {list.length > 0 && <GraphCards graphs={list} />}
+        {graphs.isSuccess && (
+          <div className={style.foot}>
+            <DeletedGraphs />
+          </div>
+        )}
       </div>
     </main>
   );

@@ -102,7 +102,7 @@ function More({ robot, onEdit }: Pick<Props, "robot" | "onEdit">) {
           Change …
         </Menu.Item>
         <Menu.Item
-          color="red"
+          c="var(--error)"
           leftSection={<IconTrash size={15} />}
           disabled={!may}
           onClick={() => void forget()}

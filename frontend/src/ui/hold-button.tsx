@@ -53,7 +53,6 @@ export function HoldButton({ label, name, question, disabled = false, size, icon
           className={style.button ?? ""}
           data-holding={holding || undefined}
           disabled={disabled}
-          aria-label={name}
           title={`${name} (hold)`}
           leftSection={icon}
           onPointerDown={(event) => {
@@ -76,7 +75,8 @@ export function HoldButton({ label, name, question, disabled = false, size, icon
             if (event.detail === 0 && !holding) setAsking(true);
           }}
         >
-          {label}
+          <span aria-hidden>{label}</span>
+          <span className="visually-hidden">{name}</span>
         </Button>
       </Popover.Target>
       <Popover.Dropdown>

@@ -123,7 +123,7 @@ export function PickList({ label, placeholder, find, onPick, none, take = "take"
         })}
         {options.length === 0 && <p className={style.none}>{none}</p>}
       </div>
-      <p className={style.help}>
+      <p className={style.help} data-keys>
         <Kbd>↑</Kbd> <Kbd>↓</Kbd> choose · <Kbd>Enter</Kbd> {take} · <Kbd>Esc</Kbd> close
       </p>
     </div>

@@ -63,9 +63,16 @@ export const theme = createTheme({
     NumberInput: { defaultProps: small },
     Select: { defaultProps: { ...small, allowDeselect: false } },
     Tooltip: { defaultProps: { openDelay: 350, withArrow: true, fz: "xs" } },
-    Menu: { defaultProps: { shadow: "md", position: "bottom-end" } },
+    // A place to put the focus that is no item has no place in a menu.
+    Menu: {
+      defaultProps: { shadow: "md", position: "bottom-end", withInitialFocusPlaceholder: false },
+    },
     Popover: { defaultProps: { shadow: "md" } },
-    Modal: { defaultProps: { centered: true, radius: "lg" } },
+    Modal: {
+      defaultProps: { centered: true, radius: "lg", closeButtonProps: { "aria-label": "Close" } },
+    },
+    // The head of a dialog is a banner to browsers, and a page has one already.
+    ModalHeader: { defaultProps: { role: "presentation" } },
     Tabs: { styles: { tab: { padding: "0.7rem 0.625rem 0.6rem" } } },
     Kbd: { defaultProps: { size: "xs" } },
   },

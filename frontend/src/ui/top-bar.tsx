@@ -1,6 +1,6 @@
 /** The bar on top of every page: where one is, what one may do, and STOP at its right end. */
 
-import { Fragment, type ReactNode } from "react";
+import { Fragment, type ReactNode, useState } from "react";
 import { Link, useRouter } from "wouter";
 import style from "./top-bar.module.css";
 
@@ -9,6 +9,8 @@ export interface Crumb {
   to?: string;
   /** Something within the page: named, yet not what the page is. */
   part?: boolean;
+  /** Gives the page another name. */
+  rename?: (name: string) => void;
 }
 
 interface Props {
@@ -35,6 +37,44 @@ function toContent(): void {
   main.focus();
 }
 
+/** What the page is; where it can be called otherwise, by pressing its name. */
+function Here({ crumb: { label, rename } }: { crumb: Crumb }) {
+  const [writing, setWriting] = useState(false);
+  if (rename === undefined || typeof label !== "string") {
+    return <h1 className={style.here}>{label}</h1>;
+  }
+  const save = (text: string) => {
+    setWriting(false);
+    const name = text.trim();
+    if (name !== "" && name !== label) rename(name);
+  };
+  if (!writing) {
+    return (
+      <h1 className={style.here}>
+        <button type="button" title={`${label}\nRename`} onClick={() => setWriting(true)}>
+          <bdi>{label}</bdi>
+        </button>
+      </h1>
+    );
+  }
+  return (
+    <input
+      // biome-ignore lint/a11y/noAutofocus: it was asked for by a press at this place
+      autoFocus
+      className={style.name}
+      aria-label="Name of the graph"
+      defaultValue={label}
+      maxLength={200}
+      onFocus={(event) => event.currentTarget.select()}
+      onBlur={(event) => save(event.currentTarget.value)}
+      onKeyDown={(event) => {
+        if (event.key === "Enter") save(event.currentTarget.value);
+        if (event.key === "Escape") setWriting(false);
+      }}
+    />
+  );
+}
+
 export function TopBar({ crumbs, status, actions, account, start, stop }: Props) {
   return (
     <header className={style.bar}>
@@ -55,7 +95,7 @@ export function TopBar({ crumbs, status, actions, account, start, stop }: Props)
             {crumb.part ? (
               <span className={style.part}>{crumb.label}</span>
             ) : crumb.to === undefined ? (
-              <h1 className={style.here}>{crumb.label}</h1>
+              <Here crumb={crumb} />
             ) : (
               <Link to={crumb.to} className={style.crumb}>
                 {crumb.label}

@@ -1,4 +1,4 @@
-/** How large the screen is, in the two steps that the page knows. */
+/** How large the screen is, in the two steps that the page knows, and what points at it. */
 import { useMediaQuery } from "@mantine/hooks";
 
 const AT_ONCE = { getInitialValueInEffect: false };
@@ -11,4 +11,9 @@ export function useIsWide(): boolean {
 /** One thing at a time. */
 export function useIsPhone(): boolean {
   return useMediaQuery("(max-width: 600px)", false, AT_ONCE);
+}
+
+/** Nothing that hovers: there is no mouse, and most likely no keyboard. */
+export function useHasFingersOnly(): boolean {
+  return useMediaQuery("(pointer: coarse) and (hover: none)", false, AT_ONCE);
 }

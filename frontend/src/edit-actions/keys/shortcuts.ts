@@ -1,5 +1,6 @@
 /** Keyboard shortcuts of edit actions, where nobody is typing; and the clipboard's own events. */
 import { useLocalStorage } from "@mantine/hooks";
+import { notifications } from "@mantine/notifications";
 import { useEffect, useRef } from "react";
 import { EDIT_ACTIONS } from "../all";
 import { copiedSelection, pasteText, rememberCopied } from "../clipboard";
@@ -81,6 +82,7 @@ export function useShortcuts(context: EditorContext): void {
       // What an edit action takes is also kept from the browser while the action has nothing to do.
       event.preventDefault();
       if (isEnabled(editAction, now.current)) editAction.run(now.current);
+      else if (editAction.idle && !event.repeat) sayIdle(editAction, now.current);
     };
     // Cards move by arrow keys of their own, which know neither undo nor frames, and take Shift with
     // Enter for one more to choose: ours come first.
@@ -99,6 +101,14 @@ export function useShortcuts(context: EditorContext): void {
     };
   }, [singles, own]);
   useClipboard(now);
+}
+
+/** A key that does nothing without a word looks broken. */
+function sayIdle(editAction: EditAction, context: EditorContext): void {
+  const id = `idle-${editAction.name}`;
+  const message = context.mayEdit ? editAction.idle : "Nothing can be changed here now.";
+  notifications.hide(id);
+  notifications.show({ id, message, autoClose: 2_500, withCloseButton: false });
 }
 
 function addAtPointer(context: EditorContext): void {

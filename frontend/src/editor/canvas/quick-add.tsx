@@ -152,7 +152,7 @@ export function QuickAdd({ context, request, known, onClose }: Props) {
         })}
         {list.length === 0 && <p className={style.none}>Type the name of the action.</p>}
       </div>
-      <p className={style.help}>
+      <p className={style.help} data-keys>
         <Kbd>↑</Kbd> <Kbd>↓</Kbd> choose · <Kbd>Enter</Kbd> place · <Kbd>Esc</Kbd> close
       </p>
     </div>

@@ -6,11 +6,12 @@ import { useEffect, useRef, useState } from "react";
 import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
 import { addActionAt, type EditorContext, freePosition } from "../../edit-actions/editor-context";
 import { endsOf } from "../../graph/document-keys";
-import { asOneEdit, connect, moveRelation } from "../../graph/edit";
+import { asOneEdit, connect, moveRelation, type NewAction } from "../../graph/edit";
 import { ENTRY, EXIT, type Key, type Precondition } from "../../graph/model";
 import { endName } from "../../graph/relation-words";
 import { colorOfName } from "../../ui/name-colors";
 import { matching, type Option, PickList } from "../../ui/pick-list";
+import { candidates } from "../canvas/quick-add";
 import style from "./arrow-dialog.module.css";
 
 /** Everything an arrow can lead from or to, those that are near first. */
@@ -95,6 +96,8 @@ function OutcomePicker({ onPick }: { onPick: (outcome: Precondition) => void }) 
 
 interface Props {
   context: EditorContext;
+  /** Actions of other graphs, found by their names as where one is added. */
+  known: readonly NewAction[];
   from: Key | null;
   to: Key | null;
   onClose: () => void;
@@ -102,14 +105,34 @@ interface Props {
 
 const FRESH = "new ";
 
-export function ArrowDialog({ context, from: given, to, onClose }: Props) {
+/** What follows may be on the canvas, in the library, or nowhere yet. */
+export function targetsOf(
+  here: readonly Option[],
+  known: readonly NewAction[],
+  search: string,
+): readonly Option[] {
+  const found = matching(here, search);
+  if (search.trim() === "") return found;
+  const fresh = candidates(known, search).map((template): Option => {
+    const isNew = !known.includes(template);
+    return {
+      id: FRESH + template.name,
+      label: isNew ? `New action “${template.name}”` : template.name,
+      sub: isNew ? "" : `one more of the library · ${template.description ?? ""}`,
+      icon: <IconPlus size={16} aria-hidden />,
+    };
+  });
+  return [...found, ...fresh];
+}
+
+export function ArrowDialog({ context, known, from: given, to, onClose }: Props) {
   const [from, setFrom] = useState(given);
   const [outcome, setOutcome] = useState<Precondition | null>(given === ENTRY ? "on_true" : null);
   const draw = (parent: Key, child: Key, when: Precondition) => {
-    const target = child.startsWith(FRESH) ? null : child;
+    const name = child.startsWith(FRESH) ? child.slice(FRESH.length) : null;
+    const template = known.find((each) => each.name === name) ?? { name: name ?? "" };
     const relation = asOneEdit(context.doc, () => {
-      const key =
-        target ?? addActionAt(context, { name: child.slice(FRESH.length) }, freePosition(context));
+      const key = name === null ? child : addActionAt(context, template, freePosition(context));
       return connect(context.doc, parent, key, when);
     });
     onClose();
@@ -129,14 +152,7 @@ export function ArrowDialog({ context, from: given, to, onClose }: Props) {
   const name = from === null ? "…" : endName(context.graph, from);
   const targets = (search: string): readonly Option[] => {
     const all = ends(context, EXIT, from).filter(({ id }) => from !== ENTRY || id !== EXIT);
-    const found = matching(all, search);
-    const wanted = search.trim();
-    const fresh: Option = {
-      id: FRESH + wanted,
-      label: `New action “${wanted}”`,
-      icon: <IconPlus size={16} aria-hidden />,
-    };
-    return wanted === "" ? found : [...found, fresh];
+    return targetsOf(all, known, search);
   };
   return (
     <Modal

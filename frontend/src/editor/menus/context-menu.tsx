@@ -99,7 +99,13 @@ export function ContextMenu({ context, screen, onClose }: Props) {
       transitionProps={{ duration: 60 }}
     >
       <Menu.Target>
-        <span className={style.spot} style={{ left: screen[0], top: screen[1] }} />
+        <button
+          type="button"
+          className={style.spot}
+          style={{ left: screen[0], top: screen[1] }}
+          tabIndex={-1}
+          aria-label="What can be done here"
+        />
       </Menu.Target>
       <Menu.Dropdown
         ref={box}

@@ -1,6 +1,7 @@
 /** What opens over the editor, one at a time: menus, the palette, dialogs of single edit actions. */
 
 import type { EditorContext, Overlay } from "../../edit-actions/editor-context";
+import type { NewAction } from "../../graph/edit";
 import { lazyPart } from "../../ui/parts/lazy-part";
 import { OverlayBoundary } from "../../ui/parts/part-boundary";
 import { CommandPalette } from "./command-palette";
@@ -13,6 +14,8 @@ const ShortcutSheet = lazyPart(() => import("./shortcut-sheet").then((part) => p
 
 interface Props {
   context: EditorContext;
+  /** Actions that can be added. */
+  known: readonly NewAction[];
   overlay: Overlay | null;
   onClose: () => void;
 }
@@ -28,12 +31,18 @@ export function Overlays(props: Props) {
   );
 }
 
-function Opened({ context, overlay, onClose }: Props) {
+function Opened({ context, known, overlay, onClose }: Props) {
   if (overlay === null) return null;
   switch (overlay.kind) {
     case "arrow":
       return (
-        <ArrowDialog context={context} from={overlay.from} to={overlay.to} onClose={onClose} />
+        <ArrowDialog
+          context={context}
+          known={known}
+          from={overlay.from}
+          to={overlay.to}
+          onClose={onClose}
+        />
       );
     case "retarget":
       return <RetargetDialog context={context} relation={overlay.relation} onClose={onClose} />;

@@ -4,7 +4,6 @@ import { IconDots } from "@tabler/icons-react";
 import { Fragment, memo } from "react";
 import {
   add,
-  dryRun,
   EDIT_ACTIONS,
   fit,
   marquee,
@@ -133,7 +132,7 @@ function EditActionMenu() {
 }
 
 export const Toolbar = memo(function Toolbar({ compact }: { compact: boolean }) {
-  const { tool, selection, snap: snapping, dryRun: dry } = useEditorContext();
+  const { tool, selection, snap: snapping } = useEditorContext();
   return (
     <div className={style.bar} role="toolbar" aria-label="Canvas tools">
       <Tool editAction={add} />
@@ -148,7 +147,6 @@ export const Toolbar = memo(function Toolbar({ compact }: { compact: boolean }) 
       {!compact && <Tool editAction={zoomOut} />}
       {!compact && <Tool editAction={zoomIn} />}
       <Tool editAction={fit} />
-      <Tool editAction={dryRun} pressed={dry !== null} />
       <EditActionMenu />
     </div>
   );

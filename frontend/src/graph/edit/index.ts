@@ -53,6 +53,11 @@ export function moveActions(doc: Y.Doc, positions: Iterable<readonly [Key, Posit
   });
 }
 
+/** Whether nobody has drawn anything that runs: no action, and no arrow from the entry. */
+export function isUndrawn(doc: Y.Doc): boolean {
+  return rootOf(doc, "actions").size === 0 && rootOf(doc, "relations").size === 0;
+}
+
 /** Adds a note or frame; `text` is its JSON. Answers its id. */
 export function addNote(doc: Y.Doc, text: JsonText): string {
   const id = newAid();

@@ -148,7 +148,7 @@ export function ParameterList({ action, side }: { action: Action; side: Paramete
   return (
     <section className={style.section}>
       <div className={style.heading}>
-        <h3>{side === "in" ? "Parameters" : "Outputs"}</h3>
+        <h2>{side === "in" ? "Parameters" : "Outputs"}</h2>
         <SectionCounts of={action.key} side={side} />
         <Button
           size="compact-xs"

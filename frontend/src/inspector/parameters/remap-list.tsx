@@ -107,7 +107,7 @@ export function RemapList({ relation }: { relation: Relation }) {
   return (
     <section className={style.section}>
       <div className={style.heading}>
-        <h3>What it carries over</h3>
+        <h2>What it carries over</h2>
         <Button size="compact-xs" variant="subtle" onClick={() => setAdding(true)}>
           Rename an output
         </Button>

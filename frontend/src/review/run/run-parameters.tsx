@@ -45,11 +45,11 @@ function Action(props: { name: string; action: ActionRun; run: Run; onPick: () =
   const found = parametersOfVisits(run.sent?.[name] ?? {}, action);
   return (
     <section className={style.action} aria-label={`Parameters of ${spaced(name)}`}>
-      <h3>
+      <h2>
         <button type="button" onClick={onPick}>
           {spaced(name)}
         </button>
-      </h3>
+      </h2>
       {found.rows.length === 0 ? (
         <p className={style.none}>No parameter has a value.</p>
       ) : (

@@ -24,9 +24,21 @@ interface Props {
   /** Why this moment cannot be started; null when it can. */
   obstacle: string | null;
   compact?: boolean;
+  /** In two lines, within reach of a thumb. */
+  thumb?: boolean;
 }
 
-export function StartControl({ graph, name, seq, settle, obstacle, compact = false }: Props) {
+function TwoLines({ first, second }: { first: string; second: string }) {
+  return (
+    <span className={style.lines}>
+      <b>{first}</b>
+      <span>{second}</span>
+    </span>
+  );
+}
+
+export function StartControl(props: Props) {
+  const { graph, name, seq, settle, obstacle, compact = false, thumb = false } = props;
   const versions = useVersions(graph).data ?? [];
   const { now } = useLive();
   const start = useStart(graph);
@@ -43,14 +55,15 @@ export function StartControl({ graph, name, seq, settle, obstacle, compact = fal
   const icon = <IconPlayerPlayFilled size={13} aria-hidden />;
   const words = start.isPending ? "Starting …" : `Start ${label}`;
   const where = engines.join(", ");
+  const wide = compact ? words : `${words} on ${where} …`;
   const ask = () =>
     void settle().then(setAsking, (error) => notifyFailure("Not started", errorText(error)));
   return (
-    <span className={style.start}>
+    <span className={style.start} data-thumb={thumb || undefined}>
       {simulated ? (
         <HoldButton
-          icon={icon}
-          label={words}
+          icon={thumb ? undefined : icon}
+          label={thumb ? <TwoLines first={words} second="hold · simulator" /> : words}
           name={why === null ? `Start ${label} in the simulator` : `Start ${label}: ${why}`}
           question={
             goes
@@ -62,14 +75,18 @@ export function StartControl({ graph, name, seq, settle, obstacle, compact = fal
         />
       ) : (
         <Button
-          leftSection={icon}
+          leftSection={thumb ? undefined : icon}
           className={style.robots ?? ""}
           disabled={why !== null}
-          aria-label={why === null ? `Start ${label} on ${where} …` : `Start ${label}: ${why}`}
           title={why ?? `Look at ${where} before starting`}
           onClick={ask}
         >
-          {compact ? words : `${words} on ${where} …`}
+          <span aria-hidden>
+            {thumb ? <TwoLines first={words} second={`on ${where} …`} /> : wide}
+          </span>
+          <span className="visually-hidden">
+            {why === null ? `Start ${label} on ${where} …` : `Start ${label}: ${why}`}
+          </span>
         </Button>
       )}
       <ActionIcon

@@ -68,12 +68,12 @@ export function StopButton({ graph }: Props) {
         className={style.stop}
         data-calm={calm || undefined}
         onClick={() => live?.stop(meant?.id ?? "all")}
-        aria-label={`Stop ${target}. Software stop, no emergency stop`}
         title={`Stop ${target}.\n${SOFT}`}
       >
+        <span className="visually-hidden">Stop {target}. Software stop, no emergency stop</span>
         <IconSquareFilled size={13} aria-hidden style={{ flex: "none" }} />
-        <span className={style.word}>
-          STOP<span aria-hidden>{meant || all === 0 ? "" : " ALL"}</span>
+        <span className={style.word} aria-hidden>
+          STOP{meant || all === 0 ? "" : " ALL"}
         </span>
         <span className={style.count} aria-hidden>
           {stopButtonText(now.link, meant ? here.length : all)}
@@ -84,9 +84,11 @@ export function StopButton({ graph }: Props) {
           type="button"
           className={style.all}
           onClick={() => live?.stop("all")}
-          aria-label="Stop everything that runs, everywhere. Software stop, no emergency stop"
           title={`Stop everything that runs (Ctrl+.).\n${SOFT}`}
         >
+          <span className="visually-hidden">
+            Stop everything that runs, everywhere. Software stop, no emergency stop
+          </span>
           <span aria-hidden>ALL {all}</span>
         </button>
       )}

@@ -2,5 +2,5 @@
 import { Notifications } from "@mantine/notifications";
 
 export function Messages() {
-  return <Notifications position="bottom-right" zIndex={350} />;
+  return <Notifications position="top-center" zIndex={350} className="toasts" />;
 }
