@@ -11,7 +11,7 @@ export PYTHONNOUSERSITE := 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 # Tests never speak to other machines.
-unit e2e ros-test soak soak-ros pictures bench: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
+unit e2e ros-test soak soak-ros pictures screens bench: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 
 # Whose packages a sourced ROS 2 can lend: the Python that it was built for, on Ubuntu the system's.
 PYTHON ?= python3
@@ -130,6 +130,15 @@ workspace: setup ## a sourced ROS 2 as Ubuntu 24.04 lays it out, in a root of it
 pictures: setup ## take the pictures of the documentation from the running product
 	@$(BROWSER)
 	@PICTURES=1 $(NPM) run --silent e2e -- e2e/pictures.spec.ts
+
+.PHONY: screens
+screens: setup ## take every page on every screen, to be looked at: frontend/screens, or TO=DIR
+	@$(BROWSER)
+	@SCREENS=1 $(if $(TO),SCREENS_TO="$(abspath $(TO))") $(NPM) run --silent e2e -- e2e/screens.spec.ts
+
+.PHONY: newcomer
+newcomer: frontend/node_modules/.done ## count what eight actions cost by mouse: URL=http://127.0.0.1:8000 TOKEN=…
+	@ACTION_ASSISTANT_TOKEN="$(TOKEN)" $(NODE) node bench/newcomer.mjs "$(or $(URL),http://127.0.0.1:8000)"
 
 .PHONY: bench
 bench: setup ## measure speed; prints tables (ARGS="rooms" for one benchmark)
