@@ -1,6 +1,6 @@
 /** The command palette: every edit action with its shortcut, and every place to go to. */
 import { IconRouteSquare2, IconSquareRounded } from "@tabler/icons-react";
-import { useEffect, useMemo, useRef } from "react";
+import { useLayoutEffect, useMemo, useRef } from "react";
 import { useLocation } from "wouter";
 import { useGraphs } from "../../api/graphs";
 import { EDIT_ACTIONS } from "../../edit-actions/all";
@@ -57,7 +57,7 @@ export function CommandPalette({
 }) {
   const [, go] = useLocation();
   const shown = useRef<HTMLDialogElement>(null);
-  useEffect(() => {
+  useLayoutEffect(() => {
     const dialog = shown.current;
     dialog?.showModal();
     return () => dialog?.close(); // gives the focus back
@@ -84,6 +84,7 @@ export function CommandPalette({
   );
   const onPick = (id: string) => {
     const [kind = "", key = ""] = id.split(" ");
+    shown.current?.close(); // else nothing outside of it could take the focus
     onClose();
     if (kind === "graph") go(`/graphs/${encodeURIComponent(key)}`);
     else if (kind === "action") {
