@@ -1,77 +1,17 @@
-/** Graphs that were deleted: when, how large, and the way back. */
-import { Button, Modal, Skeleton } from "@mantine/core";
-import { notifications } from "@mantine/notifications";
-import { IconRestore, IconTrash } from "@tabler/icons-react";
-import { useQueryClient } from "@tanstack/react-query";
+/** The way to graphs that were deleted. */
+import { Button } from "@mantine/core";
+import { IconTrash } from "@tabler/icons-react";
 import { useState } from "react";
-import { type GraphSummary, recoverGraph, refreshGraphs, useDeletedGraphs } from "../api/graphs";
-import { errorText } from "../api/http";
-import { useMay } from "../api/use-person";
-import { ago, instant, useNow } from "../ui/times";
-import style from "./deleted-graphs.module.css";
+import { lazyPart } from "../ui/parts/lazy-part";
+import { OverlayBoundary } from "../ui/parts/part-boundary";
 
-/** The last deleted first: what one looks for is mostly what has just gone. */
-function byDeletion(graphs: readonly GraphSummary[]): GraphSummary[] {
-  const at = ({ deleted_at }: GraphSummary) => instant(deleted_at ?? null) ?? 0;
-  return [...graphs].sort((a, b) => at(b) - at(a));
-}
-
-function Row({ graph, now }: { graph: GraphSummary; now: number }) {
-  const client = useQueryClient();
-  const mayEdit = useMay("edit");
-  const [busy, setBusy] = useState(false);
-  const at = instant(graph.deleted_at ?? null);
-  const bringBack = async () => {
-    setBusy(true);
-    try {
-      await recoverGraph(graph.id);
-    } catch (error) {
-      notifications.show({ color: "red", title: "Not brought back", message: errorText(error) });
-    } finally {
-      await refreshGraphs(client);
-      setBusy(false);
-    }
-  };
-  return (
-    <li className={style.row}>
-      <span className={style.text}>
-        <bdi className={style.name}>{graph.name || "Untitled"}</bdi>
-        <span className={style.sub}>
-          {graph.actions === 1 ? "1 action" : `${graph.actions ?? 0} actions`}
-          {at !== null && ` · deleted ${ago(at, now)}`}
-        </span>
-      </span>
-      {mayEdit && (
-        <Button
-          leftSection={<IconRestore size={15} aria-hidden />}
-          disabled={busy}
-          onClick={() => void bringBack()}
-        >
-          Bring back<span className="visually-hidden"> {graph.name || "Untitled"}</span>
-        </Button>
-      )}
-    </li>
-  );
-}
-
-function List() {
-  const now = useNow(20_000);
-  const deleted = useDeletedGraphs(true);
-  const graphs = byDeletion(deleted.data ?? []);
-  if (deleted.isPending) return <Skeleton height={40} />;
-  if (deleted.isError) return <p role="alert">{errorText(deleted.error)}</p>;
-  if (graphs.length === 0) return <p className={style.none}>Nothing is deleted.</p>;
-  return (
-    <ul className={style.list}>
-      {graphs.map((graph) => (
-        <Row key={graph.id} graph={graph} now={now} />
-      ))}
-    </ul>
-  );
-}
+const DeletedGraphsDialog = lazyPart(() =>
+  import("./deleted-graphs-dialog").then((part) => part.DeletedGraphsDialog),
+);
 
 export function DeletedGraphs() {
-  const [open, setOpen] = useState(false);
+  // Null until it was asked for: from then on it stays, and gives the focus back when it closes.
+  const [open, setOpen] = useState<boolean | null>(null);
   return (
     <>
       <Button
@@ -82,9 +22,9 @@ export function DeletedGraphs() {
       >
         Deleted graphs
       </Button>
-      <Modal opened={open} onClose={() => setOpen(false)} title="Deleted graphs" size="lg">
-        <List />
-      </Modal>
+      <OverlayBoundary>
+        {open !== null && <DeletedGraphsDialog opened={open} onClose={() => setOpen(false)} />}
+      </OverlayBoundary>
     </>
   );
 }

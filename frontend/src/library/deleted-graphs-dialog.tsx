@@ -1,0 +1,79 @@
+/** Graphs that were deleted: when, how large, and the way back. */
+import { Button, Modal, Skeleton } from "@mantine/core";
+import { notifications } from "@mantine/notifications";
+import { IconRestore } from "@tabler/icons-react";
+import { useQueryClient } from "@tanstack/react-query";
+import { useState } from "react";
+import { type GraphSummary, recoverGraph, refreshGraphs, useDeletedGraphs } from "../api/graphs";
+import { errorText } from "../api/http";
+import { useMay } from "../api/use-person";
+import { ago, instant, useNow } from "../ui/times";
+import style from "./deleted-graphs-dialog.module.css";
+
+/** The last deleted first: what one looks for is mostly what has just gone. */
+function byDeletion(graphs: readonly GraphSummary[]): GraphSummary[] {
+  const at = ({ deleted_at }: GraphSummary) => instant(deleted_at ?? null) ?? 0;
+  return [...graphs].sort((a, b) => at(b) - at(a));
+}
+
+function Row({ graph, now }: { graph: GraphSummary; now: number }) {
+  const client = useQueryClient();
+  const mayEdit = useMay("edit");
+  const [busy, setBusy] = useState(false);
+  const at = instant(graph.deleted_at ?? null);
+  const bringBack = async () => {
+    setBusy(true);
+    try {
+      await recoverGraph(graph.id);
+    } catch (error) {
+      notifications.show({ color: "red", title: "Not brought back", message: errorText(error) });
+    } finally {
+      await refreshGraphs(client);
+      setBusy(false);
+    }
+  };
+  return (
+    <li className={style.row}>
+      <span className={style.text}>
+        <bdi className={style.name}>{graph.name || "Untitled"}</bdi>
+        <span className={style.sub}>
+          {graph.actions === 1 ? "1 action" : `${graph.actions ?? 0} actions`}
+          {at !== null && ` · deleted ${ago(at, now)}`}
+        </span>
+      </span>
+      {mayEdit && (
+        <Button
+          leftSection={<IconRestore size={15} aria-hidden />}
+          disabled={busy}
+          onClick={() => void bringBack()}
+        >
+          Bring back<span className="visually-hidden"> {graph.name || "Untitled"}</span>
+        </Button>
+      )}
+    </li>
+  );
+}
+
+function List() {
+  const now = useNow(20_000);
+  const deleted = useDeletedGraphs(true);
+  const graphs = byDeletion(deleted.data ?? []);
+  if (deleted.isPending) return <Skeleton height={40} />;
+  if (deleted.isError) return <p role="alert">{errorText(deleted.error)}</p>;
+  if (graphs.length === 0) return <p className={style.none}>Nothing is deleted.</p>;
+  return (
+    <ul className={style.list}>
+      {graphs.map((graph) => (
+        <Row key={graph.id} graph={graph} now={now} />
+      ))}
+    </ul>
+  );
+}
+
+export function DeletedGraphsDialog(props: { opened: boolean; onClose: () => void }) {
+  return (
+    <Modal {...props} title="Deleted graphs" size="lg">
+      <List />
+    </Modal>
+  );
+}
