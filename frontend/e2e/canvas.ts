@@ -121,7 +121,8 @@ export async function tidy(page: Page): Promise<void> {
 
 /** Waits until everything is on disk, also where things stand in a graph that was opened anew. */
 export async function saved(page: Page): Promise<void> {
-  await expect(page.locator("section[aria-label=Graph] [aria-busy=true]")).toHaveCount(0);
+  const busy = page.locator("main [aria-busy=true]:not([aria-label=Run])");
+  await expect(busy).toHaveCount(0, { timeout: 30_000 });
   await expect(page.getByText("Saved", { exact: true })).toBeVisible();
 }
 

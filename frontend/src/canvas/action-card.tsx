@@ -15,6 +15,7 @@ import type { CardNode } from "./elements";
 import { CARD_LINES, cardSize } from "./geometry/arrange";
 import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "./outcome";
 import { ProblemBadge } from "./problem-badge";
+import { STATE_LETTER } from "./zoom/detail";
 
 function ProgressLine({ progress }: { progress: Progress }) {
   const now = useNow(1000, progress.since !== null);
@@ -58,6 +59,9 @@ export const ActionCard = memo(function ActionCard({
       data-other={other === null ? undefined : true}
       data-selected={selected || undefined}
       data-tone={progress?.tone}
+      data-name={action.name}
+      data-state={progress?.word}
+      data-letter={STATE_LETTER[progress?.tone ?? "idle"] || undefined}
       data-ghost={action.missing || undefined}
       data-dim={dim || undefined}
       data-flow={role}

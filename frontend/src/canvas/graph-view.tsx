@@ -18,6 +18,7 @@ import { NoteCard } from "./notes/note-card";
 import { notePlaces } from "./notes/note-nodes";
 import { ArrowTips, OutcomeArrow } from "./outcome-arrow";
 import { NO_PROBLEM_MARKS } from "./problem-marks";
+import { ZoomDetail } from "./zoom/zoom-detail";
 import "@xyflow/react/dist/style.css";
 import "./canvas.css";
 
@@ -87,6 +88,7 @@ export function GraphView({ graph, progress, selected = NONE, label, onSelect }:
         aria-label={label}
       >
         <ArrowTips />
+        <ZoomDetail />
         <Background variant={BackgroundVariant.Dots} gap={20} size={1.4} />
       </ReactFlow>
     </LineContext>

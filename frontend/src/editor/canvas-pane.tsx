@@ -123,6 +123,7 @@ function Inside(props: Props) {
     frame,
     places,
     sizes,
+    lines: canvas.lines,
     direction: graph.direction,
     phone,
     begun,
@@ -135,12 +136,13 @@ function Inside(props: Props) {
     canvasHandle.current = { positions: () => places, sizes: () => sizes, view: followed.view };
   }, [canvasHandle, followed, places, sizes]);
 
+  const dry = context.dryRun !== null || undefined;
   useDryRunInView(context);
   useGraphLink(context, begun);
 
   return (
     <div className={style.whole}>
-      <div className={style.stage} ref={frame} data-dry={context.dryRun ? true : undefined}>
+      <div className={style.stage} ref={frame} aria-busy={first.busy} data-dry={dry}>
         <EditableCanvas
           context={context}
           canvas={canvas}

@@ -3,7 +3,7 @@ import { createContext, useCallback, useContext, useSyncExternalStore } from "re
 import { lineNow } from "./line-path";
 import type { RouterReport } from "./router.worker";
 import { type RoutedLine, simpleLines } from "./routes";
-import type { Scene } from "./scene";
+import type { Point, Scene } from "./scene";
 
 /** Arrows listen for themselves, so that a card that moves draws only its own again. */
 export class LineStore {
@@ -40,6 +40,11 @@ export class LineStore {
 
   isOpen(id: string): boolean {
     return this.opened === id;
+  }
+
+  /** All points of all lines. */
+  *points(): Generator<Point> {
+    for (const { points } of this.lines.values()) yield* points;
   }
 
   get offset(): number | null {

@@ -76,3 +76,13 @@ test("two views that look the same are alike", () => {
   expect(isSameViewport({ x: 0, y: 0, zoom: 1 }, { x: 1, y: -1, zoom: 1.001 })).toBe(true);
   expect(isSameViewport({ x: 0, y: 0, zoom: 1 }, { x: 9, y: 0, zoom: 1 })).toBe(false);
 });
+
+test("what is shown whole has its lines in view, which may run beyond all cards", () => {
+  const places = new Map([["a", [0, 0] as const]]);
+  const points = [
+    [-40, 20],
+    [900, 300],
+  ] as const;
+  expect(boundsOf(places, new Map(), points)).toEqual({ x: -40, y: 0, width: 940, height: 300 });
+  expect(boundsOf(new Map(), new Map(), points)).toBeNull();
+});

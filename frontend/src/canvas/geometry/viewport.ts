@@ -50,8 +50,12 @@ function freeOf({ width, height, covered = TOOLS }: CanvasArea): Bounds {
   };
 }
 
-/** The box round everything that stands somewhere; null while nothing does. */
-export function boundsOf(places: Positions, sizes: Sizes): Bounds | null {
+/** The box round everything that stands somewhere, and round points; null while nothing stands. */
+export function boundsOf(
+  places: Positions,
+  sizes: Sizes,
+  points: Iterable<Position> = [],
+): Bounds | null {
   let box: [number, number, number, number] | null = null;
   for (const [key, [x, y]] of places) {
     const { width, height } = sizes.get(key) ?? CARD;
@@ -62,6 +66,10 @@ export function boundsOf(places: Positions, sizes: Sizes): Bounds | null {
       Math.max(box[2], x + width),
       Math.max(box[3], y + height),
     ];
+  }
+  for (const [x, y] of points) {
+    if (box === null) break;
+    box = [Math.min(box[0], x), Math.min(box[1], y), Math.max(box[2], x), Math.max(box[3], y)];
   }
   return box && { x: box[0], y: box[1], width: box[2] - box[0], height: box[3] - box[1] };
 }

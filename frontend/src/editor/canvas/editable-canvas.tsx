@@ -22,6 +22,7 @@ import { type NoteEditing, NoteEditingContext } from "../../canvas/notes/note-ca
 import { noteColor } from "../../canvas/notes/note-colors";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
 import { ArrowTips } from "../../canvas/outcome-arrow";
+import { ZoomDetail } from "../../canvas/zoom/zoom-detail";
 import { addActionAt, type EditorContext, GRID } from "../../edit-actions/editor-context";
 import { asOneEdit, insertInto, removeNotes } from "../../graph/edit";
 import { changeNote } from "../../graph/edit/notes";
@@ -30,6 +31,7 @@ import { withLinkIds } from "../../graph/note-links";
 import { endName } from "../../graph/relation-words";
 import { Cursors } from "../../people/cursors";
 import { PeopleAtCards } from "../../people/people";
+import { toneColor } from "../../status/state-label";
 import { useRoom } from "../../sync/use-room";
 import { colorOfName } from "../../ui/name-colors";
 import { useStableCallback } from "../../ui/use-stable-callback";
@@ -92,6 +94,8 @@ function mapColor(node: CanvasNode): string {
     const part = node.data.note.kind === "frame" ? 18 : 60;
     return `color-mix(in srgb, ${noteColor[node.data.note.color]} ${part}%, transparent)`;
   }
+  const tone = node.data.progress?.tone ?? "idle";
+  if (tone !== "idle") return toneColor[tone];
   const robot = node.type === "action" ? node.data.action.actor : "";
   return robot === "" ? "var(--line2)" : colorOfName(robot);
 }
@@ -250,6 +254,7 @@ function Drawing({
       aria-label="Canvas"
     >
       <ArrowTips />
+      <ZoomDetail />
       <Background variant={BackgroundVariant.Dots} gap={20} size={1.4} />
       <Cursors />
       <PeopleAtCards me={me} places={canvas.places} sizes={canvas.sizes} />

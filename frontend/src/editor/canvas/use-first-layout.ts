@@ -14,7 +14,7 @@ const TURN_MS = 800;
 export function useFirstLayout(
   context: EditorContext,
   arrived: boolean,
-): { places: Positions | null; pending: boolean } {
+): { places: Positions | null; pending: boolean; busy: boolean } {
   const unplaced = arrived && isUnplaced(context.graph);
   // Somebody has undone the layout: doing it again would leave them no way back.
   const stood = useRef(false);
@@ -61,5 +61,7 @@ export function useFirstLayout(
       clearTimeout(patience);
     };
   }, [loose]);
-  return { places: loose ? places : null, pending: loose && places === null };
+  const pending = loose && places === null;
+  const busy = pending || (loose && places === plain.current);
+  return { places: loose ? places : null, pending, busy };
 }

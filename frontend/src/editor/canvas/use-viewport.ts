@@ -1,6 +1,7 @@
 /** The view of the canvas: what is seen at first, what Fit shows, and how it follows a run. */
 import type { ReactFlowInstance } from "@xyflow/react";
 import { type RefObject, useCallback, useEffect, useMemo, useRef, useState } from "react";
+import type { LineStore } from "../../canvas/arrows/line-store";
 import type { Arrow, CanvasNode } from "../../canvas/elements";
 import { CARD, type Positions, pillSize, type Sizes } from "../../canvas/geometry/arrange";
 import {
@@ -24,6 +25,7 @@ interface ViewportInput {
   frame: RefObject<HTMLDivElement | null>;
   places: Positions;
   sizes: Sizes;
+  lines: LineStore;
   direction: Direction;
   phone: boolean;
   /** The graph has been heard of and has something to show. */
@@ -86,7 +88,8 @@ function running(progress: ReadonlyMap<Key, Progress>): Key[] {
 }
 
 export function useViewport(given: ViewportInput) {
-  const { flow, frame, places, sizes, direction, phone, begun, progress, run, pointer } = given;
+  const { flow, frame, places, sizes, lines, direction, phone, begun, progress, run, pointer } =
+    given;
   const now = useRef({ places, sizes, direction });
   now.current = { places, sizes, direction };
   const least = phone ? READABLE.phone : READABLE.desktop;
@@ -96,7 +99,7 @@ export function useViewport(given: ViewportInput) {
   const showAll = useCallback(
     (goal: "first" | "whole", duration: number) => {
       const { places, sizes, direction } = now.current;
-      const [box, element] = [boundsOf(places, sizes), frame.current];
+      const [box, element] = [boundsOf(places, sizes, lines.points()), frame.current];
       if (box === null || element === null) return;
       const room = roomOf(element);
       const [x, y] = places.get(ENTRY) ?? [box.x, box.y];
@@ -108,7 +111,7 @@ export function useViewport(given: ViewportInput) {
       fitted.current = { view: next, goal };
       void flow.setViewport(next, { duration: glide(duration) });
     },
-    [flow, frame, least],
+    [flow, frame, lines, least],
   );
 
   // The graph arrives after the canvas, and its sizes after that.

@@ -1,0 +1,44 @@
+/** How much is shown at which zoom: less is said far away, and never smaller. Pure. */
+import type { Tone } from "../../status/progress";
+
+/** `sign`: too far for names, the state alone is left. */
+export type Detail = "near" | "middle" | "far" | "sign";
+
+/** From this zoom on; below the last one there is nothing less to show. */
+const FROM: readonly (readonly [Detail, number])[] = [
+  ["near", 0.9],
+  ["middle", 0.5],
+  ["far", 0.33],
+];
+/** What was shown changes back only this much later, so that nothing flickers at a threshold. */
+const PLAY = 1.05;
+/** Zooms are numbers of a machine: 0.9 may be a little less. */
+const SLACK = 0.001;
+
+const ORDER: readonly Detail[] = ["sign", "far", "middle", "near"];
+
+export function detailAt(zoom: number, before: Detail | null): Detail {
+  const [now = "sign"] = FROM.find(([, from]) => zoom >= from - SLACK) ?? [];
+  if (before === null || ORDER.indexOf(now) <= ORDER.indexOf(before)) return now;
+  const [late = "sign"] = FROM.find(([, from]) => zoom >= from * PLAY - SLACK) ?? [];
+  return ORDER.indexOf(late) > ORDER.indexOf(before) ? late : before;
+}
+
+const STEPS = 40;
+
+/** As much of the canvas as one pixel on screen, px; in steps, since each is a restyling of all cards. */
+export function unitAt(zoom: number): number {
+  return STEPS / Math.max(1, Math.floor(zoom * STEPS + SLACK));
+}
+
+/** The state of an action in one letter, for where there is no room for a word. */
+export const STATE_LETTER: Readonly<Record<Tone, string>> = {
+  idle: "",
+  run: "▶",
+  true: "✓",
+  false: "✗",
+  error: "!",
+  stopped: "■",
+  done: "✓",
+  unknown: "?",
+};
