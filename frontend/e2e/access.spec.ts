@@ -82,6 +82,7 @@ async function graph(name: string): Promise<string> {
 
 for (const scheme of ["light", "dark"] as const) {
   test(`a checker finds nothing on any page, ${scheme}`, async ({ browser }) => {
+    test.setTimeout(180_000); // a score of places, each examined wholly
     const options = { colorScheme: scheme, reducedMotion: "reduce" as const };
     const { page, context } = await product.person(browser, "Ada", options);
     const found: string[] = [];
@@ -159,6 +160,7 @@ test("at 320 px, which is a desktop at 400 %, nothing has to be scrolled sideway
       return scrollWidth - clientWidth;
     });
     expect(wide, path).toBeLessThanOrEqual(0);
+    await expect(page.getByRole("button", { name: /^Stop / })).toBeInViewport({ ratio: 1 });
     expect(await faults(page, path)).toEqual([]);
   }
   await context.close();

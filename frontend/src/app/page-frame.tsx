@@ -34,6 +34,8 @@ interface WayProps {
   name: string;
   /** Something else needs the room on a narrow screen. */
   tight: boolean;
+  /** Beside a graph, whose name and state need the room of a phone. */
+  beside: boolean;
 }
 
 // The bar is drawn with the graph; what of it is always the same is not.
@@ -42,7 +44,7 @@ const Sharing = memo(
   lazyPart(() => import("../account/share-dialog").then((part) => part.ShareDialog)),
 );
 
-const Way = memo(function Way({ to, icon: Icon, name, tight }: WayProps) {
+const Way = memo(function Way({ to, icon: Icon, name, tight, beside }: WayProps) {
   return (
     <Button
       component={Link}
@@ -54,6 +56,7 @@ const Way = memo(function Way({ to, icon: Icon, name, tight }: WayProps) {
       leftSection={<Icon size={16} aria-hidden />}
       className={style.way ?? ""}
       data-tight={tight || undefined}
+      data-graph={beside || undefined}
     >
       {name}
     </Button>
@@ -66,7 +69,8 @@ export function PageBar({ crumbs, status, actions, start, graph, at }: Props) {
   const [sharing, setSharing] = useState<boolean | null>(null);
   const share = useStableCallback(() => setSharing(true));
   const closeSharing = useStableCallback(() => setSharing(false));
-  const tight = Boolean(start);
+  const ways = { tight: Boolean(start), beside: graph !== undefined };
+  const { tight } = ways;
   return (
     <TopBar
       crumbs={crumbs}
@@ -74,8 +78,8 @@ export function PageBar({ crumbs, status, actions, start, graph, at }: Props) {
       actions={
         <>
           {actions}
-          {at !== "robots" && <Way to="/robots" icon={IconRobot} name="Robots" tight={tight} />}
-          {at !== "runs" && <Way to="/runs" icon={IconHistory} name="Runs" tight={tight} />}
+          {at !== "robots" && <Way to="/robots" icon={IconRobot} name="Robots" {...ways} />}
+          {at !== "runs" && <Way to="/runs" icon={IconHistory} name="Runs" {...ways} />}
           {mayShare && (
             <Button
               variant="subtle"
