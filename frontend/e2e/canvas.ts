@@ -155,9 +155,11 @@ export async function watch(page: Page): Promise<void> {
     const seen = new Set<string>();
     Object.assign(window, { seenRunning: seen });
     setInterval(() => {
-      for (const node of document.querySelectorAll(".react-flow__node-action")) {
-        const [, name] = /^([A-Za-z]+)\d+.*running/.exec(node.textContent ?? "") ?? [];
-        if (name !== undefined) seen.add(name);
+      for (const shown of document.querySelectorAll<HTMLElement>(
+        ".react-flow__node-action [data-name]",
+      )) {
+        const name = shown.dataset["name"];
+        if (name !== undefined && shown.textContent?.includes("running")) seen.add(name);
       }
     }, 20);
   });

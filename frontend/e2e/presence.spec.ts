@@ -49,9 +49,16 @@ async function looking(page: Page) {
 }
 
 async function pan(page: Page, dx: number, dy: number): Promise<void> {
-  const box = await page.locator(".react-flow__pane").boundingBox();
-  if (box === null) throw new Error("no canvas");
-  const [x, y] = [box.x + 60, box.y + box.height / 2];
+  // From where nothing is drawn: a card or an arrow would be moved instead.
+  const free = await page.evaluate(() => {
+    const room = document.querySelector(".react-flow__pane")?.getBoundingClientRect();
+    if (!room) throw new Error("no canvas");
+    const rows = [0.5, 0.6, 0.7, 0.8, 0.4, 0.3].map((part) => room.y + room.height * part);
+    const spots = rows.flatMap((y) => [60, 160, 260, 360].map((x) => [room.x + x, y] as const));
+    return spots.find(([x, y]) => document.elementFromPoint(x, y)?.matches(".react-flow__pane"));
+  });
+  if (free === undefined) throw new Error("no free spot");
+  const [x, y] = free;
   await page.mouse.move(x, y);
   await page.mouse.down();
   await page.mouse.move(x + dx, y + dy, { steps: 10 });
