@@ -158,7 +158,7 @@ export async function watch(page: Page): Promise<void> {
       for (const shown of document.querySelectorAll<HTMLElement>(
         ".react-flow__node-action [data-name]",
       )) {
-        const name = shown.dataset["name"];
+        const name = shown.dataset.name;
         if (name !== undefined && shown.textContent?.includes("running")) seen.add(name);
       }
     }, 20);

@@ -3,13 +3,13 @@
 import type { EditorContext, Overlay } from "../../edit-actions/editor-context";
 import type { NewAction } from "../../graph/edit";
 import { lazyPart } from "../../ui/parts/lazy-part";
-import { OverlayBoundary } from "../../ui/parts/part-boundary";
+import { OverlayBoundary, PartBoundary } from "../../ui/parts/part-boundary";
 import { CommandPalette } from "./command-palette";
-import { GraphPrint } from "./graph-print";
 
 const ArrowDialog = lazyPart(() => import("./arrow-dialog").then((part) => part.ArrowDialog));
 const RetargetDialog = lazyPart(() => import("./arrow-dialog").then((part) => part.RetargetDialog));
 const ContextMenu = lazyPart(() => import("./context-menu").then((part) => part.ContextMenu));
+const GraphPrint = lazyPart(() => import("./graph-print").then((part) => part.GraphPrint));
 const ShortcutSheet = lazyPart(() => import("./shortcut-sheet").then((part) => part.ShortcutSheet));
 
 interface Props {
@@ -23,7 +23,10 @@ interface Props {
 export function Overlays(props: Props) {
   return (
     <>
-      <GraphPrint context={props.context} />
+      {/* Nothing is seen of it before somebody prints: then the browser prints the page as it is. */}
+      <PartBoundary frame={() => null}>
+        <GraphPrint context={props.context} />
+      </PartBoundary>
       <OverlayBoundary>
         <Opened {...props} />
       </OverlayBoundary>
