@@ -305,7 +305,7 @@ test("a decision that is led to the end ends either way, and what runs beside it
   const field = page.getByRole("combobox", { name: "Name of the parameter" });
   await field.fill("said");
   await field.press("Enter");
-  await page.getByRole("button", { name: "Tidy", exact: true }).click();
+  await tidy(page);
   await connect(page, "Bring", "true", "exit");
   await connect(page, "Answer", "true", "exit");
   const waited = async () => (await umrfOf(product, id)).graph_exit.map((end) => end.required);

@@ -194,7 +194,7 @@ test("the page opens without a server, with what the device keeps, and says what
   const ada = await product.person(browser, "Ada", { serviceWorkers: "allow" });
   const graph = await newGraph("kept");
   await enter(ada.page, graph);
-  await add(ada.page, "Before");
+  await add(ada.page, "Kept");
   await saved(ada.page);
   await ada.page.evaluate(() => navigator.serviceWorker.ready);
   await expect.poll(() => ada.page.evaluate(() => caches.keys())).toHaveLength(1);
@@ -210,8 +210,8 @@ test("the page opens without a server, with what the device keeps, and says what
     .getByRole("region", { name: "On this device" })
     .getByRole("link", { name: "kept" })
     .click();
-  await expect(card(page, "Before")).toBeVisible();
-  await add(page, "While");
+  await expect(card(page, "Kept")).toBeVisible();
+  await add(page, "Alone");
   await offline(page, 1);
   await expect(page.getByRole("button", { name: /^Start v1: not connected/ })).toBeDisabled();
   await page.getByRole("button", { name: /^Stop everything/ }).click();
@@ -227,7 +227,7 @@ test("the page opens without a server, with what the device keeps, and says what
 
   await product.start();
   await saved(page);
-  expect(await stored(graph)).toEqual(["Before", "While"]);
+  expect(await stored(graph)).toEqual(["Alone", "Kept"]);
   await expect(page.getByText(/robots cannot be started/i)).toBeHidden();
   await ada.context.close();
 });

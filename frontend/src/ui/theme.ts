@@ -65,7 +65,13 @@ export const theme = createTheme({
     Tooltip: { defaultProps: { openDelay: 350, withArrow: true, fz: "xs" } },
     // A place to put the focus that is no item has no place in a menu.
     Menu: {
-      defaultProps: { shadow: "md", position: "bottom-end", withInitialFocusPlaceholder: false },
+      defaultProps: {
+        shadow: "md",
+        position: "bottom-end",
+        withInitialFocusPlaceholder: false,
+        // A menu that fades after it was used would take the next tap.
+        transitionProps: { duration: 100, exitDuration: 0 },
+      },
     },
     Popover: { defaultProps: { shadow: "md" } },
     Modal: {
