@@ -176,6 +176,17 @@ test("“worked yesterday, fails today” is answered in one look", async () => 
   await expect(page.getByText(/then Wait_1: true in run \d+, error in run \d+/)).toBeVisible();
   await expect(page.getByText("gripper jammed")).toBeVisible();
   await expect(page.getByText("Both ran exactly the same graph.")).toBeVisible();
+  const canvas = page.getByRole("region", { name: "Both runs on the graph" });
+  await expect(card(page, "Wait", 1).getByText("1 · first difference")).toBeVisible();
+  await expect(canvas.getByText("1 · first difference")).toHaveCount(1);
+  await expect(
+    page.getByRole("list", { name: "Differences" }).getByRole("listitem").first(),
+  ).toHaveText(/^1\s*Wait 1 ended with an error/);
+  const lanes = page.getByRole("region", { name: "Both runs over time" });
+  await expect(lanes.getByRole("listitem").filter({ hasText: "Wait_1" })).toHaveAttribute(
+    "data-parting",
+  );
+  await page.getByRole("tab", { name: "Step by step" }).click();
   await expect(page.getByRole("row", { name: /Wait_1/ })).toContainText("here they part");
 });
 
@@ -198,6 +209,22 @@ test("a run goes again with one fault, in the simulator", async () => {
   await page.getByRole("button", { name: "Run in the simulator" }).click();
   await expect(page).not.toHaveURL(new RegExp(good.id));
   await expect(card(page, "Wait", 2).getByText("error")).toBeVisible({ timeout: 15_000 });
+});
+
+test("a run that failed opens as a dry-run at any of its moments, and goes on otherwise", async () => {
+  const { page } = ada;
+  await page.goto(`${product.url}/runs/${bad.id}`);
+  await page.getByRole("link", { name: "Dry-run from 0:00" }).click();
+  const bar = page.getByRole("region", { name: "Dry-run" });
+  await expect(bar.getByText("Wait 1 runs")).toBeVisible();
+  await expect(card(page, "Wait").getByText("true")).toBeVisible(); // as it was then
+  await expect(bar.getByText(`in run ${bad.number}`)).toHaveText(/error/);
+  await bar.getByRole("button", { name: new RegExp(`^From run ${bad.number}`) }).click();
+  await expect(page.getByText("With which values 2 of 2 actions ran was not seen")).toBeVisible();
+  await page.keyboard.press("Escape");
+  await bar.getByRole("group").getByRole("button", { name: /true/ }).click();
+  await expect(card(page, "Wait", 1).getByText("true")).toBeVisible();
+  await expect(card(page, "Wait", 2).getByText("running")).toBeVisible();
 });
 
 /** A graph in which the first action hands a value to the second one. */

@@ -232,8 +232,10 @@ test("the good and the bad one part where it jammed, and the graph had changed t
   await page.goto(
     `${product.url}/runs/compare?${new URLSearchParams({ a: runs.good?.id ?? "", b: runs.bad?.id ?? "" })}`,
   );
-  await expect(page.getByRole("row").filter({ hasText: "here they part" })).toBeVisible();
   await expect(page.getByRole("list", { name: "What changed in the graph" })).toContainText("Jam");
+  await expect(card(page, "Jam").getByText("1 · first difference")).toBeVisible();
+  await page.getByRole("tab", { name: "Step by step" }).click();
+  await expect(page.getByRole("row").filter({ hasText: "here they part" })).toBeVisible();
 });
 
 test("what ran on the robot is repeated in the simulator with one fault", async () => {
@@ -278,8 +280,10 @@ test("time without an answer is hatched, and said", async () => {
 test("two robots share the timeline, with who stopped them and what proves it", async () => {
   const { page } = ada;
   await open(page, runs.two);
-  await expect(lanes(page)).toContainText("David · Patrol_0");
-  await expect(lanes(page)).toContainText("Eve · Patrol_0");
+  for (const robot of ["David", "Eve"]) {
+    await expect(lanes(page).getByText(robot, { exact: true })).toBeVisible(); // above its lanes
+  }
+  await expect(lanes(page).getByText("Patrol_0")).toHaveCount(2);
   await expect(page.getByText(/pressed Stop$/).first()).toBeVisible();
   await expect(page.getByTitle("Proven: nothing runs any more").first()).toBeVisible();
 });

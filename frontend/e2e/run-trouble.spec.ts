@@ -100,23 +100,28 @@ test("two robots run one graph: the page says whose run it shows, and shows the 
   await begin(graph, "David", "Eve");
   await page.goto(`${product.url}/graphs/${graph}`);
   await saved(page);
-  const whose = strip(page).getByRole("group", { name: "Runs of this graph that go on" });
-  await expect(whose.getByRole("button")).toHaveCount(2);
-  const eves = whose.getByRole("button", { name: /on Eve, running/ });
-  const davids = whose.getByRole("button", { name: /on David, running/ });
+  const robots = strip(page).getByRole("tablist", { name: "Robots that run this graph" });
+  await expect(robots.getByRole("tab")).toHaveCount(3);
+  const both = robots.getByRole("tab", { name: "Both robots" });
+  await expect(both).toHaveAttribute("aria-selected", "true");
+  const lanes = strip(page).getByRole("list", { name: "Actions of the run over time" });
+  await expect(lanes.getByText("Wait_0")).toHaveCount(2); // one lane for each robot
+  const eves = robots.getByRole("tab", { name: /^Eve Wait 0/ });
+  const davids = robots.getByRole("tab", { name: /^David Wait 0/ });
+  await expect(page.getByRole("region", { name: "Moves now" })).toContainText("David Wait 0");
   await davids.click();
-  await expect(davids).toHaveAttribute("aria-pressed", "true");
+  await expect(davids).toHaveAttribute("aria-selected", "true");
+  await expect(lanes.getByText("Wait_0")).toHaveCount(1);
   const shown = (robot: string, all: readonly Run[]) =>
     `Run ${all.find(({ engine }) => engine === robot)?.number}`;
   const all = await runs();
   await expect(strip(page).getByText(shown("David", all), { exact: true })).toBeVisible();
-  await eves.focus();
-  await page.keyboard.press("Enter");
+  await page.keyboard.press("ArrowRight");
   await expect(strip(page).getByText(shown("Eve", all), { exact: true })).toBeVisible();
-  await expect(eves).toHaveAttribute("aria-pressed", "true");
+  await expect(eves).toHaveAttribute("aria-selected", "true");
   await page.screenshot({ path: test.info().outputPath("two-robots.png") });
   await stopAll(page);
-  await expect(whose).toHaveCount(0);
+  await expect(robots).toHaveCount(0);
 });
 
 test("a run in which nothing moves says what it waits for, and keeps it as its cause", async () => {
@@ -191,10 +196,10 @@ test("a dry-run does not hide a run that goes on", async () => {
   await begin(graph, "David");
   await page.goto(`${product.url}/graphs/${graph}`);
   await saved(page);
-  await expect(strip(page).getByText("David")).toBeVisible();
+  await expect(strip(page).getByText("David", { exact: true })).toBeVisible();
   await page.getByRole("button", { name: "Dry-run", exact: true }).first().click();
   await expect(page.getByRole("region", { name: "Dry-run" })).toBeVisible();
-  await expect(strip(page).getByText("David")).toBeVisible();
+  await expect(strip(page).getByText("David", { exact: true })).toBeVisible();
   await expect(strip(page).getByText("running", { exact: true }).first()).toBeVisible();
   await page.screenshot({ path: test.info().outputPath("dry-run-beside.png") });
   await stopAll(page);

@@ -55,7 +55,7 @@ const LAYERS: Readonly<Record<string, readonly string[]>> = {
   robots: ["ui", "api", "status"],
   library: ["graph", "ui", "api", "status", "canvas"],
   account: ["ui", "api"],
-  app: ["graph", "ui", "api", "status", "offline", "canvas", "sync", "editor"].concat([
+  app: ["graph", "ui", "api", "status", "offline", "canvas", "sync", "dry-run", "editor"].concat([
     "runs",
     "review",
     "robots",

@@ -1,24 +1,29 @@
 /** The editor of a graph with the list on its left and its runs below. */
 import { Button } from "@mantine/core";
 import { IconMapOff } from "@tabler/icons-react";
-import { type ReactNode, useEffect, useMemo, useRef, useState } from "react";
-import { Link } from "wouter";
+import { memo, type ReactNode, useEffect, useMemo, useRef, useState } from "react";
+import { Link, useSearch } from "wouter";
 import { useVersions, versionName } from "../api/graphs";
 import { newestRun, openRuns, useLive } from "../api/live/use-live";
 import { type Run, useLastRun } from "../api/runs";
 import { useMay, usePerson } from "../api/use-person";
+import { useSeed } from "../editor/dry-run/use-seed";
 import { Editor, type Shown } from "../editor/editor";
 import { useKnownActions } from "../library/known-actions";
 import { Sidebar } from "../library/sidebar";
+import { useReplay } from "../review/replay/use-replay";
+import { askedDryRun } from "../review/run/dry-run-link";
 import { ConnectionStatus } from "../runs/connection-status";
 import { DraftStatus } from "../runs/draft-status";
-import { RunStrip } from "../runs/run-strip";
+import { RunDrawer } from "../runs/drawer/run-drawer";
 import { RecordDryRun } from "../runs/start/record-dry-run";
 import { StartControl } from "../runs/start/start-control";
-import { progressByAid } from "../status/progress";
+import { useProgress } from "../status/use-progress";
 import { roomUrl } from "../sync/room-connection";
-import { RoomProvider, useLinkPart, useRoom } from "../sync/use-room";
+import { RoomProvider, useLinkPart, useRoom, useThrottledGraph } from "../sync/use-room";
 import { Empty } from "../ui/empty";
+import { instant } from "../ui/times";
+import { useStableCallback } from "../ui/use-stable-callback";
 import { useNewGraphs } from "./new-graphs";
 import { PageBar, PageFrame } from "./page-frame";
 import { useTitle } from "./use-title";
@@ -64,13 +69,27 @@ function useRunHere(id: string): RunHere {
   };
 }
 
+/** The right edge of what can be replayed: the end, or now. */
+function useEdge(run: Run | null): number {
+  return instant(run?.ended_at) ?? Date.now();
+}
+
 function Inside({ id }: { id: string }) {
   const { person, visit } = usePerson();
   const { create, choose } = useNewGraphs();
   const { actions } = useKnownActions();
   const known = useMemo(() => actions.map((action) => action.template), [actions]);
   const { going, choose: chooseRun, live, run, label, unsure } = useRunHere(id);
-  const progress = useMemo(() => progressByAid(live, unsure), [live, unsure]);
+  const { runner } = useLive();
+  const replay = useReplay(runner, run ?? null, useEdge(run ?? null), null);
+  const past = replay.at !== null;
+  const progress = useProgress(past ? replay.run : live, unsure && !past, replay.at);
+  const newest = run?.id;
+  const { seek } = replay;
+  // biome-ignore lint/correctness/useExhaustiveDependencies: another run is shown as it is now
+  useEffect(() => seek(null), [newest, seek]);
+  const begun = useLinkPart(({ seq }) => seq > 0);
+  const seed = useSeed(runner, askedDryRun(useSearch()), useThrottledGraph(), begun);
   const mayStart = useMay("simulate");
   const gone = useLinkPart(
     ({ state, why, seq }) => state === "refused" && why === "no-such-graph" && seq === 0,
@@ -93,7 +112,7 @@ function Inside({ id }: { id: string }) {
       progress={progress}
       run={live?.ended_at === null ? live.id : null}
       bar={(parts) => <TitledBar id={id} {...parts} />}
-      list={(place) => <Sidebar current={id} onNew={create} onImport={choose} onPlace={place} />}
+      list={(place) => <Lists id={id} create={create} choose={choose} place={place} />}
       status={(shown: Shown) => (
         <DraftStatus
           run={live}
@@ -129,8 +148,10 @@ function Inside({ id }: { id: string }) {
         )
       }
       strip={(shown: Shown) => (
-        <RunStrip
+        <RunDrawer
           run={run}
+          cursor={replay.at}
+          onSeek={seek}
           going={going}
           onChoose={chooseRun}
           graph={shown.graph}
@@ -141,9 +162,27 @@ function Inside({ id }: { id: string }) {
           onFold={shown.fold}
         />
       )}
+      seed={seed}
       corner={<ConnectionStatus run={live} whose={going.length > 1} />}
     />
   );
+}
+
+const StillSidebar = memo(Sidebar);
+
+/** Its functions stay the same, so that it is not drawn with each event of a run. */
+function Lists({ id, create, choose, place }: ListsProps) {
+  const onNew = useStableCallback(create);
+  const onImport = useStableCallback(choose);
+  const onPlace = useStableCallback(place);
+  return <StillSidebar current={id} onNew={onNew} onImport={onImport} onPlace={onPlace} />;
+}
+
+interface ListsProps {
+  id: string;
+  create: ReturnType<typeof useNewGraphs>["create"];
+  choose: ReturnType<typeof useNewGraphs>["choose"];
+  place: Parameters<Parameters<typeof Editor>[0]["list"]>[0];
 }
 
 function TitledBar(props: { id: string } & Parameters<typeof PageBar>[0]) {

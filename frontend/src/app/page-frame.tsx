@@ -5,6 +5,7 @@ import { memo, type ReactNode, useState } from "react";
 import { Link } from "wouter";
 import { AccountMenu } from "../account/account-menu";
 import { useMay } from "../api/use-person";
+import { MovesNowLine } from "../runs/moves-now-line";
 import { StopButton } from "../runs/stop/stop-button";
 import { lazyPart } from "../ui/parts/lazy-part";
 import { OverlayBoundary } from "../ui/parts/part-boundary";
@@ -43,6 +44,7 @@ const Account = memo(AccountMenu);
 const Sharing = memo(
   lazyPart(() => import("../account/share-dialog").then((part) => part.ShareDialog)),
 );
+const Moving = memo(MovesNowLine);
 
 const Way = memo(function Way({ to, icon: Icon, name, tight, beside }: WayProps) {
   return (
@@ -74,7 +76,12 @@ export function PageBar({ crumbs, status, actions, start, graph, at }: Props) {
   return (
     <TopBar
       crumbs={crumbs}
-      status={status}
+      status={
+        <>
+          {status}
+          <Moving />
+        </>
+      }
       actions={
         <>
           {actions}

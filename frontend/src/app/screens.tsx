@@ -1,7 +1,7 @@
 /** The screens that look back: runs, one run, two beside each other, statistics. */
 import { useLocation } from "wouter";
 import { useVersions } from "../api/graphs";
-import { ComparePage } from "../review/compare-page";
+import { ComparePage } from "../review/compare/compare-page";
 import type { RepeatActions } from "../review/run/run-menu";
 import { RunPage } from "../review/run/run-page";
 import { RunsPage } from "../review/runs-page";

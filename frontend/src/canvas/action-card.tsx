@@ -1,7 +1,7 @@
 /** An action on the canvas: robot, name, state, two parameters; its input before it, its four outcomes behind. */
 import { IconGhost2, IconMessageCircle } from "@tabler/icons-react";
 import { Handle, type NodeProps, Position } from "@xyflow/react";
-import { memo } from "react";
+import { memo, use } from "react";
 import { cardRows } from "../graph/parameters/card-rows";
 import { durationText } from "../status/durations";
 import type { Progress } from "../status/progress";
@@ -9,7 +9,7 @@ import { StateLabel } from "../status/state-label";
 import { colorOfName } from "../ui/name-colors";
 import { stopwatch, useNow } from "../ui/times";
 import style from "./action-card.module.css";
-import { useDataRole, useIsDimmed, useOpenThreadCount } from "./card-highlights";
+import { CardStateContext, useDataRole, useIsDimmed, useOpenThreadCount } from "./card-highlights";
 import { CardLines } from "./card-lines";
 import type { CardNode } from "./elements";
 import { CARD_LINES, cardSize } from "./geometry/arrange";
@@ -52,6 +52,7 @@ export const ActionCard = memo(function ActionCard({
   const dim = useIsDimmed(action.actor);
   const talk = useOpenThreadCount(action.key);
   const role = useDataRole(action.key);
+  const instead = use(CardStateContext)?.(action.key);
   return (
     <div
       className={style.card}
@@ -93,7 +94,7 @@ export const ActionCard = memo(function ActionCard({
         {action.instanceId > 0 && <span className={style.instance}>{action.instanceId}</span>}
       </div>
       {action.missing && <div className={style.hint}>named by an arrow, but not there</div>}
-      {!action.missing && progress && <ProgressLine progress={progress} />}
+      {!action.missing && (instead ?? (progress && <ProgressLine progress={progress} />))}
       <CardLines
         rows={rows}
         most={says ? CARD_LINES - 1 : CARD_LINES}

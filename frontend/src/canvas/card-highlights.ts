@@ -1,5 +1,5 @@
 /** Highlights on cards: whose robot's actions stand out, who gives and takes a value, open threads. */
-import { useSyncExternalStore } from "react";
+import { createContext, type ReactNode, useSyncExternalStore } from "react";
 import type { Key } from "../graph/model";
 
 /** The actions that give a value, and those that take it. */
@@ -69,3 +69,6 @@ export function useOpenThreadCount(key: Key): number {
     () => cardHighlights.now().openThreads.get(key) ?? 0,
   );
 }
+
+/** What stands in place of the state where something else than one run is shown. */
+export const CardStateContext = createContext<((key: Key) => ReactNode) | null>(null);

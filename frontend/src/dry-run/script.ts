@@ -1,6 +1,7 @@
 /** What a person has decided in a dry-run, as the script that the simulator plays. Pure. */
 import type { Behaviour, Command, Script } from "../api/dry-runs";
 import type { RunningAction } from "./playback";
+import type { DryRunSeed } from "./seed";
 
 export type DecidedOutcome = "on_true" | "on_false" | "on_error";
 export type DecidedFaultKind = "error" | "never" | "exception" | "deaf" | "stop";
@@ -23,9 +24,16 @@ export type DecidedFault =
 export interface Decisions {
   readonly decisions: readonly Decision[];
   readonly fault: DecidedFault | null;
+  /** What actions did before anybody decided, one behaviour for each call. */
+  readonly before?: DryRunSeed["behaviours"];
 }
 
 export const NOTHING_DECIDED: Decisions = { decisions: [], fault: null };
+
+/** Nothing decided yet, at a moment of a run. */
+export function decidedBy(seed: DryRunSeed | null): Decisions {
+  return seed === null ? NOTHING_DECIDED : { ...NOTHING_DECIDED, before: seed.behaviours };
+}
 
 export const faultWords: Readonly<Record<DecidedFaultKind, string>> = {
   error: "Ends with an error",
@@ -52,7 +60,7 @@ export function decide(
     (other) => other.at <= at && !(other.node === node && other.call === call),
   );
   const fault = before.fault?.kind === "stop" && before.fault.at > at ? null : before.fault;
-  return { decisions: [...earlier, { node, call, since, at, outcome }], fault };
+  return { ...before, decisions: [...earlier, { node, call, since, at, outcome }], fault };
 }
 
 const faulty: Readonly<Record<Exclude<DecidedFaultKind, "stop">, Behaviour>> = {
@@ -63,8 +71,8 @@ const faulty: Readonly<Record<Exclude<DecidedFaultKind, "stop">, Behaviour>> = {
 };
 
 /** One behaviour for each call; the last repeats, so what nobody decided comes last. */
-export function scriptOf({ decisions, fault }: Decisions): Script {
-  const calls = new Map<string, Behaviour[]>();
+export function scriptOf({ decisions, fault, before = {} }: Decisions): Script {
+  const calls = new Map(Object.entries(before).map(([node, list]) => [node, [...list]]));
   const usual = (node: string): Behaviour =>
     fault !== null && fault.kind !== "stop" && fault.node === node ? faulty[fault.kind] : {};
   for (const { node, call, since, at, outcome } of decisions) {

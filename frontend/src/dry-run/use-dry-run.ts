@@ -24,9 +24,11 @@ import {
   type DecidedOutcome,
   type Decisions,
   decide,
+  decidedBy,
   NOTHING_DECIDED,
   scriptOf,
 } from "./script";
+import { type DryRunSeed, type SeedDoubt, seededMoment } from "./seed";
 
 export const DRY_RUN_SPEEDS = [0.5, 1, 4, 16] as const;
 
@@ -44,6 +46,10 @@ export interface DryRun {
   readonly busy: boolean;
   readonly failed: Error | null;
   readonly cut: boolean;
+  /** The moment of a run from which it starts; null: from its own start. */
+  readonly seed: DryRunSeed | null;
+  /** What of that moment is not known, or not reached by the rules. */
+  readonly doubts: readonly SeedDoubt[];
   go(index: number): void;
   play(on: boolean): void;
   setSpeed(speed: number): void;
@@ -79,6 +85,29 @@ function useShownMoment(trace: readonly TraceEvent[], at: number, graph: Graph) 
   }, [trace, moments, index, graph]);
   return useMemo(() => ({ moments, index, sighting, words }), [moments, index, sighting, words]);
 }
+
+/** Goes to the moment of a run from which a dry-run starts, once it is played; says what is not so. */
+function useSeed(
+  seed: DryRunSeed | null,
+  trace: readonly TraceEvent[],
+  graph: Graph,
+  busy: boolean,
+  setAt: (at: number) => void,
+): readonly SeedDoubt[] {
+  const [found, setFound] = useState<{ of: DryRunSeed | null; doubts: readonly SeedDoubt[] }>(NONE);
+  useEffect(() => {
+    if (seed === null || busy || found.of === seed) return;
+    const keys = keysByName(graph);
+    const moments = momentsOf(trace);
+    const states = moments.map(({ to }) => playbackStateAt(trace, to, graph, keys));
+    const { index, doubts } = seededMoment(seed, states, keys);
+    setAt(moments[index]?.at ?? 0);
+    setFound({ of: seed, doubts: [...seed.doubts, ...doubts] });
+  }, [seed, trace, graph, busy, found, setAt]);
+  return found.of === seed ? found.doubts : (seed?.doubts ?? NONE.doubts);
+}
+
+const NONE = { of: null, doubts: [] as readonly SeedDoubt[] };
 
 /** Decides at the moment that is shown; `setGoal`: what comes after it is to be shown next. */
 function useDeciding(
@@ -119,6 +148,7 @@ function useResult(id: string, open: boolean, seq: number, decided: Decisions) {
 /** Null while no dry-run is open. `seq` is the moment of the graph that the page shows. */
 export function useDryRun(id: string, graph: Graph, seq: number) {
   const [open, setOpen] = useState(false);
+  const [seed, setSeed] = useState<DryRunSeed | null>(null);
   const [decided, setDecided] = useState(NOTHING_DECIDED);
   const [at, setAt] = useState(0);
   const [goal, setGoal] = useState<number | null>(null);
@@ -129,6 +159,7 @@ export function useDryRun(id: string, graph: Graph, seq: number) {
   const trace = useMemo(() => data?.trace ?? [], [data]);
   const shown = useShownMoment(trace, at, graph);
   const { moments, index } = shown;
+  const doubts = useSeed(open ? seed : null, trace, graph, busy, setAt);
 
   // After a decision the next thing that happens is shown, as soon as it is known.
   useEffect(() => {
@@ -145,15 +176,21 @@ export function useDryRun(id: string, graph: Graph, seq: number) {
 
   const deciding = useDeciding(shown, setDecided, setGoal);
   const restart = useCallback(() => {
-    setDecided(NOTHING_DECIDED);
+    setDecided(decidedBy(seed));
     setAt(0);
     play(false);
+  }, [seed]);
+  const begin = useCallback((from: DryRunSeed | null = null) => {
+    setSeed(from);
+    setDecided(decidedBy(from));
+    setAt(0);
+    play(false);
+    setOpen(true);
   }, []);
   const close = useCallback(() => {
-    restart();
+    begin();
     setOpen(false);
-  }, [restart]);
-  const begin = useCallback(() => setOpen(true), []);
+  }, [begin]);
 
   const cut = data?.cut === true;
   const commands = useMemo(
@@ -161,8 +198,11 @@ export function useDryRun(id: string, graph: Graph, seq: number) {
     [go, deciding, restart, close],
   );
   const dryRun = useMemo<DryRun | null>(
-    () => (open ? { ...shown, playing, speed, decided, busy, failed, cut, ...commands } : null),
-    [open, shown, playing, speed, decided, busy, failed, cut, commands],
+    () =>
+      open
+        ? { ...shown, playing, speed, decided, busy, failed, cut, seed, doubts, ...commands }
+        : null,
+    [open, shown, playing, speed, decided, busy, failed, cut, seed, doubts, commands],
   );
   return { dryRun, begin };
 }

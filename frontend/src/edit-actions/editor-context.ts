@@ -2,6 +2,7 @@
 import { createContext, use } from "react";
 import type * as Y from "yjs";
 import { CARD, freeSpot, placeAfter, unplaced } from "../canvas/geometry/arrange";
+import type { DryRunSeed } from "../dry-run/seed";
 import type { DryRun } from "../dry-run/use-dry-run";
 import { relationId } from "../graph/document-keys";
 import {
@@ -83,7 +84,8 @@ export interface EditorContext {
   readonly view: CanvasView;
   /** The graph is played on the canvas; null while it is not. */
   readonly dryRun: DryRun | null;
-  beginDryRun(): void;
+  /** `from`: a moment of a run, as the record has it. */
+  beginDryRun(from?: DryRunSeed): void;
   select(ids: Iterable<string>): void;
   setTool(tool: Tool): void;
   setSnap(snap: boolean): void;

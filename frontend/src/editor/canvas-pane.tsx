@@ -24,7 +24,7 @@ import { Toolbar } from "./menus/toolbar";
 import type { EditorState } from "./use-editor";
 import { useGraphLink } from "./use-graph-link";
 
-const DryRunBar = lazyPart(() => import("./dry-run-bar").then((part) => part.DryRunBar));
+const DryRunBar = lazyPart(() => import("./dry-run/dry-run-bar").then((part) => part.DryRunBar));
 
 interface Props {
   me: string;

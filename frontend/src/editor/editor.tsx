@@ -1,9 +1,10 @@
 /** The editor of one graph: list, canvas, details and run strip, arranged for the screen at hand. */
 import { useLocalStorage } from "@mantine/hooks";
-import type { ComponentProps, ReactNode } from "react";
+import { type ComponentProps, memo, type ReactNode, useEffect } from "react";
 import type { Script } from "../api/dry-runs";
 import { useOpenThreadsOnCards, useThreads } from "../comments/use-threads";
 import { scriptOf } from "../dry-run/script";
+import type { DryRunSeed } from "../dry-run/seed";
 import { addActionAt, type EditorContext, freePosition } from "../edit-actions/editor-context";
 import { useShortcuts } from "../edit-actions/keys/shortcuts";
 import { FindBar } from "../find/find-bar";
@@ -73,6 +74,8 @@ interface Props {
   /** Makes the dry-run that is open a run. */
   record: (shown: Shown, script: Script, onStarted: () => void) => ReactNode;
   corner: ReactNode;
+  /** The moment of a run that a dry-run is to begin with; null without one. */
+  seed: DryRunSeed | null;
 }
 
 /** What the check of a moment says. */
@@ -152,6 +155,22 @@ function withDryRun(start: ReactNode): ReactNode {
   );
 }
 
+/** Opens the dry-run that was asked for. */
+function useSeededDryRun({ beginDryRun }: EditorContext, seed: DryRunSeed | null): void {
+  useEffect(() => {
+    if (seed !== null) beginDryRun(seed);
+  }, [seed, beginDryRun]);
+}
+
+/** How the dry-run that is open becomes a run. */
+function recordOf({ dryRun }: EditorContext, shown: Shown, record: Props["record"]): ReactNode {
+  return dryRun && record(shown, scriptOf(dryRun.decided), dryRun.close);
+}
+
+/** The side panels are drawn when something about them has changed, not with each event of a run. */
+const StillInspector = memo(Inspector);
+const StillPeople = memo(People);
+
 export function Editor(props: Props) {
   const { id, known, progress } = props;
   const wide = useIsWide();
@@ -165,6 +184,7 @@ export function Editor(props: Props) {
   useRemoteEditAnnouncements(context.graph, link.seq > 0);
   useRunAnnouncements(context.graph, progress);
   useShortcuts(context);
+  useSeededDryRun(context, props.seed);
 
   const place = (template: NewAction) => {
     if (!context.mayEdit) return;
@@ -174,7 +194,6 @@ export function Editor(props: Props) {
     panels.setLeft(false);
   };
   const shown = useShown(context, link, { seq: problems?.seq, told });
-  const { dryRun } = context;
   const stage = (
     <CanvasPane
       me={props.me}
@@ -184,13 +203,13 @@ export function Editor(props: Props) {
       compact={!wide}
       phone={phone}
       run={props.run}
-      record={dryRun && props.record(shown, scriptOf(dryRun.decided), dryRun.close)}
+      record={recordOf(context, shown, props.record)}
       writing={overlay?.kind === "note" ? overlay.key : null}
       corner={phone ? null : props.corner}
     />
   );
   // A dry-run is told apart from runs that are over; one that goes on is never out of sight.
-  const strip = dryRun && props.run === null ? null : props.strip(shown);
+  const strip = context.dryRun && props.run === null ? null : props.strip(shown);
   const parts = {
     panels,
     stage,
@@ -200,7 +219,7 @@ export function Editor(props: Props) {
       <FindBar problems={problems?.problems ?? []} onClose={editor.closeFind} />
     ),
     details: (
-      <Inspector
+      <StillInspector
         id={id}
         seq={link.seq}
         panel={editor.panel}
@@ -222,11 +241,11 @@ export function Editor(props: Props) {
             {wide && props.status(shown)}
           </>
         ),
-        actions: <People me={props.me} />,
+        actions: <StillPeople me={props.me} />,
         start: phone ? null : withDryRun(props.start(shown)),
       })}
       {phone ? (
-        <PhoneLayout {...parts} dry={dryRun !== null} start={() => props.start(shown)} />
+        <PhoneLayout {...parts} dry={context.dryRun !== null} start={() => props.start(shown)} />
       ) : (
         <DeskLayout {...parts} wide={wide} list={() => props.list(place)} />
       )}

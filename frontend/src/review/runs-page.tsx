@@ -1,5 +1,5 @@
 /** What ran: newest first, with who, when, how long and how it ended. */
-import { Button, Checkbox, Skeleton } from "@mantine/core";
+import { ActionIcon, Button, Checkbox, Skeleton } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import {
   IconAlertTriangle,
@@ -10,7 +10,7 @@ import {
   IconSearch,
 } from "@tabler/icons-react";
 import { useInfiniteQuery, useMutation } from "@tanstack/react-query";
-import { useCallback, useMemo, useState } from "react";
+import { type MouseEvent, useCallback, useMemo, useState } from "react";
 import { Link, useLocation, useSearch } from "wouter";
 import { authorName } from "../api/graphs";
 import { errorText } from "../api/http";
@@ -102,6 +102,22 @@ function Row({ run, now, chosen, onChoose }: RunRowProps) {
       <td>{authorName(run.author)}</td>
       <td className={style.quiet}>{start !== null && `${day(start, now)} ${clock(start)}`}</td>
       <td className={style.took}>{took}</td>
+      <td className={style.figures}>
+        {run.graph !== null && (
+          <ActionIcon
+            component={Link}
+            to={`/runs/statistics?graph=${encodeURIComponent(run.graph)}`}
+            size={24}
+            variant="subtle"
+            color="gray"
+            aria-label={`Statistics of ${run.graph_name}`}
+            title={`Statistics of ${run.graph_name}`}
+            onClick={(event: MouseEvent) => event.stopPropagation()}
+          >
+            <IconChartBar size={15} aria-hidden />
+          </ActionIcon>
+        )}
+      </td>
     </tr>
   );
 }
@@ -130,6 +146,9 @@ function Rows({ runs, chosen, onChoose }: RowsProps) {
             <th>Started by</th>
             <th>Started</th>
             <th className={style.took}>Took</th>
+            <th>
+              <span className={style.hidden}>Statistics</span>
+            </th>
           </tr>
         </thead>
         <tbody>

@@ -110,12 +110,41 @@ export function progressOf(action: ActionRun, run: Run, unsure: boolean): Progre
   };
 }
 
-/** Progress by `aid`; actions of sub-graphs, which carry none, are left out. */
+/** What was said of an action last, while nothing about it or its run changed. */
+const lastSaid = new WeakMap<ActionRun, { key: string; progress: Progress }>();
+
+export function progressOfAction(
+  name: string,
+  action: ActionRun,
+  run: Run,
+  unsure: boolean,
+): Progress {
+  const key = `${name} ${run.ended_at !== null} ${unsure || run.state === "unknown"}`;
+  const before = lastSaid.get(action);
+  if (before?.key === key) return before.progress;
+  const progress = { name, ...progressOf(action, run, unsure) };
+  lastSaid.set(action, { key, progress });
+  return progress;
+}
+
+/** Progress by `aid`; actions of sub-graphs, which carry none, are left out. What is told of an action
+ * that did not change is the same object again. */
 export function progressByAid(run: Run | null, unsure: boolean): Map<string, Progress> {
   const found = new Map<string, Progress>();
   if (run === null) return found;
   for (const [name, action] of Object.entries(run.actions ?? {})) {
-    if (action.aid) found.set(action.aid, { name, ...progressOf(action, run, unsure) });
+    if (action.aid) found.set(action.aid, progressOfAction(name, action, run, unsure));
+  }
+  return found;
+}
+
+/** Progress as it was at a moment, ms: what went on then had gone on for so long. */
+export function progressAt(run: Run, unsure: boolean, at: number | null): Map<string, Progress> {
+  const found = progressByAid(run, unsure);
+  if (at === null) return found;
+  for (const [aid, progress] of found) {
+    if (progress.since === null) continue;
+    found.set(aid, { ...progress, since: null, took: Math.max(0, at - progress.since) });
   }
   return found;
 }

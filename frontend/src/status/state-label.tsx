@@ -39,15 +39,18 @@ interface Props {
   word: string;
   more?: string;
   pill?: boolean;
+  /** Its sign does not turn: something else beside it moves already. */
+  still?: boolean;
 }
 
-export function StateLabel({ tone, word, more, pill = false }: Props) {
+export function StateLabel({ tone, word, more, pill = false, still = false }: Props) {
   const Sign = signs[tone];
   return (
     <span
       className={pill ? style.pill : style.word}
       style={{ color: toneColor[tone] }}
       data-tone={tone}
+      data-still={still || undefined}
     >
       <Sign size={tone === "stopped" ? 9 : 12} stroke={2.8} aria-hidden className={style.sign} />
       {word}

@@ -5,6 +5,7 @@ import type { Robot } from "../robots";
 import { getRun, postStop, type Run } from "../runs";
 import type { RunnerApi } from "../schema/runner";
 import { sessionEnd } from "../session-end";
+import { isUrgentChange, withKeptParts } from "./kept-run";
 import {
   blockedByBrowser,
   findUnreachableReason,
@@ -46,6 +47,7 @@ const STOPS_KEPT = 5;
 const AGAIN = 1_000; // ms between two tries to send a Stop
 const SOON = 5_000; // ms; the longest wait for another try to reach the runner
 const SELDOM = 60_000; // ms; the same where trying soon has proven to be of no use
+const TOGETHER = 100; // ms in which news of runs are told together, unless they are urgent
 const ALL_HOLDS = 5_000; // ms; later, "all" would mean runs that nobody had seen when it was asked
 
 /** Usable without React: `subscribe` and `now` fit `useSyncExternalStore`. */
@@ -69,6 +71,9 @@ export class LiveSocket {
   #again: ReturnType<typeof setTimeout> | undefined;
   #tries = 0;
   #closed = false;
+  /** News of runs that listeners are told of soon. */
+  #untold: ReturnType<typeof setTimeout> | undefined;
+  #toldAt = 0; // of a clock that nobody sets
   /** What was found out about the last socket that did not open. */
   #unreached: UnreachableReason | null = null;
 
@@ -85,6 +90,7 @@ export class LiveSocket {
     this.#closed = true;
     clearTimeout(this.#watch);
     clearTimeout(this.#again);
+    clearTimeout(this.#untold);
     this.#socket?.close();
     this.#socket = null;
   }
@@ -233,7 +239,7 @@ export class LiveSocket {
             (error: Error) => console.warn("A run's end is not known", id, error.message),
           );
         }
-        for (const run of message.runs) runs.set(run.id, run);
+        for (const run of message.runs) runs.set(run.id, withKeptParts(runs.get(run.id), run));
         this.#set({
           link: "live",
           unreached: null,
@@ -267,8 +273,14 @@ export class LiveSocket {
     }
   }
 
+  /** An action that ends tells of itself and of the next one: they are drawn together. */
   #putRun(run: Run): void {
-    this.#set({ runs: new Map(this.state.runs).set(run.id, run) });
+    const before = this.state.runs.get(run.id);
+    const now = withKeptParts(before, run);
+    this.state = { ...this.state, runs: new Map(this.state.runs).set(run.id, now) };
+    const wait = this.#toldAt + TOGETHER - performance.now();
+    if (wait <= 0 || isUrgentChange(before, now)) this.#tell();
+    else this.#untold ??= setTimeout(() => this.#tell(), wait);
   }
 
   #putStop(stop: StopRequest): void {
@@ -284,6 +296,13 @@ export class LiveSocket {
 
   #set(part: Partial<LiveState>): void {
     this.state = { ...this.state, ...part };
+    this.#tell();
+  }
+
+  #tell(): void {
+    clearTimeout(this.#untold);
+    this.#untold = undefined;
+    this.#toldAt = performance.now();
     for (const listener of this.#listeners) listener();
   }
 }

@@ -1,6 +1,6 @@
 /** The view of the canvas: what is seen at first, what Fit shows, and how it follows a run. */
 import type { ReactFlowInstance } from "@xyflow/react";
-import { type RefObject, useCallback, useEffect, useMemo, useRef, useState } from "react";
+import { type RefObject, useCallback, useEffect, useMemo, useRef } from "react";
 import type { LineStore } from "../../canvas/arrows/line-store";
 import type { Arrow, CanvasNode } from "../../canvas/elements";
 import { CARD, type Positions, pillSize, type Sizes } from "../../canvas/geometry/arrange";
@@ -19,6 +19,7 @@ import {
 import type { CanvasView } from "../../edit-actions/editor-context";
 import { type Direction, ENTRY, type Key, type Position } from "../../graph/model";
 import type { Progress } from "../../status/progress";
+import { useFollowRun } from "./follow-run";
 
 interface ViewportInput {
   flow: ReactFlowInstance<CanvasNode, Arrow>;
@@ -77,14 +78,6 @@ export function focusCard(room: HTMLElement, key: Key, tries: number): void {
     else if (left > 0) requestAnimationFrame(() => look(left - 1));
   };
   look(tries);
-}
-
-/** The actions that run, the latest first. */
-function running(progress: ReadonlyMap<Key, Progress>): Key[] {
-  return [...progress]
-    .filter(([, { tone, since }]) => tone === "run" && since !== null)
-    .sort(([, a], [, b]) => (b.since ?? 0) - (a.since ?? 0))
-    .map(([key]) => key);
 }
 
 export function useViewport(given: ViewportInput) {
@@ -203,33 +196,6 @@ export function useViewport(given: ViewportInput) {
     [showAll, show, flow, frame, pointer],
   );
 
-  const follow = useFollow({ run, progress, show });
+  const follow = useFollowRun({ flow, frame, now, run, progress, glide });
   return { view, ...follow };
-}
-
-interface Followed {
-  run: string | null;
-  progress: ReadonlyMap<Key, Progress>;
-  show: (keys: readonly Key[], goal: "near") => void;
-}
-
-/** Brings what runs into view until the person moves the view; each run begins anew. */
-function useFollow({ run, progress, show }: Followed) {
-  const [left, setLeft] = useState<string | null>(null);
-  const lost = run !== null && left === run;
-  const going = running(progress);
-  const key = going.join(" ");
-  // biome-ignore lint/correctness/useExhaustiveDependencies: only when other actions run
-  useEffect(() => {
-    if (run === null || lost || going.length === 0) return;
-    // All of them if they fit together at this zoom; else at least the one that began last.
-    show(going.slice(0, 1), "near");
-    show(going, "near");
-  }, [run, lost, key]);
-  return {
-    /** A run goes, and the view no longer follows it. */
-    lost,
-    onPanned: useCallback(() => setLeft(run), [run]),
-    onFollow: useCallback(() => setLeft(null), []),
-  };
 }

@@ -7,7 +7,7 @@ import {
   IconPlayerTrackNext,
   IconPlayerTrackPrev,
 } from "@tabler/icons-react";
-import { useEffect, useRef } from "react";
+import { type ReactNode, useEffect, useRef } from "react";
 import { duration } from "../../ui/times";
 import style from "./replay-controls.module.css";
 import { REPLAY_SPEEDS, type ReplayCursor } from "./use-replay";
@@ -15,6 +15,8 @@ import { REPLAY_SPEEDS, type ReplayCursor } from "./use-replay";
 interface Props {
   replay: ReplayCursor;
   goes: boolean;
+  /** What can be done at the moment where it stands. */
+  children?: ReactNode;
 }
 
 /** Space plays, arrows step, Home and End go to the ends: wherever nobody is typing. */
@@ -45,7 +47,7 @@ function usePlayerKeys(replay: ReplayCursor): void {
   }, []);
 }
 
-export function PlayerControls({ replay, goes }: Props) {
+export function PlayerControls({ replay, goes, children }: Props) {
   const { at, start, end, playing, speed, seek, play, step } = replay;
   usePlayerKeys(replay);
   const here = at ?? end;
@@ -114,6 +116,7 @@ export function PlayerControls({ replay, goes }: Props) {
       >
         {goes ? (live ? "Live" : "Back to live") : "End"}
       </Button>
+      {children}
     </section>
   );
 }

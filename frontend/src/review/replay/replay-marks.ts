@@ -1,7 +1,7 @@
 /** What of a replay stands on the time axis, and what its marks say in words. */
 import type { Replay, ReplayMark } from "../../api/review";
 import type { Run } from "../../api/runs";
-import type { TimeGap, TimeSign } from "../../status/timeline";
+import type { TimeGap, TimeSign } from "../../status/lanes/timeline";
 import { clock, instant } from "../../ui/times";
 
 const SIGNS: Record<string, TimeSign["tone"]> = {

@@ -17,7 +17,7 @@ import { chapterAt, ReplayPlayer } from "./replay";
 
 export const REPLAY_SPEEDS = [0.25, 0.5, 1, 2, 4, 8, 16] as const;
 
-export interface ReplayCursor {
+export interface ReplayCursor<Shown extends Run | null = Run> {
   /** Milliseconds since 1970; null at the live edge, or at the end of what is over. */
   at: number | null;
   start: number;
@@ -28,7 +28,7 @@ export interface ReplayCursor {
   waiting: boolean;
   failed: unknown;
   /** The run as it was known at the cursor. */
-  run: Run;
+  run: Shown;
   player: ReplayPlayer | null;
   seek: (at: number | null) => void;
   play: (playing: boolean) => void;
@@ -39,34 +39,43 @@ export interface ReplayCursor {
 const AGAIN = 3_000; // ms between two requests for the replay of a run that goes on
 
 /** The replay of a run that goes on is asked for again and again while somebody looks at it. */
-function useAskedAgain(newest: Run, asked: boolean): void {
+function useAskedAgain(newest: Run | null, asked: boolean): void {
   const client = useQueryClient();
-  const goes = newest.ended_at === null;
+  const goes = newest?.ended_at === null;
+  const id = newest?.id ?? "";
   useEffect(() => {
     if (!goes || !asked) return;
-    const key = ["runs", "film", newest.id];
+    const key = ["runs", "film", id];
     const timer = setInterval(() => void client.invalidateQueries({ queryKey: key }), AGAIN);
     return () => {
       clearInterval(timer);
       void client.invalidateQueries({ queryKey: key });
     };
-  }, [goes, asked, client, newest.id]);
+  }, [goes, asked, client, id]);
 }
 
 /** What plays the replay, with the run as it was when its replay began. */
 function usePlayer(
   data: ReturnType<typeof useReplayData>["data"],
-  newest: Run,
+  newest: Run | null,
 ): ReplayPlayer | null {
   const still = useRef(newest);
-  if (still.current.id !== newest.id || newest.umrf !== still.current.umrf) still.current = newest;
-  return useMemo(() => (data ? new ReplayPlayer(data, still.current) : null), [data]);
+  const isOther = still.current?.id !== newest?.id || newest?.umrf !== still.current?.umrf;
+  if (isOther) still.current = newest;
+  return useMemo(
+    () => (data && still.current !== null ? new ReplayPlayer(data, still.current) : null),
+    [data],
+  );
 }
 
 /** The run as it was known at the cursor. */
-function useRunAt(player: ReplayPlayer | null, at: number | null, newest: Run): Run {
+function useRunAt<Shown extends Run | null>(
+  player: ReplayPlayer | null,
+  at: number | null,
+  newest: Shown,
+): Shown {
   return useMemo(
-    () => (at === null || player === null ? newest : player.at(at)),
+    () => (at === null || player === null ? newest : (player.at(at) as Shown)),
     [at, player, newest],
   );
 }
@@ -98,20 +107,20 @@ function useRunningTime(
   }, [playing, speed, edge, setAt, setPlaying]);
 }
 
-/** `newest`: the run as it is known now; `end`: the right edge of its time. */
-export function useReplay(
+/** `newest`: the run as it is known now, null without one; `end`: the right edge of its time. */
+export function useReplay<Shown extends Run | null>(
   runner: string | undefined,
-  newest: Run,
+  newest: Shown,
   end: number,
   from: number | null,
-): ReplayCursor {
-  const start = instant(newest.requested_at) ?? instant(newest.started_at) ?? end;
+): ReplayCursor<Shown> {
+  const start = instant(newest?.requested_at) ?? instant(newest?.started_at) ?? end;
   const [at, setAt] = useState(from);
   const [playing, setPlaying] = useState(false);
   const [speed, setSpeed] = useState(1);
   const [chapter, setChapter] = useState(0);
-  const asked = at !== null || playing;
-  const replay = useReplayData(runner, newest.id, chapter, asked);
+  const asked = newest !== null && (at !== null || playing);
+  const replay = useReplayData(runner, newest?.id ?? "", chapter, asked);
   useAskedAgain(newest, asked);
   const player = usePlayer(replay.data, newest);
   const chapters = replay.data?.chapters;

@@ -1,14 +1,11 @@
-/** What can be done with a run that was: run it again, compare it, hand it over, expect it. */
+/** A run once more: on its robots, or in the simulator, as it went or with one fault; expected from now on. */
 import { Button, Menu, Modal, Stack, Text, TextInput } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import {
-  IconArrowsDiff,
   IconBug,
   IconChevronDown,
-  IconDownload,
   IconPlayerPlay,
   IconPlayerTrackNext,
-  IconPrinter,
   IconRepeat,
   IconShieldCheck,
 } from "@tabler/icons-react";
@@ -16,7 +13,7 @@ import { useState } from "react";
 import { useLocation } from "wouter";
 import { graphMoment, useVersions, versionName } from "../../api/graphs";
 import { errorText } from "../../api/http";
-import { expectRun, exportUrl } from "../../api/review";
+import { expectRun } from "../../api/review";
 import type { Run } from "../../api/runs";
 import { FaultDialog } from "./fault-dialog";
 import { type Repeated, type RepeatedVersion, repeatRun } from "./repeat-run";
@@ -80,39 +77,6 @@ function ExpectDialog({ runner, run, onClose }: Props & { onClose: () => void })
         </Button>
       </Stack>
     </Modal>
-  );
-}
-
-/** The run as files. */
-function HandOver({ runner, run }: Props) {
-  const file = (format: "jsonl" | "csv" | "mcap") =>
-    runner === undefined ? undefined : exportUrl(runner, run.id, format);
-  return (
-    <>
-      <Menu.Label>Hand over</Menu.Label>
-      {(
-        [
-          ["jsonl", "Every event (JSON lines)"],
-          ["csv", "Intervals (CSV)"],
-          ["mcap", "For Foxglove (MCAP)"],
-        ] as const
-      ).map(([format, label]) => (
-        <Menu.Item
-          key={format}
-          component="a"
-          href={file(format)}
-          leftSection={<IconDownload size={15} aria-hidden />}
-        >
-          {label}
-        </Menu.Item>
-      ))}
-      <Menu.Item
-        leftSection={<IconPrinter size={15} aria-hidden />}
-        onClick={() => setTimeout(() => window.print(), 0)}
-      >
-        Record on paper (print or PDF)
-      </Menu.Item>
-    </>
   );
 }
 
@@ -191,9 +155,9 @@ export function RunMenu({ runner, run, engines, onStart }: MenuProps) {
             leftSection={<IconRepeat size={15} aria-hidden />}
             rightSection={<IconChevronDown size={14} aria-hidden />}
             className={style.again ?? ""}
-            aria-label="Again"
+            aria-label="Run again"
           >
-            <span className={style.word}>Again</span>
+            <span className={style.word}>Run again</span>
           </Button>
         </Menu.Target>
         <Menu.Dropdown>
@@ -221,13 +185,7 @@ export function RunMenu({ runner, run, engines, onStart }: MenuProps) {
             onSimulate={simulate}
             onFault={() => setDialog("fault")}
           />
-          <Menu.Label>Look closer</Menu.Label>
-          <Menu.Item
-            leftSection={<IconArrowsDiff size={15} aria-hidden />}
-            onClick={() => go(`/runs/compare?b=${encodeURIComponent(run.id)}`)}
-          >
-            Compare with …
-          </Menu.Item>
+          <Menu.Label>From now on</Menu.Label>
           <Menu.Item
             leftSection={<IconShieldCheck size={15} aria-hidden />}
             disabled={!over || !ran}
@@ -235,7 +193,6 @@ export function RunMenu({ runner, run, engines, onStart }: MenuProps) {
           >
             Expect this course …
           </Menu.Item>
-          <HandOver runner={runner} run={run} />
         </Menu.Dropdown>
       </Menu>
       {dialog === "fault" && (

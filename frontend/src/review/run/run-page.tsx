@@ -1,9 +1,9 @@
 /** One run: its version on the canvas, every visit on the timeline, what was said, how it ended. */
-import { Button, Skeleton, Tabs } from "@mantine/core";
+import { Skeleton, Tabs } from "@mantine/core";
 import { IconAlertTriangle } from "@tabler/icons-react";
 import { ReactFlowProvider } from "@xyflow/react";
-import { type ReactNode, useEffect, useMemo, useState } from "react";
-import { Link, useSearch } from "wouter";
+import { memo, type ReactNode, useEffect, useMemo, useState } from "react";
+import { useSearch } from "wouter";
 import { authorName } from "../../api/graphs";
 import { errorText } from "../../api/http";
 import { useLive } from "../../api/live/use-live";
@@ -12,10 +12,11 @@ import { type Run, useRun } from "../../api/runs";
 import { fromUmrf } from "../../canvas/from-umrf";
 import { GraphView } from "../../canvas/graph-view";
 import type { Graph } from "../../graph/model";
-import { type Progress, progressByAid, runEndText, runLabel } from "../../status/progress";
+import { lanesOf, useLanes } from "../../status/lanes/lanes";
+import { Timeline, type Track } from "../../status/lanes/timeline";
+import { runEndText, runLabel } from "../../status/progress";
 import { StateLabel } from "../../status/state-label";
-import { Timeline, type Track } from "../../status/timeline";
-import { lanesOf } from "../../status/timeline-lanes";
+import { useProgress } from "../../status/use-progress";
 import { Empty } from "../../ui/empty";
 import { clock, instant, useNow } from "../../ui/times";
 import type { Crumb } from "../../ui/top-bar";
@@ -25,8 +26,9 @@ import { type ReplayCursor, useReplay } from "../replay/use-replay";
 import { FailureCauses } from "./causes";
 import { RunEvents } from "./events";
 import { RawEvents } from "./raw-events";
+import { DryRunFromHere, RunActions } from "./run-actions";
 import { RunFacts } from "./run-facts";
-import { type RepeatActions, RunMenu } from "./run-menu";
+import type { RepeatActions } from "./run-menu";
 import { PinRun, RunNotes } from "./run-notes";
 import style from "./run-page.module.css";
 import { RunParameters } from "./run-parameters";
@@ -46,17 +48,6 @@ interface Props {
   bar: (parts: RunBarParts) => ReactNode;
   /** The dialog by which everything is started. */
   start: (again: RepeatActions, onClose: () => void) => ReactNode;
-}
-
-/** Progress as it was at a moment: what went on then had gone on for so long. */
-function progressAt(run: Run, unsure: boolean, at: number | null): Map<string, Progress> {
-  const found = progressByAid(run, unsure);
-  if (at === null) return found;
-  for (const [aid, progress] of found) {
-    if (progress.since === null) continue;
-    found.set(aid, { ...progress, since: null, took: Math.max(0, at - progress.since) });
-  }
-  return found;
 }
 
 /** Where a link points: a moment, in ms after the start, and an action. */
@@ -189,12 +180,20 @@ function enginesOf(run: Run, mates: readonly Track[]): string[] {
   return [run.engine, ...mates.map(({ run: mate }) => mate.engine)].sort();
 }
 
+/** The page is drawn with time, the canvas only with what changes on it. */
+const RunCanvas = memo(function RunCanvas(props: Parameters<typeof GraphView>[0]) {
+  return (
+    <ReactFlowProvider>
+      <GraphView {...props} />
+    </ReactFlowProvider>
+  );
+});
+
 interface RunTimelineProps {
   newest: Run;
   graph: Graph;
   replay: ReplayCursor;
   replayData: Parameters<typeof timelineSignsOf>[0];
-  until: number;
   unsure: boolean;
   selected: string | null;
   onPick: (aid: string | null) => void;
@@ -204,14 +203,18 @@ interface RunTimelineProps {
 
 /** Every visit, and the controls of the replay. */
 function RunTimeline(props: RunTimelineProps) {
-  const { newest, graph, replay, replayData, until, unsure, selected, onPick, mates } = props;
-  const robot = mates.length > 0 ? newest.engine : "";
-  const lanes = useMemo(() => lanesOf(newest, graph, robot), [newest, graph, robot]);
+  const { newest, graph, replay, replayData, unsure, selected, onPick, mates } = props;
+  const { now } = useLive();
+  const lanes = useLanes(newest, graph, mates.length > 0 ? newest.engine : "");
+  const silent = instant(newest.unknown_since);
+  const until = instant(newest.ended_at) ?? silent ?? replay.end;
   const signs = useMemo(() => timelineSignsOf(replayData), [replayData]);
   const gaps = useMemo(() => silentTimesOf(replayData, newest, until), [replayData, newest, until]);
   return (
     <section className={style.strip} aria-label="Timeline">
-      <PlayerControls replay={replay} goes={newest.ended_at === null} />
+      <PlayerControls replay={replay} goes={newest.ended_at === null}>
+        <DryRunFromHere run={newest} at={replay.at} />
+      </PlayerControls>
       {replay.failed !== null && (
         <p className={style.failed} role="alert">
           The replay cannot be loaded: {errorText(replay.failed)}
@@ -220,8 +223,7 @@ function RunTimeline(props: RunTimelineProps) {
       <Timeline
         run={newest}
         lanes={lanes}
-        until={until}
-        unsure={unsure}
+        silentSince={unsure ? now.since : silent}
         selected={selected}
         onPick={onPick}
         cursor={replay.at}
@@ -241,16 +243,13 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
   const graph = useMemo(() => fromUmrf(newest.umrf), [newest.umrf]);
   const goes = newest.ended_at === null;
   const unsure = goes && live.link === "down";
-  const present = useNow(250, goes);
+  const present = useNow(1000, goes);
   const until = unsure ? live.since : (instant(newest.ended_at) ?? present);
   const replay = useReplay(runner, newest, until, place.from);
   const { run } = replay;
   const past = replay.at !== null;
   useAddress(newest.id, replay, selected);
-  const progress = useMemo(
-    () => progressAt(run, unsure && !past, replay.at),
-    [run, unsure, past, replay.at],
-  );
+  const progress = useProgress(run, unsure && !past, replay.at);
   const mates = useTracks(runner, newest);
   const engines = useMemo(() => enginesOf(newest, mates), [newest, mates]);
   const [again, setAgain] = useState<RepeatActions | null>(null);
@@ -269,34 +268,26 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
         actions: (
           <>
             <PinRun runner={runner} run={newest.id} />
-            <RunMenu runner={runner} run={newest} engines={engines} onStart={setAgain} />
-            {newest.graph !== null && (
-              <Button component={Link} to={`/graphs/${newest.graph}`} className={style.back ?? ""}>
-                Open graph
-              </Button>
-            )}
+            <RunActions runner={runner} run={newest} engines={engines} onStart={setAgain} />
           </>
         ),
       })}
       <main className={style.page}>
         <FailureCauses runner={runner} run={newest} onShow={show} />
         <section className={style.canvas} aria-label="Graph of the run">
-          <ReactFlowProvider>
-            <GraphView
-              graph={graph}
-              progress={progress}
-              selected={picked}
-              onSelect={setSelected}
-              label={`Version ${label} of ${newest.graph_name}`}
-            />
-          </ReactFlowProvider>
+          <RunCanvas
+            graph={graph}
+            progress={progress}
+            selected={picked}
+            onSelect={setSelected}
+            label={`Version ${label} of ${newest.graph_name}`}
+          />
         </section>
         <RunTimeline
           newest={newest}
           graph={graph}
           replay={replay}
           replayData={replayData}
-          until={until}
           unsure={unsure}
           selected={selected}
           onPick={setSelected}

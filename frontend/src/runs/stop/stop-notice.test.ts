@@ -2,7 +2,14 @@ import { expect, test } from "vitest";
 import type { LiveState, StopRequest } from "../../api/live/live-socket";
 import { needsRestConfirmation, type Run } from "../../api/runs";
 import { runToStop, stopButtonText } from "./stop-button";
-import { movingAgain, noticeOf, othersNotice, unreachableNotice } from "./stop-notice";
+import {
+  headOf,
+  movingAgain,
+  noticeKey,
+  noticeOf,
+  othersNotice,
+  unreachableNotice,
+} from "./stop-notice";
 
 const stop: StopRequest = { id: "s", run: "r", at: 1000, state: "heard", detail: "" };
 
@@ -116,6 +123,15 @@ test("a run that was called stopped and moves again is shouted before anything e
   expect(notice?.text).toContain("MOVES AGAIN: run 7: David shows Work_0 moving");
   expect(notice?.text).toContain("It is being stopped again.");
   expect(notice?.text).toContain("hardware stop");
+});
+
+test("what is put aside keeps its head, and comes back when it is about something else", () => {
+  const loud = (text: string) => ({ tone: "loud", text, stays: true }) as const;
+  const one = loud("STOP UNCONFIRMED: run 7 on David: no proof has come.");
+  expect(headOf(one)).toBe("STOP UNCONFIRMED");
+  expect(noticeKey(loud("STOP UNCONFIRMED: run 7 on David: it is deaf."))).toBe(noticeKey(one));
+  expect(noticeKey(loud("STOP UNCONFIRMED: run 8 on Eve: it is deaf."))).not.toBe(noticeKey(one));
+  expect(noticeKey(loud("MOVES AGAIN: run 7: David moves."))).not.toBe(noticeKey(one));
 });
 
 test("a runner that is not reached is never silence", () => {

@@ -1,5 +1,6 @@
 /** What became of a Stop, in words, until it is proven. */
 import { CloseButton } from "@mantine/core";
+import { IconAlertOctagon } from "@tabler/icons-react";
 import { useState } from "react";
 import type { LiveState, StopRequest } from "../../api/live/live-socket";
 import { foreignGraphs, openRuns, useLive } from "../../api/live/use-live";
@@ -131,6 +132,32 @@ export function unreachableNotice(now: LiveState, at: number): StopNoticeText {
   return { tone: "loud", stays: true, text };
 }
 
+type ShownNotice = NonNullable<StopNoticeText>;
+
+/** What stays to be read when the rest is put aside: STOP UNCONFIRMED, say. */
+export function headOf({ text }: ShownNotice): string {
+  return text.split(":", 1)[0] ?? text;
+}
+
+/** The same notice stays aside while it says the same of the same runs; anything new is shouted again. */
+export function noticeKey({ text }: ShownNotice): string {
+  return `${headOf({ tone: "loud", text })} ${(text.match(/run \d+/g) ?? []).sort().join(" ")}`;
+}
+
+/** Whether the loud notice is put aside. What it says stays to be seen, in short; `asked`: the newest
+ * Stop, with which it is shouted again. */
+function useAside(notice: StopNoticeText, asked: string) {
+  const [put, setPut] = useState("");
+  const key = notice?.stays ? `${asked} ${noticeKey(notice)}` : "";
+  // Once it is over, or about something else, it is not aside any more: the next one is shouted.
+  if (put !== "" && key !== put) setPut("");
+  return {
+    is: key !== "" && key === put,
+    put: () => setPut(key),
+    bringBack: () => setPut(""),
+  };
+}
+
 export function StopNotice() {
   const { now } = useLive();
   const [dismissed, setDismissed] = useState("");
@@ -145,7 +172,15 @@ export function StopNotice() {
     (watching ? noticeOf(last, now, at) : null) ??
     othersNotice(now) ??
     unreachableNotice(now, at);
+  const aside = useAside(notice, last?.id ?? "");
   if (notice === null) return null;
+  if (aside.is) {
+    return (
+      <button type="button" className={style.aside} onClick={aside.bringBack} title={notice.text}>
+        <IconAlertOctagon size={15} aria-hidden /> {headOf(notice)}
+      </button>
+    );
+  }
   const looked =
     notice.tone === "loud" && now.link !== "down"
       ? openRuns(now).find(needsRestConfirmation)
@@ -165,6 +200,9 @@ export function StopNotice() {
         )}
       </span>
       {looked && <ConfirmRestButton run={looked} loud />}
+      {notice.stays && (
+        <CloseButton size="sm" aria-label="Put aside" title="Put aside" onClick={aside.put} />
+      )}
       {!notice.stays && (
         <CloseButton size="sm" aria-label="Hide" onClick={() => setDismissed(last?.id ?? "")} />
       )}

@@ -10,19 +10,20 @@ import {
   IconX,
 } from "@tabler/icons-react";
 import type { ReactNode } from "react";
-import { errorText } from "../api/http";
-import { OutcomeSign, outcomeColor, outcomeWord } from "../canvas/outcome";
-import type { RunningAction } from "../dry-run/playback";
-import { type DecidedFaultKind, faultWords } from "../dry-run/script";
-import { DRY_RUN_SPEEDS, type DryRun } from "../dry-run/use-dry-run";
-import * as editActions from "../edit-actions/dry-run-actions";
-import type { EditAction } from "../edit-actions/edit-action";
-import { labelOf } from "../edit-actions/edit-action";
-import { type EditorContext, selectedActions } from "../edit-actions/editor-context";
-import { FirstShortcut } from "../edit-actions/keys/shortcut-keys";
-import { fullName } from "../graph/model";
-import { endName } from "../graph/relation-words";
+import { errorText } from "../../api/http";
+import { OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
+import type { RunningAction } from "../../dry-run/playback";
+import { type DecidedFaultKind, faultWords } from "../../dry-run/script";
+import { DRY_RUN_SPEEDS, type DryRun } from "../../dry-run/use-dry-run";
+import * as editActions from "../../edit-actions/dry-run-actions";
+import type { EditAction } from "../../edit-actions/edit-action";
+import { labelOf } from "../../edit-actions/edit-action";
+import { type EditorContext, selectedActions } from "../../edit-actions/editor-context";
+import { FirstShortcut } from "../../edit-actions/keys/shortcut-keys";
+import { fullName } from "../../graph/model";
+import { endName } from "../../graph/relation-words";
 import style from "./dry-run-bar.module.css";
+import { SeedEnd, SeedNote } from "./dry-run-seed";
 
 const CHOICES = ["on_true", "on_false", "on_error"] as const;
 
@@ -111,6 +112,7 @@ function Choices({ context, run }: { context: EditorContext; run: DryRun }) {
           {outcomeWord[outcome]}
         </Button>
       ))}
+      <SeedEnd run={run} node={going.node} />
     </div>
   );
 }
@@ -179,7 +181,12 @@ function Said({ run }: { run: DryRun }) {
     <>
       {run.words.join(" · ") || "…"}
       {last && run.cut && <i> · It goes on; the dry-run is cut here.</i>}
-      {last && !run.cut && run.sighting.running.length > 0 && <i> · This never ends by itself.</i>}
+      {last && !run.cut && run.sighting.running.length > 0 && (
+        <i>
+          {" "}
+          · {run.seed ? "It waits for you: decide how it ends." : "This never ends by itself."}
+        </i>
+      )}
     </>
   );
 }
@@ -198,6 +205,7 @@ export function DryRunBar({
     <section className={style.bar} aria-label="Dry-run">
       <div className={style.row}>
         <span className={style.title}>Dry-run</span>
+        <SeedNote run={run} />
         <Step context={context} editAction={editActions.restart}>
           <IconPlayerSkipBack size={17} aria-hidden />
         </Step>

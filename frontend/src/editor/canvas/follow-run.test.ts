@@ -1,0 +1,43 @@
+import fc from "fast-check";
+import { expect, test } from "vitest";
+import { CARD } from "../../canvas/geometry/arrange";
+import { followedBox, followingViewport } from "./follow-run";
+
+const frame = { width: 900, height: 500 };
+const card = (x: number, y: number) => ({ x, y, width: CARD.width, height: CARD.height });
+const zoomed = (zoom: number) => ({ x: 0, y: 0, zoom });
+
+test("what runs near the middle leaves the view where it is", () => {
+  expect(followingViewport(card(300, 200), frame, zoomed(1))).toBeNull();
+});
+
+test("what leaves the middle is brought back with room ahead of it, at the same zoom", () => {
+  const next = followingViewport(card(2_000, 200), frame, zoomed(0.8));
+  expect(next?.zoom).toBe(0.8);
+  const left = 2_000 * 0.8 + (next?.x ?? 0);
+  expect(left).toBeGreaterThan(0);
+  expect(left + CARD.width * 0.8).toBeLessThan(frame.width / 2 + 20);
+});
+
+test("wherever a card stands, one motion is enough", () => {
+  const place = fc.integer({ min: -5_000, max: 5_000 });
+  const zoom = fc.double({ min: 0.1, max: 1.5, noNaN: true });
+  fc.assert(
+    fc.property(place, place, zoom, (x, y, zoom) => {
+      const next = followingViewport(card(x, y), frame, zoomed(zoom));
+      if (next !== null) expect(followingViewport(card(x, y), frame, next)).toBeNull();
+    }),
+  );
+});
+
+test("of several that run all are shown where they fit, else the latest", () => {
+  const places = new Map<string, readonly [number, number]>([
+    ["a", [0, 0]],
+    ["b", [300, 0]],
+    ["far", [9_000, 0]],
+  ]);
+  const box = (keys: string[]) => followedBox(keys, places, new Map(), frame, 1);
+  expect(box(["b", "a"])).toMatchObject({ x: 0, width: 300 + CARD.width });
+  expect(box(["far", "a"])).toMatchObject({ x: 9_000, width: CARD.width });
+  expect(box(["gone"])).toBeNull();
+});

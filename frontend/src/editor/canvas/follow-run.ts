@@ -1,0 +1,143 @@
+/** How the view follows a run: along the path that is taken, seldom, and never against the person. */
+import type { ReactFlowInstance, Viewport } from "@xyflow/react";
+import { type RefObject, useCallback, useEffect, useRef, useState } from "react";
+import type { Arrow, CanvasNode } from "../../canvas/elements";
+import type { Positions, Sizes } from "../../canvas/geometry/arrange";
+import { type Bounds, boundsOf } from "../../canvas/geometry/viewport";
+import type { Key } from "../../graph/model";
+import type { Progress } from "../../status/progress";
+
+interface FrameRoom {
+  readonly width: number;
+  readonly height: number;
+}
+
+/** Of the frame: what runs within is left where it is. */
+const CALM = 0.12;
+/** Where what runs comes to stand: most graphs go on to the right and down. */
+const AIM = { x: 0.38, y: 0.42 };
+const GLIDE = 700; // ms
+
+/** The actions that run, the latest first. */
+function runningKeys(progress: ReadonlyMap<Key, Progress>): Key[] {
+  return [...progress]
+    .filter(([, { tone, since }]) => tone === "run" && since !== null)
+    .sort(([, a], [, b]) => (b.since ?? 0) - (a.since ?? 0))
+    .map(([key]) => key);
+}
+
+/** Where to look so that a box is seen with room around it; null while it is. The zoom stays. */
+export function followingViewport(box: Bounds, frame: FrameRoom, view: Viewport): Viewport | null {
+  const { zoom } = view;
+  const [width, height] = [box.width * zoom, box.height * zoom];
+  const [left, top] = [box.x * zoom + view.x, box.y * zoom + view.y];
+  const calm = { x: frame.width * CALM, y: frame.height * CALM };
+  const within = (from: number, size: number, edge: number, room: number) =>
+    from >= Math.min(edge, (room - size) / 2) &&
+    from + size <= room - Math.min(edge, (room - size) / 2);
+  const seen =
+    within(left, width, calm.x, frame.width) && within(top, height, calm.y, frame.height);
+  if (seen) return null;
+  const aim = (size: number, room: number, share: number) =>
+    Math.max(0, Math.min(room - size, room * share - size / 2));
+  return {
+    x: aim(width, frame.width, AIM.x) - box.x * zoom,
+    y: aim(height, frame.height, AIM.y) - box.y * zoom,
+    zoom,
+  };
+}
+
+/** All that run where they fit in the frame together; else the one that began last. */
+export function followedBox(
+  running: readonly Key[],
+  places: Positions,
+  sizes: Sizes,
+  frame: FrameRoom,
+  zoom: number,
+): Bounds | null {
+  const some = (keys: readonly Key[]): Bounds | null => {
+    const found: Positions = new Map();
+    for (const key of keys) {
+      const at = places.get(key);
+      if (at) found.set(key, at);
+    }
+    return boundsOf(found, sizes);
+  };
+  const all = some(running);
+  const fits =
+    all !== null &&
+    all.width * zoom <= frame.width * 0.8 &&
+    all.height * zoom <= frame.height * 0.8;
+  return fits ? all : some(running.slice(0, 1));
+}
+
+const HANDS_REST = 4_000; // ms after which somebody who did something on the canvas is followed again
+const TYPING = "input, textarea, [contenteditable=true], [role=dialog] *";
+
+/** Whether the person is at work: the view is theirs then. */
+function useHandsOn(frame: RefObject<HTMLElement | null>) {
+  const last = useRef(Number.NEGATIVE_INFINITY);
+  useEffect(() => {
+    const room = frame.current;
+    if (room === null) return;
+    const touched = () => {
+      last.current = performance.now();
+    };
+    const kinds = ["pointerdown", "keydown", "wheel"] as const;
+    for (const kind of kinds) room.addEventListener(kind, touched, { passive: true });
+    return () => {
+      for (const kind of kinds) room.removeEventListener(kind, touched);
+    };
+  }, [frame]);
+  const isBusy = useCallback(
+    () =>
+      performance.now() - last.current < HANDS_REST ||
+      document.activeElement?.matches(TYPING) === true,
+    [],
+  );
+  const release = useCallback(() => {
+    last.current = Number.NEGATIVE_INFINITY;
+  }, []);
+  return { isBusy, release };
+}
+
+interface Followed {
+  flow: ReactFlowInstance<CanvasNode, Arrow>;
+  frame: RefObject<HTMLDivElement | null>;
+  /** Where everything stands now. */
+  now: RefObject<{ places: Positions; sizes: Sizes }>;
+  /** The run that goes, if one does. */
+  run: string | null;
+  progress: ReadonlyMap<Key, Progress>;
+  /** How long a motion may take here: nothing for people who want none. */
+  glide: (ms: number) => number;
+}
+
+/** Keeps what runs in view until the person moves the view; each run begins anew. */
+export function useFollowRun({ flow, frame, now, run, progress, glide }: Followed) {
+  const [left, setLeft] = useState<string | null>(null);
+  const lost = run !== null && left === run;
+  const going = runningKeys(progress);
+  const key = going.join(" ");
+  const { isBusy, release } = useHandsOn(frame);
+  // biome-ignore lint/correctness/useExhaustiveDependencies: only when other actions run
+  useEffect(() => {
+    const room = frame.current;
+    if (run === null || lost || going.length === 0 || room === null || isBusy()) return;
+    const size = { width: room.clientWidth, height: room.clientHeight };
+    const here = flow.getViewport();
+    const { places, sizes } = now.current ?? { places: new Map(), sizes: new Map() };
+    const box = followedBox(going, places, sizes, size, here.zoom);
+    const next = box && followingViewport(box, size, here);
+    if (next) void flow.setViewport(next, { duration: glide(GLIDE) });
+  }, [run, lost, key]);
+  return {
+    /** A run goes, and the view no longer follows it. */
+    lost,
+    onPanned: useCallback(() => setLeft(run), [run]),
+    onFollow: useCallback(() => {
+      release();
+      setLeft(null);
+    }, [release]),
+  };
+}

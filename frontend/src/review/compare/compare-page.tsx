@@ -1,0 +1,256 @@
+/** Two runs on one canvas: what differed before they began, where they part, and why that is likely. */
+import { Button, Select, Skeleton, Tabs } from "@mantine/core";
+import { IconAlertTriangle, IconArrowsDiff } from "@tabler/icons-react";
+import { useQuery } from "@tanstack/react-query";
+import { type ReactNode, useState } from "react";
+import { Link, useLocation, useSearch } from "wouter";
+import { authorName } from "../../api/graphs";
+import { errorText } from "../../api/http";
+import { useLive } from "../../api/live/use-live";
+import { type Comparison, listRuns, NO_FILTER, useComparison } from "../../api/review";
+import { getRun, type Run, useRun } from "../../api/runs";
+import { boundsText } from "../../status/durations";
+import { runEndText, runLabel } from "../../status/progress";
+import { StateLabel } from "../../status/state-label";
+import { Empty } from "../../ui/empty";
+import { clock, day, instant, useNow } from "../../ui/times";
+import type { RunBarParts } from "../run/run-page";
+import { GraphChanges } from "./changes";
+import style from "./compare-page.module.css";
+import { ComparedCanvas, Legend } from "./compared-cards";
+import { differencesOf, likelyCause, sameAsSeen } from "./differences";
+import { GhostLanes } from "./ghost-lanes";
+import { Steps } from "./steps-table";
+
+function Head({ run, title }: { run: Run; title: string }) {
+  const now = useNow(60_000);
+  const start = instant(run.started_at);
+  const end = instant(run.ended_at);
+  const { tone, word } = runLabel(run);
+  return (
+    <section className={style.run} aria-label={title}>
+      <Link to={`/runs/${run.id}`} className={style.link}>
+        Run {run.number} · {run.graph_name}
+      </Link>
+      <StateLabel pill tone={tone} word={end === null ? word : runEndText(run)} />
+      <span className={style.meta}>
+        {run.simulated ? "simulator" : run.engine} · {authorName(run.author)}
+        {start !== null && ` · ${day(start, now)} ${clock(start)}`}
+        {end !== null && boundsText(run.took) && ` · ${boundsText(run.took)}`}
+      </span>
+    </section>
+  );
+}
+
+function Said({ found }: { found: Comparison }) {
+  const { parting } = found;
+  if (parting === null) return null;
+  const said = [...new Set([...parting.messages_a, ...parting.messages_b])];
+  return (
+    <>
+      {said.map((text) => (
+        <blockquote key={text} className={style.said}>
+          “{text}”
+        </blockquote>
+      ))}
+    </>
+  );
+}
+
+/** What came of it in one sentence, with what most likely made them part. */
+function Verdict({ found }: { found: Comparison }) {
+  const cause = likelyCause(found);
+  return (
+    <section className={style.verdict} data-parts={found.parting !== null || undefined}>
+      <IconArrowsDiff size={18} aria-hidden />
+      <div>
+        <p>
+          <b>{found.text}</b>
+          {cause !== null && <span> Likely because {cause}.</span>}
+          {found.parting !== null && cause === null && (
+            <span> Nothing that is known differed before.</span>
+          )}
+        </p>
+        <Said found={found} />
+      </div>
+    </section>
+  );
+}
+
+function Before({ found }: { found: Comparison }) {
+  return (
+    <section>
+      <h3>Before they began</h3>
+      {!found.same_engine && (
+        <p className={style.same}>
+          They ran in different places: {found.a.engine} and {found.b.engine}.
+        </p>
+      )}
+      <GraphChanges found={found} />
+    </section>
+  );
+}
+
+function WhereTheyPart({ found, onSelect }: SideProps) {
+  const all = differencesOf(found);
+  const same = sameAsSeen(found);
+  return (
+    <>
+      <section>
+        <h3>Where they part</h3>
+        {all.length === 0 && <p className={style.same}>Nowhere, as far as was seen.</p>}
+        <ol className={style.differences} aria-label="Differences">
+          {all.slice(0, MOST).map(({ number, step, title, text }) => (
+            <li key={number}>
+              <i aria-hidden>{number}</i>
+              <button type="button" onClick={() => onSelect(step.aid)}>
+                {title}
+              </button>
+              <p>{text}</p>
+            </li>
+          ))}
+        </ol>
+        {all.length > MOST && <p className={style.same}>and {all.length - MOST} more</p>}
+      </section>
+      {same.length > 0 && (
+        <section>
+          <h3>The same, as far as seen</h3>
+          {same.slice(0, MOST).map(({ name, text }) => (
+            <p key={name} className={style.same}>
+              <b>{name}</b> {text}.
+            </p>
+          ))}
+        </section>
+      )}
+    </>
+  );
+}
+
+const MOST = 12; // of each list
+
+interface SideProps {
+  found: Comparison;
+  onSelect: (aid: string | null) => void;
+}
+
+/** The differences in words, and every step in a table. */
+function Side({ found, onSelect }: SideProps) {
+  return (
+    <aside className={style.side} aria-label="What differs">
+      <Tabs defaultValue="differences" keepMounted={false} className={style.tabs ?? ""}>
+        <Tabs.List>
+          <Tabs.Tab value="differences">Differences {differencesOf(found).length}</Tabs.Tab>
+          <Tabs.Tab value="steps">Step by step</Tabs.Tab>
+        </Tabs.List>
+        <Tabs.Panel value="differences" className={style.panel ?? ""}>
+          <Head run={found.b} title="This run" />
+          <Head run={found.a} title="The other run" />
+          <Before found={found} />
+          <WhereTheyPart found={found} onSelect={onSelect} />
+        </Tabs.Panel>
+        <Tabs.Panel value="steps" className={style.panel ?? ""}>
+          <div className={style.scroll}>
+            <Steps found={found} />
+          </div>
+          {found.left_out > 0 && (
+            <p className={style.same}>{found.left_out} later steps are not listed.</p>
+          )}
+        </Tabs.Panel>
+      </Tabs>
+    </aside>
+  );
+}
+
+function Found({ runner, found }: { runner: string | undefined; found: Comparison }) {
+  const [selected, setSelected] = useState<string | null>(null);
+  const b = useRun(runner, found.b.id).data;
+  const props = { found, selected };
+  return (
+    <div className={style.layout}>
+      <Verdict found={found} />
+      <section className={style.canvas} aria-label="Both runs on the graph">
+        {b === undefined ? (
+          <Skeleton height="100%" radius={0} />
+        ) : (
+          <>
+            <ComparedCanvas {...props} run={b} onSelect={setSelected} />
+            <Legend found={found} />
+          </>
+        )}
+      </section>
+      <div className={style.strip}>
+        <GhostLanes {...props} a={found.a} b={found.b} onPick={setSelected} />
+      </div>
+      <Side found={found} onSelect={setSelected} />
+    </div>
+  );
+}
+
+/** Chooses the run to compare with, among those of the same graph. */
+function Choose({ runner, b }: { runner: string; b: string }) {
+  const [, go] = useLocation();
+  const second = useQuery({
+    queryKey: ["runs", "one", b],
+    queryFn: ({ signal }) => getRun(runner, b, signal),
+  });
+  const graph = second.data?.graph ?? second.data?.graph_name ?? "";
+  const others = useQuery({
+    queryKey: ["runs", "of", graph],
+    queryFn: ({ signal }) => listRuns(runner, { ...NO_FILTER, graph }, null, 200, signal),
+    enabled: graph !== "",
+  });
+  const choices = (others.data ?? [])
+    .filter((run) => run.id !== b)
+    .map((run) => ({ value: run.id, label: `Run ${run.number} · ${runEndText(run)}` }));
+  return (
+    <Empty icon={<IconArrowsDiff size={22} />} title="Compare with which run?">
+      <Select
+        aria-label="Run to compare with"
+        placeholder={
+          choices.length === 0 && others.isSuccess ? "No other run of it" : "Choose a run"
+        }
+        data={choices}
+        searchable
+        onChange={(a) => a && go(`/runs/compare?${new URLSearchParams({ a, b })}`)}
+      />
+    </Empty>
+  );
+}
+
+export function ComparePage({ bar }: { bar: (parts: RunBarParts) => ReactNode }) {
+  const query = new URLSearchParams(useSearch());
+  const [a, b] = [query.get("a") ?? "", query.get("b") ?? ""];
+  const { runner } = useLive();
+  const found = useComparison(runner, a, b);
+  return (
+    <>
+      {bar({
+        crumbs: [{ label: "Runs", to: "/runs" }, { label: "Compare" }],
+        actions: a !== "" && b !== "" && (
+          <Button
+            component={Link}
+            variant="default"
+            to={`/runs/compare?${new URLSearchParams({ a: b, b: a })}`}
+          >
+            Swap
+          </Button>
+        ),
+      })}
+      <main className={style.page}>
+        {a === "" && runner !== undefined && b !== "" && <Choose runner={runner} b={b} />}
+        {found.isLoading && (
+          <div className={style.inner} aria-busy="true">
+            <Skeleton height={60} mb={12} />
+            <Skeleton height={280} />
+          </div>
+        )}
+        {found.isError && (
+          <Empty icon={<IconAlertTriangle size={22} />} title="These runs cannot be compared">
+            {errorText(found.error)}
+          </Empty>
+        )}
+        {found.data && <Found runner={runner} found={found.data} />}
+      </main>
+    </>
+  );
+}

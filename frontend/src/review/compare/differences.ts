@@ -1,0 +1,191 @@
+/** Where two runs part and why that is likely: differences in words, never between overlapping ranges. Pure. */
+import type { ComparedField, ComparedStep, Comparison } from "../../api/review";
+import type { Visit } from "../../api/runs";
+import { boundsText } from "../../status/durations";
+import { visitDuration } from "../../status/progress";
+
+/** How long something took, ms; `most` is Infinity where nothing bounds it. */
+export interface DurationRange {
+  readonly least: number;
+  readonly most: number;
+}
+
+/** What an action did in one run. */
+export interface ActionSummary {
+  /** `true`, `false`, `error`, `stopped`, or `unknown`, in the order of its visits. */
+  readonly results: readonly string[];
+  /** All its visits together; null where an end was not seen. */
+  readonly took: DurationRange | null;
+}
+
+export interface ComparedAction {
+  readonly aid: string | null;
+  readonly name: string;
+  /** Null: it did not run. */
+  readonly a: ActionSummary | null;
+  readonly b: ActionSummary | null;
+}
+
+function rangeOf(visit: Visit): DurationRange | null {
+  const { took, atMost } = visitDuration(visit);
+  return took === null ? null : { least: took, most: atMost ?? took };
+}
+
+function summaryOf(visits: readonly Visit[]): ActionSummary | null {
+  if (visits.length === 0) return null;
+  const ranges = visits.map(rangeOf);
+  const known = ranges.every((range) => range !== null);
+  return {
+    results: visits.map(({ result }) => result ?? "unknown"),
+    took: known
+      ? {
+          least: ranges.reduce((sum, range) => sum + range.least, 0),
+          most: ranges.reduce((sum, range) => sum + range.most, 0),
+        }
+      : null,
+  };
+}
+
+/** Each action once, in the order in which they began. */
+export function comparedActions(found: Comparison): ComparedAction[] {
+  const steps = new Map<string, ComparedStep[]>();
+  for (const step of found.steps) {
+    steps.set(step.action, [...(steps.get(step.action) ?? []), step]);
+  }
+  return [...steps].map(([name, all]) => ({
+    name,
+    aid: all[0]?.aid ?? null,
+    a: summaryOf(all.flatMap(({ a }) => a ?? [])),
+    b: summaryOf(all.flatMap(({ b }) => b ?? [])),
+  }));
+}
+
+export function rangeText(range: DurationRange | null): string {
+  if (range === null) return "no end seen";
+  const most = range.most === Number.POSITIVE_INFINITY ? null : range.most / 1000;
+  return boundsText({ least: range.least / 1000, most }) ?? "not known how long";
+}
+
+export function overlap(a: DurationRange, b: DurationRange): boolean {
+  return a.least <= b.most && b.least <= a.most;
+}
+
+export interface NumberedDifference {
+  /** 1 is the first one: where the runs part. */
+  readonly number: number;
+  readonly step: ComparedStep;
+  readonly title: string;
+  readonly text: string;
+}
+
+const spaced = (name: string) => name.replace(/_(\d+)$/, " $1");
+
+function ended(visit: Visit): string {
+  if (visit.result === null) return visit.until === null ? "went on" : "ended, result not known";
+  return visit.result === "error" ? "ended with an error" : `ended ${visit.result}`;
+}
+
+function visitWords(step: ComparedStep): string {
+  return step.visit > 1 ? `${spaced(step.action)}, visit ${step.visit},` : spaced(step.action);
+}
+
+function differenceOf(
+  step: ComparedStep,
+  found: Comparison,
+): Pick<NumberedDifference, "title" | "text"> {
+  const [a, b] = [`run ${found.a.number}`, `run ${found.b.number}`];
+  const [one, other] = [step.a, step.b];
+  const who = visitWords(step);
+  if (one === null || other === null) {
+    const ran = one ?? other;
+    const [where, not] = one === null ? [b, a] : [a, b];
+    const did = ran === null ? "" : ` and ${ended(ran)} after ${rangeText(rangeOf(ran))}`;
+    const again = step.visit > 1 ? " again" : "";
+    const text = `In ${where} it ran${again}${did}; in ${not} it did not.`;
+    return { title: `${who} ran only in ${where}`, text };
+  }
+  const slower =
+    step.slower === null || step.slower === undefined
+      ? ""
+      : ` Clearly longer in ${step.slower === "a" ? a : b}.`;
+  return {
+    title: `${who} ${ended(other)}`,
+    text: `After ${rangeText(rangeOf(other))}. In ${a} it ${ended(one)} after ${rangeText(rangeOf(one))}.${slower}`,
+  };
+}
+
+const DIFFERS: ReadonlySet<string> = new Set(["result", "only_a", "only_b"]);
+
+/** What is proven to differ, from the parting on. */
+export function differencesOf(found: Comparison): NumberedDifference[] {
+  return found.steps
+    .filter(({ relation }) => DIFFERS.has(relation))
+    .map((step, i) => ({ number: i + 1, step, ...differenceOf(step, found) }));
+}
+
+/** Actions that ended the same, and for which no difference in time is claimed. */
+export function sameAsSeen(found: Comparison): { name: string; text: string }[] {
+  return comparedActions(found).flatMap(({ name, a, b }) => {
+    const steps = found.steps.filter(({ action }) => action === name);
+    const same = steps.every(({ relation, slower }) => relation === "same" && !slower);
+    if (!same || !a?.took || !b?.took) return [];
+    if (!overlap(a.took, b.took)) return [];
+    const [x, y] = [rangeText(b.took), rangeText(a.took)];
+    const text = x === y ? `${x} in both` : `${x} and ${y} overlap: no difference is claimed`;
+    return [{ name: spaced(name), text }];
+  });
+}
+
+/** The value inside a parameter's JSON text, or the text itself. */
+export function plainValue(value: unknown): string {
+  if (value === null || value === undefined) return "—";
+  if (typeof value !== "string") return JSON.stringify(value);
+  try {
+    const parsed: unknown = JSON.parse(value);
+    if (typeof parsed === "object" && parsed !== null && "pvf_value" in parsed) {
+      return JSON.stringify(parsed.pvf_value);
+    }
+    return typeof parsed === "string" ? parsed : value;
+  } catch {
+    return value;
+  }
+}
+
+export function fieldWords(field: string): string {
+  if (field.startsWith("in/")) return `input ${field.slice(3)}`;
+  if (field.startsWith("out/")) return `output ${field.slice(4)}`;
+  if (field.startsWith("remap/")) return `remap of ${field.slice(6)}`;
+  return field.replaceAll("_", " ");
+}
+
+function changedWords({ field, before, after }: ComparedField): string {
+  const name = field.replace(/^(in|out)\//, "");
+  return `its ${name} was ${plainValue(after)} instead of ${plainValue(before)}`;
+}
+
+/** What the visit ran with in one run and not in the other, as far as engines told it. */
+function ranWithOther({ a, b }: ComparedStep): string | null {
+  const [before, after] = [a?.inputs, b?.inputs];
+  if (!before || !after) return null;
+  const name = Object.keys(after).find((each) => each in before && before[each] !== after[each]);
+  if (name === undefined) return null;
+  const [was, is] = [plainValue(before[name]), plainValue(after[name])];
+  return `it ran with ${name.replaceAll("::", " / ")} ${is} instead of ${was}`;
+}
+
+/** What most likely made the runs part: the nearest thing that differed before. Null: nothing known did. */
+export function likelyCause(found: Comparison): string | null {
+  const { parting } = found;
+  if (parting === null) return null;
+  const { step } = parting;
+  const own = found.graph.actions.find(({ aid }) => aid === step.aid);
+  const field = own?.fields.find(({ field }) => /^(in|out)\//.test(field)) ?? undefined;
+  if (field !== undefined) return changedWords(field);
+  const input = ranWithOther(step);
+  if (input !== null) return input;
+  if (own !== undefined && own.change !== "changed") return `${own.name} was ${own.change}`;
+  const led = found.graph.relations.find(({ child }) => child === step.action);
+  if (led !== undefined) return `the arrow ${led.parent} → ${led.child} was ${led.change}`;
+  if (!found.same_engine) return `they ran on ${found.a.engine} and on ${found.b.engine}`;
+  return null;
+}

@@ -1,0 +1,69 @@
+import { expect, test } from "vitest";
+import type { LiveState } from "../api/live/live-socket";
+import type { Run } from "../api/runs";
+import { movesNow } from "./moves-now";
+
+const action = (state: string, how = "observed") => ({
+  aid: "a",
+  state,
+  visits: [{ how }],
+  older: 0,
+  messages: [],
+});
+
+const run = (part: Partial<Run>) =>
+  ({
+    id: "r",
+    number: 1,
+    engine: "atlas",
+    simulated: false,
+    state: "running",
+    ended_at: null,
+    unknown_since: null,
+    actions: {},
+    ...part,
+  }) as unknown as Run;
+
+const live = (runs: Run[], link: LiveState["link"] = "live"): LiveState => ({
+  link,
+  since: 0,
+  engines: [],
+  runs: new Map(runs.map((each) => [each.id, each])),
+  stops: [],
+});
+
+const actions = (all: Record<string, ReturnType<typeof action>>) =>
+  all as unknown as Run["actions"];
+
+test("what runs is named by robot, and what was only concluded is marked", () => {
+  const birch = run({
+    id: "b",
+    engine: "birch",
+    actions: actions({ Hold_2: action("RUNNING", "inferred") }),
+  });
+  const atlas = run({
+    actions: actions({ Drive_0: action("RUNNING"), Open_0: action("FINISHED") }),
+  });
+  expect(movesNow(live([birch, atlas])).map(({ robot, words }) => `${robot}: ${words}`)).toEqual([
+    "atlas: Drive 0",
+    "birch: Hold 2 (inferred)",
+  ]);
+});
+
+test("of a robot that is not heard nothing is said to move, and nothing to rest", () => {
+  const moving = actions({ Drive_0: action("RUNNING") });
+  const silent = run({ state: "unknown", unknown_since: "1970-01-01T00:00:01Z", actions: moving });
+  expect(movesNow(live([silent]))).toMatchObject([{ kind: "unknown", words: "not known" }]);
+  for (const link of ["down", "connecting"] as const) {
+    expect(movesNow(live([run({ actions: moving })], link))).toMatchObject([
+      { kind: "unknown", words: "not known" },
+    ]);
+  }
+});
+
+test("a stop under way is no rest, and a run that has ended is no longer told", () => {
+  expect(movesNow(live([run({ state: "stopping" })]))).toMatchObject([
+    { kind: "unknown", words: "stopping, rest not proven" },
+  ]);
+  expect(movesNow(live([run({ state: "finished", ended_at: "t" })]))).toEqual([]);
+});

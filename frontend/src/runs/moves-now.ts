@@ -1,0 +1,61 @@
+/** What moves now, on which robot: only what an engine has shown; the rest is said to be not known. Pure. */
+import type { LiveState } from "../api/live/live-socket";
+import { foreignGraphs, openRuns } from "../api/live/use-live";
+import type { Run } from "../api/runs";
+import { instant } from "../ui/times";
+
+export interface Moving {
+  readonly robot: string;
+  /** `moves`: seen; `still`: heard of, and nothing was seen to move; `unknown`: nobody knows. */
+  readonly kind: "moves" | "still" | "unknown";
+  readonly words: string;
+  /** The run of it; null for what nobody started from here. */
+  readonly run: string | null;
+}
+
+const MOVE: ReadonlySet<string> = new Set(["RUNNING", "STOPPING", "PAUSE_REQUESTED"]);
+
+/** The actions of a run that were seen to move, by their names, with what was not seen marked. */
+export function movingActions(run: Run): string[] {
+  return Object.entries(run.actions ?? {})
+    .filter(([, action]) => MOVE.has(action.state))
+    .map(([name, action]) => {
+      const words = name.replace(/_(\d+)$/, " $1");
+      return action.visits.at(-1)?.how === "inferred" ? `${words} (inferred)` : words;
+    });
+}
+
+const AT_NO_WORD: Partial<Record<Run["state"], string>> = {
+  paused: "paused",
+  requested: "asked to start",
+  published: "starting",
+  stopping: "stopping, rest not proven",
+};
+
+function ofRun(run: Run): Moving {
+  const robot = run.simulated ? "simulator" : run.engine;
+  const base = { robot, run: run.id };
+  if (run.state === "unknown" || run.state === "lost" || instant(run.unknown_since) !== null) {
+    return { ...base, kind: "unknown", words: "not known" };
+  }
+  const names = movingActions(run);
+  if (names.length > 0) return { ...base, kind: "moves", words: names.join(", ") };
+  const words = AT_NO_WORD[run.state] ?? "no action seen to run";
+  return { ...base, kind: run.state === "stopping" ? "unknown" : "still", words };
+}
+
+/** By robot. While the runner is not heard, nothing is known of any of them. */
+export function movesNow(now: LiveState): Moving[] {
+  const runs = openRuns(now).map(ofRun);
+  const foreign = foreignGraphs(now).map(
+    ({ robot, held }): Moving => ({
+      robot: robot.name,
+      kind: "moves",
+      words: `${held.graph}, not started here`,
+      run: null,
+    }),
+  );
+  const all = [...runs, ...foreign].sort((a, b) => a.robot.localeCompare(b.robot));
+  if (now.link === "live") return all;
+  return all.map((each) => ({ ...each, kind: "unknown", words: "not known" }));
+}

@@ -1,0 +1,149 @@
+/** One action over time: its visits as bars, and how it is now at the right. */
+import { Fragment, memo } from "react";
+import type { Visit } from "../../api/runs";
+import { colorOfName } from "../../ui/name-colors";
+import { stopwatch, useNow } from "../../ui/times";
+import { durationText } from "../durations";
+import type { Progress, Tone } from "../progress";
+import { StateLabel, toneColor } from "../state-label";
+import { shareOf, type TimeAxis } from "./axis";
+import { type Bar, barOf } from "./bars";
+import type { Lane } from "./lanes";
+import style from "./timeline.module.css";
+
+interface Props {
+  lane: Lane;
+  visits: readonly Visit[];
+  progress: Progress | null;
+  axis: TimeAxis;
+  /** When its run ended, ms; null while it goes on. */
+  ended: number | null;
+  /** Since when nothing is heard of its run, ms. */
+  silentSince: number | null;
+  selected: boolean;
+  onPick: ((aid: string) => void) | undefined;
+}
+
+const GROWS = 250; // ms between two drawings of what goes on
+
+const percent = (share: number) => `${share * 100}%`;
+
+/** What reaches from a moment to now: moved, not drawn again, while time goes on. */
+function Growing({ axis, from, ...look }: GrowingProps) {
+  const now = useNow(GROWS);
+  const left = shareOf(axis, from);
+  const room = Math.max(1e-6, 1 - left);
+  const part = Math.max(0.004, shareOf(axis, now) - left) / room;
+  return (
+    <span className={style.grows} style={{ left: percent(left) }}>
+      <i
+        className={look.className}
+        data-tone={look.tone}
+        style={{
+          transform: `translateX(${(Math.min(1, part) - 1) * 100}%)`,
+          ...(look.tone ? { color: toneColor[look.tone] } : {}),
+        }}
+      />
+    </span>
+  );
+}
+
+interface GrowingProps {
+  axis: TimeAxis;
+  from: number;
+  tone?: Tone;
+  className?: string | undefined;
+}
+
+function Fixed({ bar, inferred }: { bar: Bar; inferred: boolean }) {
+  const { sure, maybe, tone } = bar;
+  const color = toneColor[tone];
+  return (
+    <>
+      {maybe && (
+        <i
+          className={style.maybe}
+          data-bounds={sure === null ? "all" : undefined}
+          title="It went on at some time within this: its ends were not seen exactly"
+          style={{ left: percent(maybe.left), width: percent(maybe.width), color }}
+        />
+      )}
+      {sure && (
+        <i
+          data-tone={tone}
+          data-inferred={inferred || undefined}
+          style={{ left: percent(sure.left), width: percent(sure.width), color }}
+        />
+      )}
+    </>
+  );
+}
+
+/** One visit. What goes on is drawn up to now; from where nothing is heard any more, hatched. */
+function VisitBar(props: Pick<Props, "axis" | "ended" | "silentSince"> & { visit: Visit }) {
+  const { visit, axis, ended, silentSince } = props;
+  const known = ended ?? silentSince;
+  const bar = barOf(visit, axis, known ?? axis.start + axis.span, ended !== null);
+  if (bar === null) return null;
+  const grows = bar.open && silentSince === null && bar.sure !== null;
+  if (!grows) return <Fixed bar={bar} inferred={visit.how === "inferred"} />;
+  const from = axis.start + (bar.sure?.left ?? 0) * axis.span;
+  return <Growing axis={axis} from={from} tone="run" className={style.open} />;
+}
+
+/** How long it has been going on. */
+function Since({ progress, since }: { progress: Progress; since: number }) {
+  const now = useNow(1000);
+  return (
+    <StateLabel tone={progress.tone} word={progress.word} more={stopwatch(now - since)} still />
+  );
+}
+
+function LaneState({ progress }: { progress: Progress }) {
+  if (progress.since !== null && progress.tone === "run") {
+    return <Since progress={progress} since={progress.since} />;
+  }
+  const took = durationText(progress);
+  const often = progress.visits > 1 ? `${progress.visits}×` : "";
+  const more = [took, often].filter(Boolean).join(" · ");
+  return (
+    <StateLabel
+      tone={progress.tone}
+      word={progress.word}
+      still
+      {...(more === "" ? {} : { more })}
+    />
+  );
+}
+
+export const LaneRow = memo(function LaneRow(props: Props) {
+  const { lane, visits, progress, axis, ended, silentSince, selected, onPick } = props;
+  const silent = ended === null ? silentSince : null;
+  const was = visits.at(-1)?.until === null;
+  return (
+    <li className={style.lane} data-lane={lane.name} data-selected={selected || undefined}>
+      <button
+        type="button"
+        className={style.name}
+        disabled={lane.aid === null || onPick === undefined}
+        onClick={() => lane.aid && onPick?.(lane.aid)}
+        title={lane.name}
+      >
+        <i style={{ background: colorOfName(lane.robot) }} aria-hidden />
+        <span>{lane.name}</span>
+      </button>
+      <div className={style.track} data-track aria-hidden>
+        {visits.map((visit, i) => (
+          // biome-ignore lint/suspicious/noArrayIndexKey: visits only ever grow
+          <Fragment key={i}>
+            <VisitBar visit={visit} axis={axis} ended={ended} silentSince={silentSince} />
+          </Fragment>
+        ))}
+        {silent !== null && (
+          <Growing axis={axis} from={silent} className={was ? style.silentOpen : style.silent} />
+        )}
+      </div>
+      <span className={style.state}>{progress && <LaneState progress={progress} />}</span>
+    </li>
+  );
+});

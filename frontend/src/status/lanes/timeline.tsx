@@ -1,0 +1,266 @@
+/** Lanes of runs over time, by robot: one for each action, with what is not known left hatched. */
+import {
+  Fragment,
+  type KeyboardEvent,
+  type PointerEvent,
+  useEffect,
+  useMemo,
+  useRef,
+  useState,
+} from "react";
+import type { Run } from "../../api/runs";
+import { colorOfName } from "../../ui/name-colors";
+import { duration, instant, stopwatch } from "../../ui/times";
+import { progressOf, progressOfAction, type Tone } from "../progress";
+import { toneColor } from "../state-label";
+import { growingSpan, shareOf, type TimeAxis, ticksOf, wholeSpan } from "./axis";
+import { LaneRow } from "./lane-row";
+import { type Lane, robotsOf } from "./lanes";
+import { Playhead } from "./playhead";
+import style from "./timeline.module.css";
+
+interface Props extends Track {
+  selected?: string | null;
+  onPick?: (aid: string) => void;
+  /** Where a replay stands, ms; null at the live edge. */
+  cursor?: number | null;
+  onSeek?: (at: number | null) => void;
+  /** The keyboard seeks here: nothing else beside it does. */
+  seeksByKeys?: boolean;
+  signs?: readonly TimeSign[];
+  gaps?: readonly TimeGap[];
+  /** Runs on the same axis: those that began together with this one. */
+  others?: readonly Track[];
+}
+
+/** The lanes of a run. */
+export interface Track {
+  run: Run;
+  lanes: readonly Lane[];
+  /** Since when nothing is heard of it, ms. */
+  silentSince?: number | null;
+}
+
+/** A moment worth seeing on the axis: a stop, a pause, a proof, an alarm. */
+export interface TimeSign {
+  at: number;
+  tone: Tone;
+  text: string;
+}
+
+/** A time of which nothing is known, ms. */
+export interface TimeGap {
+  from: number;
+  until: number;
+  text: string;
+}
+
+/** From the first start to the last end; while something goes on it grows in steps. */
+function useAxis(tracks: readonly Track[]): TimeAxis {
+  const starts = tracks.map(({ run }) => instant(run.started_at ?? run.requested_at));
+  const start = Math.min(...starts.filter((each) => each !== null), Date.now());
+  const ends = tracks.map(({ run }) => instant(run.ended_at));
+  const goes = ends.includes(null);
+  const end = Math.max(...ends.map((each) => each ?? start));
+  const [steps, setSteps] = useState(0);
+  useEffect(() => {
+    if (!goes) return;
+    const timer = setInterval(() => setSteps(growingSpan(Date.now() - start)), 250);
+    return () => clearInterval(timer);
+  }, [goes, start]);
+  const span = goes ? Math.max(steps, growingSpan(Date.now() - start)) : wholeSpan(end - start);
+  return useMemo(() => ({ start, span }), [start, span]);
+}
+
+function Ticks({ span }: { span: number }) {
+  return (
+    <div className={style.axis} aria-hidden>
+      {ticksOf(span).map((t) => (
+        <span key={t} style={{ left: `${(t / span) * 100}%` }}>
+          {t < 60_000 ? `${t / 1000} s` : duration(t)}
+        </span>
+      ))}
+    </div>
+  );
+}
+
+interface AcrossProps {
+  axis: TimeAxis;
+  cursor: number | null;
+  goes: boolean;
+  silentSince: number | null;
+  signs: readonly TimeSign[];
+  gaps: readonly TimeGap[];
+}
+
+/** Everything that stands across the lanes: ticks, gaps, signs and the playhead. */
+function Across({ axis, cursor, goes, silentSince, signs, gaps }: AcrossProps) {
+  const at = (moment: number) => shareOf(axis, moment) * 100;
+  return (
+    <div className={style.across} aria-hidden>
+      {ticksOf(axis.span).map((t) => (
+        <i key={t} className={style.tick} style={{ left: `${(t / axis.span) * 100}%` }} />
+      ))}
+      {gaps.map((gap) => (
+        <i
+          key={gap.from}
+          className={style.gap}
+          title={gap.text}
+          style={{ left: `${at(gap.from)}%`, width: `${at(gap.until) - at(gap.from)}%` }}
+        />
+      ))}
+      {signs.map((sign) => (
+        <i
+          key={`${sign.at} ${sign.text}`}
+          className={style.sign}
+          title={sign.text}
+          style={{ left: `${at(sign.at)}%`, color: toneColor[sign.tone] }}
+        />
+      ))}
+      <Playhead axis={axis} cursor={cursor} goes={goes} silentSince={silentSince} />
+    </div>
+  );
+}
+
+const NOTHING: readonly never[] = [];
+
+/** What begins to run comes into view, within the list only. */
+function useNewestInView(lanes: Props["lanes"], run: Run, live: boolean) {
+  const list = useRef<HTMLUListElement>(null);
+  const newest = live
+    ? lanes.findLast(({ name }) => {
+        const action = run.actions?.[name];
+        return action !== undefined && progressOf(action, run, false)?.tone === "run";
+      })?.name
+    : undefined;
+  useEffect(() => {
+    const box = list.current;
+    if (box === null || newest === undefined) return;
+    const lane = box.querySelector<HTMLElement>(`[data-lane="${CSS.escape(newest)}"]`);
+    if (lane === null) return;
+    const [view, at] = [box.getBoundingClientRect(), lane.getBoundingClientRect()];
+    if (at.bottom > view.bottom) box.scrollTop += at.bottom - view.bottom;
+    else if (at.top < view.top) box.scrollTop -= view.top - at.top;
+  }, [newest]);
+  return list;
+}
+
+/** Pulling over the ruler or the lanes goes to that moment; keys go in seconds. */
+function useSeeking(axis: TimeAxis, cursor: number | null, onSeek: Props["onSeek"]) {
+  const ruler = useRef<HTMLDivElement>(null);
+  const seek = (event: PointerEvent<HTMLElement>) => {
+    const box = ruler.current?.getBoundingClientRect();
+    if (onSeek === undefined || box === undefined) return;
+    if (event.type === "pointermove" && event.buttons === 0) return;
+    const on = event.target as Element;
+    const held = event.currentTarget.hasPointerCapture(event.pointerId);
+    if (!held && on.closest("[data-track], [data-ruler]") === null) return;
+    if (event.type === "pointerdown") event.currentTarget.setPointerCapture(event.pointerId);
+    const part = Math.min(1, Math.max(0, (event.clientX - box.left) / box.width));
+    onSeek(axis.start + part * axis.span);
+  };
+  const onKeyDown = (event: KeyboardEvent) => {
+    const here = cursor ?? Math.min(Date.now(), axis.start + axis.span);
+    const goal = new Map<string, number | null>([
+      ["ArrowLeft", here - 1000],
+      ["ArrowRight", cursor === null ? null : here + 1000],
+      ["Home", axis.start],
+      ["End", null],
+    ]);
+    if (onSeek === undefined || !goal.has(event.key)) return;
+    event.preventDefault();
+    event.stopPropagation();
+    onSeek(goal.get(event.key) ?? null);
+  };
+  return { ruler, pull: { onPointerDown: seek, onPointerMove: seek }, onKeyDown };
+}
+
+/** How the ruler is told and moved by those who do not use a pointer. */
+function sliderOf(axis: TimeAxis, cursor: number | null) {
+  const at = cursor === null ? axis.span : cursor - axis.start;
+  return {
+    role: "slider",
+    tabIndex: 0,
+    "aria-label": "Moment of the run",
+    "aria-valuemin": 0,
+    "aria-valuemax": Math.round(axis.span / 1000),
+    "aria-valuenow": Math.round(at / 1000),
+    "aria-valuetext": cursor === null ? "now" : stopwatch(at),
+  } as const;
+}
+
+interface GroupsProps extends Pick<Props, "selected" | "onPick"> {
+  track: Track;
+  axis: TimeAxis;
+  /** Robots have their names above their lanes. */
+  named: boolean;
+}
+
+/** The lanes of one run, those of each robot together. */
+function Groups({ track, axis, named, selected = null, onPick }: GroupsProps) {
+  const { run, lanes, silentSince = null } = track;
+  const ended = instant(run.ended_at);
+  const silent = ended === null ? silentSince : null;
+  return robotsOf(lanes).map((robot) => (
+    <Fragment key={robot}>
+      {named && (
+        <li className={style.robot} style={{ color: colorOfName(robot) }}>
+          <i style={{ background: colorOfName(robot) }} aria-hidden />
+          {robot === "" ? "any robot" : robot}
+        </li>
+      )}
+      {lanes
+        .filter((lane) => lane.robot === robot)
+        .map((lane) => {
+          const action = run.actions?.[lane.name];
+          return (
+            <LaneRow
+              key={lane.name}
+              lane={lane}
+              visits={action?.visits ?? NOTHING}
+              progress={action ? progressOfAction(lane.name, action, run, silent !== null) : null}
+              axis={axis}
+              ended={ended}
+              silentSince={silent}
+              selected={lane.aid !== null && lane.aid === selected}
+              onPick={onPick}
+            />
+          );
+        })}
+    </Fragment>
+  ));
+}
+
+export function Timeline(props: Props) {
+  const { run, lanes, onSeek, cursor = null, signs = NOTHING, gaps = NOTHING } = props;
+  const tracks: readonly Track[] = [props, ...(props.others ?? NOTHING)];
+  const axis = useAxis(tracks);
+  const goes = tracks.some((track) => track.run.ended_at === null);
+  const silentSince = run.ended_at === null ? (props.silentSince ?? null) : null;
+  const list = useNewestInView(lanes, run, run.ended_at === null && cursor === null);
+  const { ruler, pull, onKeyDown } = useSeeking(axis, cursor, onSeek);
+  const named = tracks.length > 1 || robotsOf(lanes).length > 1;
+  const slider = props.seeksByKeys && onSeek ? { ...sliderOf(axis, cursor), onKeyDown } : {};
+  return (
+    <div className={style.timeline} data-seeks={onSeek !== undefined || undefined} {...pull}>
+      <div className={style.head}>
+        <div ref={ruler} className={style.ruler} data-ruler {...slider}>
+          <Ticks span={axis.span} />
+        </div>
+      </div>
+      <Across {...{ axis, cursor, goes, silentSince, signs, gaps }} />
+      <ul ref={list} className={style.lanes} aria-label="Actions of the run over time">
+        {tracks.map((track) => (
+          <Groups
+            key={track.run.id}
+            track={track}
+            axis={axis}
+            named={named}
+            selected={props.selected ?? null}
+            {...(props.onPick ? { onPick: props.onPick } : {})}
+          />
+        ))}
+      </ul>
+    </div>
+  );
+}

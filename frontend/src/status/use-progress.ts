@@ -1,0 +1,24 @@
+/** Progress of a run for React: the same map as before while nothing in it has changed. */
+import { useRef } from "react";
+import type { Run } from "../api/runs";
+import { type Progress, progressAt } from "./progress";
+
+export type ProgressByAid = ReadonlyMap<string, Progress>;
+
+function keptProgress(before: ProgressByAid, now: ProgressByAid): ProgressByAid {
+  if (before.size !== now.size) return now;
+  for (const [key, progress] of now) if (before.get(key) !== progress) return now;
+  return before;
+}
+
+/** `at`: the moment at which a replay stands, ms. */
+export function useProgress(
+  run: Run | null,
+  unsure: boolean,
+  at: number | null = null,
+): ProgressByAid {
+  const last = useRef<ProgressByAid>(new Map());
+  const now = run === null ? new Map() : progressAt(run, unsure, at);
+  last.current = keptProgress(last.current, now);
+  return last.current;
+}
