@@ -318,7 +318,7 @@ test("the rarer filters narrow the list, and what was stored can be read as it i
 test("statistics tell how often it succeeds and which action fails", async () => {
   const { page } = ada;
   await page.goto(`${product.url}/runs?graph=${graph}`);
-  await page.getByRole("link", { name: "Statistics" }).click();
+  await page.getByRole("link", { name: "Statistics", exact: true }).click();
   await expect(page.getByText(/of \d+ runs finished true/)).toBeVisible();
   await expect(page.getByRole("row", { name: /Wait_1/ })).toBeVisible();
   await expect(page.getByText(/Wait_1.*visits|1 of \d+ visits/).first()).toBeVisible();

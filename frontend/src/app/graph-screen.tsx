@@ -14,7 +14,6 @@ import { Sidebar } from "../library/sidebar";
 import { useReplay } from "../review/replay/use-replay";
 import { askedDryRun } from "../review/run/dry-run-link";
 import { ConnectionStatus } from "../runs/connection-status";
-import { DraftStatus } from "../runs/draft-status";
 import { RunDrawer } from "../runs/drawer/run-drawer";
 import { RecordDryRun } from "../runs/start/record-dry-run";
 import { StartControl } from "../runs/start/start-control";
@@ -22,11 +21,15 @@ import { useProgress } from "../status/use-progress";
 import { roomUrl } from "../sync/room-connection";
 import { RoomProvider, useLinkPart, useRoom, useThrottledGraph } from "../sync/use-room";
 import { Empty } from "../ui/empty";
+import { lazyPart } from "../ui/parts/lazy-part";
+import { PartBoundary } from "../ui/parts/part-boundary";
 import { instant } from "../ui/times";
 import { useStableCallback } from "../ui/use-stable-callback";
 import { useNewGraphs } from "./new-graphs";
 import { PageBar, PageFrame } from "./page-frame";
 import { useTitle } from "./use-title";
+
+const DraftStatus = lazyPart(() => import("../runs/draft-status").then((part) => part.DraftStatus));
 
 /** How long a start waits for the name of the moment on screen, ms. */
 const NAMED_MS = 3_000;
@@ -114,14 +117,16 @@ function Inside({ id }: { id: string }) {
       bar={(parts) => <TitledBar id={id} {...parts} />}
       list={(place) => <Lists id={id} create={create} choose={choose} place={place} />}
       status={(shown: Shown) => (
-        <DraftStatus
-          run={live}
-          label={label}
-          graph={shown.graph}
-          seq={shown.seq}
-          settle={settle}
-          obstacle={shown.obstacle}
-        />
+        <PartBoundary waiting={null}>
+          <DraftStatus
+            run={live}
+            label={label}
+            graph={shown.graph}
+            seq={shown.seq}
+            settle={settle}
+            obstacle={shown.obstacle}
+          />
+        </PartBoundary>
       )}
       start={(shown: Shown) =>
         mayStart && (

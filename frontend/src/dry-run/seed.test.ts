@@ -7,7 +7,8 @@ import { addAction, connect, setEntry } from "../graph/edit";
 import { readGraph } from "../graph/read";
 import { keysByName, type PlaybackState } from "./playback";
 import { decidedBy, scriptOf } from "./script";
-import { seededMoment, seedOf, visitAt } from "./seed";
+import { seededMoment } from "./seed";
+import { seedOf, visitAt } from "./seed-of-run";
 
 const doc = new Y.Doc();
 const look = addAction(doc, { name: "Look" });

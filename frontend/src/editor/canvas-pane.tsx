@@ -41,6 +41,8 @@ interface Props {
   writing: string | null;
   /** In the lower right corner. */
   corner: ReactNode;
+  /** Whether cards that stand nowhere are about to be placed, which is an edit. */
+  onPlacing: (placing: boolean) => void;
 }
 
 /** What is said while there is nothing to see. */
@@ -104,7 +106,7 @@ function Inside(props: Props) {
   // The canvas keeps up with the hands of others; what stands beside it comes after.
   const context = useMemo<EditorContext>(() => ({ ...calm, graph }), [calm, graph]);
   const arrived = useLinkPart(({ seq }) => seq > 0);
-  const first = useFirstLayout(context, arrived);
+  const first = useFirstLayout(context, arrived, props.onPlacing);
   const canvas = useCanvasElements({
     graph: first.pending ? EMPTY_GRAPH : context.graph,
     selection: context.selection,

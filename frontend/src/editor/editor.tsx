@@ -1,6 +1,6 @@
 /** The editor of one graph: list, canvas, details and run strip, arranged for the screen at hand. */
 import { useLocalStorage } from "@mantine/hooks";
-import { type ComponentProps, memo, type ReactNode, useEffect } from "react";
+import { type ComponentProps, memo, type ReactNode, useEffect, useState } from "react";
 import type { Script } from "../api/dry-runs";
 import { useOpenThreadsOnCards, useThreads } from "../comments/use-threads";
 import { scriptOf } from "../dry-run/script";
@@ -84,8 +84,9 @@ interface Checked {
   readonly told: readonly ToldProblem[];
 }
 
-function obstacleOf(context: EditorContext, link: RoomLink, checked: Checked) {
+function obstacleOf(context: EditorContext, link: RoomLink, checked: Checked, placing: boolean) {
   if (link.state !== "live") return "not connected to the editor";
+  if (placing) return "its cards are being placed";
   if (link.unsaved > 0) return "saving";
   if (context.graph.actions.length === 0) return "nothing to run yet";
   const blocks = checked.seq === link.seq ? blockWords(checked.told) : "";
@@ -110,7 +111,12 @@ function crumbsOf(context: EditorContext): Crumb[] {
   ];
 }
 
-function useShown(context: EditorContext, link: RoomLink, checked: Checked): Shown {
+function useShown(
+  context: EditorContext,
+  link: RoomLink,
+  checked: Checked,
+): Shown & { onPlacing: (placing: boolean) => void } {
+  const [placing, setPlacing] = useState(false);
   const wide = useIsWide();
   const phone = useIsPhone();
   const [folded, setFolded] = useLocalStorage({
@@ -124,7 +130,8 @@ function useShown(context: EditorContext, link: RoomLink, checked: Checked): Sho
   return {
     graph: context.graph,
     seq: link.seq,
-    obstacle: obstacleOf(context, link, checked),
+    obstacle: obstacleOf(context, link, checked, placing),
+    onPlacing: setPlacing,
     selected,
     pick: (aid) => {
       context.select([aid]);
@@ -173,8 +180,6 @@ const StillPeople = memo(People);
 
 export function Editor(props: Props) {
   const { id, known, progress } = props;
-  const wide = useIsWide();
-  const phone = useIsPhone();
   const panels = usePanels();
   const { context, adding, overlay, ...editor } = useEditor(id, panels.onPanel);
   const link = useThrottledLink();
@@ -194,18 +199,20 @@ export function Editor(props: Props) {
     panels.setLeft(false);
   };
   const shown = useShown(context, link, { seq: problems?.seq, told });
+  const { compact, phone } = shown;
   const stage = (
     <CanvasPane
       me={props.me}
       canvasHandle={editor.canvasHandle}
       progress={progress}
       marks={marks}
-      compact={!wide}
+      compact={compact}
       phone={phone}
       run={props.run}
       record={recordOf(context, shown, props.record)}
       writing={overlay?.kind === "note" ? overlay.key : null}
       corner={phone ? null : props.corner}
+      onPlacing={shown.onPlacing}
     />
   );
   // A dry-run is told apart from runs that are over; one that goes on is never out of sight.
@@ -238,7 +245,7 @@ export function Editor(props: Props) {
           <>
             <SaveStatus />
             <ProblemCount told={told} />
-            {wide && props.status(shown)}
+            {!compact && props.status(shown)}
           </>
         ),
         actions: <StillPeople me={props.me} />,
@@ -247,7 +254,7 @@ export function Editor(props: Props) {
       {phone ? (
         <PhoneLayout {...parts} dry={context.dryRun !== null} start={() => props.start(shown)} />
       ) : (
-        <DeskLayout {...parts} wide={wide} list={() => props.list(place)} />
+        <DeskLayout {...parts} wide={!compact} list={() => props.list(place)} />
       )}
       <RoomNotices />
       <Overlays context={context} known={known} overlay={overlay} onClose={editor.closeOverlay} />

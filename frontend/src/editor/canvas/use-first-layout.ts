@@ -1,5 +1,5 @@
 /** Lays out a graph in which nothing stands anywhere yet, and writes that down as one edit. */
-import { useEffect, useRef, useState } from "react";
+import { useEffect, useLayoutEffect, useRef, useState } from "react";
 import { arrange, isUnplaced, type Positions } from "../../canvas/geometry/arrange";
 import { LAYOUT_PATIENCE_MS } from "../../canvas/geometry/use-laid-out";
 import type { EditorContext } from "../../edit-actions/editor-context";
@@ -10,11 +10,19 @@ import { usePeople } from "../../sync/use-room";
 /** Of several pages that open it at once the others wait for one; their places would be the same. */
 const TURN_MS = 800;
 
-/** The places, for as long as nobody has written any; null before, and where they are not needed. */
+interface FirstLayout {
+  /** For as long as nobody has written any; null before, and where they are not needed. */
+  readonly places: Positions | null;
+  readonly pending: boolean;
+  readonly busy: boolean;
+}
+
+/** `onPlacing`: told whether the edit that writes the places is still to come. */
 export function useFirstLayout(
   context: EditorContext,
   arrived: boolean,
-): { places: Positions | null; pending: boolean; busy: boolean } {
+  onPlacing: (placing: boolean) => void,
+): FirstLayout {
   const unplaced = arrived && isUnplaced(context.graph);
   // Somebody has undone the layout: doing it again would leave them no way back.
   const stood = useRef(false);
@@ -22,6 +30,7 @@ export function useFirstLayout(
   const loose = unplaced && !stood.current;
   const plain = useRef<Positions | null>(null);
   const [places, setPlaces] = useState<Positions | null>(null);
+  const [failed, setFailed] = useState(false);
   const people = usePeople();
   const now = useRef({ context, people });
   now.current = { context, people };
@@ -44,6 +53,7 @@ export function useFirstLayout(
       clearTimeout(patience);
       if (!asked || gone.current) return;
       setPlaces(found ?? new Map());
+      setFailed(found === null);
       if (found === null) return;
       if (plain.current !== null) requestAnimationFrame(() => now.current.context.view.open());
       const { context, people } = now.current;
@@ -63,5 +73,11 @@ export function useFirstLayout(
   }, [loose]);
   const pending = loose && places === null;
   const busy = pending || (loose && places === plain.current);
+  const placing = loose && context.mayEdit && !failed && context.graph.actions.length > 0;
+  // Before anything is drawn: a Start that can be pressed for a moment only would be called off.
+  useLayoutEffect(() => {
+    onPlacing(placing);
+    return () => onPlacing(false);
+  }, [placing, onPlacing]);
   return { places: loose ? places : null, pending, busy };
 }

@@ -1,16 +1,29 @@
 /** The moment of a run from which a dry-run is asked for, as the record has it. */
-import { useRef } from "react";
+import { notifications } from "@mantine/notifications";
+import { useEffect, useRef, useState } from "react";
+import { errorText } from "../../api/http";
 import { useRun } from "../../api/runs";
-import { fromUmrf } from "../../canvas/from-umrf";
-import { type DryRunSeed, seedOf } from "../../dry-run/seed";
-import { differences } from "../../graph/meaning";
+import type { DryRunSeed } from "../../dry-run/seed";
 import type { Graph } from "../../graph/model";
-import { instant } from "../../ui/times";
+import type { seedOfMoment } from "./record-reader";
 
 /** Of a run, `t` ms after its start. */
 interface Asked {
   run: string;
   t: number;
+}
+
+/** What reads records is loaded for those who ask. */
+function useRecordReader(asked: boolean): typeof seedOfMoment | null {
+  const [loaded, setLoaded] = useState<{ seedOfMoment: typeof seedOfMoment } | null>(null);
+  useEffect(() => {
+    if (!asked) return;
+    import("./record-reader").then(setLoaded, (error: Error) => {
+      const message = errorText(error);
+      notifications.show({ color: "red", title: "The dry-run does not begin there", message });
+    });
+  }, [asked]);
+  return loaded?.seedOfMoment ?? null;
 }
 
 /** Made once for each moment that is asked for: the graph as it was when the record arrived. */
@@ -21,13 +34,12 @@ export function useSeed(
   begun: boolean,
 ): DryRunSeed | null {
   const run = useRun(asked === null ? undefined : runner, asked?.run ?? "").data;
+  const read = useRecordReader(asked !== null);
   const made = useRef<{ asked: Asked; seed: DryRunSeed } | null>(null);
-  if (asked === null || run === undefined || !begun) return null;
+  if (asked === null || run === undefined || !begun || read === null) return null;
   const { current } = made;
   if (current?.asked.run === asked.run && current.asked.t === asked.t) return current.seed;
-  const start = instant(run.started_at ?? run.requested_at) ?? 0;
-  const differs = differences(fromUmrf(run.umrf), graph).length;
-  const seed = seedOf(run, graph, differs, start + asked.t);
+  const seed = read(run, graph, asked.t);
   made.current = { asked, seed };
   return seed;
 }
