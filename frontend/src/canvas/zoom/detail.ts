@@ -10,8 +10,11 @@ const FROM: readonly (readonly [Detail, number])[] = [
   ["middle", 0.5],
   ["far", 0.33],
 ];
-/** What was shown changes back only this much later, so that nothing flickers at a threshold. */
-const PLAY = 1.05;
+/**
+ * What was shown changes back only this much later, so that nothing flickers at a threshold. Not so
+ * what is near: graphs open at just that zoom (READABLE), and Fit leads to it from further away.
+ */
+const PLAY: Readonly<Record<Detail, number>> = { near: 1, middle: 1.05, far: 1.05, sign: 1 };
 /** Zooms are numbers of a machine: 0.9 may be a little less. */
 const SLACK = 0.001;
 
@@ -20,7 +23,7 @@ const ORDER: readonly Detail[] = ["sign", "far", "middle", "near"];
 export function detailAt(zoom: number, before: Detail | null): Detail {
   const [now = "sign"] = FROM.find(([, from]) => zoom >= from - SLACK) ?? [];
   if (before === null || ORDER.indexOf(now) <= ORDER.indexOf(before)) return now;
-  const [late = "sign"] = FROM.find(([, from]) => zoom >= from * PLAY - SLACK) ?? [];
+  const [late = "sign"] = FROM.find(([detail, from]) => zoom >= from * PLAY[detail] - SLACK) ?? [];
   return ORDER.indexOf(late) > ORDER.indexOf(before) ? late : before;
 }
 
