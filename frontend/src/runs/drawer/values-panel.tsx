@@ -37,11 +37,11 @@ export function ValuesPanel({ run, graph, aid }: Props) {
   const onlySent = found.values.some(({ from }) => from === "sent");
   return (
     <aside className={style.values} aria-label={`Values of ${spaced(found.name)}`}>
-      <h3>
+      <h2>
         {spaced(found.name)}
         {!run.simulated && ` on ${run.engine}`}
         <Age run={run} />
-      </h3>
+      </h2>
       <dl>
         {found.values.map(({ name, text, from }) => (
           <div key={name} data-from={from}>
