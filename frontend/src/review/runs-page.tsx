@@ -110,7 +110,7 @@ function Row({ run, now, chosen, onChoose }: RunRowProps) {
             size={24}
             variant="subtle"
             color="gray"
-            aria-label={`Statistics of ${run.graph_name}`}
+            aria-label="Statistics of its graph"
             title={`Statistics of ${run.graph_name}`}
             onClick={(event: MouseEvent) => event.stopPropagation()}
           >

@@ -63,8 +63,9 @@ function glide(ms: number): number {
   return window.matchMedia("(prefers-reduced-motion: reduce)").matches ? 0 : ms;
 }
 
-/** Where people write or decide. */
-const BUSY = "input, textarea, select, [contenteditable=true], [role=dialog] *";
+/** Where people write, decide, or walk by keys. */
+const BUSY =
+  "input, textarea, select, [contenteditable=true], [role=dialog] *, [role=treegrid], [role=treegrid] *";
 
 /** Focuses a card, which may be drawn some frames later only; not once the person is busy elsewhere. */
 export function focusCard(room: HTMLElement, key: Key, tries: number): void {

@@ -1,5 +1,6 @@
 /** What opens over the editor, one at a time: menus, the palette, dialogs of single edit actions. */
 
+import { useEffect } from "react";
 import type { EditorContext, Overlay } from "../../edit-actions/editor-context";
 import type { NewAction } from "../../graph/edit";
 import { lazyPart } from "../../ui/parts/lazy-part";
@@ -21,6 +22,10 @@ interface Props {
 }
 
 export function Overlays(props: Props) {
+  // What is typed right after their key shall find them: they do not wait until the page rests.
+  useEffect(() => {
+    for (const part of [ArrowDialog, ContextMenu]) void part.preload();
+  }, []);
   return (
     <>
       {/* Nothing is seen of it before somebody prints: then the browser prints the page as it is. */}
