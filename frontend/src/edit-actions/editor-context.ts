@@ -51,6 +51,8 @@ export interface CanvasView {
   fit(): void;
   /** As on opening: all of it where that can be read, else its beginning. */
   open(): void;
+  /** The same, if the view still is as it was opened: nobody has moved it since. */
+  reopen(): void;
   zoomIn(): void;
   zoomOut(): void;
   /** `whole`: as large as it fits; else only so near that it can be read. */

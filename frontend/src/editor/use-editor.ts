@@ -29,6 +29,7 @@ const NONE: ReadonlySet<string> = new Set();
 const NO_CANVAS_VIEW: CanvasView = {
   fit: () => {},
   open: () => {},
+  reopen: () => {},
   zoomIn: () => {},
   zoomOut: () => {},
   show: () => {},
@@ -146,6 +147,7 @@ function canvasOf(handle: RefObject<CanvasHandle>) {
   const view: CanvasView = {
     fit: () => handle.current.view.fit(),
     open: () => handle.current.view.open(),
+    reopen: () => handle.current.view.reopen(),
     zoomIn: () => handle.current.view.zoomIn(),
     zoomOut: () => handle.current.view.zoomOut(),
     show: (keys, goal) => handle.current.view.show(keys, goal),

@@ -55,7 +55,7 @@ export function useFirstLayout(
       setPlaces(found ?? new Map());
       setFailed(found === null);
       if (found === null) return;
-      if (plain.current !== null) requestAnimationFrame(() => now.current.context.view.open());
+      if (plain.current !== null) requestAnimationFrame(() => now.current.context.view.reopen());
       const { context, people } = now.current;
       const earlier = people.filter(({ client }) => client < context.doc.clientID).length;
       const write = () => {

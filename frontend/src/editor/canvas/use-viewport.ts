@@ -161,6 +161,11 @@ export function useViewport(given: ViewportInput) {
     () => ({
       fit: () => showAll("whole", 200),
       open: () => showAll("first", 200),
+      reopen: () => {
+        const last = fitted.current;
+        const isAsOpened = last?.goal === "first" && isSameViewport(last.view, flow.getViewport());
+        if (isAsOpened) showAll("first", 200);
+      },
       zoomIn: () => void flow.zoomIn({ duration: glide(120) }),
       zoomOut: () => void flow.zoomOut({ duration: glide(120) }),
       show: (keys, goal = "middle") => show(keys, goal),
