@@ -51,7 +51,7 @@ export interface CanvasView {
   fit(): void;
   /** As on opening: all of it where that can be read, else its beginning. */
   open(): void;
-  /** The same, if the view still is as it was opened: nobody has moved it since. */
+  /** What was shown on opening or by Fit is shown again, if nobody has moved the view since. */
   reopen(): void;
   zoomIn(): void;
   zoomOut(): void;

@@ -139,6 +139,7 @@ export function useViewport(given: ViewportInput) {
       }
       const [box, room] = [boundsOf(some, now.current.sizes), frame.current];
       if (box === null || room === null) return;
+      fitted.current = null;
       const size = roomOf(room);
       const here: Viewport = flow.getViewport();
       if (goal === "whole") {
@@ -162,18 +163,23 @@ export function useViewport(given: ViewportInput) {
       fit: () => showAll("whole", 200),
       open: () => showAll("first", 200),
       reopen: () => {
-        const last = fitted.current;
-        const isAsOpened = last?.goal === "first" && isSameViewport(last.view, flow.getViewport());
-        if (isAsOpened) showAll("first", 200);
+        if (fitted.current !== null) showAll(fitted.current.goal, 200);
       },
-      zoomIn: () => void flow.zoomIn({ duration: glide(120) }),
-      zoomOut: () => void flow.zoomOut({ duration: glide(120) }),
+      zoomIn: () => {
+        fitted.current = null;
+        void flow.zoomIn({ duration: glide(120) });
+      },
+      zoomOut: () => {
+        fitted.current = null;
+        void flow.zoomOut({ duration: glide(120) });
+      },
       show: (keys, goal = "middle") => show(keys, goal),
       reveal: ([x, y]) => {
         const room = frame.current;
         if (room === null) return;
         const size = roomOf(room);
         const next = viewportShowing({ x, y, ...CARD }, size, flow.getViewport());
+        fitted.current = null;
         if (next !== null) void flow.setViewport(next, { duration: glide(200) });
       },
       middle: (): Position => {
@@ -203,5 +209,9 @@ export function useViewport(given: ViewportInput) {
   );
 
   const follow = useFollowRun({ flow, frame, now, run, progress, glide });
-  return { view, ...follow };
+  const onPanned = useCallback(() => {
+    fitted.current = null;
+    follow.onPanned();
+  }, [follow.onPanned]);
+  return { view, ...follow, onPanned };
 }
