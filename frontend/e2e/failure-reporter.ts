@@ -46,7 +46,9 @@ export default class Failures implements Reporter {
       const each = reasons.map(([reason, count]) => `${count} × ${reason}`).join("; ");
       this.said.push(`${number === 1 ? "1 test was" : `${number} tests were`} skipped: ${each}`);
     }
-    this.said.push(...wrong.map((reason) => `✘ CI may not skip this (e2e/failure-reporter.ts): ${reason}`));
+    this.said.push(
+      ...wrong.map((reason) => `✘ CI may not skip this (e2e/failure-reporter.ts): ${reason}`),
+    );
     for (const line of this.said) process.stderr.write(`${line}\n`);
     return { status: wrong.length > 0 && status === "passed" ? "failed" : status };
   }
