@@ -2,7 +2,7 @@
 import { Skeleton } from "@mantine/core";
 import { IconAlertTriangle } from "@tabler/icons-react";
 import { Link } from "wouter";
-import type { GraphSummary } from "../api/graphs";
+import { authorName, type GraphSummary } from "../api/graphs";
 import { newestRun, useLive } from "../api/live/use-live";
 import { runEndText, runLabel, type Tone } from "../status/progress";
 import { toneColor } from "../status/state-label";
@@ -32,7 +32,7 @@ export function GraphRow({ graph, current }: { graph: GraphSummary; current: boo
     const start = instant(run.started_at) ?? now;
     const end = instant(run.ended_at) ?? now;
     words = goes
-      ? `${run.author?.name ?? ""} · ${runLabel(run).word} · ${stopwatch(now - start)}`
+      ? `${authorName(run.author)} · ${runLabel(run).word} · ${stopwatch(now - start)}`
       : `${runEndText(run)} · ${ago(end, now)}`;
   }
   const errors = graph.problems?.error ?? 0;

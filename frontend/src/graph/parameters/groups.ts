@@ -13,8 +13,13 @@ export interface NumberRow {
 /** One thing in a list of parameters: a single one, a group of rows, or a group of anything. */
 export type ParameterBlock =
   | { readonly kind: "single"; readonly parameter: Parameter }
-  | { readonly kind: "rows"; readonly prefix: string; readonly word: string; readonly rows: readonly NumberRow[] }
-  | { readonly kind: "group"; readonly prefix: string; readonly members: readonly Parameter[] }; // biome-ignore format: one shape a line
+  | {
+      readonly kind: "rows";
+      readonly prefix: string;
+      readonly word: string;
+      readonly rows: readonly NumberRow[];
+    }
+  | { readonly kind: "group"; readonly prefix: string; readonly members: readonly Parameter[] };
 
 const parentOf = (path: string): string => path.slice(0, path.lastIndexOf("/") + 1);
 const LETTERS = new Set(["x", "y", "z", "w", "r", "p", "roll", "pitch", "yaw", "theta"]);

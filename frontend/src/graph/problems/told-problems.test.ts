@@ -43,8 +43,12 @@ function grip() {
 test("a pose that is not written is one thing to fill in, and says what of it", () => {
   const { key, graph } = grip();
   const at = (axis: string) =>
-    problem("H8", `/actions/1/input_parameters/at/position/${axis}`, { where: {
-      path: `/actions/1/input_parameters/at/position/${axis}`, aid: key } }); // biome-ignore format: short
+    problem("H8", `/actions/1/input_parameters/at/position/${axis}`, {
+      where: {
+        path: `/actions/1/input_parameters/at/position/${axis}`,
+        aid: key,
+      },
+    });
   const told = toldProblems([at("x"), at("z")], graph);
   expect(told.map(({ kind, message, inputs }) => [kind, message, inputs])).toEqual([
     [
