@@ -56,8 +56,15 @@ def test_the_wheel_carries_neither_tests_nor_what_builds(wheel: Path) -> None:
     outside = [
         each for each in names if "static" not in each.parts and "dist-info" not in str(each)
     ]
-    assert {each.suffix for each in outside} == {".py", ".json", ".jsonl", ".typed"}
+    assert {each.suffix for each in outside} == {
+        ".py",
+        ".json",
+        ".jsonl",
+        ".typed",
+        ".jinja",
+    }
     assert {each.parts[1] for each in outside if each.suffix in {".json", ".jsonl"}} == {"examples"}
+    assert {each.parent.name for each in outside if each.suffix == ".jinja"} == {"templates"}
     assert not {each.suffix for each in names} & {".map", ".ts", ".tsx", ".mako", ".pyc"}
     assert not [each for each in names if "test" in each.name or "tests" in each.parts]
 

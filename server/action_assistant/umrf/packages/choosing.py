@@ -1,0 +1,55 @@
+"""Which actions a graph has that packages can be made for: one for each name."""
+
+from collections.abc import Iterator
+
+import msgspec
+
+from action_assistant.umrf.json.text import dump, parse_small
+from action_assistant.umrf.model import Action, Graph, Parameter
+from action_assistant.umrf.packages.naming import NameRefusal
+from action_assistant.umrf.signatures import signature_of
+
+
+def distinct_actions(graph: Graph) -> tuple[Action, ...]:
+    """The first action of each name, in the order of the graph. Values are left out: each node gives
+    its own, and in the file of an action they would be those of every graph."""
+    found: dict[str, Action] = {}
+    for action in graph.actions:
+        if not action.missing:
+            found.setdefault(action.name, action)
+    return tuple(map(_without_values, found.values()))
+
+
+def disagreements(graph: Graph) -> tuple[NameRefusal, ...]:
+    """Actions of one name whose parameters differ: the engine would find the package for some only."""
+    return tuple(_disagreements(graph))
+
+
+def _disagreements(graph: Graph) -> Iterator[NameRefusal]:
+    first: dict[str, Action] = {}
+    for action in graph.actions:
+        if action.missing:
+            continue
+        other = first.setdefault(action.name, action)
+        one, two = signature_of(other), signature_of(action)
+        if (one.inputs, one.outputs) != (two.inputs, two.outputs):
+            reason = (
+                f"“{other.full_name}” and “{action.full_name}” have different parameters, and one "
+                "package cannot be of both."
+            )
+            yield NameRefusal(action.name, reason)
+
+
+def _without_values(action: Action) -> Action:
+    return msgspec.structs.replace(
+        action,
+        inputs=tuple(map(_without_value, action.inputs)),
+        outputs=tuple(map(_without_value, action.outputs)),
+    )
+
+
+def _without_value(parameter: Parameter) -> Parameter:
+    leaf = parse_small(parameter.text)
+    if not isinstance(leaf, dict) or "pvf_value" not in leaf:
+        return parameter
+    return Parameter(parameter.path, dump({k: v for k, v in leaf.items() if k != "pvf_value"}))

@@ -1,0 +1,107 @@
+"""The files of an action package, from the description of its action."""
+
+from functools import cache
+from pathlib import Path
+from typing import Any, Final
+
+import msgspec
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+from action_assistant.umrf.files.action_files import write_action
+from action_assistant.umrf.files.older_dialects import RELATIONS
+from action_assistant.umrf.model import Action
+from action_assistant.umrf.packages import escapes
+from action_assistant.umrf.packages.naming import NameRefusal, check_name, snake_case
+from action_assistant.umrf.packages.structures import ParameterStruct, structure
+
+_TEMPLATES: Final = Path(__file__).with_name("templates")
+_CPP: Final = "cpp"
+#: Template and language by path; `{}` is the name of the package.
+_FILES: Final = {
+    "CMakeLists.txt": ("cmake_lists", "cmake"),
+    "README.md": ("readme", "markdown"),
+    "include/{}/input_parameters.hpp": ("input_parameters", _CPP),
+    "include/{}/output_parameters.hpp": ("output_parameters", _CPP),
+    "include/{}/temoto_action.hpp": ("temoto_action", _CPP),
+    "package.xml": ("package", "xml"),
+    "src/{}.cpp": ("action", _CPP),
+    "test/{}_test.cpp": ("trial", _CPP),
+}
+
+
+class ImpossiblePackage(Exception):
+    """There can be no package of the action; `refusals` say why."""
+
+    def __init__(self, refusals: tuple[NameRefusal, ...]) -> None:
+        super().__init__(" ".join(refusal.sentence for refusal in refusals))
+        self.refusals = refusals
+
+
+def package_files(action: Action) -> dict[str, bytes]:
+    """Contents by path (with `/`) below the folder of the package, whose name is
+    `naming.snake_case(action.name)`. Raises `ImpossiblePackage`."""
+    refusals = check_name(action.name)
+    inputs, against_inputs = structure(action, "input_parameters")
+    outputs, against_outputs = structure(action, "output_parameters")
+    if refusals := (*refusals, *against_inputs, *against_outputs):
+        raise ImpossiblePackage(refusals)
+    package = snake_case(action.name)
+    known = {
+        "package": package,
+        "namespace": f"{package}_action",
+        "name": action.name,
+        "description": action.description.strip() or f"The action {action.name}.",
+        "inputs": inputs,
+        "outputs": outputs,
+    }
+    found = {
+        path.format(package): _rendered(template, language, known)
+        for path, (template, language) in _FILES.items()
+        if _wanted(template, inputs, outputs)
+    }
+    found[f"{package}.umrf.json"] = write_action(_described(action)).encode()
+    return dict(sorted(found.items()))
+
+
+def _wanted(template: str, inputs: ParameterStruct, outputs: ParameterStruct) -> bool:
+    sides = {"input_parameters": inputs, "output_parameters": outputs}
+    return template not in sides or bool(sides[template].values)
+
+
+def _described(action: Action) -> Action:
+    """The action apart from any graph: without number, actor, place and relations."""
+    extra = tuple((k, v) for k, v in action.extra if k not in {*RELATIONS, "instance_id"})
+    return msgspec.structs.replace(action, instance_id=0, actor="", position=None, extra=extra)
+
+
+def _rendered(template: str, language: str, known: dict[str, Any]) -> bytes:
+    text = environment(language).get_template(f"{template}.jinja").render(known)
+    return text.encode()
+
+
+@cache
+def environment(language: str) -> Environment:
+    """Where templates of a language are rendered: what has no type of `escapes.ACCEPTED` raises
+    TypeError, what is not given raises UndefinedError."""
+    made = Environment(
+        loader=FileSystemLoader(_TEMPLATES),
+        autoescape=False,
+        finalize=escapes.only(language),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        auto_reload=False,
+    )
+    made.filters |= {
+        "cpp_name": escapes.cpp_name,
+        "cpp_type": escapes.cpp_type,
+        "cpp_string": escapes.cpp_string,
+        "cpp_comment": escapes.cpp_comment,
+        "package_name": escapes.package_name,
+        "cmake": escapes.cmake,
+        "xml": escapes.xml,
+        "markdown": escapes.markdown,
+        "blanks": escapes.blanks,
+    }
+    return made

@@ -1,0 +1,166 @@
+"""Parameters of an action as C++ has them: structs in structs, a member for each value."""
+
+from collections.abc import Iterator
+from typing import Final, Literal, TypeAlias
+
+import msgspec
+
+from action_assistant.umrf.json.text import Json, parse_small
+from action_assistant.umrf.model import Action, Parameter
+from action_assistant.umrf.packages.naming import NameRefusal, member_name
+from action_assistant.umrf.parameters import MAX_PATH, flat_name, keys_of
+
+Field: TypeAlias = Literal["input_parameters", "output_parameters"]
+
+#: C++ types by native ones. Of others the engine knows no value: it hands on what an action gave.
+CPP_TYPES: Final = {
+    "string": "std::string",
+    "strings": "std::vector<std::string>",
+    "number": "double",
+    "numbers": "std::vector<double>",
+    "bool": "bool",
+    "bools": "std::vector<bool>",
+}
+OPAQUE: Final = "boost::any"
+
+
+class StructValue(msgspec.Struct, frozen=True):
+    """One parameter. `flat`: its name in the engine (`pose::x`); `access`: below the outermost struct
+    (`pose.x`); `kind` as in the file."""
+
+    flat: str
+    access: str
+    kind: str
+    required: bool
+
+    @property
+    def cpp_type(self) -> str:
+        """Of the member."""
+        return CPP_TYPES.get(self.kind, OPAQUE)
+
+    @property
+    def opaque(self) -> bool:
+        """Whether only actions know what is in it."""
+        return self.kind not in CPP_TYPES
+
+
+class StructLine(msgspec.Struct, frozen=True):
+    """One line of a declaration, `depth` levels in: `open` of a struct (`name` its type), `member`, or
+    `close` (`name` the member of that type, `kind`; empty for the outermost)."""
+
+    does: Literal["open", "member", "close"]
+    depth: int
+    name: str
+    kind: str = ""
+    value: StructValue | None = None
+
+
+class ParameterStruct(msgspec.Struct, frozen=True):
+    """All parameters of one side. `lines` declare them, `values` are in the order of the file."""
+
+    lines: tuple[StructLine, ...]
+    values: tuple[StructValue, ...]
+
+    @property
+    def any_opaque(self) -> bool:
+        """Whether a member is a `boost::any`."""
+        return any(value.opaque for value in self.values)
+
+
+class _StructGroup:
+    """A struct while it is put together: members by their C++ names, with the keys that they are from."""
+
+    def __init__(self) -> None:
+        self.members: dict[str, tuple[str, _StructGroup | StructValue]] = {}
+
+
+class _StructReader:
+    def __init__(self, action: Action, field: Field) -> None:
+        self.root = _StructGroup()
+        self.values: list[StructValue] = []
+        self.refusals: list[NameRefusal] = []
+        self.place = f"{action.name}/{field}"
+
+    def refuse(self, path: str, reason: str) -> None:
+        self.refusals.append(NameRefusal(f"{self.place}/{path}", reason))
+
+    def add(self, parameter: Parameter) -> None:
+        keys, leaf = keys_of(parameter.path), parse_small(parameter.text)
+        if leaf == {}:
+            return  # an empty group has nothing in it
+        reason = _against(keys, leaf)
+        if reason is not None:
+            self.refuse(parameter.path, reason)
+            return
+        assert isinstance(leaf, dict)
+        group, names = self.root, tuple(map(member_name, keys))
+        for key, name in zip(keys[:-1], names[:-1], strict=True):
+            other, below = group.members.setdefault(name, (key, _StructGroup()))
+            if other != key or not isinstance(below, _StructGroup):
+                self.refuse(parameter.path, _taken(key, other, name))
+                return
+            group = below
+        value = StructValue(
+            flat=flat_name(parameter.path),
+            access=".".join(names),
+            kind=str(leaf["pvf_type"]),
+            required=leaf.get("pvf_required") is not False,
+        )
+        other, there = group.members.setdefault(names[-1], (keys[-1], value))
+        if there is not value:
+            self.refuse(parameter.path, _taken(keys[-1], other, names[-1]))
+            return
+        self.values.append(value)
+
+
+def structure(action: Action, field: Field) -> tuple[ParameterStruct, tuple[NameRefusal, ...]]:
+    """One side of an action, and why it cannot be: keys that C++ cannot tell apart, types that the
+    engine does not read."""
+    reader = _StructReader(action, field)
+    for parameter in action.inputs if field == "input_parameters" else action.outputs:
+        reader.add(parameter)
+    lines = tuple(_lines(reader.root, f"{field}_t", "", 0))
+    return ParameterStruct(lines, tuple(reader.values)), tuple(reader.refusals)
+
+
+def _lines(group: _StructGroup, kind: str, member: str, depth: int) -> Iterator[StructLine]:
+    yield StructLine("open", depth, kind)
+    for name, (_, below) in group.members.items():
+        if isinstance(below, _StructGroup):
+            yield from _lines(below, _type_of(name, kind, group), name, depth + 1)
+        else:
+            yield StructLine("member", depth + 1, name, value=below)
+    yield StructLine("close", depth, member, kind)
+
+
+def _type_of(name: str, around: str, group: _StructGroup) -> str:
+    """`pose_t` for `pose`; another where the struct around or a member beside has that name."""
+    kind = f"{name}_t"
+    others = {f"{each}_t" for each in group.members if each != name}
+    while kind == around or kind in group.members or kind in others:
+        kind += "_t"
+    return kind
+
+
+def _taken(key: str, other: str, name: str) -> str:
+    if key == other:
+        return f"“{key}” is there twice, or as a value and as a group."
+    return f"“{key}” and “{other}” would both be the member “{name}” in C++."
+
+
+def _against(keys: tuple[str, ...], leaf: Json) -> str | None:
+    if len(keys) > MAX_PATH:
+        return f"It lies in {len(keys) - 1} groups; {MAX_PATH - 1} can be read again."
+    for key in keys:
+        if not key:
+            return "A key is empty, and the engine would not find it."
+        if ":" in key:
+            return f"The engine would split “{key}” at its colon."
+        if "\x00" in key:
+            return "A key has a NUL in it, where texts of C end."
+    kind = leaf.get("pvf_type") if isinstance(leaf, dict) else None
+    if not isinstance(leaf, dict) or not isinstance(kind, str) or not kind or "\x00" in kind:
+        return "It has no `pvf_type` that is a text; the engine refuses the file."
+    if kind not in CPP_TYPES and "pvf_value" in leaf:
+        return f"The engine reads no value of the type “{kind}”, and refuses the file that has one."
+    return None

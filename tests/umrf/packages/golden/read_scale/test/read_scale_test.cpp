@@ -1,0 +1,35 @@
+#include "../src/read_scale.cpp"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <future>
+
+using Tested = read_scale_action::ReadScale;
+
+TEST(read_scale_action, EndsSoonAfterAStop)
+{
+  Tested action;
+  std::future<bool> result = std::async(std::launch::async, [&action] { return action.onRun(); });
+  action.stopAction();
+  EXPECT_EQ(result.wait_for(std::chrono::seconds(5)), std::future_status::ready);
+}
+
+TEST(read_scale_action, HoldsWhileItIsPausedAndGoesOnAfterwards)
+{
+  Tested action;
+  action.onPause();
+  std::future<bool> result = std::async(std::launch::async, [&action] { return action.onRun(); });
+  EXPECT_EQ(result.wait_for(std::chrono::seconds(2)), std::future_status::timeout);
+  action.onResume();
+  EXPECT_EQ(result.wait_for(std::chrono::seconds(30)), std::future_status::ready);
+}
+
+TEST(read_scale_action, CanBeStoppedWhileItIsPaused)
+{
+  Tested action;
+  action.onPause();
+  std::future<bool> result = std::async(std::launch::async, [&action] { return action.onRun(); });
+  action.stopAction();
+  EXPECT_EQ(result.wait_for(std::chrono::seconds(5)), std::future_status::ready);
+}

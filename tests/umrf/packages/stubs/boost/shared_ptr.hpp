@@ -1,0 +1,7 @@
+#pragma once
+#include <memory>
+
+namespace boost
+{
+using std::shared_ptr;
+}
