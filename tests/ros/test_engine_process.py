@@ -45,6 +45,11 @@ def test_a_run_that_did_not_obey_ends_with_the_process_of_its_engine(
         ) as control:
             await _answering(robots, domain)
             run = (await control.start(order(sequence(), engine="David"), ANN)).run.id
+            # An engine passes by an action that is still being loaded when it is stopped, and
+            # calls it RUNNING for ever: it has not begun to disobey.
+            with anyio.fail_after(20):
+                while "Work_0" not in control.open[run].run.active:  # noqa: ASYNC110
+                    await anyio.sleep(0.05)
             await control.stop(run, BEN)
             with anyio.fail_after(20):
                 while not control.open[run].run.unconfirmed:  # noqa: ASYNC110

@@ -7,6 +7,7 @@ runs these tests where all of that lies at its own place, under Python 3.12, and
 """
 
 import importlib.machinery
+import importlib.util
 import os
 import shlex
 import signal
@@ -35,10 +36,17 @@ NUMPY = Path("/usr/lib/python3/dist-packages/numpy")
 FITS = f"core/_multiarray_umath{importlib.machinery.EXTENSION_SUFFIXES[0]}"
 OF_THE_SYSTEM = any((NUMPY / f"{private}{FITS}").exists() for private in ("", "_"))
 
-pytestmark = pytest.mark.skipif(
-    not (PLAIN.exists() and (LAID_OUT or (WHEELS / "share" / "ament_index").is_dir())),
-    reason="needs .venv and .venv-ros: `make setup ros`",
-)
+pytestmark = [
+    # Its processes are those of `.venv` whoever runs it: once is enough.
+    pytest.mark.skipif(
+        not LAID_OUT and importlib.util.find_spec("rclpy") is None,
+        reason="rclpy is not here; `make ros-test` brings it",
+    ),
+    pytest.mark.skipif(
+        not (PLAIN.exists() and (LAID_OUT or (WHEELS / "share" / "ament_index").is_dir())),
+        reason="needs .venv and .venv-ros: `make setup ros`",
+    ),
+]
 
 
 @pytest.fixture(scope="module")
