@@ -3,6 +3,7 @@
 from typing import Any
 
 import msgspec
+import pytest
 
 from action_assistant.runner.analysis.comparison import compare
 from action_assistant.runner.links.observations import NodeResult, NodeState
@@ -80,6 +81,25 @@ def test_an_action_that_only_one_run_reached_is_where_they_part() -> None:
     assert found.parting is not None
     assert found.parting.step.relation == "only_a"
     assert "never run in run 2" in found.text
+
+
+@pytest.mark.parametrize("slower", [500_000, 2_000_000])
+def test_where_one_action_stands_for_another_they_part_at_that_of_this_run(slower: int) -> None:
+    """Whichever began a moment earlier: only its own actions stand in the graph that is shown."""
+    good = went(1, ("Work_0", "true"), ("Old_0", "true"))
+    found = compared(good, went(2, ("Work_0", "true"), ("New_0", "error"), Work_0=slower))
+    assert [(step.action, step.relation) for step in found.steps] == [
+        ("Work_0", "same"),
+        ("New_0", "only_b"),
+        ("Old_0", "only_a"),
+    ]
+    assert found.parting.step.action == "New_0"
+
+
+def test_an_action_that_was_left_out_comes_before_what_follows_in_both() -> None:
+    good = went(1, ("Work_0", "true"), ("Old_0", "true"), ("Work_1", "true"), ("Late_0", "true"))
+    found = compared(good, went(2, ("Work_0", "true"), ("Work_1", "true"), ("New_0", "true")))
+    assert found.parting.step.action == "Old_0"
 
 
 def test_a_result_that_nobody_saw_is_no_difference_yet_is_said() -> None:

@@ -71,6 +71,22 @@ def test_what_runs_on_when_the_usual_course_is_finished_is_not_finished_with_it(
     assert ends == {"": "finished", "on_false": "halted", "on_error": "halted"}
 
 
+def test_a_bypass_passes_the_outcome_on_so_it_is_tried_though_it_is_the_answer_to_all() -> None:
+    """A1 bypasses A0 whether true or an error; with an error A0 bypasses A1, round and round."""
+    bypassing = Conditions("bypass", "run", "bypass", "run")
+    arrows = (
+        Relation(parent=ENTRY, child="k0", conditions=ENTRY_CONDITIONS),
+        Relation(
+            parent="k0", child="k1", conditions=Conditions("run", "run", "bypass"), required=False
+        ),
+        Relation(parent="k1", child="k0", conditions=bypassing, required=False),
+    )
+    actions = tuple(Action(key=f"k{n}", name=f"A{n}") for n in range(2))
+    trials = Trials(Graph(name="g", actions=actions, relations=arrows))
+    ends = {(t.action.name, t.outcome): t.end.kind for t in trials if t.action is not None}
+    assert ends["A1", "on_error"] == "locked"
+
+
 @given(busy_graphs(8))
 @settings(max_examples=examples(60), deadline=None, suppress_health_check=list(HealthCheck))
 def test_what_is_not_tried_cannot_end_otherwise(graph: Graph) -> None:

@@ -62,7 +62,7 @@ class RunComparison(msgspec.Struct, frozen=True, kw_only=True):
 def compare(a: Run, b: Run, umrf_a: str, umrf_b: str) -> RunComparison:
     """Compare two runs that may be of different graphs. Total."""
     graph = difference((0, _graph(umrf_a)), (0, _graph(umrf_b)))
-    steps = sorted(_steps(a, b), key=lambda step: _begun(step, a, b))
+    steps = _own_first(sorted(_steps(a, b), key=lambda step: _begun(step, a, b)))
     parting = next((_parting(step, a, b) for step in steps if _parts(step)), None)
     return RunComparison(
         a=views.summary(a),
@@ -161,6 +161,20 @@ def _begun(step: ComparedVisit, a: Run, b: Run) -> tuple[float, str, int]:
 
 def _parts(step: ComparedVisit) -> bool:
     return step.relation in {"result", "only_a", "only_b"}
+
+
+def _own_first(steps: list[ComparedVisit]) -> list[ComparedVisit]:
+    """Where each run went on by an action that the other lacks, that of this run, `b`, comes first:
+    which of them began earlier is chance, and only its own stand in its graph."""
+    first = next((at for at, step in enumerate(steps) if _parts(step)), None)
+    if first is None or steps[first].relation != "only_a":
+        return steps
+    for at, step in enumerate(steps[first + 1 :], first + 1):
+        if step.a is not None and step.b is not None:
+            return steps
+        if step.relation == "only_b":
+            return [*steps[:first], step, *steps[first:at], *steps[at + 1 :]]
+    return steps
 
 
 def _parting(step: ComparedVisit, a: Run, b: Run) -> Parting:

@@ -104,13 +104,15 @@ class Trials:
         return end
 
     def _meant(self) -> list[tuple[int, Precondition]]:
-        """What can make a difference: children that answer otherwise, or outputs that are missed."""
+        """What can make a difference: children that answer otherwise, or are bypassed and pass the
+        outcome on, or outputs that are missed."""
         found: list[tuple[int, Precondition]] = []
         for place, row in enumerate(self.net.edges):
             edges = [edge for edge in row if edge is not None]
             gives = any(edge.given is None or edge.given[1] for edge in edges)
             for outcome in _OTHERWISE:
-                differs = any(e.responses[outcome] != e.responses["on_true"] for e in edges)
+                answers = [(e.responses[outcome], e.responses["on_true"]) for e in edges]
+                differs = any(other != usual or other == "bypass" for other, usual in answers)
                 if differs or (gives and outcome == "on_error"):
                     found.append((place, outcome))
         return found
