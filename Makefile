@@ -11,7 +11,7 @@ export PYTHONNOUSERSITE := 1
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 # Tests never speak to other machines.
-unit e2e ros-test soak soak-ros pictures screens bench: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
+unit e2e ros-test soak soak-ros pictures screens browsers bench: export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 
 # Whose packages a sourced ROS 2 can lend: the Python that it was built for, on Ubuntu the system's.
 PYTHON ?= python3
@@ -135,6 +135,11 @@ pictures: setup ## take the pictures of the documentation from the running produ
 screens: setup ## take every page on every screen, to be looked at: frontend/screens, or TO=DIR
 	@$(BROWSER)
 	@SCREENS=1 $(if $(TO),SCREENS_TO="$(abspath $(TO))") $(NPM) run --silent e2e -- e2e/screens.spec.ts
+
+.PHONY: browsers
+browsers: setup ## the main job in Firefox and WebKit, by keys and by touch
+	@scripts/need firefox-esr=firefox-esr WebKitWebDriver=webkit2gtk-driver Xvfb=xvfb
+	@BROWSERS=1 $(NPM) run --silent e2e -- e2e/other-browsers.spec.ts --workers=1
 
 .PHONY: newcomer
 newcomer: frontend/node_modules/.done ## count what eight actions cost by mouse: URL=http://127.0.0.1:8000 TOKEN=…

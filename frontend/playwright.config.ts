@@ -8,10 +8,10 @@ process.env.ROS_AUTOMATIC_DISCOVERY_RANGE = "LOCALHOST";
 
 // Without the code for windows the same engine starts sooner and leaves more of the processors.
 const SHELL = "/usr/bin/chromium-headless-shell";
-const installed = existsSync(SHELL) ? SHELL : "/usr/bin/chromium";
+export const CHROMIUM = process.env.CHROMIUM ?? (existsSync(SHELL) ? SHELL : "/usr/bin/chromium");
 
 const launchOptions = {
-  executablePath: process.env.CHROMIUM ?? installed,
+  executablePath: CHROMIUM,
   args: [
     "--no-sandbox",
     "--disable-gpu",
@@ -23,7 +23,7 @@ const launchOptions = {
   ],
 };
 /** Names of the network that lead to this computer: on plain http their pages are no secure context. */
-const lan = [
+export const LAN_ARGS = [
   ...launchOptions.args,
   "--host-resolver-rules=MAP lab.test 127.0.0.1, MAP robots.test 127.0.0.1",
 ];
@@ -59,7 +59,7 @@ export default defineConfig({
     {
       name: "lan",
       testMatch: NAMED,
-      use: { launchOptions: { ...launchOptions, args: lan } },
+      use: { launchOptions: { ...launchOptions, args: LAN_ARGS } },
     },
   ],
 });

@@ -9,11 +9,20 @@ import { defineConfig } from "vitest/config";
 const editor = process.env.ACTION_ASSISTANT_EDITOR ?? "http://127.0.0.1:8000";
 
 /** Vendor code in few files that change seldom, so that an upgrade of ours leaves them cached. */
-const vendors: { name: string; test: RegExp }[] = [
+const vendors: { name: string; test: RegExp; tags?: "$initial"[] }[] = [
   { name: "react", test: /node_modules\/(react|react-dom|scheduler|use-sync-external-store)\// },
   { name: "canvas", test: /node_modules\/(@xyflow|d3-|classcat|zustand)/ },
   { name: "sync", test: /node_modules\/(yjs|y-protocols|lib0)\// },
+  // What every page loads comes in one piece: it is smaller than in many, and asked for once.
+  { name: "ui", test: /node_modules\//, tags: ["$initial"] },
+  { name: "page", test: /src\/(?!offline\/(service-worker|requests))/, tags: ["$initial"] },
 ];
+
+/** In the page only: parts of libraries that are large, and of which it uses nothing that is large. */
+const substitutes = ["d3-color", "lib0/logging"].map((name) => ({
+  find: new RegExp(`^${name}$`),
+  replacement: resolve(import.meta.dirname, `substitutes/${name.replace("/", "-")}.ts`),
+}));
 
 const PUBLIC = resolve(import.meta.dirname, "public");
 /** Fonts of scripts that few graphs are written in are kept when they are first shown. */
@@ -53,6 +62,7 @@ export default defineConfig({
   plugins: [react(), pageVersion()],
   // The server writes the path at which a proxy shows the page into index.html.
   base: "./",
+  resolve: { alias: substitutes },
   build: {
     outDir: "dist",
     manifest: true,
@@ -60,6 +70,8 @@ export default defineConfig({
     // Fonts inlined as data: would be refused by the Content-Security-Policy.
     assetsInlineLimit: 0,
     rolldownOptions: {
+      // React Flow's components are made by these; what nobody draws of them is left out.
+      treeshake: { manualPureFunctions: ["createContext", "forwardRef", "memo"] },
       input: {
         index: resolve(import.meta.dirname, "index.html"),
         "service-worker": resolve(import.meta.dirname, "src/offline/service-worker.ts"),
@@ -80,9 +92,16 @@ export default defineConfig({
     },
   },
   test: {
-    include: ["src/**/*.test.{ts,tsx}"],
     environment: "node",
+    pool: "threads",
+    // Its own choice leaves one of two processors idle.
+    maxWorkers: 2,
     // A busy machine is slow, and that is no fault of what is tested.
     testTimeout: 30_000,
+    projects: [
+      // What has no document leaves nothing behind, so its files share what they import.
+      { extends: true, test: { name: "pure", include: ["src/**/*.test.ts"], isolate: false } },
+      { extends: true, test: { name: "page", include: ["src/**/*.test.tsx"] } },
+    ],
   },
 });

@@ -94,6 +94,14 @@ def actions(draw: st.DrawFn, key: Key, name: str, instance_id: int) -> Action:
     )
 
 
+#: By response, mostly places, sometimes what some other program wrote there.
+waypoints = st.dictionaries(
+    st.sampled_from(RESPONSES),
+    st.sampled_from(["[[12,-40]]", "[[0,0],[36,120]]", "[]", '{"x":1}', "7"]),
+    max_size=2,
+).map(lambda found: tuple((r, found[r]) for r in RESPONSES if r in found))
+
+
 @st.composite
 def relations(draw: st.DrawFn, parent: Key, child: Key) -> Relation:
     """One relation between two keys; ends say only what they can."""
@@ -108,6 +116,7 @@ def relations(draw: st.DrawFn, parent: Key, child: Key) -> Relation:
         child_order=0.0 if parent == ENTRY else draw(orders),
         parents_extra=() if parent == ENTRY else draw(extras()),
         children_extra=() if child == EXIT else draw(extras()),
+        waypoints=draw(waypoints),
     )
     if ENTRY in (parent, child) or EXIT in (parent, child):
         return relation

@@ -1,25 +1,18 @@
 /** One's own name, light or dark, and the way out. */
-import {
-  Button,
-  Group,
-  SegmentedControl,
-  Stack,
-  Text,
-  TextInput,
-  useMantineColorScheme,
-} from "@mantine/core";
+import { Button, Group, Stack, Text, TextInput, useMantineColorScheme } from "@mantine/core";
 import { IconDeviceDesktop, IconLogout, IconMoon, IconShare, IconSun } from "@tabler/icons-react";
 import { useState } from "react";
 import { errorText } from "../api/http";
 import { useLive } from "../api/live/use-live";
 import { ROLE_WORDS, rememberedName, signOut } from "../api/session";
 import { usePerson } from "../api/use-person";
+import { Segments } from "../ui/segments";
 
 const schemes = [
   { value: "light", label: <IconSun size={15} aria-label="Light" /> },
   { value: "dark", label: <IconMoon size={15} aria-label="Dark" /> },
   { value: "auto", label: <IconDeviceDesktop size={15} aria-label="Like the system" /> },
-];
+] as const;
 
 function Appearance() {
   const { colorScheme, setColorScheme } = useMantineColorScheme();
@@ -28,13 +21,7 @@ function Appearance() {
       <Text size="sm" mb={4}>
         Appearance
       </Text>
-      <SegmentedControl
-        fullWidth
-        size="xs"
-        data={schemes}
-        value={colorScheme}
-        onChange={(value) => setColorScheme(value as "light" | "dark" | "auto")}
-      />
+      <Segments fullWidth size="xs" data={schemes} value={colorScheme} onChange={setColorScheme} />
     </div>
   );
 }

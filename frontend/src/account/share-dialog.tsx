@@ -1,5 +1,5 @@
 /** Share: links with a role, who came in by them, and their end. For owners. */
-import { Button, Group, Modal, SegmentedControl, Select, Text, TextInput } from "@mantine/core";
+import { Button, Group, Modal, Select, Text, TextInput } from "@mantine/core";
 import { useMediaQuery } from "@mantine/hooks";
 import { IconLock, IconLockOpen2, IconPlugConnectedX } from "@tabler/icons-react";
 import { useState } from "react";
@@ -8,6 +8,7 @@ import { useLive } from "../api/live/use-live";
 import { pageUrl } from "../api/page-url";
 import { ROLE_WORDS, type Role } from "../api/session";
 import { type Sharing, useInvite, useRevoke, useSharing } from "../api/sharing";
+import { Segments } from "../ui/segments";
 import style from "./share-dialog.module.css";
 import { ShareLink } from "./share-link";
 
@@ -82,12 +83,12 @@ function NewLink() {
         invite.mutate({ role, label: label.trim() }, { onSuccess: () => setLabel("") });
       }}
     >
-      <SegmentedControl
+      <Segments
         fullWidth
-        aria-label="Role"
+        label="Role"
         data={INVITED.map((value) => ({ value, label: LABELS[value] }))}
         value={role}
-        onChange={(value) => setRole(value as (typeof INVITED)[number])}
+        onChange={setRole}
       />
       <Text size="sm" c="dimmed">
         Whoever has the link may {ROLE_WORDS[role]}.

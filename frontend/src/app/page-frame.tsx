@@ -7,10 +7,10 @@ import { AccountMenu } from "../account/account-menu";
 import { useMay } from "../api/use-person";
 import { MovesNowLine } from "../runs/moves-now-line";
 import { StopButton } from "../runs/stop/stop-button";
+import { useStableCallback } from "../ui/hooks/use-stable-callback";
 import { lazyPart } from "../ui/parts/lazy-part";
 import { OverlayBoundary } from "../ui/parts/part-boundary";
 import { type Crumb, TopBar } from "../ui/top-bar";
-import { useStableCallback } from "../ui/use-stable-callback";
 import style from "./page-frame.module.css";
 
 const leave = async (person: string) => {

@@ -1,11 +1,12 @@
 /** An action on the canvas: robot, name, state, two parameters; its input before it, its four outcomes behind. */
 import { IconGhost2, IconMessageCircle } from "@tabler/icons-react";
 import { Handle, type NodeProps, Position } from "@xyflow/react";
-import { memo, use } from "react";
+import { memo, use, useRef } from "react";
 import { cardRows } from "../graph/parameters/card-rows";
 import { durationText } from "../status/durations";
 import type { Progress } from "../status/progress";
 import { StateLabel } from "../status/state-label";
+import { useInStep } from "../status/use-in-step";
 import { colorOfName } from "../ui/name-colors";
 import { stopwatch, useNow } from "../ui/times";
 import style from "./action-card.module.css";
@@ -53,8 +54,11 @@ export const ActionCard = memo(function ActionCard({
   const talk = useOpenThreadCount(action.key);
   const role = useDataRole(action.key);
   const instead = use(CardStateContext)?.(action.key);
+  const card = useRef<HTMLDivElement>(null);
+  useInStep(card, progress?.tone === "run");
   return (
     <div
+      ref={card}
       className={style.card}
       style={{ height, "--c": color, "--other": other ?? undefined } as React.CSSProperties}
       data-other={other === null ? undefined : true}

@@ -11,6 +11,7 @@ import {
   type NodeOptions,
   nodesOf,
   responsesOf,
+  sceneOf,
   surroundingsOf,
 } from "./elements";
 import { fromUmrf } from "./from-umrf";
@@ -71,6 +72,17 @@ test("what did not change is not drawn again", () => {
   expect(after).not.toBe(before);
   const card = (nodes: typeof before) => nodes.find(({ id }) => id === a);
   expect(card(after)?.position).toEqual(card(before)?.position);
+});
+
+test("lines lead to cards as large as these are drawn, also before they are measured", () => {
+  const { graph } = drawn();
+  for (const direction of ["right", "down"] as const) {
+    const turned: Graph = { ...graph, direction };
+    const nodes = nodesOf(turned, options(turned)).filter(({ type }) => type === "action");
+    const { cards } = sceneOf(turned, options(turned), null);
+    for (const { id, measured } of nodes)
+      expect(cards.find(({ key }) => key === id)).toMatchObject(measured ?? {});
+  }
 });
 
 test("a graph without places stands from entry down to exit", () => {

@@ -9,18 +9,20 @@ import {
   EXIT,
   type Graph,
   type Key,
+  type Position,
   type Precondition,
   type Relation,
   type Response,
   spokenOutcomes,
 } from "../graph/model";
 import { dataFlowOf, type InputGivers } from "../graph/parameters/data-flow";
+import { movedTogether, movesBetween, shifted } from "../graph/waypoints";
 import type { Progress } from "../status/progress";
 import { type Bundle, bundlesOf, pillSizeOf } from "./arrows/bundles";
 import { gridOffset, type Scene, type SceneCard } from "./arrows/scene";
 import { expectedCard, expectedEnd } from "./card-handles";
-import { CARD, type Positions, pillSize } from "./geometry/arrange";
-import { type NoteNode, noteNodes } from "./notes/note-nodes";
+import { cardSize, type Positions, pillSize } from "./geometry/arrange";
+import { type FoldedNode, type NoteNode, noteNodes } from "./notes/note-nodes";
 import { OUTCOMES, outcomeWord } from "./outcome";
 import { type ProblemMark, type ProblemMarks, problemMarkWords } from "./problem-marks";
 
@@ -38,7 +40,7 @@ export type CardNode = Node<
   "action"
 >;
 export type EndNode = Node<{ end: "entry" | "exit"; direction: Direction; progress: null }, "end">;
-export type CanvasNode = CardNode | EndNode | NoteNode;
+export type CanvasNode = CardNode | EndNode | NoteNode | FoldedNode;
 
 export interface OutcomeResponse {
   readonly outcomes: readonly Precondition[];
@@ -64,6 +66,8 @@ export type Arrow = Edge<
     came: Precondition | null;
     /** The parent has ended, and with none of the bundle's outcomes. */
     passed: boolean;
+    /** It begins at a folded frame, where no outcome has a port of its own. */
+    portless?: boolean;
   },
   "outcome"
 >;
@@ -193,15 +197,24 @@ function isLit(relation: Relation, outcome: Precondition, options: ArrowOptions)
 const FARTHEST = 1e7; // px; a file may put a card anywhere
 const END_WIDTH = 84; // px of an end that are seen, in the middle of its place
 
+/** While both ends of a line are dragged its waypoints go along. */
+function viaOf(bundle: Bundle, moved: Positions): readonly Position[] {
+  const { waypoints, source: parent, target: child } = bundle;
+  const by = waypoints.length > 0 ? movedTogether({ parent, child }, moved) : null;
+  return by ? shifted(waypoints, by) : waypoints;
+}
+
+interface SceneOptions extends Pick<NodeOptions, "places" | "measured" | "marks"> {
+  /** Where everything stands while nobody drags it. */
+  rest?: Positions | undefined;
+}
+
 /** What lines are drawn between. `offset` is that of the scene before. */
-export function sceneOf(
-  graph: Graph,
-  options: Pick<NodeOptions, "places" | "measured" | "marks">,
-  offset: number | null,
-): Scene {
+export function sceneOf(graph: Graph, options: SceneOptions, offset: number | null): Scene {
   const { direction } = graph;
   const cards: SceneCard[] = [];
   const pill = pillSize(direction);
+  const moved = options.rest ? movesBetween(options.rest, options.places) : new Map();
   const put = (key: Key, size: { width: number; height: number }) => {
     const at = options.places.get(key);
     const { width = size.width, height = size.height } = options.measured.get(key) ?? {};
@@ -210,13 +223,13 @@ export function sceneOf(
     cards.push({ key, x: at[0] + (width - seen) / 2, y: at[1], width: seen, height });
   };
   put(ENTRY, pill);
-  for (const { key } of graph.actions) put(key, CARD);
+  for (const action of graph.actions) put(action.key, cardSize(action, direction));
   put(EXIT, pill);
   const lines = graph.relations.flatMap((relation) =>
     bundlesOf(relation).map((bundle, i) => {
       const marked = i === 0 && options.marks.has(bundle.relation);
       const { id, source, target } = bundle;
-      return { id, source, target, pill: pillSizeOf(bundle, marked) };
+      return { id, source, target, pill: pillSizeOf(bundle, marked), via: viaOf(bundle, moved) };
     }),
   );
   return { direction, offset: gridOffset(cards, direction, offset), cards, lines };

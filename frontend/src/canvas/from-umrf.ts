@@ -6,6 +6,7 @@ import {
   ENTRY,
   ENTRY_CONDITIONS,
   EXIT,
+  fullName,
   type Graph,
   type Key,
   type Position,
@@ -72,10 +73,31 @@ const plain = {
   childOrder: 0,
   parentsExtra: [],
   childrenExtra: [],
+  waypoints: [],
 } as const;
 
 function remaps(value: unknown): Remap[] {
   return list(value).map((item) => ({ source: text(item.from), target: text(item.to) }));
+}
+
+/** Waypoints stand in files by the names of the actions (docs/decisions/052-waypoints.md). */
+function bent(relations: readonly Relation[], actions: readonly Action[], told: unknown) {
+  const names = new Map(actions.map((each) => [each.key, fullName(each)]));
+  const nameOf = (key: Key) => names.get(key) ?? key;
+  const texts = new Map(
+    list(told).map(({ parent, child, listing, response, points }) => [
+      `${text(parent)} ${text(child)} ${whole(listing)} ${text(response)}`,
+      JSON.stringify(points ?? null),
+    ]),
+  );
+  return relations.map((relation) => {
+    const ends = `${nameOf(relation.parent)} ${nameOf(relation.child)} ${relation.listing}`;
+    const waypoints = RESPONSES.flatMap((response) => {
+      const said = texts.get(`${ends} ${response}`);
+      return said === undefined ? [] : [[response, said] as const];
+    });
+    return waypoints.length === 0 ? relation : { ...relation, waypoints };
+  });
 }
 
 /** What `actions` of a UMRF object and its ends say. */
@@ -123,7 +145,7 @@ export function fromUmrf(umrf: unknown): Graph {
     name: text(root.graph_name),
     description: text(root.graph_description),
     actions,
-    relations: [...relations.values()],
+    relations: bent([...relations.values()], actions, gui.waypoints),
     entryPosition: position(gui.entry) ?? position(object(gui.positions).entry),
     exitPosition: position(gui.exit) ?? position(object(gui.positions).exit),
     direction: asDirection(gui.direction),

@@ -1,14 +1,16 @@
 /** An arrow from an outcome: the first of a bundle draws its line and pill, each its own port. */
 import { BaseEdge, EdgeLabelRenderer, type EdgeProps, useStoreApi } from "@xyflow/react";
-import { memo, useLayoutEffect, useRef } from "react";
+import { memo, use, useLayoutEffect, useRef, useState } from "react";
+import { BendHandles, LineEditingContext } from "./arrows/bend-handles";
 import { pillWord } from "./arrows/bundles";
 import { PILL_PLAY } from "./arrows/docks";
 import { behindPill, pathOf } from "./arrows/line-path";
 import { useIsOpen, useLine } from "./arrows/line-store";
-import type { RoutedLine } from "./arrows/routes";
+import { type DraggedOutcome, useOutcomeDrag } from "./arrows/outcome-drag";
 import type { Point } from "./arrows/scene";
+import type { RoutedLine } from "./arrows/simple-lines";
 import type { Arrow } from "./elements";
-import { OutcomeSign, outcomeColor } from "./outcome";
+import { type Outcome, OutcomeSign, outcomeColor, outcomeWord } from "./outcome";
 import style from "./outcome-arrow.module.css";
 import { ProblemBadge } from "./problem-badge";
 
@@ -55,7 +57,7 @@ export const OutcomeArrow = memo(function OutcomeArrow(props: EdgeProps<Arrow>) 
   }, [dx, dy]);
   if (!data || !line) return <g ref={group} />;
   const pill = played(line, open);
-  const opened = open && line.docked && pill !== null && !data.entry;
+  const opened = open && line.docked && pill !== null && !data.entry && !data.portless;
   return (
     <g ref={group}>
       {data.lead && (
@@ -71,6 +73,7 @@ export const OutcomeArrow = memo(function OutcomeArrow(props: EdgeProps<Arrow>) 
         />
       )}
       {data.lead && pill && <Pill {...{ id, data, line, pill }} selected={selected === true} />}
+      {data.lead && selected && <BendHandles arrow={id} bundle={data.bundle} line={line} />}
     </g>
   );
 });
@@ -107,37 +110,95 @@ function BundleLine({ id, data, line, pill, selected, opened }: BundleProps & { 
 /** What a bundle says; whoever cannot see it hears it from its arrows. */
 function Pill({ id, data, pill: [x, y], selected }: BundleProps & { pill: Point }) {
   const store = useStoreApi();
+  const editing = use(LineEditingContext);
+  const [dragged, setDragged] = useState<DraggedOutcome | null>(null);
   const word = pillWord(data.bundle);
   return (
-    <EdgeLabelRenderer>
-      <div
-        className={style.pill}
-        data-selected={selected || undefined}
-        data-passed={data.passed || undefined}
-        // Once for a relation, whatever it says: who looks for it finds one.
-        data-relation={data.answers || data.entry ? data.relation : undefined}
-        style={{ transform: `translate(-50%, -50%) translate(${x}px, ${y}px)` }}
-      >
-        {data.mark && (
-          // biome-ignore lint/a11y/noStaticElementInteractions: chosen by keys like every arrow
-          // biome-ignore lint/a11y/useKeyWithClickEvents: the arrow itself is chosen by keys
-          <span className={style.mark} onClick={() => store.getState().addSelectedEdges([id])}>
-            <ProblemBadge mark={data.mark} on="arrow" />
-          </span>
-        )}
-        {!data.entry &&
-          data.bundle.outcomes.map((outcome) => (
-            <span key={outcome} className={style.glyph} style={{ color: outcomeColor[outcome] }}>
-              <OutcomeSign outcome={outcome} size={11} />
+    <>
+      {dragged && <DraggedLine from={[x, y]} dragged={dragged} />}
+      <EdgeLabelRenderer>
+        <div
+          className={style.pill}
+          data-selected={selected || undefined}
+          data-passed={data.passed || undefined}
+          // Once for a relation, whatever it says: who looks for it finds one.
+          data-relation={data.answers || data.entry ? data.relation : undefined}
+          style={{ transform: `translate(-50%, -50%) translate(${x}px, ${y}px)` }}
+        >
+          {data.mark && (
+            // biome-ignore lint/a11y/noStaticElementInteractions: chosen by keys like every arrow
+            // biome-ignore lint/a11y/useKeyWithClickEvents: the arrow itself is chosen by keys
+            <span className={style.mark} onClick={() => store.getState().addSelectedEdges([id])}>
+              <ProblemBadge mark={data.mark} on="arrow" />
             </span>
-          ))}
-        {word !== "" && (
-          <span className={style.word} aria-hidden>
-            {word}
-          </span>
-        )}
-      </div>
-    </EdgeLabelRenderer>
+          )}
+          {data.entry ? null : selected && editing ? (
+            <OutcomeHandles bundle={data.bundle} editing={editing} onDrag={setDragged} />
+          ) : (
+            <Glyphs outcomes={data.bundle.outcomes} />
+          )}
+          {word !== "" && (
+            <span className={style.word} aria-hidden>
+              {word}
+            </span>
+          )}
+        </div>
+      </EdgeLabelRenderer>
+    </>
+  );
+}
+
+function Glyphs({ outcomes }: { outcomes: readonly Outcome[] }) {
+  return outcomes.map((outcome) => (
+    <span key={outcome} className={style.glyph} style={{ color: outcomeColor[outcome] }}>
+      <OutcomeSign outcome={outcome} size={11} />
+    </span>
+  ));
+}
+
+/** The outcomes of a chosen arrow, each of which can be dragged off. */
+function OutcomeHandles(props: Parameters<typeof useOutcomeDrag>[0]) {
+  const { bundle, editing } = props;
+  const drag = useOutcomeDrag(props);
+  const line = editing.nameOf(bundle);
+  return bundle.outcomes.map((outcome) => (
+    <button
+      key={outcome}
+      type="button"
+      className={`${style.handle} nodrag nopan`}
+      data-own-keys
+      data-dragged={drag.dragged === outcome || undefined}
+      aria-label={`Lead “${outcomeWord[outcome]}” of ${line} elsewhere`}
+      style={{ color: outcomeColor[outcome] }}
+      onPointerDown={drag.start}
+      onPointerMove={(event) => drag.move(event, outcome)}
+      onPointerUp={drag.drop}
+      onPointerCancel={drag.stop}
+      // The arrow has its own answer to these two; every other key is a shortcut as elsewhere.
+      onKeyDown={(event) => {
+        if (event.key === "Enter" || event.key === " ") event.stopPropagation();
+      }}
+      onClick={(event) => {
+        event.stopPropagation();
+        // A press of Enter or Space has no pointer, hence no clicks to count.
+        if (event.detail === 0) editing.choose(bundle, outcome);
+      }}
+    >
+      <OutcomeSign outcome={outcome} size={11} />
+    </button>
+  ));
+}
+
+/** From the pill to where an outcome is dragged. */
+function DraggedLine({ from, dragged }: { from: Point; dragged: DraggedOutcome }) {
+  const { outcome, at } = dragged;
+  return (
+    <path
+      className={style.dragged}
+      d={`M${from[0]} ${from[1]}L${at[0]} ${at[1]}`}
+      style={{ stroke: outcomeColor[outcome] }}
+      markerEnd={`url(#tip-${outcome})`}
+    />
   );
 }
 

@@ -1,5 +1,5 @@
 /** What people say about an action, or about any: threads with answers, done or open. */
-import { Button, Textarea, Tooltip } from "@mantine/core";
+import { Button, Textarea } from "@mantine/core";
 import { IconCheck, IconMessageCircle, IconRotate2 } from "@tabler/icons-react";
 import { useState } from "react";
 import { usePerson } from "../api/use-person";
@@ -10,6 +10,7 @@ import type { Key } from "../graph/model";
 import { endName } from "../graph/relation-words";
 import { usePersonColors } from "../sync/use-room";
 import { Empty } from "../ui/empty";
+import { Tooltip } from "../ui/floating/tooltip";
 import { initials } from "../ui/name-colors";
 import { ago, useNow } from "../ui/times";
 import style from "./comments.module.css";
@@ -210,8 +211,8 @@ export function Comments({ threads }: { threads: readonly Thread[] }) {
       )}
       {here.length > 0 && (
         <Tooltip
-          multiline
-          w={260}
+          width={260}
+          onFocus
           label="A comment carries the name that its page wrote. The history of the graph shows who stored each change; that the server vouches for."
         >
           {/* biome-ignore lint/a11y/noNoninteractiveTabindex: so that the words can be had by keyboard */}

@@ -35,6 +35,12 @@ export function decidedBy(seed: DryRunSeed | null): Decisions {
   return seed === null ? NOTHING_DECIDED : { ...NOTHING_DECIDED, before: seed.behaviours };
 }
 
+/** Whether anything that had ended by the moment of a run was decided otherwise since. */
+export function rewritesRun({ decisions }: Decisions, { actions }: DryRunSeed): boolean {
+  const ended = new Map(actions.map(({ node, ended }) => [node, ended]));
+  return decisions.some(({ node, call }) => call < (ended.get(node) ?? 0));
+}
+
 export const faultWords: Readonly<Record<DecidedFaultKind, string>> = {
   error: "Ends with an error",
   never: "Never ends",

@@ -51,11 +51,13 @@ const OPEN: Behaviour = { never: true };
 
 interface Found extends SeededAction {
   readonly calls: Behaviour[];
+  readonly inputs: Visit["inputs"][];
   readonly end: string | null;
 }
 
 function seededAction(node: string, action: ActionRun, at: number, doubts: SeedDoubt[]): Found {
   const calls: Behaviour[] = [];
+  const inputs: Visit["inputs"][] = [];
   let [ended, end]: [number, string | null] = [0, null];
   if (action.older > 0) {
     doubts.push({ node, text: `its first ${action.older} visits are not kept singly` });
@@ -72,6 +74,7 @@ function seededAction(node: string, action: ActionRun, at: number, doubts: SeedD
       doubts.push({ node, text: `${may} by then: nobody saw it exactly` });
     }
     if (state === "not begun") continue;
+    inputs.push(visit.inputs);
     if (state === "ended") {
       ended += 1;
       calls.push(endedBehaviour(node, visit, doubts));
@@ -80,7 +83,7 @@ function seededAction(node: string, action: ActionRun, at: number, doubts: SeedD
       end = visit.until === null ? null : (visit.result ?? "with an unknown result");
     }
   }
-  return { node, begun: calls.length, ended, calls, end };
+  return { node, begun: calls.length, ended, calls, inputs, end };
 }
 
 /** The names of the actions of a run in the graph that is played, by their names in the run. */
@@ -141,6 +144,7 @@ export function seedOf(run: Run, graph: Graph, differs: number, at: number): Dry
     at: at - Date.parse(run.started_at ?? run.requested_at),
     behaviours: Object.fromEntries(begun.map(({ node, calls }) => [node, calls])),
     actions: found.map(({ node, begun, ended }) => ({ node, begun, ended })),
+    inputs: Object.fromEntries(begun.map(({ node, inputs }) => [node, inputs])),
     ends: new Map(ends),
     values,
     doubts,

@@ -6,8 +6,8 @@ import { mapsOf } from "../graph/document-keys";
 import { addAction, connect, setEntry } from "../graph/edit";
 import { readGraph } from "../graph/read";
 import { keysByName, type PlaybackState } from "./playback";
-import { decidedBy, scriptOf } from "./script";
-import { seededMoment } from "./seed";
+import { decide, decidedBy, rewritesRun, scriptOf } from "./script";
+import { seededMoment, withRecordedValues } from "./seed";
 import { seedOf, visitAt } from "./seed-of-run";
 
 const doc = new Y.Doc();
@@ -60,6 +60,37 @@ test("what had ended is played as it went, and what went on waits for a decision
   });
   expect(seed.ends.get("Grip_0")).toBe("error");
   expect(seed.values).toEqual([{ node: "Look_0", name: "place", text: '"door"' }]);
+});
+
+test("what is played again has the values of the run, and nothing else has any", () => {
+  const loops = ran({
+    Look_0: [
+      look,
+      [
+        visit(0, 1, { inputs: { place: '"door"' } }),
+        visit(2, 3),
+        visit(4, 5, { inputs: { place: '"shelf"' } }),
+        visit(8, 9, { inputs: { place: '"dock"' } }),
+      ],
+    ],
+  });
+  const seed = seedOf(loops, graph, 0, at(6));
+  const keys = keysByName(graph);
+  const shown = (visits: number) => {
+    const { progress } = withRecordedValues(state({ [look]: visits }, []), seed, keys);
+    return progress.get(look)?.inputs;
+  };
+  expect([0, 1, 2, 3, 4].map(shown)).toEqual([
+    undefined,
+    { place: '"door"' },
+    undefined,
+    { place: '"shelf"' },
+    undefined,
+  ]);
+  const going = (call: number) => ({ key: look, node: "Look_0", call, since: 0 });
+  const rewrites = (call: number) =>
+    rewritesRun(decide(decidedBy(seed), going(call), "on_true", 0), seed);
+  expect([rewrites(2), rewrites(3)]).toEqual([true, false]);
 });
 
 test("what is not known of the moment says so, and nothing of it is hidden", () => {

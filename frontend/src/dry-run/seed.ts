@@ -1,5 +1,6 @@
 /** A moment of a recorded run as the beginning of a dry-run: what was so, and what nobody knows. Pure. */
 import type { Behaviour } from "../api/dry-runs";
+import type { Visit } from "../api/runs";
 import type { Key } from "../graph/model";
 import type { PlaybackState } from "./playback";
 
@@ -32,10 +33,28 @@ export interface DryRunSeed {
   /** What actions did by then, one behaviour for each call. */
   readonly behaviours: Readonly<Record<string, readonly Behaviour[]>>;
   readonly actions: readonly SeededAction[];
+  /** The values of each visit that had begun by then, as engines report them; null: not seen. */
+  readonly inputs: Readonly<Record<string, readonly Visit["inputs"][]>>;
   /** How the visits that went on then ended in the run, by node; told, not played. */
   readonly ends: ReadonlyMap<string, string>;
   readonly values: readonly SeedValue[];
   readonly doubts: readonly SeedDoubt[];
+}
+
+/** What is played, with the values that the run had in the visits that are played again. */
+export function withRecordedValues(
+  state: PlaybackState,
+  { inputs }: DryRunSeed,
+  keys: ReadonlyMap<string, Key>,
+): PlaybackState {
+  const progress = new Map(state.progress);
+  for (const [node, visits] of Object.entries(inputs)) {
+    const key = keys.get(node);
+    const now = key === undefined ? undefined : progress.get(key);
+    const known = visits[(now?.visits ?? 0) - 1];
+    if (key !== undefined && now && known) progress.set(key, { ...now, inputs: known });
+  }
+  return { ...state, progress };
 }
 
 /** Where the rules have led an action elsewhere than the run, in words; null where they have not. */

@@ -26,9 +26,10 @@ import {
   decide,
   decidedBy,
   NOTHING_DECIDED,
+  rewritesRun,
   scriptOf,
 } from "./script";
-import { type DryRunSeed, type SeedDoubt, seededMoment } from "./seed";
+import { type DryRunSeed, type SeedDoubt, seededMoment, withRecordedValues } from "./seed";
 
 export const DRY_RUN_SPEEDS = [0.5, 1, 4, 16] as const;
 
@@ -64,7 +65,12 @@ export interface DryRun {
 const EMPTY: PlaybackState = { progress: new Map<Key, Progress>(), running: [], state: "" };
 
 /** The moment that is shown: which one, what is seen there, and what it says in words. */
-function useShownMoment(trace: readonly TraceEvent[], at: number, graph: Graph) {
+function useShownMoment(
+  trace: readonly TraceEvent[],
+  at: number,
+  graph: Graph,
+  seed: DryRunSeed | null,
+) {
   const moments = useMemo(() => momentsOf(trace), [trace]);
   const index = Math.max(
     0,
@@ -72,8 +78,11 @@ function useShownMoment(trace: readonly TraceEvent[], at: number, graph: Graph) 
   );
   const sighting = useMemo(() => {
     const moment = moments[index];
-    return moment ? playbackStateAt(trace, moment.to, graph, keysByName(graph)) : EMPTY;
-  }, [trace, moments, index, graph]);
+    if (!moment) return EMPTY;
+    const keys = keysByName(graph);
+    const state = playbackStateAt(trace, moment.to, graph, keys);
+    return seed === null ? state : withRecordedValues(state, seed, keys);
+  }, [trace, moments, index, graph, seed]);
   const words = useMemo(() => {
     const moment = moments[index];
     const keys = keysByName(graph);
@@ -157,7 +166,7 @@ export function useDryRun(id: string, graph: Graph, seq: number) {
   const { data, isPlaceholderData, error: failed } = useResult(id, open, seq, decided);
   const busy = data === undefined || isPlaceholderData;
   const trace = useMemo(() => data?.trace ?? [], [data]);
-  const shown = useShownMoment(trace, at, graph);
+  const shown = useShownMoment(trace, at, graph, seed && !rewritesRun(decided, seed) ? seed : null);
   const { moments, index } = shown;
   const doubts = useSeed(open ? seed : null, trace, graph, busy, setAt);
 

@@ -3,6 +3,7 @@ import { ALIGN, DISTRIBUTE, NUDGE, snap, tidy, tidySelection, turn } from "./arr
 import * as draw from "./draw";
 import { DRY_RUN } from "./dry-run-actions";
 import type { EditAction } from "./edit-action";
+import * as folding from "./folding";
 import * as notes from "./notes";
 import { PANELS } from "./panels";
 import * as graph from "./share";
@@ -10,6 +11,7 @@ import * as look from "./view";
 
 export * from "./arrange";
 export * from "./draw";
+export * from "./folding";
 export * from "./notes";
 export * from "./share";
 export * from "./view";
@@ -18,6 +20,7 @@ export const EDIT_ACTIONS: readonly EditAction[] = [
   draw.add,
   draw.connectTo,
   draw.retargetArrow,
+  draw.straightenLine,
   notes.insert,
   draw.entry,
   draw.exit,
@@ -49,6 +52,9 @@ export const EDIT_ACTIONS: readonly EditAction[] = [
   look.marquee,
   look.pan,
   ...look.WALK,
+  folding.fold,
+  folding.foldAll,
+  folding.unfoldAll,
   notes.details,
   look.toCanvas,
   look.menu,

@@ -18,10 +18,13 @@ import {
 } from "@tabler/icons-react";
 import { type Align, align, type Block, distribute } from "../canvas/geometry/align";
 import { CARD } from "../canvas/geometry/arrange";
+import { asOneEdit } from "../graph/edit";
+import { straighten } from "../graph/edit/waypoints";
 import type { EditAction } from "./edit-action";
 import {
   type EditorContext,
   GRID,
+  nudging,
   selectedActions,
   selectedNotes,
   writePositions,
@@ -121,7 +124,14 @@ export const tidySelection: EditAction = {
   run: (context) => {
     const keys = new Set(selectedActions(context).map(({ key }) => key));
     void layOutSome(context, keys).then((places) => {
-      if (places !== null) writePositions(context, places);
+      if (places === null) return;
+      const inside = context.graph.relations.filter(
+        ({ parent, child }) => keys.has(parent) && keys.has(child),
+      );
+      asOneEdit(context.doc, () => {
+        straighten(context.doc, inside);
+        writePositions(context, places);
+      });
     });
   },
 };
@@ -151,14 +161,8 @@ function nudge(context: EditorContext, dx: number, dy: number): void {
   const moved = new Map(
     blocks(context).map(({ key, x, y }) => [key, [x + dx * step, y + dy * step] as const]),
   );
-  // Presses in a row are one step of undo.
-  const last = context.undo.undoStack.at(-1);
-  context.undo.captureTimeout = last?.meta.get(NUDGED) === true ? 900 : 0;
-  writePositions(context, moved);
-  context.undo.captureTimeout = 0;
-  context.undo.undoStack.at(-1)?.meta.set(NUDGED, true);
+  nudging(context, "cards", () => writePositions(context, moved));
 }
-const NUDGED = "nudged";
 
 export const NUDGE: readonly EditAction[] = Object.entries(WAYS).flatMap(
   ([key, [dx, dy, word, icon]]) =>

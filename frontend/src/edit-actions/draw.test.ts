@@ -2,8 +2,9 @@ import { expect, test } from "vitest";
 import * as Y from "yjs";
 import { addAction, connect, setExit } from "../graph/edit";
 import { graphNow } from "../graph/edit/document-writes";
+import { notesOf, writeNote } from "../graph/edit/notes";
 import { ENTRY } from "../graph/model";
-import { connectTo } from "./draw";
+import { connectTo, removeSelection } from "./draw";
 import { addActionAt, type EditorContext, type Overlay } from "./editor-context";
 
 function editor(doc: Y.Doc, selection: readonly string[]) {
@@ -13,6 +14,7 @@ function editor(doc: Y.Doc, selection: readonly string[]) {
     graph: graphNow(doc),
     selection: new Set(selection),
     positions: () => new Map(),
+    select: () => {},
     openOverlay: (overlay: Overlay | null) => opened.push(overlay),
   } as unknown as EditorContext;
   return { context, opened };
@@ -40,4 +42,14 @@ test("the next arrow goes on from the end of the one that was drawn last", () =>
   expect(from(look)).toEqual({ kind: "arrow", from: look, to: null });
   setExit(doc, grip);
   expect(from(`${grip}>exit`)).toEqual({ kind: "arrow", from: grip, to: null });
+});
+
+test("a frame that is deleted leaves what lies in it", () => {
+  const doc = new Y.Doc();
+  addAction(doc, { name: "Look", position: [50, 50] });
+  const frame = { kind: "frame", at: [0, 0], size: [400, 300], text: "", color: "blue" } as const;
+  const [chosen, other] = [writeNote(doc, frame), writeNote(doc, frame)];
+  removeSelection.run(editor(doc, [chosen]).context);
+  expect(notesOf(graphNow(doc)).map(({ key }) => key)).toEqual([other]);
+  expect(graphNow(doc).actions.map(({ name }) => name)).toEqual(["Look"]);
 });

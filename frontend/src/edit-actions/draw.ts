@@ -10,6 +10,7 @@ import {
   IconCut,
   IconDeselect,
   IconFlag,
+  IconLine,
   IconPlayerPlay,
   IconPlus,
   IconRouteAltRight,
@@ -28,7 +29,9 @@ import {
   unsetExit,
 } from "../graph/edit";
 import { clipOf, paste } from "../graph/edit/clip";
+import { straighten } from "../graph/edit/waypoints";
 import { type Action, ENTRY, EXIT, type Key } from "../graph/model";
+import { isBent } from "../graph/waypoints";
 import { copyText } from "../ui/copy-text";
 import { copiedSelection, pasteText, readText, rememberCopied } from "./clipboard";
 import type { EditAction } from "./edit-action";
@@ -132,7 +135,10 @@ export const removeSelection: EditAction = {
     asOneEdit(context.doc, () => {
       removeRelations(context.doc, relations);
       removeActions(context.doc, actions);
-      removeNotes(context.doc, selectedNotes(context));
+      removeNotes(
+        context.doc,
+        selectedNotes(context).map((key) => key.slice(2)),
+      );
     });
     context.select([]);
   },
@@ -240,6 +246,18 @@ export const retargetArrow: EditAction = {
     const [relation] = selectedRelations(context);
     if (relation) context.openOverlay({ kind: "retarget", relation: relationId(relation) });
   },
+};
+
+export const straightenLine: EditAction = {
+  name: "straighten",
+  label: "Straighten the line",
+  group: "Draw",
+  shortcuts: [],
+  icon: IconLine,
+  changes: true,
+  also: "remove bends waypoints unbend reset route",
+  enabled: (context) => selectedRelations(context).some(isBent),
+  run: (context) => straighten(context.doc, selectedRelations(context)),
 };
 
 /** Ties all that are chosen to one end, or unties them when all of them are. */

@@ -99,4 +99,13 @@ test("one more action goes behind what is chosen, where it is free", () => {
     }) as unknown as EditorContext;
   expect(freePosition(standing("right"))).toEqual([316, 136]);
   expect(freePosition(standing("down"))).toEqual([240, 212]);
+  // An exit that nobody has placed stands behind the last card: it makes way.
+  const ended = (exitPosition: [number, number] | null) =>
+    ({
+      ...standing("right"),
+      graph: { ...EMPTY_GRAPH, direction: "right", exitPosition, actions: [{ key: "a" }] },
+      positions: () => new Map(Object.entries({ a: [0, 0], exit: exitPosition ?? [272, 36] })),
+    }) as unknown as EditorContext;
+  expect(freePosition(ended(null))).toEqual([316, 0]);
+  expect(freePosition(ended([320, 36]))).toEqual([316, 172]);
 });

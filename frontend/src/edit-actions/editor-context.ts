@@ -14,7 +14,15 @@ import {
   setEntry,
 } from "../graph/edit";
 import { notesOf, placeNotes, withContents } from "../graph/edit/notes";
-import type { Action, Graph, Key, Position, Precondition, Relation } from "../graph/model";
+import {
+  type Action,
+  EXIT,
+  type Graph,
+  type Key,
+  type Position,
+  type Precondition,
+  type Relation,
+} from "../graph/model";
 
 /** Where the search for an action opens, and what it is tied to once chosen. */
 export interface AddRequest {
@@ -27,13 +35,17 @@ export interface AddRequest {
   readonly into?: string;
 }
 
-export type Panel = "details" | "outline" | "json" | "comments" | "problems";
+export type Panel = "details" | "library" | "outline" | "json" | "comments" | "problems";
 export type Tool = "pan" | "select";
 
 /** What opens over the editor, one at a time. */
 export type Overlay =
   | { readonly kind: "arrow"; readonly from: Key | null; readonly to: Key | null }
-  | { readonly kind: "retarget"; readonly relation: string }
+  | {
+      readonly kind: "retarget";
+      readonly relation: string;
+      readonly outcome?: Precondition;
+    }
   /** The text of a note or frame is being written. */
   | { readonly kind: "note"; readonly key: string }
   | { readonly kind: "menu"; readonly screen: Position }
@@ -83,6 +95,8 @@ export interface EditorContext {
   readonly tool: Tool;
   /** Whether what is moved by hand snaps to the grid. */
   readonly snap: boolean;
+  /** Frames that this person sees folded, on this device: keys that may be gone. */
+  readonly folded: ReadonlySet<string>;
   readonly view: CanvasView;
   /** The graph is played on the canvas; null while it is not. */
   readonly dryRun: DryRun | null;
@@ -91,6 +105,7 @@ export interface EditorContext {
   select(ids: Iterable<string>): void;
   setTool(tool: Tool): void;
   setSnap(snap: boolean): void;
+  fold(frames: readonly string[], folded: boolean): void;
   setPanel(panel: Panel): void;
   openAdd(request?: AddRequest): void;
   openOverlay(surface: Overlay | null): void;
@@ -126,9 +141,21 @@ export function writePositions(context: EditorContext, moved: ReadonlyMap<string
   const places = context.positions();
   const all = withContents(graph, moved, places, context.sizes());
   asOneEdit(doc, () => {
-    moveActions(doc, new Map([...unplaced(graph, places), ...all]));
+    moveActions(doc, unplaced(graph, places));
+    moveActions(doc, all);
     placeNotes(doc, graph, all);
   });
+}
+
+const NUDGED = "nudged";
+
+/** Moves something by a press of a key: presses in a row, of the same thing, are one step of undo. */
+export function nudging({ undo }: EditorContext, what: string, write: () => void): void {
+  const last = undo.undoStack.at(-1);
+  undo.captureTimeout = last?.meta.get(NUDGED) === what ? 900 : 0;
+  write();
+  undo.captureTimeout = 0;
+  undo.undoStack.at(-1)?.meta.set(NUDGED, what);
 }
 
 export function selectedRelations(context: EditorContext): Relation[] {
@@ -136,11 +163,14 @@ export function selectedRelations(context: EditorContext): Relation[] {
   return context.graph.relations.filter((relation) => context.selection.has(relationId(relation)));
 }
 
-/** Where cards and ends stand: what takes up room. */
+/** Where cards and ends stand: what takes up room. An exit that nobody has placed makes way by itself. */
 function takenBoxes(context: EditorContext) {
+  const floating = context.graph.exitPosition === null;
   const sizes = context.sizes();
   return [...context.positions()].flatMap(([key, [x, y]]) =>
-    key.startsWith("g/") ? [] : [{ x, y, ...(sizes.get(key) ?? CARD) }],
+    key.startsWith("g/") || (floating && key === EXIT)
+      ? []
+      : [{ x, y, ...(sizes.get(key) ?? CARD) }],
   );
 }
 

@@ -6,6 +6,7 @@ import { notesAfter } from "../canvas/geometry/follow-notes";
 import { LayoutLeft, layOut } from "../canvas/geometry/layout";
 import { asOneEdit, moveActions, setDirection } from "../graph/edit";
 import { changeNote, notesOf } from "../graph/edit/notes";
+import { straighten } from "../graph/edit/waypoints";
 import type { Direction, Graph, Key } from "../graph/model";
 import { announcer } from "../ui/announcer";
 import type { EditorContext } from "./editor-context";
@@ -79,6 +80,7 @@ export async function layOutGraph(
   const notes = notesAfter(notesOf(before), old, places, sizes, direction);
   asOneEdit(doc, () => {
     setDirection(doc, direction);
+    straighten(doc, context.graph.relations);
     moveActions(doc, places);
     for (const [key, change] of notes) changeNote(doc, key, change);
   });

@@ -12,12 +12,13 @@ import { useFollowedView } from "../people/use-followed-view";
 import type { Progress } from "../status/progress";
 import { useGraph, useLinkPart } from "../sync/use-room";
 import { Empty } from "../ui/empty";
+import { useHasFingersOnly } from "../ui/hooks/use-screen-size";
 import { lazyPart } from "../ui/parts/lazy-part";
 import { PartBoundary } from "../ui/parts/part-boundary";
-import { useHasFingersOnly } from "../ui/use-screen-size";
 import { EditableCanvas } from "./canvas/editable-canvas";
 import { useCanvasElements } from "./canvas/use-canvas-elements";
 import { useFirstLayout } from "./canvas/use-first-layout";
+import { useUnfolding } from "./canvas/use-unfolding";
 import { useViewport } from "./canvas/use-viewport";
 import style from "./canvas-pane.module.css";
 import { Toolbar } from "./menus/toolbar";
@@ -107,12 +108,11 @@ function Inside(props: Props) {
   const context = useMemo<EditorContext>(() => ({ ...calm, graph }), [calm, graph]);
   const arrived = useLinkPart(({ seq }) => seq > 0);
   const first = useFirstLayout(context, arrived, props.onPlacing);
+  const { selection, select, folded } = context;
   const canvas = useCanvasElements({
     graph: first.pending ? EMPTY_GRAPH : context.graph,
-    selection: context.selection,
-    select: context.select,
+    ...{ selection, select, folded, marks },
     progress: context.dryRun?.sighting.progress ?? progress,
-    marks,
     laidOut: first.places,
   });
   const { flow, places, sizes } = canvas;
@@ -120,17 +120,19 @@ function Inside(props: Props) {
   const pointer = useRef<Position | null>(null);
   const waiting = !arrived || (first.pending && context.graph.actions.length > 1);
   const begun = arrived && context.graph.actions.length > 0 && !first.pending;
+  const dry = context.dryRun !== null || undefined;
   const { view, lost, onPanned, onFollow } = useViewport({
     flow,
     frame,
     places,
     sizes,
     lines: canvas.lines,
+    ...useUnfolding(context, canvas),
     direction: graph.direction,
     phone,
-    begun,
-    progress: context.dryRun ? NOTHING : progress,
-    run: context.dryRun ? null : run,
+    opens: begun ? "cards" : arrived && !first.pending ? "ends" : "nothing",
+    progress: dry ? NOTHING : progress,
+    run: dry ? null : run,
     pointer,
   });
   const followed = useFollowedView({ flow, frame, view, onPanned });
@@ -138,7 +140,6 @@ function Inside(props: Props) {
     canvasHandle.current = { positions: () => places, sizes: () => sizes, view: followed.view };
   }, [canvasHandle, followed, places, sizes]);
 
-  const dry = context.dryRun !== null || undefined;
   useDryRunInView(context);
   useGraphLink(context, begun);
 

@@ -5,9 +5,13 @@ import type { Script } from "../api/dry-runs";
 import { useOpenThreadsOnCards, useThreads } from "../comments/use-threads";
 import { scriptOf } from "../dry-run/script";
 import type { DryRunSeed } from "../dry-run/seed";
-import { addActionAt, type EditorContext, freePosition } from "../edit-actions/editor-context";
+import {
+  type AddRequest,
+  addActionAt,
+  type EditorContext,
+  freePosition,
+} from "../edit-actions/editor-context";
 import { useShortcuts } from "../edit-actions/keys/shortcuts";
-import { FindBar } from "../find/find-bar";
 import { type NewAction, setGraphName } from "../graph/edit";
 import type { Graph, Key } from "../graph/model";
 import type { ToldProblem } from "../graph/problems/told-problems";
@@ -17,23 +21,24 @@ import { People } from "../people/people";
 import type { Progress } from "../status/progress";
 import type { RoomLink } from "../sync/room-connection";
 import { useThrottledLink } from "../sync/use-room";
+import { useIsPhone, useIsWide } from "../ui/hooks/use-screen-size";
 import { lazyPart } from "../ui/parts/lazy-part";
 import { PartBoundary } from "../ui/parts/part-boundary";
 import type { Crumb } from "../ui/top-bar";
-import { useIsPhone, useIsWide } from "../ui/use-screen-size";
 import { EditorContextProvider } from "./canvas/note-links";
-import { QuickAdd } from "./canvas/quick-add";
 import { CanvasPane } from "./canvas-pane";
-import { DeskLayout, PhoneLayout } from "./layouts";
 import { DryRunButton } from "./menus/dry-run-button";
 import { Overlays } from "./menus/overlays";
+import { DeskLayout, PhoneLayout } from "./panels/layouts";
+import { usePanels } from "./panels/use-panels";
 import { blockWords, ProblemCount, useToldProblems } from "./problem-count";
 import { RoomNotices } from "./room-notices";
 import { SaveStatus } from "./save-status";
 import { useRemoteEditAnnouncements, useRunAnnouncements } from "./use-announcements";
 import { useEditor } from "./use-editor";
-import { usePanels } from "./use-panels";
 
+const FindBar = lazyPart(() => import("../find/find-bar").then((part) => part.FindBar));
+const QuickAdd = lazyPart(() => import("./canvas/quick-add").then((part) => part.QuickAdd));
 const Outline = lazyPart(() => import("../outline/outline").then((part) => part.Outline));
 
 /** What the page around the editor may want to know. */
@@ -152,6 +157,24 @@ function OutlinePane(props: ComponentProps<typeof Outline>) {
   );
 }
 
+function FindPane(props: ComponentProps<typeof FindBar>) {
+  return (
+    <PartBoundary waiting={null}>
+      <FindBar {...props} />
+    </PartBoundary>
+  );
+}
+
+type Adding = ComponentProps<typeof QuickAdd>;
+
+function AddPane({ request, ...others }: Omit<Adding, "request"> & { request: AddRequest | null }) {
+  return (
+    <PartBoundary waiting={null}>
+      {request !== null && <QuickAdd request={request} {...others} />}
+    </PartBoundary>
+  );
+}
+
 /** What comes before a start stands beside it. */
 function withDryRun(start: ReactNode): ReactNode {
   return (
@@ -178,6 +201,13 @@ function recordOf({ dryRun }: EditorContext, shown: Shown, record: Props["record
 const StillInspector = memo(Inspector);
 const StillPeople = memo(People);
 
+/** What is typed right after their keys shall find them. */
+function usePreloaded(): void {
+  useEffect(() => {
+    for (const part of [QuickAdd, FindBar]) void part.preload();
+  }, []);
+}
+
 export function Editor(props: Props) {
   const { id, known, progress } = props;
   const panels = usePanels();
@@ -189,6 +219,7 @@ export function Editor(props: Props) {
   useRemoteEditAnnouncements(context.graph, link.seq > 0);
   useRunAnnouncements(context.graph, progress);
   useShortcuts(context);
+  usePreloaded();
   useSeededDryRun(context, props.seed);
 
   const place = (template: NewAction) => {
@@ -223,7 +254,7 @@ export function Editor(props: Props) {
     strip,
     outline: <OutlinePane progress={progress} />,
     find: editor.isFindOpen && (
-      <FindBar problems={problems?.problems ?? []} onClose={editor.closeFind} />
+      <FindPane problems={problems?.problems ?? []} onClose={editor.closeFind} />
     ),
     details: (
       <StillInspector
@@ -254,13 +285,11 @@ export function Editor(props: Props) {
       {phone ? (
         <PhoneLayout {...parts} dry={context.dryRun !== null} start={() => props.start(shown)} />
       ) : (
-        <DeskLayout {...parts} wide={!compact} list={() => props.list(place)} />
+        <DeskLayout {...parts} wide={!compact} told={told} list={() => props.list(place)} />
       )}
       <RoomNotices />
       <Overlays context={context} known={known} overlay={overlay} onClose={editor.closeOverlay} />
-      {adding && (
-        <QuickAdd context={context} request={adding} known={known} onClose={editor.closeAdd} />
-      )}
+      <AddPane context={context} request={adding} known={known} onClose={editor.closeAdd} />
     </EditorContextProvider>
   );
 }

@@ -1,5 +1,4 @@
 /** Whether what is on screen is stored, in words. */
-import { Tooltip } from "@mantine/core";
 import {
   IconAlertTriangle,
   IconCheck,
@@ -11,6 +10,7 @@ import { useEditorContext } from "../edit-actions/editor-context";
 import type { RefusalReason, RoomLink } from "../sync/room-connection";
 import { unsavedReason } from "../sync/unsaved-reasons";
 import { useLink, useRoom } from "../sync/use-room";
+import { Tooltip } from "../ui/floating/tooltip";
 import style from "./save-status.module.css";
 
 const whys: Record<RefusalReason, string> = {
@@ -75,13 +75,7 @@ export function SaveStatus() {
   const Sign = signs[tone];
   const why = unsavedReason(link);
   return (
-    <Tooltip
-      label={why ?? ""}
-      disabled={why === null}
-      multiline
-      w={300}
-      events={{ hover: true, focus: true, touch: true }}
-    >
+    <Tooltip label={why ?? ""} disabled={why === null} width={300} onFocus>
       <span
         className={style.saved}
         data-tone={tone}

@@ -23,6 +23,7 @@ import {
   useUndo,
 } from "../sync/use-room";
 import { exportGraph } from "./export-graph";
+import { useFoldedFrames } from "./use-folded-frames";
 
 const NONE: ReadonlySet<string> = new Set();
 
@@ -110,8 +111,8 @@ function useDialogs(latest: RefObject<EditorContext | null>, onPanel: (panel: Pa
   const [isFindOpen, setFinding] = useState(false);
   const setPanel = useCallback(
     (next: Panel) => {
-      // The outline stands beside the panel of details, which stays as it is.
-      if (next !== "outline") setPanelNow(next);
+      // The lists stand beside the panel of details, which stays as it is.
+      if (next !== "outline" && next !== "library") setPanelNow(next);
       onPanel(next);
     },
     [onPanel],
@@ -168,6 +169,7 @@ export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorSt
   const latest = useRef<EditorContext | null>(null);
   const edited = useEdited(id);
   const tools = useTools();
+  const folding = useFoldedFrames(id);
   const { openers, shown } = useDialogs(latest, onPanel);
   const canvasHandle = useRef<CanvasHandle>({
     view: NO_CANVAS_VIEW,
@@ -178,8 +180,8 @@ export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorSt
     if (latest.current) void exportGraph(latest.current, format);
   }, []);
   const context = useMemo<EditorContext>(
-    () => ({ ...edited, ...tools, ...openers, ...canvasOf(canvasHandle), download }),
-    [edited, tools, openers, download],
+    () => ({ ...edited, ...tools, ...folding, ...openers, ...canvasOf(canvasHandle), download }),
+    [edited, tools, folding, openers, download],
   );
   latest.current = context;
   return { context, canvasHandle, ...shown };

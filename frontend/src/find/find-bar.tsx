@@ -1,5 +1,5 @@
 /** Find in graph: a line to type in, hits below it, next and previous, all by keyboard. */
-import { ActionIcon, Kbd, TextInput, Tooltip } from "@mantine/core";
+import { ActionIcon, Kbd, TextInput } from "@mantine/core";
 import {
   IconArrowRight,
   IconChevronDown,
@@ -12,6 +12,7 @@ import { useDeferredValue, useEffect, useId, useMemo, useRef, useState } from "r
 import type { Problem } from "../api/graphs";
 import { printedKeys } from "../edit-actions/edit-action";
 import { useEditorContext } from "../edit-actions/editor-context";
+import { Tooltip } from "../ui/floating/tooltip";
 import { find, type Hit } from "./find";
 import style from "./find-bar.module.css";
 

@@ -4,9 +4,18 @@
  * Pure. Each change keeps the keys it is made of, so that some of them can be taken and others not.
  */
 
-import { endsOf, type Maps, ROOTS, type Root, segmentsOf, splitKey } from "./document-keys";
+import {
+  bundleOfKey,
+  endsOf,
+  type Maps,
+  ROOTS,
+  type Root,
+  segmentsOf,
+  splitKey,
+} from "./document-keys";
 import { isEqual } from "./equal";
 import { ENTRY, EXIT, type Key, PRECONDITIONS } from "./model";
+import { readWaypoints } from "./waypoints";
 
 /** Values by key; `undefined` where there is none. */
 export type ValuesByRoot = { readonly [R in Root]: ReadonlyMap<string, unknown> };
@@ -88,6 +97,8 @@ export function onlyChanges(
 function groupOf(root: Root, key: string): string {
   const { head } = splitKey(key);
   if (root === "meta") return "meta";
+  const line = root === "positions" ? bundleOfKey(key) : null;
+  if (line !== null) return `relations/${splitKey(line).head}`;
   if (root === "positions" && !key.startsWith("g/") && key !== ENTRY && key !== EXIT)
     return `actions/${head}`;
   return `${root}/${root === "comments" ? key : head}`;
@@ -180,12 +191,26 @@ function nameOf(key: Key, { here, before }: ChangesInput): string {
 
 function lineOf(root: Root, key: string, given: ChangesInput, now: Maps): ChangedField | null {
   const rest = root === "meta" ? key : splitKey(key).rest;
+  if (bundleOfKey(key) !== null && root === "positions") return bendsLine(key, given, now);
   if (SILENT.has(rest) || (root === "comments" && rest !== "")) return null;
   const [was, is] = [given.before[root].get(key), given.difference[root].get(key)];
   const there = now[root].get(key);
   const line = { field: fieldOf(root, rest), before: words(root, was), after: words(root, is) };
   const other = !isEqual(there, was) && !isEqual(there, is);
   return other ? { ...line, now: words(root, there) } : line;
+}
+
+/** Where a line is bent is seen on the canvas; said is how often. */
+function bendsLine(key: string, given: ChangesInput, now: Maps): ChangedField {
+  const said = (value: unknown) => {
+    const count = typeof value === "string" ? readWaypoints(value).length : 0;
+    return count === 0 ? null : `${count} by hand`;
+  };
+  const [was, is, there] = [given.before, given.difference, now].map((maps) =>
+    maps.positions.get(key),
+  );
+  const line = { field: "Bends", before: said(was), after: said(is) };
+  return isEqual(there, was) || isEqual(there, is) ? line : { ...line, now: said(there) };
 }
 
 function fieldOf(root: Root, rest: string): string {

@@ -54,6 +54,11 @@ export const parameterKey = (aid: Key, side: ParameterSide, path: string): strin
   `${aid}|${side}/${path}`;
 export const extraKey = (aid: Key, field: string): string => `${aid}|x/${field}`;
 export const noteKey = (id: string): string => `g/${id}`;
+/** The waypoints of a line, by the id of its bundle: `<relation>|<response>`. */
+export const waypointsKey = (bundle: string): string => `w/${bundle}`;
+/** The bundle whose waypoints stand under a key of `positions`; null for other keys. */
+export const bundleOfKey = (key: string): string | null =>
+  key.startsWith("w/") ? key.slice(2) : null;
 
 /** The id of a relation, which is also the head of its keys: `<parent>><child>` or `…;n`. */
 export function relationId(relation: { parent: Key; child: Key; listing?: number }): string {

@@ -92,6 +92,8 @@ export interface Relation {
   readonly childOrder: number;
   readonly parentsExtra: Extra;
   readonly childrenExtra: Extra;
+  /** By response: through which places people have led its line, as JSON text. */
+  readonly waypoints: readonly (readonly [response: Response, text: JsonText])[];
 }
 
 export interface Graph {

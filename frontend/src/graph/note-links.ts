@@ -58,3 +58,39 @@ export function withLinkIds(text: string, actions: Actions): string {
 export function spokenNote(text: string): string {
   return text.replace(LINK, "$1");
 }
+
+/** The link that is being written before the caret. */
+export interface OpenLink {
+  /** Where its `[[` begins. */
+  readonly at: number;
+  /** What of the name is written. */
+  readonly typed: string;
+}
+
+/** Null where no link is open: before `[[`, and once something stands there that no name has. */
+export function openLink(text: string, caret: number): OpenLink | null {
+  const at = text.slice(0, caret).lastIndexOf("[[");
+  const typed = text.slice(at + 2, caret);
+  return at < 0 || typed.length > 200 || /[[\]\n#]/.test(typed) ? null : { at, typed };
+}
+
+/** What follows the caret in a link that was written before. */
+const REST = /^(?:[^[\]\n]{0,220}\]\]|\]?)/;
+
+/** What a link is written as, and up to where it takes the place of what stands there. */
+export function linkText(text: string, caret: number, name: string): { text: string; end: number } {
+  const closed = REST.exec(text.slice(caret))?.[0].length ?? 0;
+  return { text: `[[${name}]]`, end: caret + closed };
+}
+
+/** The names by which a link finds one action, and only that. */
+export function linkableNames(actions: Actions): string[] {
+  const names = actions.filter(({ missing }) => !missing).map(nameOf);
+  const count = new Map<string, number>();
+  for (const name of names) count.set(name, (count.get(name) ?? 0) + 1);
+  return names.filter((name) => {
+    const [link, ...others] = linkPieces(`[[${name}]]`);
+    const whole = others.length === 0 && typeof link === "object" && link.name === name;
+    return whole && link.id === "" && count.get(name) === 1;
+  });
+}

@@ -8,6 +8,7 @@
 import type * as Y from "yjs";
 import { type Assembly, assemble, emptyAssembly, type RawAction } from "./assemble";
 import {
+  bundleOfKey,
   endsOf,
   type Maps,
   mapsOf,
@@ -16,6 +17,7 @@ import {
   relationId,
   rootOf,
   splitKey,
+  waypointsKey,
 } from "./document-keys";
 import { isEqual } from "./equal";
 import { isAid } from "./ids";
@@ -31,6 +33,7 @@ import {
   type Parameter,
   PRECONDITIONS,
   type Precondition,
+  RESPONSES,
   type Relation,
   type Remap,
   type Response,
@@ -149,6 +152,7 @@ class Reader {
       case "positions":
         put(this.positions, key, value);
         this.staleActions.add(key);
+        this.staleRelations.add(splitKey(bundleOfKey(key) ?? "").head);
         break;
       case "actions":
         if (!isAid(head)) return;
@@ -180,7 +184,7 @@ class Reader {
     }
     for (const id of this.staleRelations) {
       const fields = this.relationFields.get(id);
-      replace(this.relations, id, (fields && readRelation(id, fields)) ?? null);
+      replace(this.relations, id, (fields && readRelation(id, fields, this.positions)) ?? null);
       if (fields?.size === 0) this.relationFields.delete(id);
     }
     this.staleActions.clear();
@@ -275,7 +279,7 @@ function listed(names: Iterable<string>, order: unknown): readonly string[] {
   return [...new Set([...first, ...known])];
 }
 
-function readRelation(id: string, fields: OwnerFields): Relation | null {
+function readRelation(id: string, fields: OwnerFields, positions: OwnerFields): Relation | null {
   const ends = endsOf(id);
   if (ends === null) return null;
   const answers = new Map<Precondition, Response>();
@@ -304,7 +308,18 @@ function readRelation(id: string, fields: OwnerFields): Relation | null {
     childOrder: asNumber(fields.get("co")) ?? 0,
     parentsExtra: extraOf(fields, "x/parents"),
     childrenExtra: extraOf(fields, "x/children"),
+    waypoints: readWaypoints(id, positions),
   };
+}
+
+const NONE: Relation["waypoints"] = [];
+
+function readWaypoints(id: string, positions: OwnerFields): Relation["waypoints"] {
+  const found = RESPONSES.flatMap((response) => {
+    const text = asJsonText(positions.get(waypointsKey(`${id}|${response}`)));
+    return text === undefined ? [] : [[response, text] as const];
+  });
+  return found.length === 0 ? NONE : found;
 }
 
 function readRemaps(fields: OwnerFields): readonly Remap[] {

@@ -1,5 +1,5 @@
 /** The arrows of an action as lines of text, and drawing one by keyboard. */
-import { ActionIcon, Button, Select, Tooltip } from "@mantine/core";
+import { ActionIcon, Button, Select } from "@mantine/core";
 import { IconPlus, IconX } from "@tabler/icons-react";
 import { useState } from "react";
 import { responsesOf } from "../canvas/elements";
@@ -9,6 +9,7 @@ import { relationId } from "../graph/document-keys";
 import { connect, removeRelation, setEntry, unsetEntry } from "../graph/edit";
 import { type Action, ENTRY, EXIT, type Precondition, type Relation } from "../graph/model";
 import { endName } from "../graph/relation-words";
+import { Tooltip } from "../ui/floating/tooltip";
 import style from "./inspector.module.css";
 
 function Line({ relation, context }: { relation: Relation; context: EditorContext }) {

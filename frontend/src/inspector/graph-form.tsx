@@ -5,7 +5,7 @@ import { useEditorContext } from "../edit-actions/editor-context";
 import { FirstShortcut } from "../edit-actions/keys/shortcut-keys";
 import { setGraphDescription, setGraphName } from "../graph/edit";
 import { DraftInput } from "../ui/draft-input";
-import { useHasFingersOnly } from "../ui/use-screen-size";
+import { useHasFingersOnly } from "../ui/hooks/use-screen-size";
 import { SharedField } from "./fields/shared-field";
 import style from "./inspector.module.css";
 import { graphLabels, setLabels } from "./labels";

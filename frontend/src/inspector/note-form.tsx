@@ -1,6 +1,8 @@
 /** A note or a frame as a form: what the canvas shows, without a pointer. */
 import { Button } from "@mantine/core";
 import { IconTrash } from "@tabler/icons-react";
+import { useRef } from "react";
+import { LinkNames } from "../canvas/notes/link-names";
 import { noteColor } from "../canvas/notes/note-colors";
 import { isMarkedUp, NoteText } from "../canvas/notes/note-text";
 import { useEditorContext } from "../edit-actions/editor-context";
@@ -47,17 +49,20 @@ export function NoteForm({ note }: { note: Note }) {
   const frame = note.kind === "frame";
   const change = (part: Parameters<typeof changeNote>[2]) => void changeNote(doc, note.key, part);
   const [width, height] = note.size;
+  const area = useRef<HTMLTextAreaElement>(null);
   return (
     <div className={style.form}>
       <SharedField of={note.key} field="text">
         <DraftInput
           label={frame ? "Title" : "Text"}
           lines={!frame}
+          area={area}
           value={note.text}
           placeholder={frame ? "What lies in it" : "What others shall know"}
           check={(draft) => (draft.length > 5_000 ? "At most 5000 characters." : null)}
           onCommit={(text) => change({ text: frame ? text : withLinkIds(text, graph.actions) })}
         />
+        {!frame && <LinkNames field={area} />}
       </SharedField>
       {!frame && isMarkedUp(note.text) && (
         <div

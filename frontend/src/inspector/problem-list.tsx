@@ -1,5 +1,5 @@
 /** What is wrong with the graph, what is still to fill in, and what may go wrong: where, and what mends it. */
-import { ActionIcon, Button, Tooltip } from "@mantine/core";
+import { ActionIcon, Button } from "@mantine/core";
 import { IconCircleCheck, IconLink, IconTool } from "@tabler/icons-react";
 import { useMemo } from "react";
 import type { Problems } from "../api/graphs";
@@ -13,6 +13,7 @@ import { dataFlowOf } from "../graph/parameters/data-flow";
 import type { ProblemKind } from "../graph/problems/problem-kinds";
 import { endName } from "../graph/relation-words";
 import { pathWords } from "../graph/value-text";
+import { Tooltip } from "../ui/floating/tooltip";
 import { focusField } from "../ui/focus-field";
 import { fieldOfTold, firstField, type Told } from "./fields/field-problems";
 import { ProblemNote, tellNothingLeft } from "./fields/problem-note";

@@ -1,47 +1,26 @@
 /** An action of the library: dragged or tapped onto the canvas; what it takes, and where it is used. */
-import { ActionIcon, Menu } from "@mantine/core";
+import { ActionIcon } from "@mantine/core";
 import { IconGripVertical, IconInfoCircle } from "@tabler/icons-react";
-import { Link } from "wouter";
-import { useGraphs } from "../api/graphs";
 import { actionDrag } from "../canvas/action-drag";
 import type { NewAction } from "../graph/edit";
+import { LateOpening } from "../ui/floating/late-opening";
+import { lazyPart } from "../ui/parts/lazy-part";
 import { type KnownAction, signature } from "./known-actions";
 import style from "./sidebar.module.css";
 
+const ActionFacts = lazyPart(() => import("./action-facts").then((part) => part.ActionFacts));
+
 function About({ known }: { known: KnownAction }) {
-  const graphs = useGraphs().data ?? [];
-  const { template, usedIn, takes, gives } = known;
   return (
-    <Menu position="right-start" width={270}>
-      <Menu.Target>
-        <ActionIcon size={28} className={style.about ?? ""} aria-label={`About ${template.name}`}>
-          <IconInfoCircle size={15} aria-hidden />
-        </ActionIcon>
-      </Menu.Target>
-      <Menu.Dropdown>
-        <div className={style.facts}>
-          <p>{template.description || "Nobody has described it yet."}</p>
-          {[
-            ["Takes", takes],
-            ["Gives", gives],
-          ].map(([title, list]) =>
-            list === undefined || list.length === 0 ? null : (
-              <p key={String(title)}>
-                <b>{title}</b> {(list as readonly string[]).join(" · ")}
-              </p>
-            ),
-          )}
-        </div>
-        <Menu.Label>
-          {usedIn.length === 1 ? "Used in 1 graph" : `Used in ${usedIn.length} graphs`}
-        </Menu.Label>
-        {usedIn.map((id) => (
-          <Menu.Item key={id} component={Link} to={`/graphs/${id}`}>
-            {graphs.find((graph) => graph.id === id)?.name || "Untitled"}
-          </Menu.Item>
-        ))}
-      </Menu.Dropdown>
-    </Menu>
+    <LateOpening opens="menu" part={(button) => <ActionFacts button={button} known={known} />}>
+      <ActionIcon
+        size={28}
+        className={style.about ?? ""}
+        aria-label={`About ${known.template.name}`}
+      >
+        <IconInfoCircle size={15} aria-hidden />
+      </ActionIcon>
+    </LateOpening>
   );
 }
 

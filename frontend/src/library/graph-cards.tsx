@@ -1,7 +1,7 @@
 /** Graphs as cards: searched, sorted, by label; each says how it is and who is in it. */
 import { NativeSelect, TextInput } from "@mantine/core";
 import { useLocalStorage } from "@mantine/hooks";
-import { IconAlertTriangle, IconSearch } from "@tabler/icons-react";
+import { IconSearch } from "@tabler/icons-react";
 import { useMemo, useState } from "react";
 import { Link } from "wouter";
 import type { GraphSummary } from "../api/graphs";
@@ -16,6 +16,7 @@ import { lazyPart } from "../ui/parts/lazy-part";
 import { PartBoundary } from "../ui/parts/part-boundary";
 import { ago, instant, useNow } from "../ui/times";
 import style from "./graph-cards.module.css";
+import { GraphCounts } from "./graph-counts";
 import { GraphMenu } from "./graph-menu";
 import { allLabels, type GraphOrder, lastRuns, ORDERS, selectGraphs } from "./graph-selection";
 import home from "./home.module.css";
@@ -25,18 +26,6 @@ const GraphPreview = lazyPart(() => import("./graph-preview").then((part) => par
 const nothing = () => null;
 
 const FEW = 4; // robots or labels on a card
-
-function Problems({ graph }: { graph: GraphSummary }) {
-  const { error = 0, warning = 0 } = graph.problems ?? {};
-  const count = error + warning;
-  if (count === 0) return null;
-  return (
-    <span className={home.problems} data-worst={error > 0 ? "error" : "warning"}>
-      <IconAlertTriangle size={13} aria-hidden />
-      {count === 1 ? "1 problem" : `${count} problems`}
-    </span>
-  );
-}
 
 function LastRun({ run, now }: { run: Run; now: number }) {
   const going = run.ended_at === null;
@@ -109,7 +98,7 @@ function GraphCard({ graph, names, last }: GraphCardProps) {
           )}
           <div className={home.facts}>
             {last && <LastRun run={last} now={now} />}
-            <Problems graph={graph} />
+            <GraphCounts graph={graph} />
             <span>
               {graph.actions === 1 ? "1 action" : `${graph.actions ?? 0} actions`}
               {at !== null && ` · changed ${ago(at, now)}`}

@@ -1,12 +1,12 @@
 /** Graphs as rows: name, last run in words, problems. */
 import { Skeleton } from "@mantine/core";
-import { IconAlertTriangle } from "@tabler/icons-react";
 import { Link } from "wouter";
 import { authorName, type GraphSummary } from "../api/graphs";
 import { newestRun, useLive } from "../api/live/use-live";
 import { runEndText, runLabel, type Tone } from "../status/progress";
 import { toneColor } from "../status/state-label";
 import { ago, instant, stopwatch, useNow } from "../ui/times";
+import { GraphCounts } from "./graph-counts";
 import style from "./sidebar.module.css";
 
 function subtitle(graph: GraphSummary, words: string | null, now: number): string {
@@ -35,7 +35,6 @@ export function GraphRow({ graph, current }: { graph: GraphSummary; current: boo
       ? `${authorName(run.author)} · ${runLabel(run).word} · ${stopwatch(now - start)}`
       : `${runEndText(run)} · ${ago(end, now)}`;
   }
-  const errors = graph.problems?.error ?? 0;
   return (
     <Link
       to={`/graphs/${graph.id}`}
@@ -48,11 +47,7 @@ export function GraphRow({ graph, current }: { graph: GraphSummary; current: boo
         <span className={style.name}>{graph.name || "Untitled"}</span>
         <span className={style.sub}>{subtitle(graph, words, now)}</span>
       </span>
-      {errors > 0 && (
-        <span className={style.errors} title={`${errors} problems that keep it from starting`}>
-          <IconAlertTriangle size={13} aria-hidden /> {errors}
-        </span>
-      )}
+      <GraphCounts graph={graph} brief />
     </Link>
   );
 }

@@ -39,6 +39,15 @@ test.each([
   expect(ids(order)).toEqual(wanted);
 });
 
+test("of two graphs that which has more wrong has more problems, then that with more to fill in", () => {
+  const few = graph("few", { wrong: 1, to_fill_in: 0, problems: { error: 1, warning: 0 } });
+  const many = graph("many", { wrong: 0, to_fill_in: 9, problems: { error: 30, warning: 0 } });
+  const some = graph("some", { wrong: 0, to_fill_in: 2, problems: { error: 40, warning: 0 } });
+  const wish = { search: "", label: null, order: "problems" } as const;
+  const found = selectGraphs([some, many, few], wish, runs);
+  expect(found.map(({ id }) => id)).toEqual(["few", "many", "some"]);
+});
+
 test("a search finds robots, labels and people, and a label is had by all that are shown", () => {
   expect(ids("name", "rover")).toEqual(["a"]);
   expect(ids("name", "mari bb")).toEqual(["bb"]);

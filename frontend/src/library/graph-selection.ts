@@ -57,13 +57,20 @@ export function selectGraphs(
     if (run === undefined) return "";
     return hasEnded(run) ? run.requested_at : `9${run.requested_at}`;
   };
-  const worst = ({ problems }: GraphSummary) =>
-    (problems?.error ?? 0) * 10_000 + (problems?.warning ?? 0);
+  // What is wrong comes before what is to fill in, and both before what may go wrong.
+  const worst = ({ wrong = 0, to_fill_in = 0, problems }: GraphSummary) => [
+    wrong,
+    to_fill_in,
+    problems?.error ?? 0,
+    problems?.warning ?? 0,
+  ];
+  const worse = (a: readonly number[], b: readonly number[]) =>
+    b.map((count, i) => count - (a[i] ?? 0)).find((more) => more !== 0) ?? 0;
   const by: Record<GraphOrder, (a: GraphSummary, b: GraphSummary) => number> = {
     changed: () => 0,
     run: (a, b) => ran(b).localeCompare(ran(a)),
     name: (a, b) => a.name.localeCompare(b.name, undefined, { numeric: true }),
-    problems: (a, b) => worst(b) - worst(a),
+    problems: (a, b) => worse(worst(a), worst(b)),
     size: (a, b) => (b.actions ?? 0) - (a.actions ?? 0),
   };
   return graphs

@@ -1,10 +1,11 @@
 /** The list on the left: graphs to open, actions to place. */
-import { ActionIcon, Kbd, TextInput, Tooltip } from "@mantine/core";
+import { ActionIcon, Kbd, TextInput } from "@mantine/core";
 import { IconFileImport, IconPlus, IconSearch } from "@tabler/icons-react";
 import { useState } from "react";
 import { useGraphs } from "../api/graphs";
 import { useMay } from "../api/use-person";
 import type { NewAction } from "../graph/edit";
+import { Tooltip } from "../ui/floating/tooltip";
 import { ActionRow } from "./action-row";
 import { GraphRow, RowSkeletons } from "./graph-rows";
 import { matchesSearch } from "./graph-selection";
@@ -72,7 +73,7 @@ export function Sidebar({ current, onNew, onImport, onPlace }: Props) {
         data-search
       />
       <div className={style.scroll}>
-        <div className={style.heading}>
+        <div className={style.heading} data-heading="Graphs">
           <h2>Graphs</h2>
           {mayEdit && (
             <>
@@ -100,7 +101,7 @@ export function Sidebar({ current, onNew, onImport, onPlace }: Props) {
         )}
         {onPlace && mayEdit && (
           <>
-            <div className={style.heading}>
+            <div className={style.heading} data-heading="Actions">
               <h2>Actions</h2>
               <span className={style.how}>drag or tap to place</span>
             </div>

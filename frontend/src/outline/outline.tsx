@@ -14,7 +14,7 @@ import type { Progress } from "../status/progress";
 import { useSelectedByOthers } from "../sync/use-room";
 import { announcer } from "../ui/announcer";
 import { Empty } from "../ui/empty";
-import { useIsPhone } from "../ui/use-screen-size";
+import { useIsPhone } from "../ui/hooks/use-screen-size";
 import style from "./outline.module.css";
 import { OutlineRow, type RowHandlers } from "./outline-row";
 import { PhoneRow } from "./phone-row";
@@ -89,7 +89,9 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
     return all.filter((row) => row.kind === "entry" || lit.has(ownerOf(row)));
   }, [graph, isOpen, robot, phone]);
   const names = useMemo(() => namesOf(graph), [graph]);
-  const [active, setActive] = useState<string>(ENTRY);
+  const [only] = selection.size === 1 ? selection : [];
+  const chosen = () => rows.find((row) => subjectOf(row) === only);
+  const [active, setActive] = useState<string>(() => chosen()?.id ?? ENTRY);
   const [edited, setEdited] = useState<Edited | null>(null);
   const tree = useRef<HTMLTableElement>(null);
   const at = Math.max(
@@ -112,7 +114,6 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
     if (!phone) context.view.show(subject.split(">").map((end) => end.split(";")[0] ?? end));
   };
   // What is selected elsewhere is found here too.
-  const [only] = selection.size === 1 ? selection : [];
   useEffect(() => {
     if (only === undefined || tree.current?.contains(document.activeElement)) return;
     const row = rows.find((candidate) => subjectOf(candidate) === only);

@@ -1,5 +1,4 @@
 /** Who else is here: faces in the bar, whom one follows, and who is at which card. */
-import { Tooltip } from "@mantine/core";
 import { ViewportPortal } from "@xyflow/react";
 import type { CSSProperties } from "react";
 import { checkedColor } from "../api/people";
@@ -7,6 +6,7 @@ import { CARD, type Positions, type Sizes } from "../canvas/geometry/arrange";
 import { splitKey } from "../graph/document-keys";
 import type { Participant } from "../sync/presence/presence";
 import { useFollowing, usePeople } from "../sync/use-room";
+import { Tooltip } from "../ui/floating/tooltip";
 import { initials } from "../ui/name-colors";
 import style from "./people.module.css";
 
@@ -94,14 +94,17 @@ interface AtCardsProps {
   me: string;
   places: Positions;
   sizes: Sizes;
+  /** The folded frames that are drawn instead of what lies in them. */
+  blockOf?: ReadonlyMap<string, string> | undefined;
 }
 
 /** Small initials at the cards of which somebody has a field under their caret. */
-export function PeopleAtCards({ me, places, sizes }: AtCardsProps) {
+export function PeopleAtCards({ me, places, sizes, blockOf }: AtCardsProps) {
   const people = usePeople();
   const at = new Map<string, Participant[]>();
   for (const person of people) {
-    const { head } = splitKey(person.presence.editing ?? "");
+    const action = splitKey(person.presence.editing ?? "").head;
+    const head = blockOf?.get(action) ?? action;
     if (person.id !== me && places.has(head)) at.set(head, [...(at.get(head) ?? []), person]);
   }
   if (at.size === 0) return null;

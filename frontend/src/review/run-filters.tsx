@@ -1,9 +1,10 @@
 /** Which runs the list shows: search, choices, and filters that somebody saved on this device. */
-import { ActionIcon, Button, Menu, SegmentedControl, Select, TextInput } from "@mantine/core";
+import { ActionIcon, Button, Menu, Select, TextInput } from "@mantine/core";
 import { useDebouncedCallback, useLocalStorage } from "@mantine/hooks";
 import { IconFilter, IconPin, IconSearch, IconTrash } from "@tabler/icons-react";
 import { useEffect, useState } from "react";
 import { filterOf, NO_FILTER, queryOf, type RunFilter, useLabels } from "../api/review";
+import { Segments } from "../ui/segments";
 import { dateOf, MoreRunFilters } from "./more-filters";
 import style from "./runs-page.module.css";
 
@@ -120,9 +121,9 @@ export function RunFilters({ runner, filter, onChange, engines }: Props) {
         }}
         className={style.search ?? ""}
       />
-      <SegmentedControl
+      <Segments
         size="xs"
-        aria-label="State"
+        label="State"
         data={ENDINGS.map(({ value, label }) => ({ value, label }))}
         value={endingOf(filter)}
         onChange={(value) => {

@@ -10,7 +10,7 @@ import type { Robot } from "../api/robots";
 import { abilitiesOf, modifyRun, type Run } from "../api/runs";
 import { useMay } from "../api/use-person";
 import type { MeaningDifference } from "../graph/meaning";
-import { HoldButton } from "../ui/hold-button";
+import { HoldButton } from "../ui/floating/hold-button";
 import style from "./modify-run.module.css";
 import { nextLabel, notifyFailure, publishedVersion } from "./start/use-start";
 

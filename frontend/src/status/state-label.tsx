@@ -9,8 +9,10 @@ import {
   IconSquareFilled,
   IconX,
 } from "@tabler/icons-react";
+import { useRef } from "react";
 import type { Tone } from "./progress";
 import style from "./state-label.module.css";
+import { useInStep } from "./use-in-step";
 
 const signs = {
   idle: IconCircle,
@@ -45,8 +47,11 @@ interface Props {
 
 export function StateLabel({ tone, word, more, pill = false, still = false }: Props) {
   const Sign = signs[tone];
+  const label = useRef<HTMLSpanElement>(null);
+  useInStep(label, tone === "run" && !still);
   return (
     <span
+      ref={label}
       className={pill ? style.pill : style.word}
       style={{ color: toneColor[tone] }}
       data-tone={tone}

@@ -1,6 +1,7 @@
 /** What is wrong with the lines of a scene, counted: for tests and the benchmark. Pure. */
-import type { LineMap } from "../canvas/arrows/routes";
+
 import type { Area, Point, Scene } from "../canvas/arrows/scene";
+import type { LineMap } from "../canvas/arrows/simple-lines";
 
 export interface Faults {
   /** Lines that pass behind a card. */

@@ -1,6 +1,7 @@
 /** How long routing takes: a whole scene, and after one card has moved. `make bench ARGS=arrows`. */
 import { bench, describe } from "vitest";
-import { routed, simpleLines } from "../canvas/arrows/routes";
+import { routed } from "../canvas/arrows/routes";
+import { simpleLines } from "../canvas/arrows/simple-lines";
 import { layeredScene, seeded } from "./scenes";
 
 const OPTIONS = { time: 0, iterations: 5, warmupTime: 0, warmupIterations: 1 };

@@ -24,6 +24,8 @@ interface Props {
   disabled?: boolean;
   autoFocus?: boolean;
   inputMode?: "decimal" | "text";
+  /** Of a field of several lines. */
+  area?: React.RefObject<HTMLTextAreaElement | null>;
 }
 
 /** Invalid drafts stay where they are and are explained; the last valid value stays written. */
@@ -82,6 +84,7 @@ export function DraftInput(props: Props) {
     return (
       <Textarea
         {...shared}
+        ref={props.area}
         autosize
         minRows={2}
         maxRows={10}

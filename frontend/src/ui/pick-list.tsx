@@ -25,6 +25,10 @@ interface Props {
   onPick: (id: string) => void;
   none: string;
   take?: string;
+  /** What has been typed before the field was there. */
+  initial?: () => string;
+  /** A key in the empty field; whether it has been taken. */
+  onEmptyKey?: (event: React.KeyboardEvent) => boolean;
 }
 
 /** Those in which every word of the search occurs; names that begin so come first. */
@@ -44,15 +48,74 @@ export function matching(options: readonly Option[], search: string): Option[] {
     .map((each) => each.option);
 }
 
-export function PickList({ label, placeholder, find, onPick, none, take = "take" }: Props) {
-  const [search, setSearch] = useState("");
+/** The id of an option, for `aria-activedescendant` of the field that it belongs to. */
+export const optionId = (list: string, at: number): string => `${list}-${at}`;
+
+interface OptionListProps {
+  id: string;
+  label: string;
+  options: readonly Option[];
+  /** The chosen one. */
+  at: number;
+  grouped?: boolean;
+  /** What is said without any. */
+  none?: string;
+  onPoint: (at: number) => void;
+  onPick: (option: Option) => void;
+}
+
+/** What can be taken, below the field that keeps the focus and knows the keys. */
+export function OptionList(props: OptionListProps) {
+  const { id, label, options, at, grouped = false, none, onPoint, onPick } = props;
+  const list = useRef<HTMLDivElement>(null);
+  useEffect(() => {
+    list.current?.querySelector(`[id="${optionId(id, at)}"]`)?.scrollIntoView({ block: "nearest" });
+  }, [at, id]);
+  let heading: string | undefined;
+  return (
+    <div id={id} ref={list} role="listbox" aria-label={label} className={style.list}>
+      {options.map((option, i) => {
+        const head = grouped && option.group !== heading ? option.group : undefined;
+        heading = option.group;
+        return (
+          <div key={option.id} role="presentation">
+            {head && (
+              <div className={style.group} role="presentation">
+                {head}
+              </div>
+            )}
+            {/* biome-ignore lint/a11y/useKeyWithClickEvents: keys are handled by the field */}
+            {/* biome-ignore lint/a11y/useFocusableInteractive: focus stays in the field */}
+            <div
+              id={optionId(id, i)}
+              role="option"
+              aria-selected={i === at}
+              aria-disabled={option.disabled || undefined}
+              className={style.item}
+              onPointerMove={() => onPoint(i)}
+              onClick={() => onPick(option)}
+            >
+              <span className={style.icon}>{option.icon}</span>
+              <span className={style.text}>
+                <span className={style.name}>{option.label}</span>
+                {option.sub && <span className={style.sub}>{option.sub}</span>}
+              </span>
+              {option.right}
+            </div>
+          </div>
+        );
+      })}
+      {options.length === 0 && none !== undefined && <p className={style.none}>{none}</p>}
+    </div>
+  );
+}
+
+export function PickList(props: Props) {
+  const { label, placeholder, find, onPick, none, take = "take", initial, onEmptyKey } = props;
+  const [search, setSearch] = useState(() => initial?.() ?? "");
   const [at, setAt] = useState(0);
   const id = useId();
   const options = find(search);
-  const list = useRef<HTMLDivElement>(null);
-  useEffect(() => {
-    list.current?.querySelector(`[id="${id}-${at}"]`)?.scrollIntoView({ block: "nearest" });
-  }, [at, id]);
   const pick = (option: Option | undefined) => {
     if (option && !option.disabled) onPick(option.id);
   };
@@ -63,11 +126,10 @@ export function PickList({ label, placeholder, find, onPick, none, take = "take"
     else if (event.key === "Home" && search === "") setAt(0);
     else if (event.key === "End" && search === "") setAt(last);
     else if (event.key === "Enter") pick(options[at]);
-    else return;
+    else if (search !== "" || !onEmptyKey?.(event)) return;
     event.preventDefault();
     event.stopPropagation();
   };
-  let heading: string | undefined;
   return (
     <div className={style.box}>
       <TextInput
@@ -84,45 +146,21 @@ export function PickList({ label, placeholder, find, onPick, none, take = "take"
         role="combobox"
         aria-expanded="true"
         aria-controls={id}
-        aria-activedescendant={options.length > 0 ? `${id}-${at}` : undefined}
+        aria-activedescendant={options.length > 0 ? optionId(id, at) : undefined}
         aria-label={label}
         autoComplete="off"
         spellCheck={false}
       />
-      <div id={id} ref={list} role="listbox" aria-label={label} className={style.list}>
-        {options.map((option, i) => {
-          const head = search === "" && option.group !== heading ? option.group : undefined;
-          heading = option.group;
-          return (
-            <div key={option.id} role="presentation">
-              {head && (
-                <div className={style.group} role="presentation">
-                  {head}
-                </div>
-              )}
-              {/* biome-ignore lint/a11y/useKeyWithClickEvents: keys are handled by the search field */}
-              {/* biome-ignore lint/a11y/useFocusableInteractive: focus stays in the search field */}
-              <div
-                id={`${id}-${i}`}
-                role="option"
-                aria-selected={i === at}
-                aria-disabled={option.disabled || undefined}
-                className={style.item}
-                onPointerMove={() => setAt(i)}
-                onClick={() => pick(option)}
-              >
-                <span className={style.icon}>{option.icon}</span>
-                <span className={style.text}>
-                  <span className={style.name}>{option.label}</span>
-                  {option.sub && <span className={style.sub}>{option.sub}</span>}
-                </span>
-                {option.right}
-              </div>
-            </div>
-          );
-        })}
-        {options.length === 0 && <p className={style.none}>{none}</p>}
-      </div>
+      <OptionList
+        id={id}
+        label={label}
+        options={options}
+        at={at}
+        grouped={search === ""}
+        none={none}
+        onPoint={setAt}
+        onPick={pick}
+      />
       <p className={style.help} data-keys>
         <Kbd>↑</Kbd> <Kbd>↓</Kbd> choose · <Kbd>Enter</Kbd> {take} · <Kbd>Esc</Kbd> close
       </p>

@@ -62,7 +62,6 @@ export const theme = createTheme({
     NativeSelect: { defaultProps: small },
     NumberInput: { defaultProps: small },
     Select: { defaultProps: { ...small, allowDeselect: false } },
-    Tooltip: { defaultProps: { openDelay: 350, withArrow: true, fz: "xs" } },
     // A place to put the focus that is no item has no place in a menu.
     Menu: {
       defaultProps: {
@@ -80,7 +79,8 @@ export const theme = createTheme({
     // The head of a dialog is a banner to browsers, and a page has one already.
     ModalHeader: { defaultProps: { role: "presentation" } },
     Tabs: { styles: { tab: { padding: "0.7rem 0.625rem 0.6rem" } } },
-    Kbd: { defaultProps: { size: "xs" } },
+    // Its smallest text is 10 px, smaller than anything on a page may be.
+    Kbd: { defaultProps: { size: "xs" }, styles: { root: { fontSize: 11 } } },
   },
 });
 

@@ -69,14 +69,22 @@ export function day(at: number, now: number): string {
   });
 }
 
-/** The present, renewed every `every` ms while `going`. */
+/**
+ * The present, renewed every `every` ms while `going`. All that shows it is renewed at whole multiples,
+ * so that it is drawn together.
+ */
 export function useNow(every = 1000, going = true): number {
   const [now, setNow] = useState(() => Date.now());
   useEffect(() => {
     if (!going) return;
-    setNow(Date.now());
-    const timer = setInterval(() => setNow(Date.now()), every);
-    return () => clearInterval(timer);
+    let timer: ReturnType<typeof setTimeout>;
+    const renew = () => {
+      const present = Date.now();
+      setNow(present);
+      timer = setTimeout(renew, every - (present % every));
+    };
+    renew();
+    return () => clearTimeout(timer);
   }, [every, going]);
   return now;
 }

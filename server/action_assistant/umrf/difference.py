@@ -127,4 +127,5 @@ def _action_says(action: Action) -> dict[str, Any]:
 def _relation_says(relation: Relation) -> dict[str, Any]:
     conditions: dict[str, Any] = msgspec.structs.asdict(relation.conditions)
     remaps = {f"remap/{remap.source}": remap.target for remap in relation.remap}
-    return conditions | {"required": relation.required} | remaps
+    waypoints = {f"waypoints/{response}": text for response, text in relation.waypoints}
+    return conditions | {"required": relation.required} | remaps | waypoints

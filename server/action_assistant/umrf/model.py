@@ -98,7 +98,8 @@ class Relation(msgspec.Struct, frozen=True, kw_only=True):
     `parent` may be `ENTRY`, `child` may be `EXIT`. `listing` counts the pairs that a file lists more
     than once, from 0. `only` names the one array that has it when a file lists one side only.
     `parent_order` is the place in the parent's `children`, `child_order` in the child's `parents`
-    (for the ends: in `graph_entry` and `graph_exit`); ties go by key.
+    (for the ends: in `graph_entry` and `graph_exit`); ties go by key. `waypoints`: by response, in the
+    order of `RESPONSES`, the JSON text of the places through which people have led its line.
     """
 
     parent: Key
@@ -112,6 +113,7 @@ class Relation(msgspec.Struct, frozen=True, kw_only=True):
     child_order: float = 0.0
     parents_extra: tuple[tuple[str, JsonText], ...] = ()
     children_extra: tuple[tuple[str, JsonText], ...] = ()
+    waypoints: tuple[tuple[Response, JsonText], ...] = ()
 
 
 class Graph(msgspec.Struct, frozen=True, kw_only=True):

@@ -26,6 +26,9 @@ def test_each_kind_of_change_has_words() -> None:
     assert said(PAIR, moved) == ["action A_0 moved"]
     other = replace(PAIR, relations=(replace(ARROW, required=False),))
     assert said(PAIR, other) == ["arrow A_0 → B_0: required is no (was yes)"]
+    bent = replace(PAIR, relations=(replace(ARROW, waypoints=(("run", "[[1,2]]"),)),))
+    assert said(PAIR, bent) == ["arrow A_0 → B_0 bent"]
+    assert said(bent, PAIR) == ["arrow A_0 → B_0 straightened"]
     assert said(PAIR, replace(PAIR, name="trio")) == ["graph pair renamed to trio"]
     noted = replace(PAIR, notes=(("g/1", '{"text":"x"}'),))
     assert said(PAIR, noted) == ["note added"]

@@ -10,11 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from action_assistant.editor.app import open_services
+from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.documents.contents import labels_of
 from action_assistant.editor.log.graph_events import graph_stream
 from action_assistant.settings import EditorSettings
 from action_assistant.umrf.model import Graph
+from action_assistant.umrf.problem_kinds import ToldCounts
 from action_assistant.web.workers.lanes import GaveUp
 from editor.api.test_api import NAV
 from editor.client import Client
@@ -34,6 +36,42 @@ def test_robots_and_labels_are_those_of_the_file(http: httpx.Client) -> None:
     assert (listed["robots"], listed["labels"]) == (["a", "b"], ["night", "demo"])
     again = http.get(f"/api/graphs/{made['id']}/umrf").json()
     assert again["gui_attributes"]["labels"] == attributes["labels"]
+
+
+def counts(view: dict[str, Any]) -> tuple[int, int]:
+    return view["wrong"], view["to_fill_in"]
+
+
+def test_what_is_wrong_is_counted_apart_from_what_is_to_fill_in(http: httpx.Client) -> None:
+    point = {"at": {axis: {"pvf_type": "number"} for axis in "xyz"}}
+    first, *others = NAV["actions"]
+    made = http.post(
+        "/api/graphs", json={**NAV, "actions": [{**first, "input_parameters": point}, *others]}
+    ).json()
+    empty = http.post("/api/graphs", json={"name": "empty"}).json()
+    listed = {each["id"]: each for each in http.get("/api/graphs").json()}
+    assert counts(listed[made["id"]]) == counts(made) == (1, 1)
+    assert counts(listed[empty["id"]]) == (0, 1)
+    found = http.get(f"/api/graphs/{made['id']}/problems").json()["problems"]
+    assert [each["code"] for each in found].count("H7") == 3 < made["problems"]["error"]
+    http.patch(f"/api/graphs/{empty['id']}", json={"name": "renamed", "description": "d"})
+    assert counts(http.get(f"/api/graphs/{empty['id']}").json()) == (0, 1)
+
+
+async def test_a_graph_that_did_not_change_is_not_checked_again(tmp_path: Path) -> None:
+    settings = EditorSettings(data=tmp_path, database=f"sqlite:///{tmp_path / 'editor.db'}")
+    asked: list[str] = []
+
+    async def counting(work: Any, /, *values: Any) -> Any:
+        asked.append(work.__name__)
+        return work(*values)
+
+    async with open_services(settings) as services:
+        made, _ = await services.catalogue.bring(json.dumps(NAV).encode(), "ada")
+        reader = GraphReader(services.journal, services.rooms, counting)
+        summaries = [await reader.summary(made.id, made.seq) for _ in range(3)]
+    assert asked.count("info") == 1
+    assert {summary.told for summary in summaries} == {ToldCounts(made.wrong, made.to_fill_in)}
 
 
 @given(st.one_of(st.lists(texts), texts, st.dictionaries(st.text(max_size=3), texts)))

@@ -79,6 +79,11 @@ parameters = st.dictionaries(words, json_texts, max_size=3).map(
 )
 
 
+waypoints = st.dictionaries(st.sampled_from(RESPONSES), json_texts, max_size=2).map(
+    lambda found: tuple((r, found[r]) for r in RESPONSES if r in found)
+)
+
+
 @st.composite
 def graphs(draw: st.DrawFn) -> Graph:
     """Any graph that a file can say: each real action with a number of its own, ghosts without a
@@ -138,6 +143,7 @@ def relations_between(draw: st.DrawFn, keys: list[str]) -> tuple[Relation, ...]:
             child_order=draw(numbers),
             parents_extra=draw(extras),
             children_extra=draw(extras),
+            waypoints=draw(waypoints),
         )
         for (parent, child), listing in sorted(places, key=lambda p: (p[0], p[1]))
     )

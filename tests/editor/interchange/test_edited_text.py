@@ -12,6 +12,7 @@ from pycrdt import Doc
 from action_assistant.editor.documents import document
 from action_assistant.editor.documents.contents import ReadGraph
 from action_assistant.editor.documents.document import Maps
+from action_assistant.editor.documents.values import relation_id
 from action_assistant.editor.interchange.edited_text import TextEdit, text_edit
 from action_assistant.errors import BadInput, NotUmrf
 from action_assistant.umrf.files import codec
@@ -95,6 +96,20 @@ def test_an_action_that_was_deleted_leaves_nothing_behind() -> None:
     answer = text_edit(moment, json.dumps(file).encode())
     stale = [key for key in moment.maps["relations"] if gone in key]
     assert {change.key for change in answer.changes} >= {*stale, gone}
+
+
+def test_an_arrow_that_was_deleted_takes_its_waypoints_along() -> None:
+    moment, file = nav()
+    line = next(r for r in moment.graph.relations if r.child == moment.graph.actions[1].key)
+    key = f"w/{relation_id(line)}|run"
+    moment.maps["positions"][key] = "[[1,2]]"
+    bent = ReadGraph(2, moment.maps, document.read_maps(moment.maps))
+    file["graph_exit"] = []
+    del file["actions"][1], file["actions"][0]["children"]
+    answer = text_edit(bent, json.dumps(file).encode())
+    assert (key, UNSET) in {(change.key, change.after) for change in answer.changes}
+    straight = codec.write(moment.graph).encode()
+    assert [change.key for change in text_edit(bent, straight).changes] == [key]
 
 
 def test_an_unknown_field_is_kept_and_can_be_edited() -> None:

@@ -335,7 +335,8 @@ def test_hostile_texts_cost_no_more_than_their_size(text: str) -> None:
         "graph_name", "graph_entry", "graph_exit", "actions", "name", "instance_id", "type",
         "parents", "children", "conditions", "required", "remap", "from", "to", "gui_attributes",
         "position", "x", "y", "action_assistant", "aid", "notes", "input_parameters", "pvf_type",
-        "state", "runtime", "messages", "entry", "umrf_actions", "id", "effect",
+        "state", "runtime", "messages", "entry", "umrf_actions", "id", "effect", "waypoints", "parent",
+        "child", "response", "listing", "points",
     ]), inner, max_size=6),
     max_leaves=40,
 ))  # fmt: skip

@@ -165,7 +165,8 @@ export interface EditorApi {
      * @description A graph as lists and pages show it. `seq` counts the changes of its document.
      *
      *     `damaged`: the first change that cannot be read; the graph is what it was before, and nobody can
-     *     change it. `people`: who is in it now.
+     *     change it. `people`: who is in it now. `problems` counts what the check found; `wrong` and
+     *     `to_fill_in` what people are told of it, one thing once, as the page tells it.
      */
     GraphView: {
         id: string;
@@ -178,6 +179,8 @@ export interface EditorApi {
         made_at: string;
         actions?: number;
         problems?: EditorApi["Counts"];
+        wrong?: number;
+        to_fill_in?: number;
         /** @default [] */
         robots?: string[];
         /** @default [] */
@@ -351,6 +354,8 @@ export interface EditorApi {
         made_at: string;
         actions?: number;
         problems?: EditorApi["Counts"];
+        wrong?: number;
+        to_fill_in?: number;
         /** @default [] */
         robots?: string[];
         /** @default [] */

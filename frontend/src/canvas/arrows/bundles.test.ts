@@ -1,11 +1,32 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
-import { ENTRY, IGNORE_ALL, PRECONDITIONS, RESPONSES, type Relation } from "../../graph/model";
+import {
+  type Action,
+  EMPTY_GRAPH,
+  ENTRY,
+  type Graph,
+  IGNORE_ALL,
+  PRECONDITIONS,
+  RESPONSES,
+  type Relation,
+} from "../../graph/model";
+import { sceneOf } from "../elements";
+import { fromUmrf } from "../from-umrf";
+import type { Positions } from "../geometry/arrange";
+import { NO_PROBLEM_MARKS } from "../problem-marks";
 import { bundlesOf, pillSizeOf, pillWord } from "./bundles";
 
 const relation = (more: Partial<Relation>): Relation => ({
   ...{ parent: "a", child: "b", listing: 0, conditions: IGNORE_ALL, required: true },
-  ...{ remap: [], only: null, parentOrder: 0, childOrder: 0, parentsExtra: [], childrenExtra: [] },
+  ...{
+    remap: [],
+    only: null,
+    parentOrder: 0,
+    childOrder: 0,
+    parentsExtra: [],
+    childrenExtra: [],
+    waypoints: [],
+  },
   ...more,
 });
 
@@ -69,4 +90,43 @@ test("the entry says nothing, unless something is wrong there; more to say needs
   const one = wide({ ...IGNORE_ALL, on_true: "run" });
   expect(wide({ ...IGNORE_ALL, on_true: "run", on_false: "run" })).toBeGreaterThan(one);
   expect(wide({ ...IGNORE_ALL, on_true: "restart" })).toBeGreaterThan(one);
+});
+
+test("the places through which a line was led are those of its response, also in a published file", () => {
+  const conditions = { ...IGNORE_ALL, on_true: "run", on_error: "stop" } as const;
+  const [run, stop] = bundlesOf(relation({ conditions, waypoints: [["stop", "[[1,2]]"]] }));
+  expect([run?.waypoints, stop?.waypoints]).toEqual([[], [[1, 2]]]);
+  const action = (name: string) => ({ name, instance_id: 0, type: "sync" });
+  const points = [[60, -24]];
+  const bend = { parent: "A_0", child: "B_0", response: "run", points };
+  const graph = fromUmrf({
+    actions: [action("A"), { ...action("B"), parents: [action("A")] }],
+    gui_attributes: { action_assistant: { waypoints: [bend, 7, { ...bend, child: "C_0" }] } },
+  });
+  const bundles = graph.relations.flatMap(bundlesOf);
+  expect(bundles.map(({ waypoints }) => waypoints)).toEqual([points, []]);
+});
+
+test("while both ends of a line are dragged its bends go along in the scene", () => {
+  const graph: Graph = {
+    ...{ ...EMPTY_GRAPH, actions: ["a", "b"].map(actionOf) },
+    relations: [
+      relation({ conditions: { ...IGNORE_ALL, on_true: "run" }, waypoints: [["run", "[[9,9]]"]] }),
+    ],
+  };
+  const rest: Positions = new Map([
+    ["a", [0, 0]],
+    ["b", [400, 0]],
+  ]);
+  const via = (places: Positions) =>
+    sceneOf(graph, { places, rest, measured: new Map(), marks: NO_PROBLEM_MARKS }, null).lines[0]
+      ?.via;
+  const dragged: Positions = new Map([...rest, ["a", [5, 7]]]);
+  expect(via(dragged)).toEqual([[9, 9]]);
+  expect(via(new Map([...dragged, ["b", [405, 7]]]))).toEqual([[14, 16]]);
+});
+
+const actionOf = (key: string): Action => ({
+  ...{ key, name: key, instanceId: 0, type: "sync", actor: "", description: "", inputs: [] },
+  ...{ outputs: [], position: null, missing: false, twin: false, extra: [] },
 });

@@ -3,11 +3,13 @@ import { relationId } from "../../graph/document-keys";
 import {
   ENTRY,
   type Key,
+  type Position,
   PRECONDITIONS,
   type Precondition,
   type Relation,
   type Response,
 } from "../../graph/model";
+import { readWaypoints } from "../../graph/waypoints";
 import type { PillSize } from "./scene";
 
 /** One line between two cards. */
@@ -24,6 +26,8 @@ export interface Bundle {
   readonly optional: boolean;
   /** From the entry: there is only one thing it can say. */
   readonly entry: boolean;
+  /** Through which places people have led it. */
+  readonly waypoints: readonly Position[];
 }
 
 /**
@@ -59,6 +63,7 @@ function made(relation: Relation): Bundle[] {
     outcomes,
     optional: !relation.required,
     entry: relation.parent === ENTRY,
+    waypoints: readWaypoints(relation.waypoints.find(([r]) => r === response)?.[1] ?? "[]"),
   }));
 }
 
@@ -72,8 +77,8 @@ export function pillWord({ response, entry }: Pick<Bundle, "response" | "entry">
 const PILL_HEIGHT = 20;
 const EDGE = 13;
 const GLYPH = 13;
-const LETTER = 6.6;
-const BADGE = 32;
+const LETTER = 7.3;
+const BADGE = 34;
 
 /** The room that a bundle's pill needs; null where there is nothing to say. */
 export function pillSizeOf(bundle: Bundle, marked: boolean): PillSize | null {

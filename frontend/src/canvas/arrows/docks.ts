@@ -126,6 +126,9 @@ function straightRow(a: End, b: End): number | null {
 /** Lines that lead back to a card in the same row keep to one side: they leave and enter there. */
 const ASIDE = 1e6;
 
+/** Pills so that lines are straight, round the middle of the side where those meet others, or none. */
+type Docking = "straight" | "centred" | "bare";
+
 export class DockPlan {
   private readonly ends = new Map<string, End>();
   private readonly cards = new BoxIndex<FlowBox & { key: string }>();
@@ -224,8 +227,9 @@ export class DockPlan {
   private leave(
     lines: DockDraft[],
     direction: Scene["direction"],
-    docked = lines.length <= MOST_DOCKED,
+    docks: Docking = lines.length <= MOST_DOCKED ? "straight" : "bare",
   ): Dock[] {
+    const docked = docks !== "bare";
     const rank = ({ source, target, back, into }: DockDraft) =>
       back && straightRow(source, target) !== null ? ASIDE : back ? center(target) : this.v(into);
     lines.sort((a, b) => rank(a) - rank(b) || a.order - b.order);
@@ -241,7 +245,8 @@ export class DockPlan {
     let at = middle - total / 2;
     const slots = lines.map((draft, i) => {
       at += i === 0 ? 0 : (gaps[i] ?? 1);
-      const straight = !draft.back && draft.into >= source.low && draft.into <= source.high;
+      const inside = draft.into >= source.low && draft.into <= source.high;
+      const straight = docks !== "centred" && !draft.back && inside;
       const gap = gaps[i] ?? 1;
       return straight ? { wish: draft.into, weight: 8, gap } : { wish: at, weight: 1, gap };
     });
@@ -253,7 +258,7 @@ export class DockPlan {
     });
     // All or none: a line without a pill would leave between those of the others.
     if (docked && !pills.every((pill) => pill === null || this.isFree(pill, source)))
-      return this.leave(lines, direction, false);
+      return this.leave(lines, direction, docks === "straight" ? "centred" : "bare");
     if (docked) for (const pill of pills) if (pill) this.pills.add(pill);
     return lines.map((draft, i) => dockOf(draft, rows[i] ?? middle, pills[i] ?? null, this));
   }

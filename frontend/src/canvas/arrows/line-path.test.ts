@@ -2,7 +2,8 @@ import fc from "fast-check";
 import { expect, test } from "vitest";
 import { layeredScene, seeded } from "../../testing/scenes";
 import { lineNow, pathOf } from "./line-path";
-import { routed, simpleLines } from "./routes";
+import { routed } from "./routes";
+import { simpleLines } from "./simple-lines";
 
 test("a path has round corners, smaller where there is less room", () => {
   expect(

@@ -1,7 +1,7 @@
 /** Points of lines as paths of SVG, with round corners; and lines whose ends have moved. Pure. */
 import { LINK } from "./docks";
-import type { RoutedLine } from "./routes";
 import type { Point } from "./scene";
+import type { RoutedLine } from "./simple-lines";
 
 const RADIUS = 10; // px
 
@@ -49,7 +49,8 @@ export function lineNow(known: RoutedLine | undefined, simple: RoutedLine): Rout
       ? known
       : { ...known, pill };
   const points = stretched(old, first, last, known.direction === "right" ? 0 : 1);
-  return points ? { ...known, ends: simple.ends, points, pill, docked: simple.docked } : simple;
+  const { ends, docked, via } = simple;
+  return points ? { ...known, ends, points, pill, docked, via } : simple;
 }
 
 const equal = (a: Point, b: Point) => a[0] === b[0] && a[1] === b[1];

@@ -94,3 +94,42 @@ test("a canvas that is gone leaves no worker behind", () => {
   store.close();
   expect(FakeWorker.all[0]?.ended).toBe(true);
 });
+
+test("a line goes where somebody drags it, and stays there until the graph says so, too", () => {
+  const store = new LineStore();
+  store.show(scene);
+  const via = () => store.lineOf(id)?.via;
+  const at = store.snapped([301, 205]);
+  store.lead(id, [at]);
+  expect(via()).toEqual([at]);
+  store.settle(true);
+  expect(via()).toEqual([at]);
+  store.show({ ...scene, lines: scene.lines.map((l) => (l.id === id ? { ...l, via: [at] } : l)) });
+  expect(via()).toEqual([at]);
+  // What is left is as it was, at once.
+  store.lead(id, [[0, 0]]);
+  store.settle(false);
+  expect(via()).toEqual([at]);
+});
+
+test("many lines that move again and again rest in between, and end where the cards are", async () => {
+  const many = layeredScene(400, seeded(3), "right");
+  expect(many.lines.length).toBeGreaterThan(300);
+  const led = many.lines[0];
+  const at = (dx: number): Scene => ({
+    ...many,
+    cards: many.cards.map((card) =>
+      card.key === led?.source ? { ...card, x: card.x + dx } : card,
+    ),
+  });
+  const store = new LineStore();
+  store.show(many);
+  const before = store.lineOf(led?.id ?? "")?.points[0]?.[0] ?? Number.NaN;
+  for (const dx of [5, 10, 15]) store.show(at(dx));
+  const told = vi.fn();
+  store.subscribe(led?.id ?? "", told);
+  const now = () => store.lineOf(led?.id ?? "")?.points[0]?.[0];
+  await vi.waitFor(() => expect(now()).toBe(before + 15), { timeout: 20_000 });
+  expect(told.mock.calls.length).toBeLessThanOrEqual(1);
+  store.close();
+});

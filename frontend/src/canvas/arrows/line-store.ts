@@ -2,8 +2,15 @@
 import { createContext, useCallback, useContext, useSyncExternalStore } from "react";
 import { lineNow } from "./line-path";
 import type { RouterReport } from "./router.worker";
-import { type RoutedLine, simpleLines } from "./routes";
-import type { Point, Scene } from "./scene";
+import { type Point, type Scene, STEP } from "./scene";
+import { type RoutedLine, simpleLines } from "./simple-lines";
+
+/**
+ * More lines than these are drawn anew for this share of the time only: twenty people who move cards
+ * of a thousand would have every frame come late.
+ */
+const MANY = 300;
+const SHARE = 0.2;
 
 /** Arrows listen for themselves, so that a card that moves draws only its own again. */
 export class LineStore {
@@ -12,18 +19,70 @@ export class LineStore {
   private simple: ReadonlyMap<string, RoutedLine> = new Map();
   private lines = new Map<string, RoutedLine>();
   private scene: Scene | null = null;
+  /** The scene as it would be if nobody led a line. */
+  private given: Scene | null = null;
+  /** A line through places to which somebody drags it; `settled`: the next scene has them. */
+  private led: { id: string; via: readonly Point[]; settled: boolean } | null = null;
   private opened: string | null = null;
   private worker: Worker | null = null;
   private busy = false;
   private waiting: Scene | null = null;
+  /** Until when lines stay as they are, and what draws them then. */
+  private restsUntil = 0;
+  private resting: ReturnType<typeof setTimeout> | undefined;
 
   /** The scene as it is now. */
-  show(scene: Scene): void {
+  show(given: Scene): void {
+    if (this.led?.settled) this.led = null;
+    this.given = given;
+    const rest = this.restsUntil - performance.now();
+    if (rest <= 0) this.draw();
+    else this.resting ??= setTimeout(() => this.draw(), rest);
+  }
+
+  private draw(): void {
+    clearTimeout(this.resting);
+    this.resting = undefined;
+    if (!this.given) return;
+    const scene = this.asLed(this.given);
     if (this.scene && sameScene(this.scene, scene)) return;
+    const began = performance.now();
     this.scene = scene;
     this.simple = simpleLines(scene);
     this.refresh(new Set([...this.lines.keys(), ...this.simple.keys()]));
     this.send(scene);
+    const took = performance.now() - began;
+    this.restsUntil = scene.lines.length > MANY ? began + took / SHARE : 0;
+  }
+
+  /** Shows a line through other places while somebody drags them. */
+  lead(id: string, via: readonly Point[]): void {
+    this.led = { id, via, settled: false };
+    if (this.given) this.show(this.given);
+  }
+
+  /** The places are let go: where they are `kept`, the next scene has them. */
+  settle(kept: boolean): void {
+    if (!this.led) return;
+    this.led = kept ? { ...this.led, settled: true } : null;
+    if (!kept && this.given) this.show(this.given);
+  }
+
+  /** The nearest place on which lines run. */
+  snapped([x, y]: Point): Point {
+    const { direction, offset } = this.scene ?? { direction: "right", offset: 0 };
+    const [column, row] = direction === "right" ? [0, offset] : [offset, 0];
+    const near = (value: number, from: number) => Math.round((value - from) / STEP) * STEP + from;
+    return [near(x, column), near(y, row)];
+  }
+
+  private asLed(scene: Scene): Scene {
+    const { led } = this;
+    if (!led) return scene;
+    const lines = scene.lines.map((line) =>
+      line.id === led.id ? { ...line, via: led.via } : line,
+    );
+    return { ...scene, lines };
   }
 
   lineOf(id: string): RoutedLine | null {
@@ -62,11 +121,16 @@ export class LineStore {
 
   /** Ends the worker; the next scene starts another. */
   close(): void {
+    clearTimeout(this.resting);
+    this.resting = undefined;
+    this.restsUntil = 0;
     this.worker?.terminate();
     this.worker = null;
     this.busy = false;
     this.waiting = null;
     this.scene = null;
+    this.given = null;
+    this.led = null;
   }
 
   private tell(id: string): void {
@@ -136,7 +200,8 @@ function sameScene(a: Scene, b: Scene): boolean {
     }) &&
     lines.every((line, i) => {
       const other = b.lines[i];
-      return other?.id === line.id && other.pill?.width === line.pill?.width;
+      const same = other?.id === line.id && other.pill?.width === line.pill?.width;
+      return same && (other.via === line.via || String(other.via) === String(line.via));
     })
   );
 }

@@ -13,6 +13,26 @@ const MARGIN = 24; // steps round everything, for lines that go round it
 const PILL_GAP = 3; // px
 const TOUCHING = 2; // px
 
+/** Waypoints farther from all cards than this are left out, px. */
+const FAR = 200 * STEP;
+
+function boundsOf(boxes: readonly FlowBox[]): FlowBox {
+  const least = (of: (box: FlowBox) => number) =>
+    boxes.reduce((n, b) => Math.min(n, of(b)), Infinity);
+  return {
+    u0: least(({ u0 }) => u0),
+    v0: least(({ v0 }) => v0),
+    u1: -least(({ u1 }) => -u1),
+    v1: -least(({ v1 }) => -v1),
+  };
+}
+
+const isNear = ({ u0, v0 }: FlowBox, bounds: FlowBox) =>
+  u0 > bounds.u0 - FAR && u0 < bounds.u1 + FAR && v0 > bounds.v0 - FAR && v0 < bounds.v1 + FAR;
+
+const fits = ({ u0, u1, v0, v1 }: FlowBox) =>
+  ((u1 - u0) / STEP + 50) * ((v1 - v0) / STEP + 50) < MOST_CELLS;
+
 export class Raster {
   readonly width: number;
   readonly height: number;
@@ -38,20 +58,17 @@ export class Raster {
     this.turns = new Uint16Array(cells);
   }
 
-  /** Null when it would be too large. */
-  static of(cards: readonly FlowBox[], pills: readonly FlowBox[], offset: number): Raster | null {
-    const all = [...cards, ...pills];
-    const least = (of: (box: FlowBox) => number) =>
-      all.reduce((n, b) => Math.min(n, of(b)), Infinity);
-    const bounds = {
-      u0: least(({ u0 }) => u0),
-      v0: least(({ v0 }) => v0),
-      u1: -least(({ u1 }) => -u1),
-      v1: -least(({ v1 }) => -v1),
-    };
-    const cells = ((bounds.u1 - bounds.u0) / STEP + 50) * ((bounds.v1 - bounds.v0) / STEP + 50);
-    if (!(cells < MOST_CELLS)) return null;
-    const raster = new Raster(bounds, offset);
+  /** Null when it would be too large. `via`: waypoints, which may lie outside. */
+  static of(
+    cards: readonly FlowBox[],
+    pills: readonly FlowBox[],
+    offset: number,
+    via: readonly FlowBox[] = [],
+  ): Raster | null {
+    const bounds = boundsOf([...cards, ...pills]);
+    const wide = boundsOf([bounds, ...via.filter((point) => isNear(point, bounds))]);
+    if (!fits(bounds)) return null;
+    const raster = new Raster(fits(wide) ? wide : bounds, offset);
     for (const card of cards) {
       raster.keep(card, CLEARANCE.wish - 0.01, NEAR);
       raster.keep(card, CLEARANCE.least - 0.01, TIGHT);

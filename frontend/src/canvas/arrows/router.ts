@@ -6,11 +6,22 @@ const PRICE = { turn: 3, crossing: 3, near: 0.5, tight: 8, touch: 60, shared: 24
 /** A line that finds no way after looking at this many points keeps its simple one. */
 const MOST_STEPS = 400_000;
 
+/** A piece of a line that leads through waypoints. */
+interface Leg {
+  /** The direction in which it begins. */
+  readonly way: number;
+  /** It begins at a waypoint, where the line may turn although it is there itself. */
+  readonly inner: boolean;
+  /** It ends at a waypoint, from where the line goes on to here; else along the direction. */
+  readonly next: { readonly cell: number; readonly last: boolean } | null;
+}
+
 /** Directions: along the direction, across, back, across the other way; `+ 2` is the opposite. */
-const ALONG = 0;
+export const ALONG = 0;
+const WHOLE: Leg = { way: ALONG, inner: false, next: null };
 
 export class Router {
-  private readonly raster: Raster;
+  readonly raster: Raster;
   private readonly price: Float32Array;
   private readonly before: Int32Array;
   /** The search in which a state was seen last, so that nothing has to be cleared. */
@@ -21,31 +32,35 @@ export class Router {
 
   constructor(raster: Raster) {
     this.raster = raster;
-    const states = raster.ground.length * 4;
+    const states = raster.ground.length * 4 + 1; // the last one is a waypoint that is reached
     this.price = new Float32Array(states);
     this.before = new Int32Array(states);
     this.seen = new Int32Array(states);
     this.closed = new Int32Array(states);
   }
 
-  /** The corners of a way that begins and ends along the direction; null when there is none. */
-  route(start: number, end: number): number[] | null {
-    const { ground, width } = this.raster;
+  /** The corners of a way, which without a leg begins and ends along the direction; null: none. */
+  route(start: number, end: number, leg: Leg = WHOLE): number[] | null {
+    const { ground } = this.raster;
     if (start < 0 || end < 0) return null;
     this.search += 1;
     this.heap.clear();
-    const [endX, endY] = [end % width, Math.floor(end / width)];
-    const last = ground.length - width;
-    this.see(start * 4 + ALONG, 0, -1, 0);
+    const reached = ground.length * 4;
+    this.see(start * 4 + leg.way, 0, -1, 0);
     for (let left = MOST_STEPS; left > 0; left -= 1) {
       const state = this.heap.pop();
       if (state < 0) return null;
       if (this.closed[state] === this.search) continue;
       this.closed[state] = this.search;
+      if (state === reached) return this.corners(this.before[state] ?? -1);
       const cell = state >> 2;
       const way = state & 3;
-      if (cell === end && way === ALONG) return this.corners(state);
+      if (cell === end && way === ALONG && leg.next === null) return this.corners(state);
       const paid = this.price[state] ?? 0;
+      if (cell === end && leg.next !== null) {
+        this.see(reached, paid + PRICE.turn * this.turnsOn(cell, way, leg.next), state, 0);
+        continue;
+      }
       for (let next = 0; next < 4; next += 1) {
         if ((next ^ 2) === way) continue;
         if (cell === end && next === ALONG) {
@@ -53,20 +68,27 @@ export class Router {
           this.see(cell * 4 + ALONG, paid + this.passing(cell, way, ALONG), state, 0);
           continue;
         }
-        const x = cell % width;
-        if ((next === 0 && x === width - 1) || (next === 2 && x === 0)) continue;
-        if ((next === 1 && cell >= last) || (next === 3 && cell < width)) continue;
-        const to = cell + (next === 0 ? 1 : next === 2 ? -1 : next === 1 ? width : -width);
+        const to = this.beside(cell, next, end);
+        if (to < 0) continue;
         const stands = ground[to] ?? 0;
-        if (stands === BLOCKED && to !== end) continue;
-        const here = cell === start && way === next ? 0 : this.passing(cell, way, next);
+        const here =
+          cell === start ? this.leaving(cell, [way, next], leg) : this.passing(cell, way, next);
         const step = 1 + (stands === TIGHT ? PRICE.tight : stands === NEAR ? PRICE.near : 0);
-        const [dx, dy] = [endX - (to % width), endY - Math.floor(to / width)];
-        const least = Math.abs(dx) + Math.abs(dy) + PRICE.turn * leastTurns(next, dx, dy);
+        const least = this.leastFrom(to, next, end, leg);
         this.see(to * 4 + next, paid + here + step + this.sharing(cell, to, next), state, least);
       }
     }
     return null;
+  }
+
+  /** The next point in a direction; -1 at the rim, and where something stands on it. */
+  private beside(cell: number, next: number, end: number): number {
+    const { ground, width } = this.raster;
+    const x = cell % width;
+    if ((next === 0 && x === width - 1) || (next === 2 && x === 0)) return -1;
+    if ((next === 1 && cell >= ground.length - width) || (next === 3 && cell < width)) return -1;
+    const to = cell + (next === 0 ? 1 : next === 2 ? -1 : next === 1 ? width : -width);
+    return ground[to] === BLOCKED && to !== end ? -1 : to;
   }
 
   private see(state: number, price: number, before: number, least: number): void {
@@ -76,6 +98,28 @@ export class Router {
     this.price[state] = price;
     this.before[state] = before;
     this.heap.push(state, price + least);
+  }
+
+  /** What is left to pay at least. */
+  private leastFrom(cell: number, way: number, end: number, { next }: Leg): number {
+    const { width } = this.raster;
+    const dx = (end % width) - (cell % width);
+    const dy = Math.floor(end / width) - Math.floor(cell / width);
+    const turns = next === null ? leastTurns(way, dx, dy) : 0;
+    return Math.abs(dx) + Math.abs(dy) + PRICE.turn * turns;
+  }
+
+  /** The turns that the next leg needs at least, after arriving like this. */
+  private turnsOn(cell: number, way: number, next: NonNullable<Leg["next"]>): number {
+    const { width } = this.raster;
+    const dx = (next.cell % width) - (cell % width);
+    const dy = Math.floor(next.cell / width) - Math.floor(cell / width);
+    return next.last ? leastTurns(way, dx, dy) : turnsTowards(way, dx, dy);
+  }
+
+  private leaving(cell: number, [way, next]: readonly [number, number], { inner }: Leg): number {
+    if (way === next) return 0;
+    return inner ? PRICE.turn : this.passing(cell, way, next);
   }
 
   /** What it costs to pass a point: a turn, a line that is crossed, one that would be touched. */
@@ -108,6 +152,14 @@ function leastTurns(way: number, dx: number, dy: number): number {
   if (way === 2) return 2;
   if (dx < 0) return 3;
   return dy === 0 || (way === 1) === dy > 0 ? 1 : 3;
+}
+
+/** The turns that are left at least, to get to a point in whatever direction. */
+function turnsTowards(way: number, dx: number, dy: number): number {
+  const [ahead, aside] = way & 1 ? [dy, dx] : [dx, dy];
+  const forward = way < 2 ? ahead : -ahead;
+  if (aside === 0) return forward > 0 ? 0 : 3;
+  return forward >= 0 ? 1 : 2;
 }
 
 /** Without the corners at which nothing turns. */

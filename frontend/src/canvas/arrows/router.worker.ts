@@ -1,6 +1,7 @@
 /** Routes lines beside the page, so that it never waits for them. */
-import { type RoutedLine, routed, type Ways } from "./routes";
+import { routed, type Ways } from "./routes";
 import type { Scene } from "./scene";
+import type { RoutedLine } from "./simple-lines";
 
 /** Only what is not as it was told before. */
 export interface RouterReport {

@@ -1,27 +1,21 @@
 /** The lines of a scene: routed as a whole, or only where something has moved. Pure. */
-import type { Direction } from "../../graph/model";
-import { type Dock, DockPlan, LINK } from "./docks";
+import { type Dock, DockPlan } from "./docks";
+import { freeCells, routeThrough } from "./legs";
 import { BLOCKED, FREE, NEAR, Raster } from "./raster";
 import { Router, straightened } from "./router";
-import { BoxIndex, boxOf, type FlowBox, type Point, pointOf, type Scene, STEP } from "./scene";
-
-/** A line as it is drawn. */
-export interface RoutedLine {
-  readonly id: string;
-  readonly direction: Direction;
-  /** What it was routed between: while that stays, so may the line. */
-  readonly ends: string;
-  /** From the side of one card to that of the other. */
-  readonly points: readonly Point[];
-  /** The middle of its pill; null where there is none, or no room for it. */
-  readonly pill: Point | null;
-  /** The pill stands beside the card that the line leaves, and can move away from it a little. */
-  readonly docked: boolean;
-  /** Between cards that stand too close, or too far away, for a way of its own. */
-  readonly simple: boolean;
-}
-
-export type LineMap = ReadonlyMap<string, RoutedLine>;
+import { BoxIndex, boxOf, type FlowBox, type Point, type Scene, STEP } from "./scene";
+import {
+  arriving,
+  at,
+  endsOf,
+  leaving,
+  middleOf,
+  type RoutedLine,
+  shown,
+  simpleLines,
+  straight,
+  viaOf,
+} from "./simple-lines";
 
 /** A way over the grid, in columns and rows, so that it outlives the raster. */
 interface Way {
@@ -33,89 +27,6 @@ interface Way {
 
 /** What routing keeps, to route less the next time. */
 export type Ways = ReadonlyMap<string, Way>;
-
-function endsOf({ start, end }: Dock, scene: Scene): string {
-  const from = `${start.column},${start.row}`;
-  return `${scene.direction} ${scene.offset} ${from} ${end.column},${end.row}`;
-}
-
-/** Lines that only know their own ends: to be drawn until those that were routed are there. */
-export function simpleLines(scene: Scene): Map<string, RoutedLine> {
-  const plan = new DockPlan(scene);
-  return new Map(
-    plan.docks.map((dock) => {
-      const points = [...simpleWay(dock)].map(([column, row]) =>
-        at(plan, scene.direction, column, row),
-      );
-      const ends = endsOf(dock, scene);
-      const docked = dock.pill !== null;
-      const pill = dock.pill ? middleOf(dock.pill, scene.direction) : null;
-      const whole = [
-        ...leaving(dock, plan, scene.direction),
-        ...points,
-        arriving(dock, scene.direction),
-      ];
-      const { id } = dock.line;
-      return [
-        id,
-        {
-          id,
-          direction: scene.direction,
-          ends,
-          points: straight(whole),
-          pill,
-          docked,
-          simple: true,
-        },
-      ];
-    }),
-  );
-}
-
-function* simpleWay({ start, end }: Dock): Generator<readonly [number, number]> {
-  yield [start.column, start.row];
-  if (start.column <= end.column) {
-    yield [start.column, end.row];
-  } else {
-    // Back in a lane beside both.
-    const lane = Math.max(start.row, end.row) + 6;
-    yield [start.column, lane];
-    yield [end.column, lane];
-  }
-  yield [end.column, end.row];
-}
-
-const at = (plan: DockPlan, direction: Direction, column: number, row: number) =>
-  pointOf(column * STEP, plan.v(row), direction);
-
-function middleOf({ u0, u1, v0, v1 }: FlowBox, direction: Direction): Point {
-  return pointOf((u0 + u1) / 2, (v0 + v1) / 2, direction);
-}
-
-function leaving({ from, start }: Dock, plan: DockPlan, direction: Direction): Point[] {
-  const v = plan.v(start.row);
-  const first = pointOf(from.u, from.v, direction);
-  // A pill beyond the corner of its card: the line goes along the card to it.
-  return from.v === v
-    ? [first]
-    : [first, pointOf(from.u + LINK, from.v, direction), pointOf(from.u + LINK, v, direction)];
-}
-
-const arriving = ({ to }: Dock, direction: Direction): Point => pointOf(to.u, to.v, direction);
-
-/** Without points at which nothing turns. */
-function straight(points: readonly Point[]): Point[] {
-  const kept: Point[] = [];
-  for (const point of points) {
-    const [a, b] = [kept.at(-2), kept.at(-1)];
-    if (b && b[0] === point[0] && b[1] === point[1]) continue;
-    const through =
-      a && b && ((a[0] === b[0] && b[0] === point[0]) || (a[1] === b[1] && b[1] === point[1]));
-    if (through) kept.pop();
-    kept.push(point);
-  }
-  return kept;
-}
 
 export interface Routed {
   readonly lines: Map<string, RoutedLine>;
@@ -135,13 +46,23 @@ interface Task {
   readonly ends: string;
   readonly start: number;
   readonly end: number;
+  /** The waypoints that can be visited. */
+  readonly via: readonly number[];
   /** The corners of its way; null when there is none. */
   cells: readonly number[] | null;
+  /** It leaves out a waypoint to which nothing leads now: it is looked for again each time. */
+  missed: boolean;
   /** The same with the straight pieces at its ends. */
   whole: readonly number[];
   /** The way that was known and still is; null for one that was looked for. */
   way: Way | null;
 }
+
+/** px from a pill that does not stand beside its card to cards and pills, and to lines of others. */
+const LOOSE_GAPS: readonly (readonly [number, number])[] = [
+  [6, 2],
+  [3, 1],
+];
 
 /** How often lines that lie on others are looked at again. */
 const ROUNDS = 4;
@@ -159,14 +80,19 @@ class Routing {
     this.plan = new DockPlan(scene);
     this.cards = scene.cards.map((card) => boxOf(card, scene.direction));
     const pills = this.plan.docks.flatMap(({ pill, link }) => [pill, link].flatMap((b) => b ?? []));
-    const raster = Raster.of(this.cards, pills, scene.offset);
+    const led = scene.lines.flatMap(({ via = [] }) =>
+      via.map(([x, y]) => boxOf({ x, y, width: 0, height: 0 }, scene.direction)),
+    );
+    const raster = Raster.of(this.cards, pills, scene.offset, led);
     this.raster = raster;
     this.tasks = this.plan.docks.map((dock) => ({
       dock,
       ends: endsOf(dock, scene),
       start: raster?.cellAt(dock.start.column, dock.start.row) ?? -1,
       end: raster?.cellAt(dock.end.column, dock.end.row) ?? -1,
+      via: raster ? freeCells(raster, viaOf(dock, scene)) : [],
       cells: null,
+      missed: false,
       way: null,
       whole: [],
     }));
@@ -182,9 +108,11 @@ class Routing {
     const { raster } = this;
     if (!raster) return { lines: simpleLines(this.scene), ways: new Map(), searched: 0 };
     const fresh = this.tasks.filter((task) => !this.keeps(task, known.get(task.dock.line.id)));
-    const length = ({ start, end }: Task) =>
+    const between = (start: number, end: number) =>
       Math.abs((start % raster.width) - (end % raster.width)) +
       Math.abs(Math.floor(start / raster.width) - Math.floor(end / raster.width));
+    const length = ({ start, end, via }: Task) =>
+      [...via, end].reduce((sum, to, i) => sum + between(via[i - 1] ?? start, to), 0);
     // Short ones first: they have the fewest ways to choose from.
     const order = fresh
       .map((task, i) => ({ task, i, length: length(task) }))
@@ -231,7 +159,7 @@ class Routing {
   /** Takes a way that is known, if nothing stands on it now. */
   private keeps(task: Task, way: Way | undefined): boolean {
     const { raster } = this;
-    if (!raster || way?.ends !== task.ends) return false;
+    if (!raster || way?.ends !== this.endsNow(task)) return false;
     const corners = way.corners.map(([column, row]) => raster.cellAt(column, row));
     if (corners.includes(-1) || this.nearness(corners) > way.near) return false;
     this.put(task, corners, way);
@@ -239,6 +167,13 @@ class Routing {
     this.mark(task, -1);
     task.cells = null;
     return false;
+  }
+
+  /** Its ends, and which of its waypoints it can visit. */
+  private endsNow({ ends, via }: Task): string {
+    const { raster } = this;
+    if (via.length === 0 || !raster) return ends;
+    return `${ends} by ${via.map((cell) => [raster.columnOf(cell), raster.rowOf(cell)]).join(" ")}`;
   }
 
   /** How near to cards a way is; infinite when one stands on it. */
@@ -264,7 +199,9 @@ class Routing {
     const kin = this.kinOf(task);
     for (const other of kin) this.mark(other, -1);
     task.cells = null;
-    this.put(task, router.route(task.start, task.end), null);
+    const { cells, missed } = routeThrough(router, [task.start, task.end], task.via);
+    task.missed = missed;
+    this.put(task, cells, null);
     for (const other of kin) if (other !== task) this.mark(other, 1);
   }
 
@@ -310,7 +247,8 @@ class Routing {
       if (plain) lines.set(id, plain);
       if (cells === null) continue;
       const corners = cells.map((cell) => [raster.columnOf(cell), raster.rowOf(cell)] as const);
-      ways.set(id, task.way ?? { ends, corners, near: this.nearness(cells) });
+      const near = task.way?.near ?? this.nearness(cells);
+      if (!task.missed) ways.set(id, task.way ?? { ends: this.endsNow(task), corners, near });
       const points = straight([
         ...leaving(dock, plan, scene.direction),
         ...corners.map(([column, row]) => at(plan, scene.direction, column, row)),
@@ -318,7 +256,9 @@ class Routing {
       ]);
       const docked = dock.pill !== null;
       const pill = dock.pill && middleOf(dock.pill, scene.direction);
-      lines.set(id, { id, direction: scene.direction, ends, points, pill, docked, simple: false });
+      const via = shown(viaOf(dock, scene), plan, scene);
+      const { direction } = scene;
+      lines.set(id, { id, direction, ends, points, pill, docked, via, simple: false });
       if (!docked && dock.line.pill) loose.push({ task, points });
     }
     this.placeLoose(loose, lines, raster);
@@ -340,13 +280,14 @@ class Routing {
       const size = task.dock.line.pill;
       if (!line || !size) continue;
       this.mark(task, -1);
-      for (const pill of places(points)) {
-        const box = boxOf(
-          { x: pill[0] - size.width / 2, y: pill[1] - size.height / 2, ...size },
-          this.scene.direction,
+      const boxAt = ([x, y]: Point) =>
+        boxOf({ x: x - size.width / 2, y: y - size.height / 2, ...size }, this.scene.direction);
+      for (const [cards, others] of LOOSE_GAPS) {
+        const pill = [...places(points)].find(
+          (at) => !taken.hits(boxAt(at), cards) && !raster.hasLine(boxAt(at), others),
         );
-        if (taken.hits(box, 6) || raster.hasLine(box, 2)) continue;
-        taken.add(box);
+        if (!pill) continue;
+        taken.add(boxAt(pill));
         lines.set(line.id, { ...line, pill });
         break;
       }

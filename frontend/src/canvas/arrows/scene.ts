@@ -24,6 +24,8 @@ export interface SceneLine {
   readonly target: string;
   /** The room that its pill needs. */
   readonly pill: PillSize | null;
+  /** Through which places people have led it. */
+  readonly via?: readonly Point[];
 }
 
 /** All of it can be sent to a worker. */
@@ -77,6 +79,17 @@ export function gridOffset(
   const best = counts.indexOf(Math.max(...counts));
   if (before === null) return best;
   return (counts[best] ?? 0) > 1.5 * (counts[before] ?? 0) ? best : before;
+}
+
+/** Where on the grid a waypoint is. */
+export interface GridPoint {
+  readonly column: number;
+  readonly row: number;
+}
+
+export function gridPoint([x, y]: Point, { direction, offset }: Scene): GridPoint {
+  const [u, v] = direction === "right" ? [x, y] : [y, x];
+  return { column: Math.round(u / STEP), row: Math.round((v - offset) / STEP) };
 }
 
 const CELL = 256; // px, the side of a bucket

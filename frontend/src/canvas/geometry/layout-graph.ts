@@ -26,6 +26,9 @@ const LONGEST = { right: 1_850, down: 1_250 } as const;
 /** As wide as it shall be when it is wrapped, as a part of its height. */
 const ASPECT = 1.5;
 
+/** Between ports, px. */
+const APART = 4;
+
 const OPTIONS: LayoutOptions = {
   "elk.algorithm": "layered",
   "elk.edgeRouting": "ORTHOGONAL",
@@ -41,7 +44,7 @@ const OPTIONS: LayoutOptions = {
   "elk.layered.spacing.edgeNodeBetweenLayers": "16",
   "elk.spacing.edgeEdge": "12",
   "elk.layered.spacing.edgeEdgeBetweenLayers": "12",
-  "elk.spacing.portPort": "4",
+  "elk.spacing.portPort": String(APART),
 };
 
 /** Pairs that hold the entry before everything and the exit behind: nothing is drawn of them. */
@@ -57,8 +60,11 @@ function holds(graph: Graph, tied: ReadonlySet<Key>): [Key, Key][] {
     ]);
 }
 
-/** px before a pill and behind it that its line needs to be free to turn. */
-const BESIDE_PILL = 18;
+/**
+ * px before a pill and behind it that its line needs to be free to turn, with what the grid of lines
+ * may take away on both sides: less, and pills that have no room beside their cards stand elsewhere.
+ */
+const BESIDE_PILL = 24;
 
 /** The port of a bundle is as large as its pill, so that there is room for that before any bend. */
 function portSize(bundle: Bundle, right: boolean): Size {
@@ -66,6 +72,28 @@ function portSize(bundle: Bundle, right: boolean): Size {
   if (pill === null) return { width: 1, height: 1 };
   const { width, height } = pill;
   return right ? { width: width + BESIDE_PILL, height } : { width, height: height + BESIDE_PILL };
+}
+
+const POINT: Size = { width: 1, height: 1 };
+
+/**
+ * The port at which a line arrives is as wide across as the one that it left, where all have room:
+ * both sides of a card are divided alike then, and cards one after the other stand level.
+ */
+function arrivalSizes(lines: readonly Bundle[], sizes: Sizes, right: boolean) {
+  const across = (line: Bundle): Size => {
+    const { width, height } = portSize(line, right);
+    return right ? { width: 1, height } : { width, height: 1 };
+  };
+  const taken = new Map<Key, number>();
+  for (const line of lines) {
+    const { width, height } = across(line);
+    taken.set(line.target, (taken.get(line.target) ?? 0) + (right ? height : width) + APART);
+  }
+  return (line: Bundle): Size => {
+    const { width, height } = sizes.get(line.target) ?? CARD;
+    return (taken.get(line.target) ?? 0) + APART <= (right ? height : width) ? across(line) : POINT;
+  };
 }
 
 /** About how long it becomes in one piece, px. */
@@ -99,6 +127,8 @@ export interface LayoutRequest {
   readonly keys: ReadonlyMap<string, Key>;
   /** What no arrow leads to or from stands in rows of its own below. */
   readonly loose: readonly Key[];
+  /** What they need with the pills of lines that lead back to themselves. */
+  readonly room: Sizes;
   readonly sizes: Sizes;
 }
 
@@ -118,15 +148,20 @@ export function layoutRequest(graph: Graph, measured: Sizes): LayoutRequest {
     ports.set(key, list);
     list.push({ id, ...size, layoutOptions: { "elk.port.side": side } });
   };
+  const arrivals = arrivalSizes(lines, sizes, right);
   const edges = lines.map((line, i): ElkExtendedEdge => {
     port(line.source, `o${i}`, portSize(line, right), right ? "EAST" : "SOUTH");
-    port(line.target, `i${i}`, { width: 1, height: 1 }, right ? "WEST" : "NORTH");
+    port(line.target, `i${i}`, arrivals(line), right ? "WEST" : "NORTH");
     return { id: `e${i}`, sources: [`o${i}`], targets: [`i${i}`] };
   });
+  // The library draws no line from a card to itself: it keeps the room for its pills.
+  const loops = loopsIn(graph);
+  for (const [i, line] of loops.entries())
+    port(line.source, `l${i}`, portSize(line, right), right ? "EAST" : "SOUTH");
   const held = graph.actions.length <= THOROUGH ? holds(graph, tied) : [];
   for (const [i, [parent, child]] of held.entries()) {
-    port(parent, `ho${i}`, { width: 1, height: 1 }, right ? "EAST" : "SOUTH");
-    port(child, `hi${i}`, { width: 1, height: 1 }, right ? "WEST" : "NORTH");
+    port(parent, `ho${i}`, POINT, right ? "EAST" : "SOUTH");
+    port(child, `hi${i}`, POINT, right ? "WEST" : "NORTH");
     edges.push({ id: `h${i}`, sources: [`ho${i}`], targets: [`hi${i}`] });
   }
   const keys = new Map<string, Key>();
@@ -156,11 +191,28 @@ export function layoutRequest(graph: Graph, measured: Sizes): LayoutRequest {
     edges,
   };
   const loose = [...order.keys()].filter((key) => !tied.has(key));
-  return { root, keys, loose, sizes };
+  return { root, keys, loose, room: withLoops(sizes, loops, right), sizes };
+}
+
+const loopsIn = (graph: Graph): Bundle[] =>
+  graph.relations.filter(({ parent, child }) => parent === child).flatMap(bundlesOf);
+
+/** Sizes of cards with the pills of lines that lead from them to themselves. */
+function withLoops(sizes: Sizes, loops: readonly Bundle[], right: boolean): Sizes {
+  const room = new Map(sizes);
+  for (const line of loops) {
+    const [card, pill] = [sizes.get(line.source) ?? CARD, portSize(line, right)];
+    const before = room.get(line.source) ?? card;
+    room.set(line.source, {
+      width: Math.max(before.width, card.width + (right ? pill.width : 0)),
+      height: Math.max(before.height, card.height + (right ? 0 : pill.height)),
+    });
+  }
+  return room;
 }
 
 /** The places in an answer. The entry of a new graph stands at 0, 0 or near it. */
-export function placesIn({ keys, loose, sizes }: LayoutRequest, answer: ElkNode): Positions {
+export function placesIn({ keys, loose, room }: LayoutRequest, answer: ElkNode): Positions {
   const places: Positions = new Map();
   const boxes = (answer.children ?? []).flatMap(({ id, x = 0, y = 0, width = 0, height = 0 }) => {
     const key = keys.get(id);
@@ -174,7 +226,7 @@ export function placesIn({ keys, loose, sizes }: LayoutRequest, answer: ElkNode)
   let low = Math.max(...boxes.map(({ y, height }) => y + height), 0) + ROWS;
   let row: typeof boxes = [];
   for (const key of loose) {
-    const size = sizes.get(key) ?? CARD;
+    const size = room.get(key) ?? CARD;
     let at = freeSpot([left, low], size, row, "down");
     if (at[0] + size.width > wide && row.length > 0) {
       low = Math.max(...row.map(({ y, height }) => y + height)) + ROWS;

@@ -5,15 +5,12 @@ import {
   type Action,
   type Direction,
   EMPTY_GRAPH,
-  ENGINE_DEFAULTS,
   ENTRY,
-  ENTRY_CONDITIONS,
   EXIT,
   type Graph,
   type Key,
-  type Parameter,
-  type Relation,
 } from "../../graph/model";
+import { anyAction, anyRelation, graphs } from "../../testing/graphs";
 import { arrange, estimatedSizes, positionsOf, ranksOf } from "./arrange";
 import { layoutRequest, placesIn } from "./layout-graph";
 
@@ -24,42 +21,13 @@ async function laidOut(graph: Graph) {
   return placesIn(request, await elk.layout(structuredClone(request.root)));
 }
 
-const action = (key: Key, inputs: readonly Parameter[] = []): Action => ({
-  key,
-  name: key,
-  instanceId: 0,
-  type: "sync",
-  actor: "",
-  description: "",
-  inputs,
-  outputs: [],
-  position: null,
-  missing: false,
-  twin: false,
-  extra: [],
-});
-
-const relation = (parent: Key, child: Key): Relation => ({
-  parent,
-  child,
-  listing: 0,
-  conditions: parent === ENTRY ? ENTRY_CONDITIONS : ENGINE_DEFAULTS,
-  required: true,
-  remap: [],
-  only: null,
-  parentOrder: 0,
-  childOrder: 0,
-  parentsExtra: [],
-  childrenExtra: [],
-});
-
 function graphOf(
   count: number,
   pairs: readonly (readonly [Key, Key])[],
   direction: Direction = "right",
 ): Graph {
-  const actions = Array.from({ length: count }, (_, i) => action(`a${i}`));
-  const relations = pairs.map(([parent, child]) => relation(parent, child));
+  const actions = Array.from({ length: count }, (_, i) => anyAction(`a${i}`));
+  const relations = pairs.map(([parent, child]) => anyRelation(parent, child));
   return { ...EMPTY_GRAPH, direction, actions, relations };
 }
 
@@ -89,29 +57,6 @@ function nearest(graph: Graph, places: ReadonlyMap<Key, readonly [number, number
   return least;
 }
 
-const parameters = fc.array(
-  fc.constant<Parameter>({ path: "x", text: '{"pvf_type":"number","pvf_value":1}' }),
-  { maxLength: 3 },
-);
-
-const graphs = fc
-  .record({
-    inputs: fc.array(parameters, { minLength: 1, maxLength: 14 }),
-    pairs: fc.array(fc.tuple(fc.nat(14), fc.nat(15)), { maxLength: 26 }),
-    direction: fc.constantFrom<Direction>("right", "down"),
-  })
-  .map(({ inputs, pairs, direction }): Graph => {
-    const keys = inputs.map((_, i) => `a${i}`);
-    const unique = new Map<string, Relation>();
-    for (const [from, to] of pairs) {
-      const parent = from === 14 ? ENTRY : keys[from % keys.length];
-      const child = to === 15 && parent !== ENTRY ? EXIT : keys[to % keys.length];
-      if (parent && child) unique.set(`${parent}>${child}`, relation(parent, child));
-    }
-    const actions = keys.map((key, i) => action(key, inputs[i]));
-    return { ...EMPTY_GRAPH, direction, actions, relations: [...unique.values()] };
-  });
-
 test("cards that are laid out are at least 32 px apart, whatever leads where", async () => {
   await fc.assert(
     fc.asyncProperty(graphs, async (graph) => {
@@ -124,6 +69,17 @@ test("cards that are laid out are at least 32 px apart, whatever leads where", a
     { numRuns: 60 },
   );
 });
+
+test.each(["right", "down"] as const)(
+  "the cards of a chain stand level, to the %s",
+  async (direction) => {
+    const places = await laidOut(chain(4, direction));
+    const across = ["a0", "a1", "a2", "a3"].map(
+      (key) => places.get(key)?.[direction === "right" ? 1 : 0],
+    );
+    expect(new Set(across).size).toBe(1);
+  },
+);
 
 test("what stands without the layout overlaps nothing either", () => {
   fc.assert(

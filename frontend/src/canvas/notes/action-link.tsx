@@ -9,6 +9,8 @@ export interface NoteLinks {
   /** What the action is called now; null when there is none. */
   target(link: NoteLink): { readonly key: Key; readonly label: string } | null;
   open(key: Key): void;
+  /** The names that a link can have. */
+  names(): readonly string[];
 }
 
 export const NoteLinksContext = createContext<NoteLinks | null>(null);

@@ -10,6 +10,7 @@ const shown = (text: string) =>
       value={{
         target: ({ id, name }) => (id || name === "Grip 0" ? { key: id, label: "Grip 0" } : null),
         open: () => {},
+        names: () => [],
       }}
     >
       <Markdown text={text} />

@@ -1,9 +1,12 @@
 /** A note or a frame on the canvas: Markdown edited as text, a colour with a name, edges to drag. */
-import { ActionIcon, Tooltip } from "@mantine/core";
+import { ActionIcon } from "@mantine/core";
 import { IconTrash } from "@tabler/icons-react";
 import { type NodeProps, NodeResizer, NodeToolbar, Position } from "@xyflow/react";
 import { createContext, memo, use, useEffect, useRef } from "react";
 import { type NewNote, NOTE_COLORS, type Note } from "../../graph/edit/notes";
+import { Tooltip } from "../../ui/floating/tooltip";
+import { FoldButton } from "./fold-button";
+import { LinkNames } from "./link-names";
 import style from "./note-card.module.css";
 import { noteColor } from "./note-colors";
 import type { NoteNode } from "./note-nodes";
@@ -24,7 +27,7 @@ export interface NoteEditing {
 
 export const NoteEditingContext = createContext<NoteEditing | null>(null);
 
-function Writing({ note, notes }: { note: Note; notes: NoteEditing }) {
+export function NoteField({ note, notes }: { note: Note; notes: NoteEditing }) {
   const field = useRef<HTMLTextAreaElement>(null);
   useEffect(() => {
     field.current?.focus({ preventScroll: true });
@@ -36,34 +39,44 @@ function Writing({ note, notes }: { note: Note; notes: NoteEditing }) {
     notes.edit(null);
   };
   return (
-    <textarea
-      ref={field}
-      className={`${style.field} nodrag nopan nowheel`}
-      aria-label={note.kind === "frame" ? "Title of the frame" : "Text of the note"}
-      defaultValue={note.text}
-      maxLength={5_000}
-      rows={note.kind === "frame" ? 1 : undefined}
-      onBlur={done}
-      onKeyDown={(event) => {
-        event.stopPropagation();
-        const ends =
-          event.key === "Enter" && (note.kind === "frame" || event.ctrlKey || event.metaKey);
-        if (event.key !== "Escape" && !ends) return;
-        event.preventDefault();
-        const card = event.currentTarget.closest<HTMLElement>(".react-flow__node");
-        done();
-        card?.focus({ preventScroll: true });
-      }}
-    />
+    <>
+      <textarea
+        ref={field}
+        className={`${style.field} nodrag nopan nowheel`}
+        aria-label={note.kind === "frame" ? "Title of the frame" : "Text of the note"}
+        defaultValue={note.text}
+        maxLength={5_000}
+        rows={note.kind === "frame" ? 1 : undefined}
+        onBlur={done}
+        onKeyDown={(event) => {
+          event.stopPropagation();
+          const ends =
+            event.key === "Enter" && (note.kind === "frame" || event.ctrlKey || event.metaKey);
+          if (event.key !== "Escape" && !ends) return;
+          event.preventDefault();
+          const card = event.currentTarget.closest<HTMLElement>(".react-flow__node");
+          done();
+          card?.focus({ preventScroll: true });
+        }}
+      />
+      {note.kind === "note" && <LinkNames field={field} />}
+    </>
   );
 }
 
-function Tools({ note, notes }: { note: Note; notes: NoteEditing }) {
+interface ToolsProps {
+  note: Note;
+  notes: NoteEditing;
+  /** What stands above it and shall not be covered, px. */
+  above?: number;
+}
+
+export function NoteTools({ note, notes, above = 10 }: ToolsProps) {
   return (
     <NodeToolbar
       isVisible={notes.alone === note.key}
       position={Position.Top}
-      offset={note.kind === "frame" ? 36 : 10}
+      offset={above}
       style={{ zIndex: 1200 }}
     >
       <div className={style.tools} role="toolbar" aria-label="Colour">
@@ -106,7 +119,7 @@ export const NoteCard = memo(function NoteCard({ data, selected }: NodeProps<Not
       data-selected={selected || undefined}
       style={{ "--c": noteColor[note.color] } as React.CSSProperties}
     >
-      {notes && <Tools note={note} notes={notes} />}
+      {notes && <NoteTools note={note} notes={notes} above={note.kind === "frame" ? 36 : 10} />}
       {notes && (
         <NodeResizer
           isVisible={selected && notes.alone === note.key}
@@ -130,8 +143,9 @@ export const NoteCard = memo(function NoteCard({ data, selected }: NodeProps<Not
         className={`${style.text} ${selected ? "nowheel" : ""}`}
         onDoubleClick={() => notes?.edit(note.key)}
       >
+        {note.kind === "frame" && <FoldButton note={note} folded={false} />}
         {editing && notes ? (
-          <Writing note={note} notes={notes} />
+          <NoteField note={note} notes={notes} />
         ) : (
           <Words note={note} empty={empty} />
         )}

@@ -1,11 +1,33 @@
 /** Notes and frames as nodes of the canvas. */
 import type { Node } from "@xyflow/react";
 import { type Note, notesOf } from "../../graph/edit/notes";
-import type { Graph, Key } from "../../graph/model";
+import type { Direction, Graph, Key } from "../../graph/model";
 import { spokenNote } from "../../graph/note-links";
+import type { ProblemCounts } from "../../graph/problems/problem-kinds";
+import type { Tone } from "../../status/progress";
 import type { Positions } from "../geometry/arrange";
 
 export type NoteNode = Node<{ note: Note }, "note">;
+
+/** How many actions are in a state. */
+export interface StateCount {
+  readonly word: string;
+  readonly tone: Tone;
+  readonly count: number;
+}
+
+/** What a folded frame says of what lies in it. */
+export interface FrameBlock {
+  readonly actions: number;
+  /** The worst first; empty where nothing runs or ran. */
+  readonly states: readonly StateCount[];
+  /** That of the worst state. */
+  readonly tone: Tone | null;
+  readonly mark: (ProblemCounts & { readonly reasons: string }) | null;
+  readonly direction: Direction;
+}
+
+export type FoldedNode = Node<{ note: Note; block: FrameBlock }, "folded">;
 
 interface Options {
   places: Positions;
@@ -27,8 +49,8 @@ function nodeOf(given: Note, { places, selected, measured, resized }: Options): 
     width: note.size[0],
     height: note.size[1],
     selected: selected.has(note.key),
-    // A frame lies behind arrows and cards, and only its title takes the pointer.
-    zIndex: frame ? -1 : selected.has(note.key) ? 1 : 0,
+    // A frame lies behind cards. Only its title takes the pointer, also where an arrow runs below it.
+    zIndex: !frame && selected.has(note.key) ? 1 : 0,
     ...(frame ? { dragHandle: "[data-title]", style: { pointerEvents: "none" } } : {}),
     connectable: false,
     data: { note },

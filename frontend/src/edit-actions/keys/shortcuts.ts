@@ -2,6 +2,7 @@
 import { useLocalStorage } from "@mantine/hooks";
 import { notifications } from "@mantine/notifications";
 import { useEffect, useRef } from "react";
+import { whenThere } from "../../ui/focus-field";
 import { EDIT_ACTIONS } from "../all";
 import { copiedSelection, pasteText, rememberCopied } from "../clipboard";
 import { type EditAction, editActionFor, isEnabled } from "../edit-action";
@@ -35,8 +36,11 @@ function worksInForms(event: KeyboardEvent, editActions: readonly EditAction[]):
 /** Lists and trees have their own use for arrow keys, Enter and Delete; the canvas shares ours. */
 function isOnCanvas(target: EventTarget | null): boolean {
   if (!(target instanceof Element) || target === document.body) return true;
-  return target.closest(".react-flow") !== null;
+  return target.closest(".react-flow") !== null && !hasOwnKeys(target);
 }
+
+/** Handles of lines move and go by these keys themselves. */
+const hasOwnKeys = (target: Element) => target.closest("[data-own-keys]") !== null;
 
 const MOVING = new Set([
   "ArrowUp",
@@ -47,6 +51,15 @@ const MOVING = new Set([
   "Delete",
   "Backspace",
 ]);
+
+/** The search of the lists, which open for it where they are put away. */
+function search(context: EditorContext): void {
+  const field = document.querySelector<HTMLInputElement>("[data-search]");
+  field?.focus();
+  if (field !== null && document.activeElement === field) return;
+  context.setPanel("library");
+  whenThere("[data-search]", (found) => found.focus());
+}
 
 /** The pointer rests on the canvas and nothing has the focus: Tab is free for the search. */
 function isOverCanvas(): boolean {
@@ -67,7 +80,7 @@ export function useShortcuts(context: EditorContext): void {
       if (MOVING.has(event.key) && !isOnCanvas(event.target)) return;
       if (event.key === "/" && singles) {
         event.preventDefault();
-        document.querySelector<HTMLInputElement>("[data-search]")?.focus();
+        search(now.current);
         return;
       }
       if (event.key === "Tab" && isOverCanvas()) {
@@ -90,6 +103,7 @@ export function useShortcuts(context: EditorContext): void {
       const ours = event.key.startsWith("Arrow") || (event.key === "Enter" && event.shiftKey);
       if (!ours || isTaken(event.target)) return;
       if (!(event.target instanceof Element) || !event.target.closest(".react-flow")) return;
+      if (hasOwnKeys(event.target)) return;
       onKey(event);
       event.stopPropagation();
     };

@@ -6,7 +6,6 @@ import {
   BackgroundVariant,
   type Connection,
   ConnectionLineType,
-  MiniMap,
   PanOnScrollMode,
   ReactFlow,
   SelectionMode,
@@ -14,12 +13,13 @@ import {
 } from "@xyflow/react";
 import { type MouseEvent, type RefObject, useEffect, useMemo, useRef } from "react";
 import { actionDrag } from "../../canvas/action-drag";
+import { LineEditingContext } from "../../canvas/arrows/bend-handles";
 import { LineContext } from "../../canvas/arrows/line-store";
 import type { Arrow, CanvasNode } from "../../canvas/elements";
+import { FoldedFrame } from "../../canvas/folding/folded-frame";
 import { CARD } from "../../canvas/geometry/arrange";
 import { edgeTypes, nodeTypes } from "../../canvas/graph-view";
 import { type NoteEditing, NoteEditingContext } from "../../canvas/notes/note-card";
-import { noteColor } from "../../canvas/notes/note-colors";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
 import { ArrowTips } from "../../canvas/outcome-arrow";
 import { ZoomDetail } from "../../canvas/zoom/zoom-detail";
@@ -31,15 +31,15 @@ import { withLinkIds } from "../../graph/note-links";
 import { endName } from "../../graph/relation-words";
 import { Cursors } from "../../people/cursors";
 import { PeopleAtCards } from "../../people/people";
-import { toneColor } from "../../status/state-label";
 import { useRoom } from "../../sync/use-room";
-import { colorOfName } from "../../ui/name-colors";
-import { useStableCallback } from "../../ui/use-stable-callback";
+import { useStableCallback } from "../../ui/hooks/use-stable-callback";
+import { GraphMap } from "../map/graph-map";
 import style from "./editable-canvas.module.css";
 import { arrowAt } from "./hit-test";
 import type { useCanvasElements } from "./use-canvas-elements";
 import { outcomeOf, type Pending, useConnecting } from "./use-connecting";
 import { useContextMenu } from "./use-context-menu";
+import { useLineEditing } from "./use-line-editing";
 import { usePinch, ZOOM } from "./use-pinch";
 
 // What React Flow gets anew, it hands on to all that is drawn.
@@ -47,7 +47,8 @@ const SNAP_GRID: [number, number] = [GRID, GRID];
 const OTHER_BUTTONS = [1, 2];
 const MORE_KEYS = ["Shift", "Meta", "Control"];
 const PLAIN = { hideAttribution: true };
-const MAP_SIZE = { width: 132, height: 92 };
+const NOTES = ".react-flow__node-note, .react-flow__node-folded";
+const NODE_TYPES = { ...nodeTypes, folded: FoldedFrame };
 
 interface Props {
   context: EditorContext;
@@ -87,17 +88,6 @@ function PendingHint({
       </Button>
     </div>
   );
-}
-
-function mapColor(node: CanvasNode): string {
-  if (node.type === "note") {
-    const part = node.data.note.kind === "frame" ? 18 : 60;
-    return `color-mix(in srgb, ${noteColor[node.data.note.color]} ${part}%, transparent)`;
-  }
-  const tone = node.data.progress?.tone ?? "idle";
-  if (tone !== "idle") return toneColor[tone];
-  const robot = node.type === "action" ? node.data.action.actor : "";
-  return robot === "" ? "var(--line2)" : colorOfName(robot);
 }
 
 /** How notes are changed from the canvas itself. */
@@ -161,7 +151,7 @@ function useHands(
     onEdgeMouseLeave: useStableCallback(() => canvas.lines.open(null)),
     onNodeClick: useStableCallback((event: MouseEvent) => {
       if (connecting.onClick(event)) return;
-      const onNote = (event.target as Element).closest(".react-flow__node-note") !== null;
+      const onNote = (event.target as Element).closest(NOTES) !== null;
       if (!onNote && context.tool === "pan") context.setPanel("details");
     }),
     onPaneClick: useStableCallback((event: MouseEvent) => {
@@ -223,7 +213,7 @@ function Drawing({
     <ReactFlow<CanvasNode, Arrow>
       nodes={canvas.nodes}
       edges={canvas.edges}
-      nodeTypes={nodeTypes}
+      nodeTypes={NODE_TYPES}
       edgeTypes={edgeTypes}
       onNodesChange={canvas.onNodesChange}
       onEdgesChange={canvas.onEdgesChange}
@@ -257,18 +247,13 @@ function Drawing({
       <ZoomDetail />
       <Background variant={BackgroundVariant.Dots} gap={20} size={1.4} />
       <Cursors />
-      <PeopleAtCards me={me} places={canvas.places} sizes={canvas.sizes} />
-      {map && (
-        <MiniMap<CanvasNode>
-          position="top-right"
-          pannable
-          zoomable
-          style={MAP_SIZE}
-          nodeBorderRadius={10}
-          nodeColor={mapColor}
-          ariaLabel="Map of the canvas"
-        />
-      )}
+      <PeopleAtCards
+        me={me}
+        places={canvas.places}
+        sizes={canvas.sizes}
+        blockOf={canvas.folding?.blockOf}
+      />
+      {map && <GraphMap nodes={canvas.nodes} flow={canvas.flow} />}
     </ReactFlow>
   );
 }
@@ -288,6 +273,7 @@ export function EditableCanvas({ context, canvas, me, map, onPanned, pointer, wr
   const press = useContextMenu(context);
   const pinch = usePinch(context, onPanned);
   const noteEditing = useNoteEditing(context, writing, canvas.setResized);
+  const lineEditing = useLineEditing(context);
   const onDoubleClick = (event: MouseEvent) => {
     if (!(event.target as Element).classList.contains("react-flow__pane")) return;
     openAddAt([event.clientX, event.clientY], null);
@@ -337,7 +323,9 @@ export function EditableCanvas({ context, canvas, me, map, onPanned, pointer, wr
     >
       <LineContext value={canvas.lines}>
         <NoteEditingContext value={noteEditing}>
-          <Drawing context={context} canvas={canvas} me={me} map={map} hands={hands} />
+          <LineEditingContext value={lineEditing}>
+            <Drawing context={context} canvas={canvas} me={me} map={map} hands={hands} />
+          </LineEditingContext>
         </NoteEditingContext>
       </LineContext>
       {connecting.pending && (

@@ -1,7 +1,8 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
 import { CARD } from "../../canvas/geometry/arrange";
-import { followedBox, followingViewport } from "./follow-run";
+import type { Progress } from "../../status/progress";
+import { followedBox, followingViewport, runningKeys } from "./follow-run";
 
 const frame = { width: 900, height: 500 };
 const card = (x: number, y: number) => ({ x, y, width: CARD.width, height: CARD.height });
@@ -40,4 +41,22 @@ test("of several that run all are shown where they fit, else the latest", () => 
   expect(box(["b", "a"])).toMatchObject({ x: 0, width: 300 + CARD.width });
   expect(box(["far", "a"])).toMatchObject({ x: 9_000, width: CARD.width });
   expect(box(["gone"])).toBeNull();
+});
+
+test("what runs in a folded frame is followed to its block", () => {
+  const runs = (since: number): Progress => ({
+    ...{ tone: "run", word: "running", since, took: null, atMost: null },
+    ...{ visits: 1, inferred: false, message: null },
+  });
+  const progress = new Map([
+    ["a", runs(1)],
+    ["b", runs(3)],
+    ["c", runs(2)],
+  ]);
+  expect(runningKeys(progress)).toEqual(["b", "c", "a"]);
+  const blockOf = new Map([
+    ["a", "g/1"],
+    ["b", "g/1"],
+  ]);
+  expect(runningKeys(progress, blockOf)).toEqual(["g/1", "c"]);
 });

@@ -14,16 +14,20 @@ interface FrameRoom {
 
 /** Of the frame: what runs within is left where it is. */
 const CALM = 0.12;
-/** Where what runs comes to stand: most graphs go on to the right and down. */
-const AIM = { x: 0.38, y: 0.42 };
-const GLIDE = 700; // ms
+/** Where what runs comes to stand: graphs go on to the right and down, and the view shall rest there. */
+const AIM = { x: 0.26, y: 0.36 };
+const GLIDE = 400; // ms
 
-/** The actions that run, the latest first. */
-function runningKeys(progress: ReadonlyMap<Key, Progress>): Key[] {
-  return [...progress]
+/** The actions that run, the latest first; what lies in a folded frame is where its block is. */
+export function runningKeys(
+  progress: ReadonlyMap<Key, Progress>,
+  blockOf?: ReadonlyMap<Key, string>,
+): Key[] {
+  const keys = [...progress]
     .filter(([, { tone, since }]) => tone === "run" && since !== null)
     .sort(([, a], [, b]) => (b.since ?? 0) - (a.since ?? 0))
-    .map(([key]) => key);
+    .map(([key]) => blockOf?.get(key) ?? key);
+  return [...new Set(keys)];
 }
 
 /** Where to look so that a box is seen with room around it; null while it is. The zoom stays. */
@@ -38,11 +42,13 @@ export function followingViewport(box: Bounds, frame: FrameRoom, view: Viewport)
   const seen =
     within(left, width, calm.x, frame.width) && within(top, height, calm.y, frame.height);
   if (seen) return null;
-  const aim = (size: number, room: number, share: number) =>
-    Math.max(0, Math.min(room - size, room * share - size / 2));
+  const aim = (size: number, room: number, share: number, calm: number) => {
+    const edge = Math.min(calm, (room - size) / 2);
+    return Math.max(edge, Math.min(room - size - edge, room * share - size / 2));
+  };
   return {
-    x: aim(width, frame.width, AIM.x) - box.x * zoom,
-    y: aim(height, frame.height, AIM.y) - box.y * zoom,
+    x: aim(width, frame.width, AIM.x, calm.x) - box.x * zoom,
+    y: aim(height, frame.height, AIM.y, calm.y) - box.y * zoom,
     zoom,
   };
 }
@@ -109,15 +115,17 @@ interface Followed {
   /** The run that goes, if one does. */
   run: string | null;
   progress: ReadonlyMap<Key, Progress>;
-  /** How long a motion may take here: nothing for people who want none. */
-  glide: (ms: number) => number;
+  /** The folded frames that are drawn instead of what lies in them. */
+  blockOf: ReadonlyMap<Key, string> | undefined;
+  /** How the view moves, in so many ms. */
+  glide: (ms: number) => { duration: number; interpolate: "linear" };
 }
 
 /** Keeps what runs in view until the person moves the view; each run begins anew. */
-export function useFollowRun({ flow, frame, now, run, progress, glide }: Followed) {
+export function useFollowRun({ flow, frame, now, run, progress, blockOf, glide }: Followed) {
   const [left, setLeft] = useState<string | null>(null);
   const lost = run !== null && left === run;
-  const going = runningKeys(progress);
+  const going = runningKeys(progress, blockOf);
   const key = going.join(" ");
   const { isBusy, release } = useHandsOn(frame);
   // biome-ignore lint/correctness/useExhaustiveDependencies: only when other actions run
@@ -129,7 +137,7 @@ export function useFollowRun({ flow, frame, now, run, progress, glide }: Followe
     const { places, sizes } = now.current ?? { places: new Map(), sizes: new Map() };
     const box = followedBox(going, places, sizes, size, here.zoom);
     const next = box && followingViewport(box, size, here);
-    if (next) void flow.setViewport(next, { duration: glide(GLIDE) });
+    if (next) void flow.setViewport(next, glide(GLIDE));
   }, [run, lost, key]);
   return {
     /** A run goes, and the view no longer follows it. */

@@ -1,8 +1,11 @@
-/** The context of the editor, and where the links of its notes lead: to the action, chosen and shown. */
+/** The context of the editor; where the links of its notes lead, and how its frames are folded. */
 import { type ReactNode, useMemo } from "react";
 import { type NoteLinks, NoteLinksContext } from "../../canvas/notes/action-link";
+import { FoldFrameContext } from "../../canvas/notes/fold-button";
 import { type EditorContext, EditorReactContext } from "../../edit-actions/editor-context";
-import { linkedAction } from "../../graph/note-links";
+import { foldFrames } from "../../edit-actions/folding";
+import { linkableNames, linkedAction } from "../../graph/note-links";
+import { useStableCallback } from "../../ui/hooks/use-stable-callback";
 
 interface Props {
   context: EditorContext;
@@ -22,12 +25,18 @@ export function EditorContextProvider({ context, children }: Props) {
         view.show([key]);
         view.focus(key);
       },
+      names: () => linkableNames(graph.actions),
     }),
     [graph.actions, select, view],
   );
+  const fold = useStableCallback((key: string, folded: boolean) =>
+    foldFrames(context, [key], folded),
+  );
   return (
     <EditorReactContext value={context}>
-      <NoteLinksContext value={links}>{children}</NoteLinksContext>
+      <NoteLinksContext value={links}>
+        <FoldFrameContext value={fold}>{children}</FoldFrameContext>
+      </NoteLinksContext>
     </EditorReactContext>
   );
 }

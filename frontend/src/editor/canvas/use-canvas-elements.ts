@@ -29,6 +29,8 @@ import {
   sceneOf,
   surroundingsOf,
 } from "../../canvas/elements";
+import { foldedArrows, foldedNodes, foldedScene } from "../../canvas/folding/folded-drawing";
+import { type Folding, foldingOf, wholeSizes } from "../../canvas/folding/folding";
 import { type Positions, positionsOf, unplaced } from "../../canvas/geometry/arrange";
 import { notePlaces } from "../../canvas/notes/note-nodes";
 import type { ProblemMarks } from "../../canvas/problem-marks";
@@ -60,6 +62,8 @@ interface CanvasElementsInput {
   marks: ProblemMarks;
   /** Where what has no place stands meanwhile. */
   laidOut: Positions | null;
+  /** Keys of the frames that are folded. */
+  folded: ReadonlySet<string>;
 }
 
 /** Where everything stands while people drag it. */
@@ -115,20 +119,19 @@ function useChosenByOthers(people: readonly Participant[]): ReadonlyMap<string, 
 }
 
 /** Cards and arrows; what is drawn as before keeps its identity. */
-function useDrawn(graph: Graph, options: Parameters<typeof nodesOf>[1]) {
+function useDrawn(graph: Graph, options: Parameters<typeof nodesOf>[1], folding: Folding | null) {
   const { selected, progress, marks } = options;
   const drawn = useRef<Drawn>({ nodes: [], edges: [], around: null });
   const nodes = useMemo(() => {
     const before = drawn.current.nodes;
-    return keepEqual(before, nodesOf(graph, options, before));
-  }, [graph, options]);
+    return keepEqual(before, foldedNodes(nodesOf(graph, options, before), folding, graph, options));
+  }, [graph, options, folding]);
   const around = useMemo(() => surroundingsOf(graph, drawn.current.around), [graph]);
   const { relations } = graph;
-  const edges = useMemo(
-    () =>
-      keepEqual(drawn.current.edges, edgesOf({ relations }, { selected, progress, marks }, around)),
-    [relations, selected, progress, marks, around],
-  );
+  const edges = useMemo(() => {
+    const all = edgesOf({ relations }, { selected, progress, marks }, around);
+    return keepEqual(drawn.current.edges, foldedArrows(all, folding));
+  }, [relations, selected, progress, marks, around, folding]);
   useEffect(() => {
     drawn.current = { nodes, edges, around };
   }, [nodes, edges, around]);
@@ -136,12 +139,16 @@ function useDrawn(graph: Graph, options: Parameters<typeof nodesOf>[1]) {
 }
 
 /** The lines of the arrows, kept in step with what stands where. */
-function useLines(graph: Graph, { places, measured, marks }: Parameters<typeof sceneOf>[1]) {
+function useLines(
+  graph: Graph,
+  { places, measured, marks, rest }: Parameters<typeof sceneOf>[1],
+  folding: Folding | null,
+) {
   const [lines] = useState(() => new LineStore());
-  useLayoutEffect(
-    () => lines.show(sceneOf(graph, { places, measured, marks }, lines.offset)),
-    [lines, graph, places, measured, marks],
-  );
+  useLayoutEffect(() => {
+    const whole = sceneOf(graph, { places, measured, marks, rest }, lines.offset);
+    lines.show(foldedScene(whole, folding, places));
+  }, [lines, graph, places, measured, marks, rest, folding]);
   useEffect(() => () => lines.close(), [lines]);
   return lines;
 }
@@ -170,6 +177,7 @@ interface Placed {
   /** Where everything stands while nobody drags it. */
   readonly rest: Positions;
   readonly sizes: ReadonlyMap<Key, MeasuredSize>;
+  readonly folding: Folding | null;
 }
 
 /** Where things stand after they were dragged; frames take along what lies in them. */
@@ -203,9 +211,10 @@ function useNodeChanges(
   const store = useStoreApi();
   const now = useRef(placed);
   now.current = placed;
-  // Drawing a marquee within a frame is about what lies in it.
+  // Drawing a marquee within a frame is about what lies in it, unless it is folded.
   const isNoFrame = useCallback((change: NodeChange<CanvasNode>) => {
     if (change.type !== "select" || !change.selected) return true;
+    if (now.current.folding?.blocks.has(change.id)) return true;
     const note = notesOf(now.current.graph).find(({ key }) => key === change.id);
     return note?.kind !== "frame";
   }, []);
@@ -260,7 +269,8 @@ function useDragging(
     if (begun.current !== null) {
       const dropped = withContents(graph, moved, rest, sizes);
       asOneEdit(doc, () => {
-        moveActions(doc, new Map([...unplaced(graph, rest), ...dropped]));
+        moveActions(doc, unplaced(graph, rest));
+        moveActions(doc, dropped);
         placeNotes(doc, graph, dropped);
         const [only] = all;
         if (over !== null && only) insertInto(doc, over, only.id);
@@ -274,8 +284,26 @@ function useDragging(
   return { onDrag, onDragStop };
 }
 
+/** What is folded, and how large everything is then. What is dragged over a block is seen until it is dropped. */
+function useFolding(
+  graph: Graph,
+  folded: ReadonlySet<string>,
+  rest: Positions,
+  sizes: Placed["sizes"],
+) {
+  const folding = useMemo(
+    () => foldingOf(graph, folded, rest, sizes),
+    [graph, folded, rest, sizes],
+  );
+  const known = useMemo(
+    () => (folding === null ? sizes : wholeSizes(graph, sizes)),
+    [folding, graph, sizes],
+  );
+  return { folding, known };
+}
+
 export function useCanvasElements(given: CanvasElementsInput) {
-  const { graph, selection, select, progress, marks, laidOut } = given;
+  const { graph, selection, select, progress, marks, laidOut, folded } = given;
   const people = usePeople();
   const flow: ReactFlowInstance<CanvasNode, Arrow> = useReactFlow<CanvasNode, Arrow>();
   const [sizes, setSizes] = useState<ReadonlyMap<Key, MeasuredSize>>(new Map());
@@ -286,6 +314,7 @@ export function useCanvasElements(given: CanvasElementsInput) {
     () => new Map([...positionsOf(graph, sizes), ...(laidOut ?? []), ...notePlaces(graph)]),
     [graph, sizes, laidOut],
   );
+  const { folding, known } = useFolding(graph, folded, rest, sizes);
   const places = useMemo(() => dragged(rest, people, drag), [rest, people, drag]);
   const others = useChosenByOthers(people);
   // The arrow that would take in what is dragged looks as if it were chosen.
@@ -297,14 +326,14 @@ export function useCanvasElements(given: CanvasElementsInput) {
     () => ({ others, places, selected, progress, marks, measured: sizes, resized }),
     [others, places, selected, progress, marks, sizes, resized],
   );
-  const drawn = useDrawn(graph, options);
-  const lines = useLines(graph, options);
-  const placed = { graph, rest, sizes };
+  const drawn = useDrawn(graph, options, folding);
+  const lines = useLines(graph, { ...options, rest }, folding);
+  const placed = { graph, rest, sizes: known, folding };
   const onEdgesChange = useSelectionChanges(selection, select);
   const onNodesChange = useNodeChanges(placed, setSizes, setDrag, onEdgesChange);
   const dragging = useDragging(placed, over, setOver, setDrag);
   const hands = { onNodesChange, onEdgesChange, ...dragging };
-  return { flow, lines, ...drawn, places, sizes, setResized, setOver, ...hands };
+  return { flow, lines, ...drawn, folding, places, sizes: known, setResized, setOver, ...hands };
 }
 
 /** One action that nothing leads to or from can be dropped into an arrow. */

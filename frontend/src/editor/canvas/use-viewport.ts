@@ -17,7 +17,7 @@ import {
   wholeViewport,
 } from "../../canvas/geometry/viewport";
 import type { CanvasView } from "../../edit-actions/editor-context";
-import { type Direction, ENTRY, type Key, type Position } from "../../graph/model";
+import { type Direction, ENTRY, EXIT, type Key, type Position } from "../../graph/model";
 import type { Progress } from "../../status/progress";
 import { useFollowRun } from "./follow-run";
 
@@ -27,10 +27,14 @@ interface ViewportInput {
   places: Positions;
   sizes: Sizes;
   lines: LineStore;
+  /** The folded frames that are drawn instead of what lies in them. */
+  blockOf: ReadonlyMap<Key, string> | undefined;
+  /** Unfolds what hides these. */
+  unfoldRound: (keys: readonly Key[]) => void;
   direction: Direction;
   phone: boolean;
-  /** The graph has been heard of and has something to show. */
-  begun: boolean;
+  /** What there is to see: nothing before the graph has been heard of. */
+  opens: "nothing" | "ends" | "cards";
   progress: ReadonlyMap<Key, Progress>;
   /** The run that goes, if one does. */
   run: string | null;
@@ -58,9 +62,11 @@ function roomOf(element: HTMLElement): CanvasArea {
   return { width: element.clientWidth, height: element.clientHeight, covered };
 }
 
-/** How long the view glides, ms; not at all for people who want no motion. */
-function glide(ms: number): number {
-  return window.matchMedia("(prefers-reduced-motion: reduce)").matches ? 0 : ms;
+/** How the view glides, in `ms`; not at all for people who want no motion. */
+function glide(ms: number): { duration: number; interpolate: "linear" } {
+  const still = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
+  // Straight there: a flight that goes farther away in between shows other cards on its way.
+  return { duration: still ? 0 : ms, interpolate: "linear" };
 }
 
 /** Where people write, decide, or walk by keys. */
@@ -82,8 +88,9 @@ export function focusCard(room: HTMLElement, key: Key, tries: number): void {
 }
 
 export function useViewport(given: ViewportInput) {
-  const { flow, frame, places, sizes, lines, direction, phone, begun, progress, run, pointer } =
-    given;
+  const { flow, frame, places, sizes, lines, direction, phone, progress, run, pointer } = given;
+  const { blockOf, unfoldRound } = given;
+  const [begun, empty] = [given.opens === "cards", given.opens === "ends"];
   const now = useRef({ places, sizes, direction });
   now.current = { places, sizes, direction };
   const least = phone ? READABLE.phone : READABLE.desktop;
@@ -93,37 +100,59 @@ export function useViewport(given: ViewportInput) {
   const showAll = useCallback(
     (goal: "first" | "whole", duration: number) => {
       const { places, sizes, direction } = now.current;
-      const [box, element] = [boundsOf(places, sizes, lines.points()), frame.current];
+      const pill = pillSize(direction);
+      const all: Sizes = new Map([[ENTRY, pill], [EXIT, pill], ...sizes]);
+      const [box, element] = [boundsOf(places, all, lines.points()), frame.current];
       if (box === null || element === null) return;
       const room = roomOf(element);
       const [x, y] = places.get(ENTRY) ?? [box.x, box.y];
-      const { width, height } = sizes.get(ENTRY) ?? pillSize(direction);
+      const { width, height } = all.get(ENTRY) ?? pill;
       const next =
         goal === "whole"
           ? wholeViewport(box, room)
           : firstViewport(box, room, [x + width / 2, y + height / 2], least, direction);
       fitted.current = { view: next, goal };
-      void flow.setViewport(next, { duration: glide(duration) });
+      void flow.setViewport(next, glide(duration));
     },
     [flow, frame, lines, least],
   );
 
-  // The graph arrives after the canvas, and its sizes after that.
+  // The graph arrives after the canvas, and its sizes after that. Who asks for all of it meanwhile
+  // shall see that.
   const opened = useRef(false);
+  const asked = useRef<"first" | "whole">("first");
   useEffect(() => {
     if (!begun || opened.current) return;
     const timer = setTimeout(() => {
       opened.current = true;
-      showAll("first", 0);
+      showAll(asked.current, 0);
     }, 60);
     return () => clearTimeout(timer);
   }, [begun, showAll]);
+  // Else they would begin under the bar. The first card is what the graph opens with.
+  useEffect(() => {
+    if (!empty || opened.current) return;
+    const timer = setTimeout(() => {
+      showAll("first", 0);
+      const { view } = fitted.current ?? { view: flow.getViewport() };
+      // Over what is said in the middle of an empty graph.
+      void flow.setViewport({ ...view, y: view.y - (frame.current?.clientHeight ?? 0) / 4 });
+      fitted.current = null;
+    }, 60);
+    return () => clearTimeout(timer);
+  }, [empty, showAll, flow, frame]);
 
   useEffect(() => {
     const room = frame.current;
     if (room === null) return;
+    const details = () => room.closest("main")?.dataset.details;
+    let before = details();
     const watch = new ResizeObserver(() => {
       const last = fitted.current;
+      const same = before === details();
+      before = details();
+      // Details that come with what is pressed leave it under the pointer.
+      if (!same) return;
       if (last && isSameViewport(last.view, flow.getViewport())) showAll(last.goal, 0);
     });
     watch.observe(room);
@@ -143,7 +172,7 @@ export function useViewport(given: ViewportInput) {
       const size = roomOf(room);
       const here: Viewport = flow.getViewport();
       if (goal === "whole") {
-        void flow.setViewport(wholeViewport(box, size), { duration: glide(250) });
+        void flow.setViewport(wholeViewport(box, size), glide(250));
         return;
       }
       const zoom = goal === "middle" ? Math.max(here.zoom, least) : here.zoom;
@@ -153,34 +182,40 @@ export function useViewport(given: ViewportInput) {
         : goal === "middle"
           ? wholeViewport(box, size)
           : null;
-      if (next !== null) void flow.setViewport(next, { duration: glide(250) });
+      if (next !== null) void flow.setViewport(next, glide(250));
     },
     [flow, frame, least],
   );
 
   const view = useMemo<CanvasView>(
     () => ({
-      fit: () => showAll("whole", 200),
+      fit: () => {
+        asked.current = "whole";
+        showAll("whole", 200);
+      },
       open: () => showAll("first", 200),
       reopen: () => {
         if (fitted.current !== null) showAll(fitted.current.goal, 200);
       },
       zoomIn: () => {
         fitted.current = null;
-        void flow.zoomIn({ duration: glide(120) });
+        void flow.zoomIn(glide(120));
       },
       zoomOut: () => {
         fitted.current = null;
-        void flow.zoomOut({ duration: glide(120) });
+        void flow.zoomOut(glide(120));
       },
-      show: (keys, goal = "middle") => show(keys, goal),
+      show: (keys, goal = "middle") => {
+        unfoldRound(keys);
+        show(keys, goal);
+      },
       reveal: ([x, y]) => {
         const room = frame.current;
         if (room === null) return;
         const size = roomOf(room);
         const next = viewportShowing({ x, y, ...CARD }, size, flow.getViewport());
         fitted.current = null;
-        if (next !== null) void flow.setViewport(next, { duration: glide(200) });
+        if (next !== null) void flow.setViewport(next, glide(200));
       },
       middle: (): Position => {
         const box = frame.current?.getBoundingClientRect();
@@ -201,14 +236,15 @@ export function useViewport(given: ViewportInput) {
         return { screen, at: [Math.round(at.x), Math.round(at.y)] };
       },
       focus: (key) => {
+        unfoldRound([key]);
         const room = frame.current;
         if (room !== null) focusCard(room, key, 12);
       },
     }),
-    [showAll, show, flow, frame, pointer],
+    [showAll, show, flow, frame, pointer, unfoldRound],
   );
 
-  const follow = useFollowRun({ flow, frame, now, run, progress, glide });
+  const follow = useFollowRun({ flow, frame, now, run, progress, blockOf, glide });
   const onPanned = useCallback(() => {
     fitted.current = null;
     follow.onPanned();

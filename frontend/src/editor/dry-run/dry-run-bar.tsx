@@ -1,5 +1,5 @@
 /** The bar of a dry-run: where one is, what happens, how it shall go on. */
-import { ActionIcon, Button, Menu, Select, Tooltip } from "@mantine/core";
+import { ActionIcon, Button, Menu, Select } from "@mantine/core";
 import {
   IconBolt,
   IconPlayerPauseFilled,
@@ -22,6 +22,7 @@ import { type EditorContext, selectedActions } from "../../edit-actions/editor-c
 import { FirstShortcut } from "../../edit-actions/keys/shortcut-keys";
 import { fullName } from "../../graph/model";
 import { endName } from "../../graph/relation-words";
+import { Tooltip } from "../../ui/floating/tooltip";
 import style from "./dry-run-bar.module.css";
 import { SeedEnd, SeedNote } from "./dry-run-seed";
 

@@ -5,8 +5,7 @@ import { IconFlag, IconPlayerPlay, IconPlus, IconSquareRounded } from "@tabler/i
 import { useEffect, useRef, useState } from "react";
 import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
 import { addActionAt, type EditorContext, freePosition } from "../../edit-actions/editor-context";
-import { endsOf } from "../../graph/document-keys";
-import { asOneEdit, connect, moveRelation, type NewAction } from "../../graph/edit";
+import { asOneEdit, connect, type NewAction } from "../../graph/edit";
 import { ENTRY, EXIT, type Key, type Precondition } from "../../graph/model";
 import { endName } from "../../graph/relation-words";
 import { colorOfName } from "../../ui/name-colors";
@@ -15,7 +14,11 @@ import { candidates } from "../canvas/quick-add";
 import style from "./arrow-dialog.module.css";
 
 /** Everything an arrow can lead from or to, those that are near first. */
-function ends(context: EditorContext, end: typeof ENTRY | typeof EXIT, near: Key | null): Option[] {
+export function ends(
+  context: EditorContext,
+  end: typeof ENTRY | typeof EXIT,
+  near: Key | null,
+): Option[] {
   const places = context.positions();
   const [x0, y0] = (near === null ? null : places.get(near)) ?? context.view.middle();
   const far = (key: Key) => {
@@ -51,6 +54,14 @@ const LETTERS: Readonly<Record<string, Precondition>> = {
 
 const STEPS: Record<string, number> = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 };
 
+/** How an outcome looks on a button, with the digit that chooses it. */
+const faceOf = (outcome: Precondition, i: number) => ({
+  leftSection: <OutcomeSign outcome={outcome} />,
+  rightSection: <span className={style.digit}>{i + 1}</span>,
+  style: { color: outcomeColor[outcome] },
+  children: outcomeWord[outcome],
+});
+
 function OutcomePicker({ onPick }: { onPick: (outcome: Precondition) => void }) {
   const row = useRef<HTMLDivElement>(null);
   const [at, setAt] = useState(0);
@@ -83,15 +94,86 @@ function OutcomePicker({ onPick }: { onPick: (outcome: Precondition) => void }) 
           data-autofocus={i === at || undefined}
           onFocus={() => setAt(i)}
           onClick={() => onPick(outcome)}
-          leftSection={<OutcomeSign outcome={outcome} />}
-          rightSection={<span className={style.digit}>{i + 1}</span>}
-          style={{ color: outcomeColor[outcome] }}
-        >
-          {outcomeWord[outcome]}
-        </Button>
+          {...faceOf(outcome, i)}
+        />
       ))}
     </div>
   );
+}
+
+/** Which outcome, while the keyboard stays in the field in which what follows is named. */
+function OutcomeRow({
+  value,
+  onPick,
+}: {
+  value: Precondition;
+  onPick: (to: Precondition) => void;
+}) {
+  return (
+    <div role="radiogroup" aria-label="Outcome" className={style.outcomes}>
+      {OUTCOMES.map((outcome, i) => (
+        <Button
+          key={outcome}
+          role="radio"
+          aria-checked={outcome === value}
+          variant={outcome === value ? "light" : "default"}
+          tabIndex={outcome === value ? 0 : -1}
+          onClick={() => onPick(outcome)}
+          onKeyDown={(event) => {
+            const next = stepped(value, event.key);
+            if (next === null) return;
+            event.preventDefault();
+            onPick(next);
+            const row = event.currentTarget.parentElement;
+            row?.querySelectorAll<HTMLElement>("[role=radio]")[OUTCOMES.indexOf(next)]?.focus();
+          }}
+          {...faceOf(outcome, i)}
+        />
+      ))}
+    </div>
+  );
+}
+
+function stepped(outcome: Precondition, key: string): Precondition | null {
+  const step = STEPS[key];
+  if (step === undefined) return null;
+  return OUTCOMES[(OUTCOMES.indexOf(outcome) + step + OUTCOMES.length) % OUTCOMES.length] ?? null;
+}
+
+/** In the empty field these choose the outcome: a name begins with none of them. */
+function outcomeByKey(now: Precondition, { key }: React.KeyboardEvent): Precondition | null {
+  if (key >= "1" && key <= "4") return OUTCOMES[Number(key) - 1] ?? null;
+  return key === "ArrowLeft" || key === "ArrowRight" ? stepped(now, key) : null;
+}
+
+/**
+ * Letters that are typed before the dialog stands: people type faster than it opens, and on the
+ * canvas the same keys do other things.
+ */
+function useEarlyKeys(onOutcome: (outcome: Precondition) => void): () => string {
+  const early = useRef("");
+  const tell = useRef(onOutcome);
+  tell.current = onOutcome;
+  useEffect(() => {
+    const onKey = (event: KeyboardEvent) => {
+      const inField = event.target instanceof HTMLElement && event.target.matches("input, button");
+      if (inField || event.ctrlKey || event.metaKey || event.altKey || event.key.length !== 1)
+        return;
+      const field = document.querySelector<HTMLElement>("[role=dialog] [role=combobox]");
+      event.stopPropagation();
+      // What is focused now is what the key writes into.
+      if (field !== null) field.focus();
+      else {
+        event.preventDefault();
+        const digit = early.current === "" && OUTCOMES[Number(event.key) - 1];
+        if (digit) tell.current(digit);
+        else early.current += event.key;
+      }
+    };
+    window.addEventListener("keydown", onKey, { capture: true });
+    return () => window.removeEventListener("keydown", onKey, { capture: true });
+  }, []);
+  return () => early.current;
 }
 
 interface Props {
@@ -125,31 +207,65 @@ export function targetsOf(
   return [...found, ...fresh];
 }
 
-export function ArrowDialog({ context, known, from: given, to, onClose }: Props) {
+/** What the dialog draws, as far as it is known. */
+function Sentence({ context, from, outcome, to }: SentenceProps) {
+  const name = from === null ? "…" : endName(context.graph, from);
+  return (
+    <p className={style.sentence} aria-live="polite">
+      {from === ENTRY ? (
+        "At the start, run …"
+      ) : (
+        <>
+          When <b>{name}</b> is{" "}
+          {outcome === null ? (
+            "…"
+          ) : (
+            <b className={style.said} style={{ color: outcomeColor[outcome] }}>
+              <OutcomeSign outcome={outcome} /> {outcomeWord[outcome]}
+            </b>
+          )}
+          , run {to === null ? "…" : <b>{endName(context.graph, to)}</b>}
+        </>
+      )}
+    </p>
+  );
+}
+
+interface SentenceProps {
+  context: EditorContext;
+  from: Key | null;
+  outcome: Precondition | null;
+  to: Key | null;
+}
+
+/** Draws it, also to an action that is made for it, and selects it. */
+function draw(
+  { context, known, onClose }: Pick<Props, "context" | "known" | "onClose">,
+  parent: Key,
+  child: Key,
+  when: Precondition,
+): void {
+  const name = child.startsWith(FRESH) ? child.slice(FRESH.length) : null;
+  const template = known.find((each) => each.name === name) ?? { name: name ?? "" };
+  const relation = asOneEdit(context.doc, () => {
+    const key = name === null ? child : addActionAt(context, template, freePosition(context));
+    return connect(context.doc, parent, key, when);
+  });
+  onClose();
+  if (relation !== null) context.select([relation]);
+  else notifications.show({ color: "red", message: "No arrow can lead there." });
+}
+
+export function ArrowDialog(props: Props) {
+  const { context, known, from: given, to, onClose } = props;
   const [from, setFrom] = useState(given);
-  const [outcome, setOutcome] = useState<Precondition | null>(given === ENTRY ? "on_true" : null);
-  const draw = (parent: Key, child: Key, when: Precondition) => {
-    const name = child.startsWith(FRESH) ? child.slice(FRESH.length) : null;
-    const template = known.find((each) => each.name === name) ?? { name: name ?? "" };
-    const relation = asOneEdit(context.doc, () => {
-      const key = name === null ? child : addActionAt(context, template, freePosition(context));
-      return connect(context.doc, parent, key, when);
-    });
-    onClose();
-    if (relation !== null) context.select([relation]);
-    else notifications.show({ color: "red", message: "No arrow can lead there." });
-  };
+  const [outcome, setOutcome] = useState<Precondition>("on_true");
+  const early = useEarlyKeys(setOutcome);
   const chooseFrom = (key: Key) => {
     setFrom(key);
-    if (key === ENTRY && to !== null && to !== EXIT) draw(ENTRY, to, "on_true");
-    else if (key === ENTRY) setOutcome("on_true");
+    if (key === ENTRY && to !== null && to !== EXIT) draw(props, ENTRY, to, "on_true");
   };
-  const chooseOutcome = (when: Precondition) => {
-    if (from !== null && to !== null) draw(from, to, when);
-    else setOutcome(when);
-  };
-  const step = from === null ? "from" : outcome === null ? "outcome" : "to";
-  const name = from === null ? "…" : endName(context.graph, from);
+  const step = from === null ? "from" : to !== null ? "outcome" : "to";
   const targets = (search: string): readonly Option[] => {
     const all = ends(context, EXIT, from).filter(({ id }) => from !== ENTRY || id !== EXIT);
     return targetsOf(all, known, search);
@@ -164,114 +280,41 @@ export function ArrowDialog({ context, known, from: given, to, onClose }: Props)
       transitionProps={{ duration: 80 }}
       overlayProps={{ backgroundOpacity: 0.3 }}
     >
-      <p className={style.sentence} aria-live="polite">
-        {from === ENTRY ? (
-          "At the start, run …"
-        ) : (
-          <>
-            When <b>{name}</b> is{" "}
-            {outcome === null ? (
-              "…"
-            ) : (
-              <b className={style.said} style={{ color: outcomeColor[outcome] }}>
-                <OutcomeSign outcome={outcome} /> {outcomeWord[outcome]}
-              </b>
-            )}
-            , run {to === null ? "…" : <b>{endName(context.graph, to)}</b>}
-          </>
-        )}
-      </p>
+      <Sentence context={context} from={from} outcome={to === null ? outcome : null} to={to} />
       {step === "from" && (
         <PickList
           key="from"
           label="From"
           placeholder="From which action?"
+          initial={early}
           find={(search) => matching(ends(context, ENTRY, null), search)}
           onPick={chooseFrom}
           none="No action is called so."
         />
       )}
-      {step === "outcome" && <OutcomePicker onPick={chooseOutcome} />}
-      {step === "to" && from !== null && outcome !== null && (
-        <PickList
-          key="to"
-          label="To"
-          placeholder="What follows?"
-          find={targets}
-          onPick={(key) => draw(from, key, outcome)}
-          none="No action is called so."
-          take="draw"
-        />
+      {step === "outcome" && from !== null && to !== null && (
+        <OutcomePicker onPick={(when) => draw(props, from, to, when)} />
       )}
-    </Modal>
-  );
-}
-
-/** Leads an arrow, with all that it says, from or to another action. */
-export function RetargetDialog({
-  context,
-  relation,
-  onClose,
-}: {
-  context: EditorContext;
-  relation: string;
-  onClose: () => void;
-}) {
-  const [end, setEnd] = useState<"parent" | "child">("child");
-  const now = endsOf(relation);
-  if (now === null) return null;
-  const lead = (key: Key) => {
-    const moved = moveRelation(context.doc, relation, { [end]: key });
-    onClose();
-    if (moved !== null) context.select([moved]);
-    else {
-      notifications.show({
-        color: "red",
-        title: "The arrow stays",
-        message: "These two are tied already, or no arrow can lead there.",
-      });
-    }
-  };
-  const options = ends(context, end === "child" ? EXIT : ENTRY, now[end]).filter(
-    ({ id }) => id !== now[end] && (id === EXIT || id !== ENTRY || now.parent === ENTRY),
-  );
-  return (
-    <Modal
-      opened
-      onClose={onClose}
-      title="Lead the arrow elsewhere"
-      yOffset="14vh"
-      centered={false}
-      transitionProps={{ duration: 80 }}
-      overlayProps={{ backgroundOpacity: 0.3 }}
-    >
-      <div className={style.outcomes}>
-        <Button
-          variant={end === "child" ? "light" : "default"}
-          aria-pressed={end === "child"}
-          onClick={() => setEnd("child")}
-        >
-          to another than {endName(context.graph, now.child)}
-        </Button>
-        {now.parent !== ENTRY && (
-          <Button
-            variant={end === "parent" ? "light" : "default"}
-            aria-pressed={end === "parent"}
-            onClick={() => setEnd("parent")}
-          >
-            from another than {endName(context.graph, now.parent)}
-          </Button>
-        )}
-      </div>
-      <PickList
-        key={end}
-        label={end === "child" ? "To" : "From"}
-        placeholder={end === "child" ? "What follows instead?" : "After which action instead?"}
-        find={(search) => matching(options, search)}
-        onPick={lead}
-        none="No action is called so."
-        take="lead there"
-      />
+      {step === "to" && from !== null && (
+        <>
+          {from !== ENTRY && <OutcomeRow value={outcome} onPick={setOutcome} />}
+          <PickList
+            key="to"
+            label="To"
+            placeholder="What follows?"
+            {...(given === null ? {} : { initial: early })}
+            find={targets}
+            onPick={(key) => draw(props, from, key, outcome)}
+            onEmptyKey={(event) => {
+              const next = from === ENTRY ? null : outcomeByKey(outcome, event);
+              if (next !== null) setOutcome(next);
+              return next !== null;
+            }}
+            none="No action is called so."
+            take="draw"
+          />
+        </>
+      )}
     </Modal>
   );
 }

@@ -33,6 +33,7 @@ function offered(context: EditorContext): readonly (readonly EditAction[])[] {
         ...editActions.ALIGN,
         ...editActions.DISTRIBUTE,
         editActions.frame,
+        editActions.fold,
       ],
       [
         editActions.connectTo,
@@ -52,11 +53,21 @@ function offered(context: EditorContext): readonly (readonly EditAction[])[] {
       [remove, heal],
     ];
   }
-  if (notes === 1)
-    return [[editActions.write], [copy, cut, duplicate, editActions.copyLink], [remove]];
+  if (notes === 1) {
+    return [
+      [editActions.write, editActions.fold],
+      [copy, cut, duplicate, editActions.copyLink],
+      [remove],
+    ];
+  }
   if (arrows > 0) {
     return [
-      [editActions.details, editActions.insert, editActions.retargetArrow],
+      [
+        editActions.details,
+        editActions.insert,
+        editActions.retargetArrow,
+        editActions.straightenLine,
+      ],
       [editActions.zoomSelection, editActions.copyLink],
       [remove],
     ];

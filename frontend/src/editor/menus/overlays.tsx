@@ -5,10 +5,14 @@ import type { EditorContext, Overlay } from "../../edit-actions/editor-context";
 import type { NewAction } from "../../graph/edit";
 import { lazyPart } from "../../ui/parts/lazy-part";
 import { OverlayBoundary, PartBoundary } from "../../ui/parts/part-boundary";
-import { CommandPalette } from "./command-palette";
 
 const ArrowDialog = lazyPart(() => import("./arrow-dialog").then((part) => part.ArrowDialog));
-const RetargetDialog = lazyPart(() => import("./arrow-dialog").then((part) => part.RetargetDialog));
+const RetargetDialog = lazyPart(() =>
+  import("./retarget-dialog").then((part) => part.RetargetDialog),
+);
+const CommandPalette = lazyPart(() =>
+  import("./command-palette").then((part) => part.CommandPalette),
+);
 const ContextMenu = lazyPart(() => import("./context-menu").then((part) => part.ContextMenu));
 const GraphPrint = lazyPart(() => import("./graph-print").then((part) => part.GraphPrint));
 const ShortcutSheet = lazyPart(() => import("./shortcut-sheet").then((part) => part.ShortcutSheet));
@@ -24,7 +28,7 @@ interface Props {
 export function Overlays(props: Props) {
   // What is typed right after their key shall find them: they do not wait until the page rests.
   useEffect(() => {
-    for (const part of [ArrowDialog, ContextMenu]) void part.preload();
+    for (const part of [ArrowDialog, CommandPalette, ContextMenu]) void part.preload();
   }, []);
   return (
     <>
@@ -53,7 +57,7 @@ function Opened({ context, known, overlay, onClose }: Props) {
         />
       );
     case "retarget":
-      return <RetargetDialog context={context} relation={overlay.relation} onClose={onClose} />;
+      return <RetargetDialog context={context} {...overlay} onClose={onClose} />;
     case "menu":
       return <ContextMenu context={context} screen={overlay.screen} onClose={onClose} />;
     case "palette":

@@ -1,10 +1,9 @@
-/** Tools on the canvas, and the menu of every edit action. */
-import { ActionIcon, Menu, Tooltip } from "@mantine/core";
+/** Tools on the canvas, and the way to the menu of every edit action. */
+import { ActionIcon } from "@mantine/core";
 import { IconDots } from "@tabler/icons-react";
-import { Fragment, memo } from "react";
+import { memo } from "react";
 import {
   add,
-  EDIT_ACTIONS,
   fit,
   marquee,
   note,
@@ -17,15 +16,13 @@ import {
   zoomIn,
   zoomOut,
 } from "../../edit-actions/all";
-import {
-  type EditAction,
-  type EditActionGroup,
-  isEnabled,
-  labelOf,
-} from "../../edit-actions/edit-action";
+import { type EditAction, isEnabled, labelOf } from "../../edit-actions/edit-action";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import { FirstShortcut } from "../../edit-actions/keys/shortcut-keys";
-import { useStableCallback } from "../../ui/use-stable-callback";
+import { LateOpening } from "../../ui/floating/late-opening";
+import { Tooltip } from "../../ui/floating/tooltip";
+import { useStableCallback } from "../../ui/hooks/use-stable-callback";
+import { lazyPart } from "../../ui/parts/lazy-part";
 import style from "./toolbar.module.css";
 
 function Tool({ editAction, pressed }: { editAction: EditAction; pressed?: boolean }) {
@@ -81,53 +78,22 @@ const ToolButton = memo(function ToolButton(props: ToolButtonProps) {
   );
 });
 
-const GROUPS: readonly EditActionGroup[] = ["Draw", "Arrange", "Look", "Graph", "Dry-run"];
-/** Walking and nudging would be eight lines that nobody clicks. */
-const KEYS_ONLY = /^(nudge|walk)-/;
+const EditActionMenu = lazyPart(() =>
+  import("./edit-action-menu").then((part) => part.EditActionMenu),
+);
 
-/** Rendered while the menu is open only: what is enabled depends on everything. */
-function ActionItems() {
-  const context = useEditorContext();
-  return GROUPS.map((group) => (
-    <Fragment key={group}>
-      <Menu.Label>{group}</Menu.Label>
-      {EDIT_ACTIONS.filter(
-        (editAction) => editAction.group === group && !KEYS_ONLY.test(editAction.name),
-      ).map((editAction) => {
-        const Sign = editAction.icon;
-        return (
-          <Menu.Item
-            key={editAction.name}
-            leftSection={<Sign size={16} aria-hidden />}
-            rightSection={<FirstShortcut editAction={editAction} />}
-            disabled={!isEnabled(editAction, context)}
-            onClick={() => editAction.run(context)}
-          >
-            {labelOf(editAction, context)}
-          </Menu.Item>
-        );
-      })}
-    </Fragment>
-  ));
-}
-
-function EditActionMenu() {
+function Everything() {
   return (
-    <Menu position="top-start" width={290}>
-      <Menu.Target>
-        <ActionIcon
-          size={34}
-          radius={0}
-          aria-label="Everything you can do"
-          className={style.tool ?? ""}
-        >
-          <IconDots size={17} aria-hidden />
-        </ActionIcon>
-      </Menu.Target>
-      <Menu.Dropdown className={style.menu ?? ""}>
-        <ActionItems />
-      </Menu.Dropdown>
-    </Menu>
+    <LateOpening opens="menu" part={(button) => <EditActionMenu button={button} />}>
+      <ActionIcon
+        size={34}
+        radius={0}
+        aria-label="Everything you can do"
+        className={style.tool ?? ""}
+      >
+        <IconDots size={17} aria-hidden />
+      </ActionIcon>
+    </LateOpening>
   );
 }
 
@@ -147,7 +113,7 @@ export const Toolbar = memo(function Toolbar({ compact }: { compact: boolean }) 
       {!compact && <Tool editAction={zoomOut} />}
       {!compact && <Tool editAction={zoomIn} />}
       <Tool editAction={fit} />
-      <EditActionMenu />
+      <Everything />
     </div>
   );
 });

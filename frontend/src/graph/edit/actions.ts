@@ -1,7 +1,7 @@
 /** Edits of actions: add, remove, rename, fields. */
 
 import type * as Y from "yjs";
-import { actionKey, endsOf, extraKey, rootOf, splitKey } from "../document-keys";
+import { actionKey, bundleOfKey, endsOf, extraKey, rootOf, splitKey } from "../document-keys";
 import { newAid } from "../ids";
 import {
   type Action,
@@ -108,10 +108,13 @@ function remove(doc: Y.Doc, gone: ReadonlySet<Key>): void {
   const actions = rootOf(doc, "actions");
   const relations = rootOf(doc, "relations");
   for (const key of [...actions.keys()]) if (gone.has(splitKey(key).head)) actions.delete(key);
-  for (const key of [...relations.keys()]) {
-    const ends = endsOf(splitKey(key).head);
-    if (ends && (gone.has(ends.parent) || gone.has(ends.child))) relations.delete(key);
-  }
+  const isGone = (id: string) => {
+    const ends = endsOf(id);
+    return ends !== null && (gone.has(ends.parent) || gone.has(ends.child));
+  };
+  for (const key of [...relations.keys()]) if (isGone(splitKey(key).head)) relations.delete(key);
+  for (const key of [...rootOf(doc, "positions").keys()])
+    if (isGone(splitKey(bundleOfKey(key) ?? "").head)) eraseKeys(doc, "positions", key);
   eraseKeys(doc, "positions", ...gone);
 }
 

@@ -8,6 +8,7 @@
 import type * as Y from "yjs";
 import {
   actionKey,
+  bundleOfKey,
   endsOf,
   mapsOf,
   noteKey,
@@ -15,10 +16,12 @@ import {
   relationId,
   rootOf,
   splitKey,
+  waypointsKey,
 } from "../document-keys";
 import { isAid, newAid } from "../ids";
 import { ENTRY, EXIT, type Key, type Position } from "../model";
 import { asNumber, asPosition } from "../values";
+import { readWaypoints, shifted } from "../waypoints";
 import { freeNumber } from "./actions";
 import { asOneEdit, nextNumber, numberGhosts, numbersOf, writeKey } from "./document-writes";
 
@@ -44,17 +47,19 @@ export function clipOf(
   const pick = (root: ReadonlyMap<string, unknown>, fits: (key: string) => boolean): ClipValues =>
     Object.fromEntries([...root].filter(([key]) => fits(key)));
   const actions = pick(maps.actions, (key) => within(splitKey(key).head));
-  const relations = pick(maps.relations, (key) => {
+  const inside = (key: string) => {
     const ends = endsOf(splitKey(key).head);
     return ends !== null && within(ends.parent) && within(ends.child);
-  });
+  };
+  const relations = pick(maps.relations, inside);
+  const bends = pick(maps.positions, (key) => inside(bundleOfKey(key) ?? ""));
   const keys = Object.keys(actions).filter(isAid);
   const notes = pick(maps.positions, (key) => key.startsWith("g/") && chosen.has(key));
   const stand = keys.flatMap((key) => {
     const at = places.get(key);
     return at ? [[key, [...at]] as const] : [];
   });
-  return { actions, relations, positions: { ...notes, ...Object.fromEntries(stand) } };
+  return { actions, relations, positions: { ...notes, ...bends, ...Object.fromEntries(stand) } };
 }
 
 export function isEmpty(clip: Clip): boolean {
@@ -127,13 +132,17 @@ const NUMBERS = new Set<string>(
 function pasteRelations(doc: Y.Doc, clip: Clip, names: ReadonlyMap<Key, Key>): void {
   for (const [field, value] of Object.entries(clip.relations)) {
     const { head, rest } = splitKey(field);
-    const ends = endsOf(head);
-    const parent = ends && names.get(ends.parent);
-    const child = ends && names.get(ends.child);
-    if (!parent || !child || NUMBERS.has(rest)) continue;
-    const id = relationId({ parent, child, listing: ends.listing });
-    writeKey(doc, "relations", `${id}|${rest}`, value);
+    const id = copyOf(head, names);
+    if (id !== null && !NUMBERS.has(rest)) writeKey(doc, "relations", `${id}|${rest}`, value);
   }
+}
+
+/** The id that a relation has between the copies; null when one of them is not there. */
+function copyOf(relation: string, names: ReadonlyMap<Key, Key>): string | null {
+  const ends = endsOf(relation);
+  const parent = ends && names.get(ends.parent);
+  const child = ends && names.get(ends.child);
+  return parent && child ? relationId({ parent, child, listing: ends.listing }) : null;
 }
 
 function pastePositions(
@@ -149,6 +158,7 @@ function pastePositions(
     const key = names.get(old);
     const at = asPosition(value);
     if (key && at) positions.set(key, [at[0] + dx, at[1] + dy]);
+    pasteBends(doc, [old, value], names, [dx, dy]);
     const note = old.startsWith("g/") ? noteAt(value) : null;
     if (note === null) continue;
     const id = noteKey(newAid());
@@ -157,6 +167,19 @@ function pastePositions(
     notes.push(id);
   }
   return notes;
+}
+
+function pasteBends(
+  doc: Y.Doc,
+  [key, text]: readonly [string, unknown],
+  names: ReadonlyMap<Key, Key>,
+  by: Position,
+): void {
+  const { head, rest } = splitKey(bundleOfKey(key) ?? "");
+  const id = copyOf(head, names);
+  const places = typeof text === "string" ? readWaypoints(text) : [];
+  if (id === null || places.length === 0) return;
+  writeKey(doc, "positions", waypointsKey(`${id}|${rest}`), JSON.stringify(shifted(places, by)));
 }
 
 function shiftOf(clip: Clip, landing: PastePosition): Position {

@@ -1,9 +1,26 @@
 /** How edits write: one transaction each, only what differs, under one origin that undo knows. */
 
 import * as Y from "yjs";
-import { endsOf, mapsFrom, mapsOf, type Root, rootOf, splitKey } from "../document-keys";
+import {
+  endsOf,
+  mapsFrom,
+  mapsOf,
+  type Root,
+  rootOf,
+  splitKey,
+  waypointsKey,
+} from "../document-keys";
 import { isAid } from "../ids";
-import { ENTRY, EXIT, type Graph, type Key, PRECONDITIONS, type Relation } from "../model";
+import {
+  ENTRY,
+  EXIT,
+  type Graph,
+  type Key,
+  PRECONDITIONS,
+  RESPONSES,
+  type Relation,
+  type Response,
+} from "../model";
 import { readGraph, readTakenUp } from "../read";
 import { asNumber, asResponse } from "../values";
 
@@ -34,7 +51,7 @@ export function eraseKeys(doc: Y.Doc, root: Root, ...keys: readonly string[]): v
 }
 
 /** The keys of an owner, `<head>` itself included. */
-export function keysOfOwner(doc: Y.Doc, root: Root, head: string): string[] {
+function keysOfOwner(doc: Y.Doc, root: Root, head: string): string[] {
   const prefix = `${head}|`;
   return [...rootOf(doc, root).keys()].filter((key) => key === head || key.startsWith(prefix));
 }
@@ -78,12 +95,59 @@ export function nextNumber(doc: Y.Doc, root: Root, field: string, fits: (head: s
   return next;
 }
 
-/** Moves a relation with everything it says under another id. */
+/** Moves a relation with everything it says, and with the bends of its lines, under another id. */
 export function moveKeys(doc: Y.Doc, from: string, to: string): void {
   const map = rootOf(doc, "relations");
   for (const key of keysOfOwner(doc, "relations", from)) {
     map.set(to + key.slice(from.length), map.get(key));
     map.delete(key);
+  }
+  for (const response of RESPONSES) moveWaypointsKey(doc, [from, response], [to, response]);
+}
+
+/** Gives the waypoints of one line to another, which keeps its own if it has some. */
+function moveWaypointsKey(
+  doc: Y.Doc,
+  from: readonly [relation: string, Response],
+  to: readonly [relation: string, Response],
+): void {
+  const [old, next] = [waypointsKey(from.join("|")), waypointsKey(to.join("|"))];
+  const text = rootOf(doc, "positions").get(old);
+  if (text === undefined) return;
+  if (!rootOf(doc, "positions").has(next)) writeKey(doc, "positions", next, text);
+  eraseKeys(doc, "positions", old);
+}
+
+/** The bends of all lines of a relation. */
+export function eraseWaypoints(doc: Y.Doc, id: string): void {
+  const keys = RESPONSES.map((response) => waypointsKey(`${id}|${response}`));
+  eraseKeys(doc, "positions", ...keys);
+}
+
+/** All of a relation: what it says, and the bends of its lines. */
+export function eraseRelation(doc: Y.Doc, id: string): void {
+  eraseKeys(doc, "relations", ...keysOfOwner(doc, "relations", id));
+  eraseWaypoints(doc, id);
+}
+
+/** The responses that have a line of their own. */
+function responsesNow(doc: Y.Doc, id: string): ReadonlySet<Response> {
+  const map = rootOf(doc, "relations");
+  const said = PRECONDITIONS.flatMap((outcome) => asResponse(map.get(`${id}|${outcome}`)) ?? []);
+  const spoken = new Set(said.filter((response) => response !== "ignore"));
+  return spoken.size > 0 ? spoken : new Set(["ignore"]);
+}
+
+/** Changes what a relation says; a line that says something else now keeps its bends. */
+export function keepingWaypoints(doc: Y.Doc, id: string, write: () => void): void {
+  const before = responsesNow(doc, id);
+  write();
+  const after = responsesNow(doc, id);
+  const [fresh, ...others] = [...after].filter((response) => !before.has(response));
+  for (const gone of before) {
+    if (after.has(gone)) continue;
+    if (fresh && others.length === 0) moveWaypointsKey(doc, [id, gone], [id, fresh]);
+    else eraseKeys(doc, "positions", waypointsKey(`${id}|${gone}`));
   }
 }
 

@@ -11,7 +11,9 @@ import type * as Y from "yjs";
 import { noteKey, rootOf } from "../document-keys";
 import { newAid } from "../ids";
 import type { Direction, JsonText, Key, Position } from "../model";
+import { asPosition } from "../values";
 import { asOneEdit, eraseKeys, hasEnd, writeKey } from "./document-writes";
+import { moveWaypoints } from "./waypoints";
 
 export * from "./actions";
 export { asOneEdit, undoOf } from "./document-writes";
@@ -40,16 +42,21 @@ export function setDirection(doc: Y.Doc, direction: Direction): void {
   });
 }
 
-/** Writes where things stand, once, when they are dropped: actions, `ENTRY` and `EXIT`. */
+/**
+ * Writes where things stand, once, when they are dropped: actions, `ENTRY` and `EXIT`. Bends of lines
+ * whose two ends move by the same way move along.
+ */
 export function moveActions(doc: Y.Doc, positions: Iterable<readonly [Key, Position]>): void {
   asOneEdit(doc, () => {
+    const moved = new Map<Key, Position>();
     for (const [key, [x, y]] of positions) {
       if (!hasEnd(doc, key)) continue;
-      const old = rootOf(doc, "positions").get(key);
-      if (!Array.isArray(old) || old[0] !== x || old[1] !== y) {
-        rootOf(doc, "positions").set(key, [x, y]);
-      }
+      const old = asPosition(rootOf(doc, "positions").get(key));
+      if (old?.[0] === x && old[1] === y) continue;
+      rootOf(doc, "positions").set(key, [x, y]);
+      if (old) moved.set(key, [x - old[0], y - old[1]]);
     }
+    if (moved.size > 0) moveWaypoints(doc, moved);
   });
 }
 

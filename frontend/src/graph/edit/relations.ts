@@ -6,9 +6,11 @@ import { ENTRY, EXIT, type Key, type Precondition, type Response, spokenOutcomes
 import {
   asOneEdit,
   eraseKeys,
+  eraseRelation,
+  eraseWaypoints,
   hasEnd,
   hasRelation,
-  keysOfOwner,
+  keepingWaypoints,
   moveKeys,
   nextNumber,
   numberGhosts,
@@ -48,12 +50,12 @@ export function draw(
     const known = pairOf(doc, parent, child);
     const id = known ?? drawn;
     if (known === null) {
-      eraseKeys(doc, "relations", ...keysOfOwner(doc, "relations", id));
+      eraseRelation(doc, id);
       writeKey(doc, "relations", `${id}|po`, nextOf(doc, "po", "parent", parent));
       writeKey(doc, "relations", `${id}|co`, nextOf(doc, "co", "child", child));
     }
     if (parent === ENTRY) writeKey(doc, "relations", `${id}|on_true`, "run");
-    else writeKey(doc, "relations", `${id}|${outcome}`, response);
+    else keepingWaypoints(doc, id, () => writeKey(doc, "relations", `${id}|${outcome}`, response));
     eraseKeys(doc, "relations", `${id}|only`);
     forget(doc, id, "conditions", "parents");
     forgetSide(doc, id);
@@ -123,7 +125,7 @@ export function setResponse(
 
 function answer(doc: Y.Doc, id: string, outcome: Precondition, response: Response): boolean {
   return edit(doc, id, () => {
-    writeKey(doc, "relations", `${id}|${outcome}`, response);
+    keepingWaypoints(doc, id, () => writeKey(doc, "relations", `${id}|${outcome}`, response));
     forget(doc, id, "conditions", "parents");
     needs(doc, id, "parents");
   });
@@ -155,7 +157,7 @@ export function mirrorRelation(doc: Y.Doc, id: string): boolean {
 }
 
 export function removeRelation(doc: Y.Doc, id: string): boolean {
-  return edit(doc, id, () => eraseKeys(doc, "relations", ...keysOfOwner(doc, "relations", id)));
+  return edit(doc, id, () => eraseRelation(doc, id));
 }
 
 export function removeRelations(doc: Y.Doc, ids: Iterable<string>): void {
@@ -188,7 +190,7 @@ function move(
     if (to === id) return id;
     if ((old.parent === ENTRY) !== (parent === ENTRY) || endsOf(to) === null) return null;
     if (!hasEnd(doc, parent) || !hasEnd(doc, child) || pairOf(doc, parent, child)) return null;
-    eraseKeys(doc, "relations", ...keysOfOwner(doc, "relations", to));
+    eraseRelation(doc, to);
     if (parent !== old.parent)
       writeKey(doc, "relations", `${id}|po`, nextOf(doc, "po", "parent", parent));
     if (child !== old.child)
@@ -272,6 +274,7 @@ function putBetween(doc: Y.Doc, id: string, key: Key): boolean {
   if (!relation.required) writeKey(doc, "relations", `${onward}|required`, false);
   const into = move(doc, id, { child: key });
   if (into === null) return removeRelation(doc, id);
+  eraseWaypoints(doc, into); // they led past where the action stands now
   writeKey(doc, "relations", `${into}|po`, relation.parentOrder);
   eraseKeys(doc, "relations", `${into}|required`);
   return true;
@@ -294,7 +297,7 @@ export function disconnect(doc: Y.Doc, parent: Key, child: Key): boolean {
     numberGhosts(doc);
     let removed = false;
     for (let id = pairOf(doc, parent, child); id; id = pairOf(doc, parent, child)) {
-      eraseKeys(doc, "relations", ...keysOfOwner(doc, "relations", id));
+      eraseRelation(doc, id);
       removed = true;
     }
     return removed;

@@ -1,4 +1,7 @@
-/** What is wrong, what is only not written yet, and what may go wrong. Pure. */
+/**
+ * What is wrong, what is only not written yet, and what may go wrong: the twin of
+ * `umrf/problem_kinds.py`, which counts them for lists of graphs. Pure.
+ */
 
 interface CheckedPlace {
   readonly aid?: string;
@@ -44,7 +47,7 @@ const MISTAKES: ReadonlySet<string> = new Set([
 /** An input to which the check asks for a value: its path; null for any other problem. */
 export function inputOf({ code, where }: CheckedProblem): string | null {
   if (code !== "H7" && code !== "H8") return null;
-  const [, path] = /^\/actions\/\d+\/input_parameters\/(.+)$/.exec(where.path ?? "") ?? [];
+  const [, path] = /^\/actions\/\d+\/input_parameters\/(.+)$/s.exec(where.path ?? "") ?? [];
   return path ?? null;
 }
 

@@ -1,6 +1,8 @@
+import { readFileSync } from "node:fs";
+import { fileURLToPath } from "node:url";
 import { expect, test } from "vitest";
 import * as Y from "yjs";
-import { mapsOf } from "../document-keys";
+import { mapsFrom, mapsOf } from "../document-keys";
 import { addAction, connect } from "../edit";
 import { readGraph } from "../read";
 import { type CheckedProblem, countsOf, countWords, kindOf } from "./problem-kinds";
@@ -76,4 +78,32 @@ test("the same said twice of one place is told once, what is wrong first", () =>
     ["H3", 2],
   ]);
   expect(countWords(countsOf(told))).toEqual(["1 wrong", "1 to fill in", "1 warning"]);
+});
+
+const file = new URL("../../../../tests/vectors/problem-kinds.json", import.meta.url);
+
+interface Vectors {
+  readonly kinds: readonly [string, "error" | "warning", string, string][];
+  readonly graphs: readonly {
+    readonly about: string;
+    readonly maps: Parameters<typeof mapsFrom>[0];
+    readonly problems: readonly CheckedProblem[];
+    readonly wrong: number;
+    readonly to_fill_in: number;
+  }[];
+}
+
+const vectors = JSON.parse(readFileSync(fileURLToPath(file), "utf8")) as Vectors;
+
+test.each(vectors.kinds)("as the vectors say, %s, %s at %s: %s", (code, severity, path, kind) => {
+  expect(kindOf(problem(code, path, { severity }))).toBe(kind);
+});
+
+test.each(vectors.graphs)("as many of each as the vectors say: $about", (vector) => {
+  const told = toldProblems(vector.problems, readGraph(mapsFrom(vector.maps)));
+  const { wrong, fillIn } = countsOf(told);
+  expect({ wrong, to_fill_in: fillIn }).toEqual({
+    wrong: vector.wrong,
+    to_fill_in: vector.to_fill_in,
+  });
 });

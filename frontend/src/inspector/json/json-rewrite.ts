@@ -1,7 +1,7 @@
 /** Edited JSON as an edit of the document, and what others changed meanwhile. Pure but for the edit. */
 import type * as Y from "yjs";
 import type { KeyChange } from "../../api/graphs";
-import { endsOf, ROOTS, type Root, rootOf, splitKey } from "../../graph/document-keys";
+import { bundleOfKey, endsOf, ROOTS, type Root, rootOf, splitKey } from "../../graph/document-keys";
 import { asOneEdit } from "../../graph/edit/document-writes";
 import { isEqual } from "../../graph/equal";
 import { ENTRY, EXIT, type Graph, type Key } from "../../graph/model";
@@ -39,7 +39,7 @@ export function places(graph: Graph, changes: readonly KeyChange[]): string[] {
 function placeOf(graph: Graph, root: string, key: string, after: unknown): string {
   const { head } = splitKey(key);
   if (root === "meta") return "the graph";
-  const ends = endsOf(head);
+  const ends = endsOf(bundleOfKey(head) ?? head);
   const name = (end: Key) => {
     if (end === ENTRY) return "Entry";
     if (end === EXIT) return "Exit";

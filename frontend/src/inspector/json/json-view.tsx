@@ -1,5 +1,5 @@
 /** The graph as UMRF JSON: in step with what is selected, and a way to edit it. */
-import { ActionIcon, Button, CopyButton, Kbd, Skeleton, Tooltip } from "@mantine/core";
+import { ActionIcon, Button, CopyButton, Kbd, Skeleton } from "@mantine/core";
 import { IconAlertTriangle, IconCheck, IconCopy } from "@tabler/icons-react";
 import { type ReactNode, useMemo, useState } from "react";
 import type { KeyChange } from "../../api/graphs";
@@ -10,6 +10,7 @@ import {
   selectedRelations,
   useEditorContext,
 } from "../../edit-actions/editor-context";
+import { Tooltip } from "../../ui/floating/tooltip";
 import { lazyPart } from "../../ui/parts/lazy-part";
 import { PartBoundary } from "../../ui/parts/part-boundary";
 import type { JsonError } from "./json-editor";

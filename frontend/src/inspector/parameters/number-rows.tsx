@@ -1,5 +1,5 @@
 /** A point, vector or pose: its numbers in rows, or one by one where each is to be changed. */
-import { ActionIcon, Tooltip } from "@mantine/core";
+import { ActionIcon } from "@mantine/core";
 import { IconAdjustments } from "@tabler/icons-react";
 import { use, useState } from "react";
 import { useEditorContext } from "../../edit-actions/editor-context";
@@ -12,6 +12,7 @@ import { groupChoices } from "../../graph/parameters/output-choices";
 import { complaint, shown, typed, withValue } from "../../graph/parameters/values";
 import { pathWords } from "../../graph/value-text";
 import { DraftInput } from "../../ui/draft-input";
+import { Tooltip } from "../../ui/floating/tooltip";
 import { SharedField } from "../fields/shared-field";
 import style from "../inspector.module.css";
 import flowStyle from "./data-flow.module.css";

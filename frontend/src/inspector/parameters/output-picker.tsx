@@ -1,11 +1,12 @@
 /** Takes the value of an input from an output: those that fit and come before, and why not the rest. */
-import { ActionIcon, Combobox, Tooltip, useCombobox } from "@mantine/core";
+import { ActionIcon, Combobox, useCombobox } from "@mantine/core";
 import { IconArrowLeft, IconLinkOff } from "@tabler/icons-react";
 import { useState } from "react";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import { leaveOutputs, takeOutputs } from "../../graph/edit/data-flow";
 import type { Key } from "../../graph/model";
 import type { OutputChoice } from "../../graph/parameters/output-choices";
+import { Tooltip } from "../../ui/floating/tooltip";
 import style from "./data-flow.module.css";
 
 const MOST = 40;

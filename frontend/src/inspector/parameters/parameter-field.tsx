@@ -1,5 +1,5 @@
 /** One parameter: what it is called, its value or what gives it, and what else it is. */
-import { ActionIcon, Tooltip } from "@mantine/core";
+import { ActionIcon } from "@mantine/core";
 import { IconAdjustments, IconLock } from "@tabler/icons-react";
 import { type ReactNode, use, useState } from "react";
 import { useEditorContext } from "../../edit-actions/editor-context";
@@ -10,6 +10,7 @@ import { type InputGiver, readValue, takenGivers } from "../../graph/parameters/
 import { outputChoices } from "../../graph/parameters/output-choices";
 import type { ParameterValue } from "../../graph/parameters/values";
 import { pathWords } from "../../graph/value-text";
+import { Tooltip } from "../../ui/floating/tooltip";
 import style from "../inspector.module.css";
 import flowStyle from "./data-flow.module.css";
 import { GiverChips } from "./given-value";
@@ -80,7 +81,7 @@ interface InputProps {
 function Given({ action, parameter, label, givers }: InputProps) {
   const renamed = givers.some((giver) => giver.renamed);
   return (
-    <div>
+    <div className={flowStyle.giving}>
       <div>{label}</div>
       <div className={flowStyle.given} data-given>
         <GiverChips givers={givers} path={parameter.path} />

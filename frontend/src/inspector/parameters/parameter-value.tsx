@@ -1,5 +1,5 @@
 /** The value of a parameter, as the form field that fits its type. */
-import { ActionIcon, SegmentedControl, Select, Tooltip } from "@mantine/core";
+import { ActionIcon, Select } from "@mantine/core";
 import { IconBackspace } from "@tabler/icons-react";
 import type { ReactNode } from "react";
 import type { Parameter } from "../../graph/model";
@@ -11,6 +11,8 @@ import {
   withValue,
 } from "../../graph/parameters/values";
 import { DraftInput } from "../../ui/draft-input";
+import { Tooltip } from "../../ui/floating/tooltip";
+import { Segments } from "../../ui/segments";
 import style from "../inspector.module.css";
 
 const HINTS: Partial<Record<string, string>> = {
@@ -44,10 +46,10 @@ function BoolValue({ label, name, field, end, write }: ValueProps) {
     <fieldset className={style.fieldset}>
       <legend>{label}</legend>
       <div className={style.boolRow}>
-        <SegmentedControl
+        <Segments
           fullWidth
           size="xs"
-          aria-label={name}
+          label={name}
           data={[
             { value: "true", label: "true" },
             { value: "false", label: "false" },

@@ -1,5 +1,4 @@
 /** Two runs on one time axis: this run filled, the other one as a ghost beneath, and where they part. */
-import { SegmentedControl } from "@mantine/core";
 import { useState } from "react";
 import type { ComparedStep, Comparison } from "../../api/review";
 import type { Run, Visit } from "../../api/runs";
@@ -7,6 +6,7 @@ import { shareOf, type TimeAxis, ticksOf, wholeSpan } from "../../status/lanes/a
 import { barOf } from "../../status/lanes/bars";
 import { visitBegin, visitEnd } from "../../status/progress";
 import { toneColor } from "../../status/state-label";
+import { Segments } from "../../ui/segments";
 import { duration, instant } from "../../ui/times";
 import { type ComparedAction, comparedActions, rangeText } from "./differences";
 import style from "./ghost-lanes.module.css";
@@ -122,11 +122,11 @@ export function GhostLanes({ found, a, b, selected, onPick }: Props) {
     <section className={style.lanes} aria-label="Both runs over time">
       <header>
         <span>A faded or hatched end: when it ended is known only to this range.</span>
-        <SegmentedControl
+        <Segments
           size="xs"
-          aria-label="Where both begin"
+          label="Where both begin"
           value={by}
-          onChange={(value) => setBy(value as Alignment)}
+          onChange={setBy}
           disabled={!step?.a || !step.b}
           data={[
             { value: "start", label: "At the start" },

@@ -1,5 +1,5 @@
 /** The controls of a replay: scrub, play, step, speed. */
-import { ActionIcon, Button, Loader, NativeSelect, Slider, Tooltip } from "@mantine/core";
+import { ActionIcon, Button, Loader, NativeSelect, Slider } from "@mantine/core";
 import {
   IconPlayerPauseFilled,
   IconPlayerPlayFilled,
@@ -8,6 +8,7 @@ import {
   IconPlayerTrackPrev,
 } from "@tabler/icons-react";
 import { type ReactNode, useEffect, useRef } from "react";
+import { Tooltip } from "../../ui/floating/tooltip";
 import { duration } from "../../ui/times";
 import style from "./replay-controls.module.css";
 import { REPLAY_SPEEDS, type ReplayCursor } from "./use-replay";

@@ -1,9 +1,10 @@
 /** Asks for one fault, and starts the run once more with it, in the simulator. */
-import { Button, Modal, SegmentedControl, Select, Stack, Text } from "@mantine/core";
+import { Button, Modal, Select, Stack, Text } from "@mantine/core";
 import { useState } from "react";
 import { errorText } from "../../api/http";
 import type { InjectedFault } from "../../api/review";
 import type { Run } from "../../api/runs";
+import { Segments } from "../../ui/segments";
 import { type Repeated, type RepeatedVersion, repeatRun } from "./repeat-run";
 
 const FAULTS: { value: InjectedFault; label: string }[] = [
@@ -44,14 +45,14 @@ export function FaultDialog({ runner, run, onDone, onClose }: Props) {
           In the simulator: everything goes as it did in run {run.number}, except this.
         </Text>
         {run.graph !== null && (
-          <SegmentedControl
-            aria-label="Version"
+          <Segments
+            label="Version"
             data={[
               { value: "same", label: "This version" },
               { value: "newest", label: "The newest one" },
             ]}
             value={which}
-            onChange={(value) => setWhich(value === "newest" ? "newest" : "same")}
+            onChange={setWhich}
           />
         )}
         <Select

@@ -4,7 +4,7 @@ import type { Script } from "../../api/dry-runs";
 import { useVersions } from "../../api/graphs";
 import { useLive } from "../../api/live/use-live";
 import { SIMULATOR } from "../../api/robots";
-import { HoldButton } from "../../ui/hold-button";
+import { HoldButton } from "../../ui/floating/hold-button";
 import { nextLabel, useStart } from "./use-start";
 
 interface Props {

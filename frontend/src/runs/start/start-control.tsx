@@ -6,7 +6,7 @@ import { useVersions } from "../../api/graphs";
 import { errorText } from "../../api/http";
 import { openRuns, useLive } from "../../api/live/use-live";
 import { SIMULATOR } from "../../api/robots";
-import { HoldButton } from "../../ui/hold-button";
+import { HoldButton } from "../../ui/floating/hold-button";
 import { lazyPart } from "../../ui/parts/lazy-part";
 import { OverlayBoundary } from "../../ui/parts/part-boundary";
 import style from "./start-control.module.css";

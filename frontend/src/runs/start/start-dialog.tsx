@@ -10,7 +10,7 @@ import { type Preflight, type Robot, runPreflight, SIMULATOR } from "../../api/r
 import type { Run } from "../../api/runs";
 import { useMay } from "../../api/use-person";
 import { EngineLabel } from "../../status/engine-label";
-import { HoldButton } from "../../ui/hold-button";
+import { HoldButton } from "../../ui/floating/hold-button";
 import { colorOfName } from "../../ui/name-colors";
 import { PreflightList } from "./preflight-list";
 import style from "./start-dialog.module.css";

@@ -6,7 +6,7 @@ import { useState } from "react";
 import { errorText } from "../../api/http";
 import { useLive } from "../../api/live/use-live";
 import { confirmRest, type Run } from "../../api/runs";
-import { HoldButton } from "../../ui/hold-button";
+import { HoldButton } from "../../ui/floating/hold-button";
 import { notifyFailure } from "../start/use-start";
 import style from "./confirm-rest-dialog.module.css";
 

@@ -5,6 +5,7 @@ import { useState } from "react";
 import type { LiveState, StopRequest } from "../../api/live/live-socket";
 import { foreignGraphs, openRuns, useLive } from "../../api/live/use-live";
 import { needsRestConfirmation, type Run } from "../../api/runs";
+import { useRootMark } from "../../ui/hooks/use-root-mark";
 import { clock, duration, useNow } from "../../ui/times";
 import { ConfirmRestButton } from "./confirm-rest-button";
 import style from "./stop-notice.module.css";
@@ -173,6 +174,7 @@ export function StopNotice() {
     othersNotice(now) ??
     unreachableNotice(now, at);
   const aside = useAside(notice, last?.id ?? "");
+  useRootMark("data-loud-notice", notice?.tone === "loud" && !aside.is);
   if (notice === null) return null;
   if (aside.is) {
     return (

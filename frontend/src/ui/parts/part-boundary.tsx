@@ -69,3 +69,14 @@ const over = (notice: ReactNode) => <div className={style.over}>{notice}</div>;
 export function OverlayBoundary({ children }: { children: ReactNode }) {
   return <PartBoundary frame={over}>{children}</PartBoundary>;
 }
+
+/** For what opens at a button, which stays as it is until the part brings its own. */
+export function OpeningBoundary({ button, children }: { button: ReactNode; children: ReactNode }) {
+  const beside = (notice: ReactNode) => (
+    <>
+      {button}
+      {over(notice)}
+    </>
+  );
+  return <PartBoundary frame={beside}>{children}</PartBoundary>;
+}

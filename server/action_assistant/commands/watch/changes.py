@@ -112,6 +112,8 @@ def _field_words(subject: Subject, who: str, field: Field) -> str:
             return f"action {before} renamed to {after}"
         case "graph", "name":
             return f"graph {before} renamed to {after}"
+    if subject == "arrow" and field.field.startswith("waypoints/"):
+        return f"{who} {'straightened' if field.after is None else 'bent'}"
     name = field.field.removeprefix("in/")
     if subject == "action" and field.field.startswith("in/"):
         name = f"parameter {name}"

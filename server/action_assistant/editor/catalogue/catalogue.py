@@ -30,7 +30,8 @@ class GraphView(msgspec.Struct, frozen=True, omit_defaults=True):
     """A graph as lists and pages show it. `seq` counts the changes of its document.
 
     `damaged`: the first change that cannot be read; the graph is what it was before, and nobody can
-    change it. `people`: who is in it now.
+    change it. `people`: who is in it now. `problems` counts what the check found; `wrong` and
+    `to_fill_in` what people are told of it, one thing once, as the page tells it.
     """
 
     id: str
@@ -41,6 +42,8 @@ class GraphView(msgspec.Struct, frozen=True, omit_defaults=True):
     made_at: datetime
     actions: int | None = None
     problems: Counts | None = None
+    wrong: int | None = None
+    to_fill_in: int | None = None
     robots: tuple[str, ...] = ()
     labels: tuple[str, ...] = ()
     people: tuple[PersonRef, ...] = ()
@@ -178,6 +181,7 @@ class Catalogue:
                 h.about_stream(row.id), [h.draft(h.DESCRIBED, h.SERVER, now)]
             )
         room = self._rooms.open_room(h.graph_stream(row.id))
+        told = summary.told
         return GraphView(
             id=row.id,
             name=name,
@@ -187,6 +191,8 @@ class Catalogue:
             made_at=h.when(row.made_at),
             actions=summary.actions,
             problems=summary.problems,
+            wrong=None if told is None else told.wrong,
+            to_fill_in=None if told is None else told.to_fill_in,
             robots=summary.robots,
             labels=summary.labels,
             people=() if room is None else room.attendance.people(),

@@ -15,6 +15,7 @@ from action_assistant.editor.log.graph_events import graph_stream
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import Conflict, NotFound, Unavailable
 from action_assistant.journal.journal import Journal
+from action_assistant.umrf.problem_kinds import ToldCounts
 from action_assistant.web.workers.lanes import HOPELESS, Crashed, RunInWorker, run_here
 
 log: Final = logging.getLogger(__name__)
@@ -34,6 +35,7 @@ class GraphSummary(msgspec.Struct, frozen=True):
     description: str | None = None
     actions: int | None = None
     problems: Counts | None = None
+    told: ToldCounts | None = None
     robots: tuple[str, ...] = ()
     labels: tuple[str, ...] = ()
     damaged: int | None = None
@@ -151,6 +153,7 @@ def _summary(seq: int, about: GraphInfo, newest: int = 0) -> GraphSummary:
         about.description,
         about.actions,
         about.problems,
+        about.told,
         about.robots,
         about.labels,
         seq + 1 if seq < newest else None,

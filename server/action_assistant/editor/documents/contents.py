@@ -20,6 +20,7 @@ from action_assistant.umrf.digest import digest
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.json.text import parse_small
 from action_assistant.umrf.model import Graph, Problem
+from action_assistant.umrf.problem_kinds import ToldCounts, told_counts
 
 _REMEMBERED: Final = 4  # moments of graphs
 _LABELS: Final = 20  # of one graph
@@ -50,12 +51,14 @@ class Counts(msgspec.Struct, frozen=True):
 
 
 class GraphInfo(msgspec.Struct, frozen=True):
-    """What lists say of a graph."""
+    """What lists say of a graph. `told`: of its problems, those that people are told to mend or to
+    fill in, one thing once."""
 
     name: str
     description: str
     actions: int
     problems: Counts
+    told: ToldCounts
     robots: tuple[str, ...]
     labels: tuple[str, ...]
 
@@ -109,6 +112,7 @@ def info_of(graph: Graph, problems: list[Problem]) -> GraphInfo:
         graph.description,
         sum(not action.missing for action in graph.actions),
         Counts(errors, len(problems) - errors),
+        told_counts(problems, graph),
         tuple(sorted({action.actor for action in graph.actions} - {""})),
         labels_of(graph),
     )

@@ -99,6 +99,8 @@ def flatten(graph: Graph) -> Maps:
         _place(positions, action.key, action.position)
     for relation in graph.relations:
         maps["relations"].update(_relation_fields(relation))
+        head = f"w/{relation_id(relation)}"
+        positions.update({f"{head}|{response}": text for response, text in relation.waypoints})
     _place(positions, ENTRY, graph.entry_position)
     _place(positions, EXIT, graph.exit_position)
     positions.update({f"g/{note}": text for note, text in graph.notes})

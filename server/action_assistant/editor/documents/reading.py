@@ -17,6 +17,7 @@ from action_assistant.umrf.model import (
     ENTRY_CONDITIONS,
     EXIT,
     PRECONDITIONS,
+    RESPONSES,
     Action,
     Conditions,
     Graph,
@@ -41,7 +42,7 @@ def read_maps(maps: Mapping[str, Mapping[str, object]]) -> Graph:
     alive = {ENTRY, EXIT, *(action.key for action in actions)}
     relations = [
         relation
-        for relation in _relations(maps.get("relations", _NOTHING))
+        for relation in _relations(maps.get("relations", _NOTHING), positions)
         if relation.parent in alive and relation.child in alive
     ]
     return Graph(
@@ -181,17 +182,27 @@ def _ghosts_taken_up(actions: list[Action]) -> dict[Key, Key]:
 # Relations
 
 
-def _relations(fields: Fields) -> list[Relation]:
+def _relations(fields: Fields, positions: Fields) -> list[Relation]:
+    led = _waypoints(positions)
     found: list[Relation] = []
     for head, own in _owners(fields).items():
         ends = ends_of(head)
-        relation = _relation(ends, own) if ends is not None else None
+        relation = _relation(ends, own, led.get(head, {})) if ends is not None else None
         if relation is not None:
             found.append(relation)
     return found
 
 
-def _relation(ends: Ends, own: Fields) -> Relation | None:
+def _waypoints(positions: Fields) -> dict[str, dict[str, JsonText]]:
+    """The JSON texts of waypoints by the id of their relation, and by response."""
+    found: dict[str, dict[str, JsonText]] = defaultdict(dict)
+    for line, text in _under(positions, "w/"):
+        relation, _, response = line.partition("|")
+        found[relation][response] = text
+    return found
+
+
+def _relation(ends: Ends, own: Fields, led: Mapping[str, JsonText]) -> Relation | None:
     answers = {outcome: values.response(own.get(outcome)) for outcome in PRECONDITIONS}
     said = {outcome: answer for outcome, answer in answers.items() if answer is not None}
     if ends.parent == ENTRY:
@@ -215,6 +226,7 @@ def _relation(ends: Ends, own: Fields) -> Relation | None:
         child_order=values.number(own.get("co")) or 0.0,
         parents_extra=_extra(own, "x/parents"),
         children_extra=_extra(own, "x/children"),
+        waypoints=tuple((response, led[response]) for response in RESPONSES if response in led),
     )
 
 

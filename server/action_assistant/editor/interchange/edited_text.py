@@ -226,10 +226,11 @@ def _leftovers(maps: Maps, old: Graph, new: Graph) -> _Wanted:
         for key in maps.get(root, {}):
             if key.partition("|")[0] in gone:
                 wanted[root, key] = UNSET
-    for key in maps.get("relations", {}):
-        ends = ends_of(key.partition("|")[0])
-        if ends and f"{ends.parent}>{ends.child};{ends.listing}" in lost:
-            wanted["relations", key] = UNSET
+    for root, prefix in (("relations", ""), ("positions", "w/")):
+        for key in maps.get(root, {}):
+            ends = ends_of(key.removeprefix(prefix).partition("|")[0])
+            if ends and f"{ends.parent}>{ends.child};{ends.listing}" in lost:
+                wanted[root, key] = UNSET
     return wanted
 
 

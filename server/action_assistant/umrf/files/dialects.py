@@ -114,8 +114,8 @@ def _from_designer(file: dict[str, Json]) -> Old:
     for end in ("entry", "exit"):
         field = f"graph_{end}"
         value = file.get(field)
-        if not isinstance(value, dict):
-            continue
+        if not isinstance(value, dict) or not isinstance(value.get("actions", []), list):
+            continue  # what is no object of the designer's stays as it is, with what is in it
         path = pointer(field)
         old.file[field] = value.get("actions", [])
         old.origins[path] = pointer(field, "actions")

@@ -19,6 +19,7 @@ from action_assistant.umrf.files.fields import (
     text_of,
 )
 from action_assistant.umrf.files.notes import Notes
+from action_assistant.umrf.files.waypoints import with_waypoints
 from action_assistant.umrf.json.text import Json, dump, pointer
 from action_assistant.umrf.model import (
     ENGINE_DEFAULTS,
@@ -144,7 +145,7 @@ class _Reader:
             extra=tuple(extra),
         )
         return Tree(
-            graph,
+            with_waypoints(graph, ours.get("waypoints")),
             tuple(self.problems),
             self.states,
             graph_state,

@@ -5,6 +5,7 @@ from operator import attrgetter
 
 import msgspec
 
+from action_assistant.umrf.files.waypoints import waypoints_json
 from action_assistant.umrf.json.text import Json, Number, dump_indented, number, parse_small
 from action_assistant.umrf.model import ENTRY, EXIT, Action, Graph, Key, Position, Relation
 from action_assistant.umrf.parameters import nest
@@ -80,6 +81,8 @@ class _Writer:
             ours["direction"] = graph.direction
         if graph.notes:
             ours["notes"] = {key: parse_small(text) for key, text in graph.notes}
+        if waypoints := waypoints_json(graph):
+            ours["waypoints"] = waypoints
         return ours
 
     def _action(self, action: Action) -> dict[str, Json]:

@@ -3,7 +3,7 @@
 See docs/umrf-and-the-engine.md 2.7.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from functools import lru_cache
 from typing import Any, Final
 
@@ -108,7 +108,7 @@ def hand_over(outputs: dict[str, Slot], remap: Sequence[Remap], inputs: dict[str
 
 
 def renamed(
-    outputs: Mapping[str, Slot], remap: Sequence[Remap], inputs: Mapping[str, Slot]
+    outputs: Collection[str], remap: Sequence[Remap], inputs: Collection[str]
 ) -> dict[str, str]:
     """Which output reaches which input: input name → output name. Raises `RemapUnknown`.
 

@@ -5,6 +5,7 @@ import * as Y from "yjs";
 import { mapsOf } from "../graph/document-keys";
 import { addAction, connect, setEntry, setExit } from "../graph/edit";
 import { writeNote } from "../graph/edit/notes";
+import { setWaypoints } from "../graph/edit/waypoints";
 import { readGraph } from "../graph/read";
 import { positionsOf } from "./geometry/arrange";
 import { svgPictureOf } from "./svg-picture";
@@ -67,4 +68,17 @@ test("a picture has every card, end, arrow and note within its bounds", () => {
     const [x, y] = [Number(rect.getAttribute("x")), Number(rect.getAttribute("y"))];
     expect(x >= x0 && x <= x0 + width && y >= y0 && y <= y0 + height).toBe(true);
   }
+});
+
+test("a line that was bent by hand goes there in the picture, too", () => {
+  const doc = new Y.Doc();
+  const [a, b] = ["A", "B"].map((name, i) => addAction(doc, { name, position: [i * 480, 0] }));
+  const id = connect(doc, a ?? "", b ?? "") ?? "";
+  const picture = () => {
+    const graph = readGraph(mapsOf(doc));
+    return svgPictureOf(graph, positionsOf(graph), new Map(), () => "#000");
+  };
+  const before = picture();
+  setWaypoints(doc, `${id}|run`, [[360, -300]]);
+  expect(picture().height).toBeGreaterThan(before.height + 150);
 });

@@ -2,8 +2,8 @@
 import { MantineProvider } from "@mantine/core";
 import { act } from "react";
 import { createRoot, type Root } from "react-dom/client";
-import { afterEach, beforeEach, expect, test, vi } from "vitest";
-import { HoldButton } from "./hold-button";
+import { afterEach, beforeAll, beforeEach, expect, test, vi } from "vitest";
+import { HoldButton, HoldQuestion } from "./hold-button";
 
 vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);
 vi.stubGlobal("matchMedia", () => ({
@@ -28,6 +28,8 @@ function button(): HTMLButtonElement {
   if (!found) throw new Error("no button");
   return found;
 }
+
+beforeAll(() => HoldQuestion.preload());
 
 beforeEach(() => {
   vi.useFakeTimers();

@@ -1,0 +1,139 @@
+/** Lines that know their own ends and waypoints, not what stands between; and how lines are drawn. Pure. */
+import type { Direction } from "../../graph/model";
+import { type Dock, DockPlan, LINK } from "./docks";
+import {
+  type FlowBox,
+  type GridPoint,
+  gridPoint,
+  type Point,
+  pointOf,
+  type Scene,
+  STEP,
+} from "./scene";
+
+/** A line as it is drawn. */
+export interface RoutedLine {
+  readonly id: string;
+  readonly direction: Direction;
+  /** What it was routed between: while that stays, so may the line. */
+  readonly ends: string;
+  /** From the side of one card to that of the other. */
+  readonly points: readonly Point[];
+  /** The middle of its pill; null where there is none, or no room for it. */
+  readonly pill: Point | null;
+  /** The pill stands beside the card that the line leaves, and can move away from it a little. */
+  readonly docked: boolean;
+  /** Its waypoints, on the grid; the line leaves out those on which something stands. */
+  readonly via: readonly Point[];
+  /** Between cards that stand too close, or too far away, for a way of its own. */
+  readonly simple: boolean;
+}
+
+export type LineMap = ReadonlyMap<string, RoutedLine>;
+
+export function endsOf({ start, end, line }: Dock, scene: Scene): string {
+  const from = `${start.column},${start.row}`;
+  const via = (line.via ?? []).map((point) => ` ${point}`).join("");
+  return `${scene.direction} ${scene.offset} ${from} ${end.column},${end.row}${via}`;
+}
+
+export const viaOf = ({ line }: Dock, scene: Scene): GridPoint[] =>
+  (line.via ?? []).map((point) => gridPoint(point, scene));
+
+export const shown = (points: readonly GridPoint[], plan: DockPlan, scene: Scene): Point[] =>
+  points.map(({ column, row }) => at(plan, scene.direction, column, row));
+
+/** Lines that only know their own ends: to be drawn until those that were routed are there. */
+export function simpleLines(scene: Scene): Map<string, RoutedLine> {
+  const plan = new DockPlan(scene);
+  return new Map(
+    plan.docks.map((dock) => {
+      const via = viaOf(dock, scene);
+      const way = via.length > 0 ? simplyThrough(dock, via) : simpleWay(dock);
+      const points = [...way].map(([column, row]) => at(plan, scene.direction, column, row));
+      const ends = endsOf(dock, scene);
+      const docked = dock.pill !== null;
+      const pill = dock.pill ? middleOf(dock.pill, scene.direction) : null;
+      const whole = [
+        ...leaving(dock, plan, scene.direction),
+        ...points,
+        arriving(dock, scene.direction),
+      ];
+      const { id } = dock.line;
+      return [
+        id,
+        {
+          id,
+          direction: scene.direction,
+          ends,
+          points: straight(whole),
+          pill,
+          docked,
+          via: shown(via, plan, scene),
+          simple: true,
+        },
+      ];
+    }),
+  );
+}
+
+function* simpleWay({ start, end }: Dock): Generator<readonly [number, number]> {
+  yield [start.column, start.row];
+  if (start.column <= end.column) {
+    yield [start.column, end.row];
+  } else {
+    // Back in a lane beside both.
+    const lane = Math.max(start.row, end.row) + 6;
+    yield [start.column, lane];
+    yield [end.column, lane];
+  }
+  yield [end.column, end.row];
+}
+
+/** From each waypoint to the next with one turn; it arrives from before the card where it can. */
+function* simplyThrough(
+  { start, end }: Dock,
+  via: readonly GridPoint[],
+): Generator<readonly [number, number]> {
+  let last: GridPoint = start;
+  yield [start.column, start.row];
+  for (const point of [...via, end]) {
+    const along = point !== end || last.column <= end.column;
+    yield along && last !== start ? [last.column, point.row] : [point.column, last.row];
+    yield [point.column, point.row];
+    last = point;
+  }
+}
+
+export const at = (plan: DockPlan, direction: Direction, column: number, row: number) =>
+  pointOf(column * STEP, plan.v(row), direction);
+
+export function middleOf({ u0, u1, v0, v1 }: FlowBox, direction: Direction): Point {
+  return pointOf((u0 + u1) / 2, (v0 + v1) / 2, direction);
+}
+
+export function leaving({ from, start }: Dock, plan: DockPlan, direction: Direction): Point[] {
+  const v = plan.v(start.row);
+  const first = pointOf(from.u, from.v, direction);
+  // A pill beyond the corner of its card: the line goes along the card to it.
+  return from.v === v
+    ? [first]
+    : [first, pointOf(from.u + LINK, from.v, direction), pointOf(from.u + LINK, v, direction)];
+}
+
+export const arriving = ({ to }: Dock, direction: Direction): Point =>
+  pointOf(to.u, to.v, direction);
+
+/** Without points at which nothing turns. */
+export function straight(points: readonly Point[]): Point[] {
+  const kept: Point[] = [];
+  for (const point of points) {
+    const [a, b] = [kept.at(-2), kept.at(-1)];
+    if (b && b[0] === point[0] && b[1] === point[1]) continue;
+    const through =
+      a && b && ((a[0] === b[0] && b[0] === point[0]) || (a[1] === b[1] && b[1] === point[1]));
+    if (through) kept.pop();
+    kept.push(point);
+  }
+  return kept;
+}

@@ -1,0 +1,73 @@
+/** A folded frame: one block with its title, how many actions it hides, and how these are. */
+import { Handle, type NodeProps, Position } from "@xyflow/react";
+import { memo, use } from "react";
+import { FoldButton, FoldFrameContext } from "../notes/fold-button";
+import { NoteEditingContext, NoteField, NoteTools } from "../notes/note-card";
+import { noteColor } from "../notes/note-colors";
+import type { FoldedNode, FrameBlock } from "../notes/note-nodes";
+import { OUTCOMES } from "../outcome";
+import { ProblemBadge } from "../problem-badge";
+import { STATE_LETTER } from "../zoom/detail";
+import { actionsWord } from "./folded-drawing";
+import style from "./folded-frame.module.css";
+
+/** Arrows need something to hold on to; where they do is for the router to say. */
+function Ports({ direction }: Pick<FrameBlock, "direction">) {
+  const right = direction === "right";
+  const [into, out] = right ? [Position.Left, Position.Right] : [Position.Top, Position.Bottom];
+  const still = { className: style.port ?? "", isConnectable: false };
+  return (
+    <>
+      <Handle {...still} type="target" id="in" position={into} />
+      {OUTCOMES.map((outcome) => (
+        <Handle {...still} key={outcome} type="source" id={outcome} position={out} />
+      ))}
+    </>
+  );
+}
+
+function States({ states }: Pick<FrameBlock, "states">) {
+  return (
+    <p className={style.states}>
+      {states.map(({ word, tone, count }, i) => (
+        <span key={word}>
+          {i > 0 && " · "}
+          <span data-tone={tone}>
+            {STATE_LETTER[tone] && <span aria-hidden>{STATE_LETTER[tone]} </span>}
+            {count} {word}
+          </span>
+        </span>
+      ))}
+    </p>
+  );
+}
+
+export const FoldedFrame = memo(function FoldedFrame({ data, selected }: NodeProps<FoldedNode>) {
+  const notes = use(NoteEditingContext);
+  const fold = use(FoldFrameContext);
+  const { note, block } = data;
+  return (
+    // biome-ignore lint/a11y/noStaticElementInteractions: double click repeats what the button does
+    <div
+      className={style.block}
+      style={{ "--c": noteColor[note.color] } as React.CSSProperties}
+      data-selected={selected || undefined}
+      data-tone={block.tone ?? undefined}
+      onDoubleClick={() => fold?.(note.key, false)}
+    >
+      {notes && <NoteTools note={note} notes={notes} above={20} />}
+      {block.mark && <ProblemBadge mark={block.mark} on="card" />}
+      <div className={style.title} data-title>
+        <FoldButton note={note} folded />
+        {notes?.editing === note.key ? (
+          <NoteField note={note} notes={notes} />
+        ) : (
+          <b className={style.name}>{note.text || "Frame"}</b>
+        )}
+      </div>
+      <p className={style.count}>{actionsWord(block.actions)}</p>
+      {block.states.length > 0 && <States states={block.states} />}
+      <Ports direction={block.direction} />
+    </div>
+  );
+});

@@ -1,0 +1,155 @@
+/** Folded frames: which of them are blocks, what these hide, and what they say of it. Pure. */
+import { relationId } from "../../graph/document-keys";
+import { inFrame, type Note, notesOf } from "../../graph/edit/notes";
+import { ENTRY, EXIT, type Graph, type Key, type Relation } from "../../graph/model";
+import type { Progress, Tone } from "../../status/progress";
+import { estimatedSizes, type Positions, type Sizes } from "../geometry/arrange";
+import type { FrameBlock, StateCount } from "../notes/note-nodes";
+import type { ProblemMark, ProblemMarks } from "../problem-marks";
+
+export interface Folding {
+  /** Frames that are drawn as one block, by their keys. */
+  readonly blocks: ReadonlyMap<string, Note>;
+  /** What is not drawn, and the block that is there instead of it. */
+  readonly blockOf: ReadonlyMap<Key, string>;
+  /** Ends are always drawn: the block on which one lies, if it does. */
+  readonly blockUnder: ReadonlyMap<Key, string>;
+}
+
+const areaOf = ({ size: [width, height] }: Note) => width * height;
+
+export const framesOf = (graph: Graph): Note[] =>
+  notesOf(graph).filter(({ kind }) => kind === "frame");
+
+/** How large everything is, also what has never been drawn: a hidden card was never measured. */
+export function wholeSizes(graph: Graph, measured: Sizes): Sizes {
+  const notes = notesOf(graph).map(
+    ({ key, size: [width, height] }) => [key, { width, height }] as const,
+  );
+  return new Map([...estimatedSizes(graph), ...measured, ...notes]);
+}
+
+/**
+ * What is drawn otherwise because of folded frames; null when nothing is. Of a frame in a folded frame
+ * nothing is drawn, so it hides nothing itself: the larger ones go first.
+ */
+export function foldingOf(
+  graph: Graph,
+  folded: ReadonlySet<string>,
+  places: Positions,
+  measured: Sizes,
+): Folding | null {
+  if (folded.size === 0) return null;
+  const frames = framesOf(graph).filter(({ key }) => folded.has(key));
+  if (frames.length === 0) return null;
+  const sizes = wholeSizes(graph, measured);
+  const [blocks, blockOf, blockUnder] = [
+    new Map<string, Note>(),
+    new Map<Key, string>(),
+    new Map<Key, string>(),
+  ];
+  for (const frame of frames.sort((a, b) => areaOf(b) - areaOf(a))) {
+    if (blockOf.has(frame.key)) continue;
+    blocks.set(frame.key, frame);
+    for (const key of inFrame(frame, places, sizes)) {
+      const found = key === ENTRY || key === EXIT ? blockUnder : blockOf;
+      if (!found.has(key)) found.set(key, frame.key);
+    }
+  }
+  return { blocks, blockOf, blockUnder };
+}
+
+/** The folded frames that have to be unfolded so that these are seen. */
+export function hiding(
+  graph: Graph,
+  folded: ReadonlySet<string>,
+  keys: readonly Key[],
+  places: Positions,
+  measured: Sizes,
+): string[] {
+  const hidden = foldingOf(graph, folded, places, measured)?.blockOf;
+  const wanted = keys.filter((key) => hidden?.has(key));
+  if (wanted.length === 0) return [];
+  const sizes = wholeSizes(graph, measured);
+  const around = framesOf(graph).filter((frame) => {
+    const inside = folded.has(frame.key) ? new Set(inFrame(frame, places, sizes)) : null;
+    return wanted.some((key) => inside?.has(key));
+  });
+  return around.map(({ key }) => key);
+}
+
+/** Whether an arrow lies wholly in one block; an end on it is part of it. */
+export function isInside({ blockOf, blockUnder }: Folding, { parent, child }: Ends): boolean {
+  const of = (key: Key) => blockOf.get(key) ?? blockUnder.get(key);
+  return of(parent) !== undefined && of(parent) === of(child);
+}
+
+type Ends = Pick<Relation, "parent" | "child">;
+
+/** What counts most first: what is not known is not taken for something that goes on or is over. */
+const WORST: readonly Tone[] = [
+  "error",
+  "unknown",
+  "run",
+  "stopped",
+  "false",
+  "true",
+  "done",
+  "idle",
+];
+
+function wordOf({ tone, word }: Progress): string {
+  if (tone === "true" || tone === "false" || word === "finished") return "done";
+  return word === "waits" ? "waiting" : word;
+}
+
+/** How many are in which state, the worst first; results that differ have no colour in common. */
+export function statesOf(progress: readonly Progress[]): StateCount[] {
+  const states = new Map<string, StateCount>();
+  for (const each of progress) {
+    const word = wordOf(each);
+    const before = states.get(word);
+    const tone = before && before.tone !== each.tone ? "done" : each.tone;
+    states.set(word, { word, tone, count: (before?.count ?? 0) + 1 });
+  }
+  return [...states.values()].sort((a, b) => WORST.indexOf(a.tone) - WORST.indexOf(b.tone));
+}
+
+/** The marks of several as one; null when nothing is wrong with any. */
+function summed(marks: readonly ProblemMark[]): ProblemMark | null {
+  if (marks.length === 0) return null;
+  const sum = (kind: "wrong" | "fillIn" | "warnings") =>
+    marks.reduce((total, mark) => total + mark[kind], 0);
+  const reasons = new Set(marks.flatMap((mark) => mark.reasons.split("\n")));
+  return {
+    wrong: sum("wrong"),
+    fillIn: sum("fillIn"),
+    warnings: sum("warnings"),
+    reasons: [...reasons].join("\n"),
+  };
+}
+
+/** What the block of a frame says of what it hides. */
+export function blockOfFrame(
+  folding: Folding,
+  frame: string,
+  graph: Graph,
+  told: { readonly progress: ReadonlyMap<Key, Progress>; readonly marks: ProblemMarks },
+): FrameBlock {
+  const { blockOf, blockUnder } = folding;
+  const actions = graph.actions.filter(({ key }) => blockOf.get(key) === frame);
+  const arrows = graph.relations.filter(
+    (relation) =>
+      isInside(folding, relation) &&
+      (blockOf.get(relation.parent) ?? blockUnder.get(relation.parent)) === frame,
+  );
+  const states = statesOf(actions.flatMap(({ key }) => told.progress.get(key) ?? []));
+  const places = [...actions.map(({ key }) => key), ...arrows.map(relationId)];
+  return {
+    actions: actions.length,
+    states,
+    tone: states[0]?.tone ?? null,
+    mark: summed(places.flatMap((place) => told.marks.get(place) ?? [])),
+    direction: graph.direction,
+  };
+}

@@ -1,0 +1,51 @@
+/** The menu of every edit action. */
+import { Menu } from "@mantine/core";
+import { Fragment, type ReactElement } from "react";
+import { EDIT_ACTIONS } from "../../edit-actions/all";
+import { type EditActionGroup, isEnabled, labelOf } from "../../edit-actions/edit-action";
+import { useEditorContext } from "../../edit-actions/editor-context";
+import { FirstShortcut } from "../../edit-actions/keys/shortcut-keys";
+import { useOpening } from "../../ui/floating/late-opening";
+import style from "./toolbar.module.css";
+
+const GROUPS: readonly EditActionGroup[] = ["Draw", "Arrange", "Look", "Graph", "Dry-run"];
+/** Walking and nudging would be eight lines that nobody clicks. */
+const KEYS_ONLY = /^(nudge|walk)-/;
+
+/** Rendered while the menu is open only: what is enabled depends on everything. */
+function ActionItems() {
+  const context = useEditorContext();
+  return GROUPS.map((group) => (
+    <Fragment key={group}>
+      <Menu.Label>{group}</Menu.Label>
+      {EDIT_ACTIONS.filter(
+        (editAction) => editAction.group === group && !KEYS_ONLY.test(editAction.name),
+      ).map((editAction) => {
+        const Sign = editAction.icon;
+        return (
+          <Menu.Item
+            key={editAction.name}
+            leftSection={<Sign size={16} aria-hidden />}
+            rightSection={<FirstShortcut editAction={editAction} />}
+            disabled={!isEnabled(editAction, context)}
+            onClick={() => editAction.run(context)}
+          >
+            {labelOf(editAction, context)}
+          </Menu.Item>
+        );
+      })}
+    </Fragment>
+  ));
+}
+
+export function EditActionMenu({ button }: { button: ReactElement }) {
+  const [opened, setOpened] = useOpening();
+  return (
+    <Menu position="top-start" width={290} opened={opened} onChange={setOpened}>
+      <Menu.Target>{button}</Menu.Target>
+      <Menu.Dropdown className={style.menu ?? ""}>
+        <ActionItems />
+      </Menu.Dropdown>
+    </Menu>
+  );
+}

@@ -1,0 +1,250 @@
+/** Where the parts of the editor stand: one at a time on a phone, else around the canvas. */
+import { ActionIcon } from "@mantine/core";
+import {
+  IconLayoutSidebar,
+  IconLayoutSidebarLeftCollapse,
+  IconLayoutSidebarRight,
+} from "@tabler/icons-react";
+import { type ReactNode, useEffect, useRef, useSyncExternalStore } from "react";
+import { actionDrag } from "../../canvas/action-drag";
+import { useEditorContext } from "../../edit-actions/editor-context";
+import type { ToldProblem } from "../../graph/problems/told-problems";
+import { Tooltip } from "../../ui/floating/tooltip";
+import { whenThere } from "../../ui/focus-field";
+import { lazyPart } from "../../ui/parts/lazy-part";
+import { PartBoundary } from "../../ui/parts/part-boundary";
+import { Segments } from "../../ui/segments";
+import { DryRunButton } from "../menus/dry-run-button";
+import style from "./layouts.module.css";
+import type { EditorSidePanel, Pane, Panels } from "./use-panels";
+
+const ListRail = lazyPart(() => import("./list-rail").then((part) => part.ListRail));
+
+const SIDES: readonly { value: EditorSidePanel; label: string }[] = [
+  { value: "library", label: "Library" },
+  { value: "outline", label: "Outline" },
+];
+
+const PANES: readonly { value: Pane; label: string }[] = [
+  { value: "canvas", label: "Canvas" },
+  { value: "outline", label: "Outline" },
+  { value: "details", label: "Details" },
+  { value: "run", label: "Run" },
+];
+
+interface Parts {
+  panels: Panels;
+  outline: ReactNode;
+  stage: ReactNode;
+  find: ReactNode;
+  details: ReactNode;
+  strip: ReactNode;
+  status: () => ReactNode;
+}
+
+interface PhoneParts extends Parts {
+  /** A dry-run is open: it is on the canvas. */
+  dry: boolean;
+  start: () => ReactNode;
+}
+
+export function PhoneLayout(props: PhoneParts) {
+  const { panels, outline, stage, find, details, strip, start, status, dry } = props;
+  const { pane, setPane } = panels;
+  useEffect(() => {
+    if (dry) setPane("canvas");
+  }, [dry, setPane]);
+  return (
+    <main className={style.phone}>
+      <Segments
+        className={style.segments ?? ""}
+        fullWidth
+        data={PANES}
+        value={pane}
+        onChange={setPane}
+      />
+      <div className={style.pane}>
+        {find}
+        {pane === "canvas" && stage}
+        {pane === "outline" && outline}
+        {pane === "details" && <div className={style.sheet}>{details}</div>}
+        {pane === "run" && (
+          <div className={style.sheet}>
+            <div className={style.status}>{status()}</div>
+            {strip}
+          </div>
+        )}
+      </div>
+      {/* Start is at the left, STOP at the right, and Dry-run keeps thumbs from meeting both. */}
+      <div className={style.reach} role="toolbar" aria-label="Run">
+        {start()}
+        <DryRunButton stacked />
+      </div>
+    </main>
+  );
+}
+
+/** On a narrow screen the panels lie over the canvas, one at a time. */
+function ListButton({ panels: { left, setLeft, setRight } }: { panels: Panels }) {
+  return (
+    <ActionIcon
+      size={40}
+      variant="default"
+      className={style.toLeft ?? ""}
+      aria-label="Graphs and actions"
+      aria-pressed={left}
+      onClick={() => {
+        setLeft(!left);
+        setRight(false);
+      }}
+    >
+      <IconLayoutSidebar size={18} />
+    </ActionIcon>
+  );
+}
+
+function DetailsButton({ panels: { right, setLeft, setRight } }: { panels: Panels }) {
+  return (
+    <ActionIcon
+      size={40}
+      variant="default"
+      className={style.toRight ?? ""}
+      aria-label="Details"
+      aria-pressed={right}
+      onClick={() => {
+        setRight(!right);
+        setLeft(false);
+      }}
+    >
+      <IconLayoutSidebarRight size={18} />
+    </ActionIcon>
+  );
+}
+
+/** Folds the list to a rail, where it stands beside the canvas. */
+function FoldButton({ fold }: { fold: Panels["fold"] }) {
+  return (
+    <Tooltip label="Fold the list">
+      <ActionIcon
+        size={30}
+        aria-label="Fold the list"
+        data-fold-list
+        onClick={() => {
+          fold(true);
+          whenThere('[data-part="Graphs"]', (button) => button.focus());
+        }}
+      >
+        <IconLayoutSidebarLeftCollapse size={17} />
+      </ActionIcon>
+    </Tooltip>
+  );
+}
+
+interface DeskParts extends Parts {
+  wide: boolean;
+  told: readonly ToldProblem[];
+  list: () => ReactNode;
+}
+
+/** The lists: beside the canvas, or over it where there is no room or a rail in their place. */
+function ListSide({ wide, panels, told, outline, list }: DeskParts) {
+  const { left, side, setSide, folded, fold } = panels;
+  const carrying = useSyncExternalStore(actionDrag.subscribe, actionDrag.now) !== null;
+  const beside = wide && !folded;
+  const open = beside || (left && !carrying);
+  return (
+    <>
+      {wide && folded && (
+        <PartBoundary waiting={null}>
+          <ListRail panels={panels} told={told} />
+        </PartBoundary>
+      )}
+      <aside
+        className={style.left}
+        // What glides away covers nothing any more.
+        data-covers={open ? "left" : undefined}
+        data-list
+        data-beside={beside || undefined}
+        data-over={beside ? undefined : wide ? "rail" : "edge"}
+        data-open={open || undefined}
+        aria-label="Library"
+      >
+        <div className={style.sides}>
+          <Segments fullWidth size="xs" data={SIDES} value={side} onChange={setSide} />
+          {beside && <FoldButton fold={fold} />}
+        </div>
+        <div className={style.side}>{side === "outline" ? outline : list()}</div>
+      </aside>
+    </>
+  );
+}
+
+/** When the details take room at the right, what was chosen is not left under their edge. */
+function useSelectedInView(open: boolean): void {
+  const context = useEditorContext();
+  const now = useRef(context);
+  now.current = context;
+  useEffect(() => {
+    if (!open) return;
+    const frame = requestAnimationFrame(() => {
+      const { selection, positions, view } = now.current;
+      const [only, ...others] = selection;
+      const at = only === undefined || others.length > 0 ? undefined : positions().get(only);
+      // What is being dragged stays under the pointer.
+      if (at && document.querySelector(".react-flow__node.dragging") === null) view.reveal(at);
+    });
+    return () => cancelAnimationFrame(frame);
+  }, [open]);
+}
+
+/**
+ * Whether the details are there. Beside a rail, where the canvas has the room, only while something
+ * is chosen or they were asked for; what was asked for ends with what was chosen.
+ */
+function useDetails(wide: boolean, { folded, right, setRight }: Panels) {
+  const { selection } = useEditorContext();
+  const rail = wide && folded;
+  const chosen = selection.size > 0;
+  const had = useRef(chosen);
+  useEffect(() => {
+    if (rail && had.current && !chosen) setRight(false);
+    had.current = chosen;
+  }, [rail, chosen, setRight]);
+  return { open: rail ? chosen || right : wide || right, asked: rail ? !chosen : !wide };
+}
+
+export function DeskLayout(props: DeskParts) {
+  const { wide, panels, stage, find, details, strip, status } = props;
+  const { open, asked } = useDetails(wide, panels);
+  useSelectedInView(wide && panels.folded && open);
+  return (
+    <main
+      className={style.editor}
+      data-wide={wide || undefined}
+      data-rail={(wide && panels.folded) || undefined}
+      data-details={open ? "open" : "closed"}
+    >
+      <ListSide {...props} />
+      <section className={style.canvas} aria-label="Graph">
+        {stage}
+        {find}
+        {!wide && <ListButton panels={panels} />}
+        {asked && <DetailsButton panels={panels} />}
+      </section>
+      <div className={style.strip}>
+        {!wide && <div className={style.draft}>{status()}</div>}
+        {strip}
+      </div>
+      <aside
+        className={style.right}
+        data-covers="right"
+        data-beside={wide || undefined}
+        data-over={wide ? undefined : "edge"}
+        data-open={open || undefined}
+        aria-label="Details"
+      >
+        {details}
+      </aside>
+    </main>
+  );
+}

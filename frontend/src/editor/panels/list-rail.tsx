@@ -1,0 +1,168 @@
+/** The list at the left folded to a rail: what is in it opens over the canvas, and is put away again. */
+import { ActionIcon } from "@mantine/core";
+import {
+  IconAlertTriangle,
+  IconBolt,
+  IconLayoutSidebarLeftExpand,
+  IconListTree,
+  IconSitemap,
+} from "@tabler/icons-react";
+import { type MouseEvent, type ReactNode, useEffect, useRef, useState } from "react";
+import { useEditorContext } from "../../edit-actions/editor-context";
+import { countsOf, countWords } from "../../graph/problems/problem-kinds";
+import type { ToldProblem } from "../../graph/problems/told-problems";
+import { Tooltip } from "../../ui/floating/tooltip";
+import { whenThere } from "../../ui/focus-field";
+import style from "./list-rail.module.css";
+import { type EditorSidePanel, type Panels, ROW } from "./use-panels";
+
+const PARTS = [
+  { name: "Graphs", side: "library", icon: IconSitemap, changes: false, field: "[data-search]" },
+  { name: "Actions", side: "library", icon: IconBolt, changes: true, field: "[data-search]" },
+  { name: "Outline", side: "outline", icon: IconListTree, changes: false, field: ROW },
+] as const;
+
+type Part = (typeof PARTS)[number];
+
+/** Escape and the canvas put away what lies over it. `opener`: gets the focus back. */
+function usePutAway(open: boolean, putAway: () => void, opener: () => HTMLElement | null) {
+  const now = useRef({ putAway, opener });
+  now.current = { putAway, opener };
+  useEffect(() => {
+    if (!open) return;
+    const inside = ({ target }: Event, where: string) =>
+      target instanceof Element && target.closest(where) !== null;
+    const onKey = (event: KeyboardEvent) => {
+      if (event.key !== "Escape" || !inside(event, "[data-list]")) return;
+      event.preventDefault();
+      now.current.putAway();
+      now.current.opener()?.focus();
+    };
+    const onPress = (event: PointerEvent) => {
+      if (inside(event, ".react-flow")) now.current.putAway();
+    };
+    window.addEventListener("keydown", onKey, { capture: true });
+    window.addEventListener("pointerdown", onPress, { capture: true });
+    return () => {
+      window.removeEventListener("keydown", onKey, { capture: true });
+      window.removeEventListener("pointerdown", onPress, { capture: true });
+    };
+  }, [open]);
+}
+
+interface RailButtonProps {
+  name: string;
+  icon: ReactNode;
+  /** Undefined: it opens nothing that it could put away. */
+  open?: boolean;
+  /** What is said besides its name. */
+  more?: string;
+  onPress: (event: MouseEvent) => void;
+}
+
+function RailButton({ name, icon, open, more, onPress }: RailButtonProps) {
+  const words = more ? `${name}: ${more}` : name;
+  return (
+    <Tooltip label={words}>
+      <button
+        type="button"
+        className={style.part}
+        aria-label={words}
+        aria-expanded={open}
+        data-part={name}
+        onClick={onPress}
+      >
+        {icon}
+        <span aria-hidden>{name}</span>
+      </button>
+    </Tooltip>
+  );
+}
+
+function ProblemsButton({ told }: { told: readonly ToldProblem[] }) {
+  const { setPanel } = useEditorContext();
+  const counts = countsOf(told);
+  const { wrong, fillIn } = counts;
+  return (
+    <RailButton
+      name="Problems"
+      more={countWords(counts).join(", ")}
+      onPress={() => setPanel("problems")}
+      icon={
+        <span className={style.counted}>
+          <IconAlertTriangle size={19} />
+          {wrong + fillIn > 0 && (
+            <span className={style.counts}>
+              {wrong > 0 && <b data-kind="wrong">{wrong}</b>}
+              {fillIn > 0 && <b data-kind="fill-in">{fillIn}</b>}
+            </span>
+          )}
+        </span>
+      }
+    />
+  );
+}
+
+interface Props {
+  panels: Panels;
+  told: readonly ToldProblem[];
+}
+
+export function ListRail({ panels, told }: Props) {
+  const { left, setLeft, side, setSide, fold } = panels;
+  const { mayEdit } = useEditorContext();
+  const rail = useRef<HTMLElement>(null);
+  const [chosen, setChosen] = useState<Part["name"]>("Graphs");
+  const shown = sideName(side, chosen);
+  usePutAway(
+    left,
+    () => setLeft(false),
+    () => rail.current?.querySelector<HTMLElement>(`[data-part="${shown}"]`) ?? null,
+  );
+  const press = (part: Part, byKey: boolean) => {
+    if (left && shown === part.name) {
+      setLeft(false);
+      return;
+    }
+    setChosen(part.name);
+    setSide(part.side);
+    setLeft(true);
+    const heading = `[data-heading="${part.name}"]`;
+    if (part.side === "library") whenThere(heading, (found) => found.scrollIntoView());
+    if (byKey) whenThere(part.field, (field) => field.focus({ preventScroll: true }));
+  };
+  return (
+    <nav ref={rail} className={style.rail} aria-label="Lists" data-list>
+      {PARTS.filter(({ changes }) => mayEdit || !changes).map((part) => (
+        <RailButton
+          key={part.name}
+          name={part.name}
+          icon={<part.icon size={19} aria-hidden />}
+          open={left && shown === part.name}
+          // A press of a key has no place.
+          onPress={(event) => press(part, event.detail === 0)}
+        />
+      ))}
+      <ProblemsButton told={told} />
+      <Tooltip label="Unfold the list">
+        <ActionIcon
+          className={style.unfold ?? ""}
+          size={44}
+          aria-label="Unfold the list"
+          onClick={() => {
+            fold(false);
+            whenThere("[data-fold-list]", (button) => button.focus());
+          }}
+        >
+          <IconLayoutSidebarLeftExpand size={19} />
+        </ActionIcon>
+      </Tooltip>
+    </nav>
+  );
+}
+
+/** What is open, when a shortcut has opened another side than was pressed. */
+function sideName(side: EditorSidePanel, chosen: Part["name"]): Part["name"] {
+  if (side === "outline") return "Outline";
+  return chosen === "Outline" ? "Graphs" : chosen;
+}

@@ -1,0 +1,50 @@
+/** Which panels beside the canvas are open; on a phone, which pane is shown. */
+import { useLocalStorage } from "@mantine/hooks";
+import { useCallback, useState } from "react";
+import type { Panel } from "../../edit-actions/editor-context";
+import { whenThere } from "../../ui/focus-field";
+
+export type Pane = "canvas" | "outline" | "details" | "run";
+
+export type EditorSidePanel = "library" | "outline";
+
+/** The row of the outline that Tab would come to. */
+export const ROW = '[role="treegrid"] [data-row][tabindex="0"]';
+
+/** Whether the list at the left is a rail where there is room for all of it: on this device. */
+function useFoldedList() {
+  const [folded, setFolded] = useLocalStorage({
+    key: "aa.list-folded",
+    defaultValue: false,
+    getInitialValueInEffect: false,
+  });
+  return { folded, setFolded };
+}
+
+export function usePanels() {
+  const [left, setLeft] = useState(false);
+  const [right, setRight] = useState(false);
+  const [pane, setPane] = useState<Pane>("canvas");
+  const [side, setSide] = useState<EditorSidePanel>("library");
+  const { folded, setFolded } = useFoldedList();
+  const fold = useCallback(
+    (next: boolean) => {
+      setFolded(next);
+      setLeft(false);
+    },
+    [setFolded],
+  );
+  const onPanel = useCallback((next: Panel) => {
+    const listed = next === "outline" || next === "library";
+    if (listed) setSide(next);
+    setRight(!listed);
+    setLeft(listed);
+    if (next === "library") return;
+    const outline = next === "outline";
+    setPane((now) => (outline ? "outline" : now === "outline" ? "details" : now));
+    if (outline) whenThere(ROW, (row) => row.focus());
+  }, []);
+  return { left, setLeft, right, setRight, pane, setPane, side, setSide, folded, fold, onPanel };
+}
+
+export type Panels = ReturnType<typeof usePanels>;

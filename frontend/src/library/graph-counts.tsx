@@ -1,0 +1,34 @@
+/** How much of a listed graph is wrong and to fill in: the two numbers that its editor tells. */
+import { IconAlertTriangle, IconPencil } from "@tabler/icons-react";
+import type { GraphSummary } from "../api/graphs";
+import { countWords, type ProblemCounts } from "../graph/problems/problem-kinds";
+import style from "./graph-counts.module.css";
+
+/** As the server counts them; nothing where it does not know. */
+function countsOfListed({ wrong = 0, to_fill_in = 0 }: GraphSummary): ProblemCounts {
+  return { wrong, fillIn: to_fill_in, warnings: 0 };
+}
+
+/** `brief`: numbers alone, where there is little room; they are told in words all the same. */
+export function GraphCounts({ graph, brief = false }: { graph: GraphSummary; brief?: boolean }) {
+  const counts = countsOfListed(graph);
+  const words = countWords(counts);
+  if (words.length === 0) return null;
+  const { wrong, fillIn } = counts;
+  return (
+    <span className={style.counts} title={words.join(", ")}>
+      {wrong > 0 && (
+        <span className={style.count} data-kind="wrong">
+          <IconAlertTriangle size={13} aria-hidden /> {wrong}{" "}
+          <span className={brief ? "visually-hidden" : undefined}>wrong</span>
+        </span>
+      )}
+      {fillIn > 0 && (
+        <span className={style.count} data-kind="fill-in">
+          <IconPencil size={13} aria-hidden /> {fillIn}{" "}
+          <span className={brief ? "visually-hidden" : undefined}>to fill in</span>
+        </span>
+      )}
+    </span>
+  );
+}
