@@ -65,6 +65,16 @@ async function opened(page: Page, look: Look, openers: readonly Opener[]): Promi
   }
 }
 
+/** The lists folded to a rail, with one of them over the canvas; and back. */
+async function folded(page: Page, look: Look): Promise<void> {
+  await page.getByRole("button", { name: "Fold the list" }).click();
+  await look("rail");
+  await page.getByRole("button", { name: "Outline", exact: true }).click();
+  await expect(page.getByRole("treegrid")).toBeVisible();
+  await look("list over the canvas");
+  await page.getByRole("button", { name: "Unfold the list" }).click();
+}
+
 async function openedByKey(page: Page, look: Look): Promise<void> {
   for (const [where, key] of BY_KEY) {
     await page.keyboard.press(key);
@@ -116,6 +126,8 @@ for (const scheme of ["light", "dark"] as const) {
     await page.keyboard.type("valve");
     await look("find");
     await page.keyboard.press("Escape");
+    await page.evaluate(() => (document.activeElement as HTMLElement | null)?.blur());
+    await folded(page, look);
     await page.evaluate(() => (document.activeElement as HTMLElement | null)?.blur());
     await openedByKey(page, look);
     await opened(page, look, OVER_EDITOR);

@@ -27,8 +27,8 @@ test.afterAll(() => product.dispose());
 
 const cards = (page: Page) => page.locator(CARD);
 
-/** Does a deed by its name in the palette. */
-async function deed(page: Page, name: string): Promise<void> {
+/** Chooses an edit action by its name in the palette. */
+async function choose(page: Page, name: string): Promise<void> {
   await page.keyboard.press("ControlOrMeta+k");
   const search = page.getByRole("combobox", { name: "Find a command, an action or a graph" });
   await search.fill(name);
@@ -178,7 +178,7 @@ test("arrows: healed, filled, led elsewhere, drawn by two taps", async ({ browse
   ]);
 
   // It is chosen now: led elsewhere with all that it says.
-  await deed(page, "Lead the arrow elsewhere");
+  await choose(page, "Lead the arrow elsewhere");
   await page.getByRole("combobox", { name: "To", exact: true }).fill("check");
   await page.keyboard.press("Enter");
   await expect.poll(() => arrows(product, id)).toContain("Wait_2 > CheckBattery_0");
@@ -220,16 +220,16 @@ test("things are put in their place: aligned, spread, tidied, nudged, framed, no
   await page.keyboard.press("Shift+ArrowRight");
 
   await pick(page, ...all);
-  await deed(page, "Align top");
+  await choose(page, "Align top");
   let at = await places(page, id);
   expect(new Set(all.map(([name, i]) => at.get(`${name} ${i}`)?.y)).size).toBe(1);
-  await deed(page, "Distribute across");
+  await choose(page, "Distribute across");
   at = await places(page, id);
   const [a = 0, b = 0, c = 0] = all.map(([name, i]) => at.get(`${name} ${i}`)?.x);
   expect(Math.abs(b - a - (c - b))).toBeLessThanOrEqual(1);
 
   // A frame round them takes them along; a note is plain text.
-  await deed(page, "Draw a frame");
+  await choose(page, "Draw a frame");
   const title = page.getByRole("textbox", { name: "Title of the frame" });
   await title.fill("Wait <b>here</b>");
   await title.press("Enter");
@@ -263,7 +263,7 @@ test("things are put in their place: aligned, spread, tidied, nudged, framed, no
 
   // The pictures have it all, escaped.
   const download = page.waitForEvent("download");
-  await deed(page, "Export as SVG");
+  await choose(page, "Export as SVG");
   const file = await (await download).createReadStream();
   let svg = "";
   for await (const chunk of file) svg += String(chunk);
@@ -271,7 +271,7 @@ test("things are put in their place: aligned, spread, tidied, nudged, framed, no
   expect(svg).not.toContain("<script");
   expect(svg.match(/stroke-width="1.6"/g)).toHaveLength(16); // four outcomes each
   const png = page.waitForEvent("download");
-  await deed(page, "Export as PNG");
+  await choose(page, "Export as PNG");
   expect((await png).suggestedFilename()).toBe("chain_4.png");
   expect(failures).toEqual([]);
   await context.close();

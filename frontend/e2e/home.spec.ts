@@ -62,7 +62,7 @@ test("keys and marquee: Tab searches, all are selected, Delete deletes, a frame 
   await expect(search).toBeFocused();
   await search.fill("Two");
   await search.press("Enter");
-  await expect(card(page, "Two")).toBeVisible();
+  await expect(card(page, "Two")).toBeInViewport({ ratio: 1 }); // the view glides there
 
   const selected = page.locator(".react-flow__node-action.selected");
   await page.mouse.click(box.x + box.width - 60, box.y + 300);

@@ -1,7 +1,7 @@
 /** The outline and search by keyboard alone, comments between two people. */
 
 import { expect, type Page, test } from "@playwright/test";
-import { card, saved } from "./canvas";
+import { CARD, card, pick, saved, start, umrfOf } from "./canvas";
 import { Product } from "./product";
 
 const product = new Product();
@@ -138,6 +138,83 @@ test("hits are stepped through by keyboard and shown on the canvas; one robot st
     await expect(page.locator("[data-dim]").first()).toBeAttached();
   }
   expect(failures).toEqual([]);
+  await context.close();
+});
+
+test("a frame folds to a block that says how its actions are, for one person on one device", async ({
+  browser,
+}) => {
+  const { page, context, failures } = await product.person(browser, "Ada");
+  const id = await product.chain(4);
+  await page.goto(`${product.url}/graphs/${id}`);
+  await saved(page);
+  await pick(page, ["Wait", 1], ["Wait", 2]);
+  await page.keyboard.press("Shift+F");
+  const title = page.getByRole("textbox", { name: "Title of the frame" });
+  await title.fill("Middle");
+  await title.press("Enter");
+  await saved(page);
+  const { seq: before } = await product.ask<{ seq: number }>(`/api/graphs/${id}`);
+
+  // By the button in its title; the keyboard stays at the frame, and B unfolds and folds it.
+  const cards = page.locator(CARD);
+  const toggle = page.getByRole("button", { name: "Contents of Middle" });
+  const block = page.getByRole("group", { name: /^Frame, blue, folded: Middle/ });
+  await expect(toggle).toHaveAttribute("aria-expanded", "true");
+  await toggle.click();
+  await expect(block).toBeFocused();
+  await expect(block).toContainText("2 actions");
+  await expect(toggle).toHaveAttribute("aria-expanded", "false");
+  await expect(cards).toHaveCount(2);
+  const from = (i: number) => page.locator(`[aria-label^="Arrow from Wait ${i}"]`);
+  await expect(from(1)).toHaveCount(0);
+  await expect(from(0)).not.toHaveCount(0);
+  await expect(from(2)).not.toHaveCount(0);
+  await page.keyboard.press("b");
+  await expect(cards).toHaveCount(4);
+  await page.keyboard.press("b");
+  await expect(cards).toHaveCount(2);
+
+  // A colleague sees all of it, nothing was written, and this device remembers.
+  const mari = await product.person(browser, "Mari");
+  await mari.page.goto(`${product.url}/graphs/${id}`);
+  await expect(mari.page.locator(CARD)).toHaveCount(4);
+  await page.reload();
+  await saved(page);
+  await expect(block).toContainText("2 actions");
+  await expect(cards).toHaveCount(2);
+  expect((await product.ask<{ seq: number }>(`/api/graphs/${id}`)).seq).toBe(before);
+
+  // What leads into it unfolds it; two clicks unfold it, too.
+  await page.keyboard.press("ControlOrMeta+f");
+  await page.getByRole("combobox", { name: "Find in graph" }).fill("Wait 2");
+  await expect(page.getByRole("status").filter({ hasText: / of / })).toHaveText(/^1 of/);
+  await page.keyboard.press("Enter");
+  await expect(card(page, "Wait", 2)).toBeVisible();
+  await expect(cards).toHaveCount(4);
+  await page.keyboard.press("Escape");
+  await toggle.click();
+  await block.getByText("2 actions").dblclick();
+  await expect(cards).toHaveCount(4);
+  await toggle.click();
+
+  // What is folded moves with its block, which is as much of it as there is to delete.
+  const height = async () => {
+    const { actions } = await umrfOf(product, id);
+    return actions.find(({ instance_id: i }) => i === 1)?.gui_attributes?.position?.y ?? 0;
+  };
+  const stood = await height();
+  await page.keyboard.press("Shift+ArrowDown");
+  await expect.poll(height).toBe(stood + 32);
+  await page.keyboard.press("Delete");
+  await expect(cards).toHaveCount(4);
+  await page.keyboard.press("ControlOrMeta+z");
+  await expect(cards).toHaveCount(2);
+  await saved(page);
+  await start(page);
+  await expect(block).toContainText("2 done", { timeout: 30_000 });
+  expect([...failures, ...mari.failures]).toEqual([]);
+  await mari.context.close();
   await context.close();
 });
 

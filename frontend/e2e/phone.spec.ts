@@ -137,3 +137,65 @@ test("STOP is at one place, apart from Start, and everything is large enough for
   await expect(page.getByText(/stopped/).first()).toBeVisible();
   await context.close();
 });
+
+test("the form of an action is compact, and its targets are large", async ({ browser }) => {
+  const { page, context, failures } = await product.person(browser, "Ada", PHONE);
+  const number = { pvf_type: "number", pvf_value: 1 };
+  const { id } = await product.ask<{ id: string }>("/api/graphs", {
+    method: "POST",
+    body: JSON.stringify({
+      graph_name: "compact",
+      graph_entry: [{ name: "Go", instance_id: 0 }],
+      graph_exit: [{ name: "Go", instance_id: 0 }],
+      actions: [
+        {
+          name: "Go",
+          instance_id: 0,
+          type: "sync",
+          input_parameters: {
+            place: { pvf_type: "string", pvf_value: "valve_7" },
+            careful: { pvf_type: "bool", pvf_value: true },
+            at: { x: number, y: number, z: number },
+          },
+        },
+      ],
+    }),
+    headers: { "content-type": "application/json" },
+  });
+  await page.goto(`${product.url}/graphs/${id}`);
+  await saved(page);
+  await page.getByText("Go", { exact: true }).first().tap();
+  await pane(page, "Details");
+  const details = page.getByRole("main");
+  const boxOf = async (what: Locator) => {
+    const box = await what.boundingBox();
+    if (box === null) throw new Error("it is not on screen");
+    return box;
+  };
+  // What a field is called stands in its row.
+  const place = details.getByRole("textbox", { name: /^place/ });
+  const [field, name] = [await boxOf(place), await boxOf(details.getByTitle("place"))];
+  expect(name.x + name.width).toBeLessThanOrEqual(field.x);
+  expect(name.y).toBeGreaterThanOrEqual(field.y - 4);
+  expect(name.y + name.height).toBeLessThanOrEqual(field.y + field.height);
+  const bool = await boxOf(details.getByRole("radiogroup", { name: "careful" }));
+  expect((await boxOf(details.getByTitle("careful"))).x).toBeLessThan(bool.x - 40);
+  // Three numbers are one row.
+  const rows = await Promise.all(
+    ["x", "y", "z"].map((axis) => boxOf(details.getByRole("textbox", { name: `${axis} of at` }))),
+  );
+  expect(new Set(rows.map(({ y }) => Math.round(y))).size).toBe(1);
+  for (const { height } of [field, ...rows]) expect(height).toBeGreaterThanOrEqual(44);
+  for (const what of ["What the parameter place is", "The numbers of at one by one"]) {
+    const { width, height } = await boxOf(details.getByRole("button", { name: what }));
+    expect(Math.min(width, height)).toBeGreaterThanOrEqual(44);
+  }
+  const size = (of: Locator) =>
+    of.evaluate((found) => Number.parseFloat(getComputedStyle(found).fontSize));
+  expect(Math.round(await size(place))).toBe(15);
+  expect(
+    Math.round(await size(details.getByTitle("place").locator("xpath=following-sibling::*[1]"))),
+  ).toBe(13);
+  expect(failures).toEqual([]);
+  await context.close();
+});

@@ -131,3 +131,59 @@ test("a card with a problem says so in its name, and its details offer the fix",
   await expect(marked).toHaveCount(0);
   await context.close();
 });
+
+/** Go wants a point that nobody gives, and goes a way that is none of the allowed ones. */
+const halfWritten = {
+  graph_name: "half_written",
+  graph_entry: [{ name: "Go", instance_id: 0 }],
+  graph_exit: [{ name: "Go", instance_id: 0 }],
+  actions: [
+    {
+      name: "Go",
+      instance_id: 0,
+      type: "sync",
+      input_parameters: {
+        at: Object.fromEntries(["x", "y", "z"].map((axis) => [axis, { pvf_type: "number" }])),
+        way: { pvf_type: "string", pvf_value: "far", pvf_allowed_values: ["near"] },
+      },
+    },
+  ],
+};
+
+test("bar, list and first page count the same, also when something is mended", async ({
+  browser,
+}) => {
+  const { page, context, failures } = await product.person(browser, "Ada");
+  const { id } = await product.ask<{ id: string }>("/api/graphs", {
+    method: "POST",
+    body: JSON.stringify(halfWritten),
+    headers: { "content-type": "application/json" },
+  });
+  await page.goto(`${product.url}/graphs/${id}`);
+  await saved(page);
+  const bar = page.getByRole("banner").getByRole("button", { name: /^\d+ (wrong|to fill in)/ });
+  const row = page
+    .getByRole("navigation", { name: "Graphs" })
+    .getByRole("link", { name: "half_written" });
+  await expect(bar).toHaveText("1 wrong 1 to fill in");
+  await expect(row).toContainText("1 wrong 1 to fill in");
+
+  await card(page, "Go").click();
+  await page.getByRole("textbox", { name: "x of at" }).fill("1");
+  await page.keyboard.press("Enter");
+  await expect(bar).toHaveText("1 wrong 1 to fill in"); // y and z are still to be written
+  for (const axis of ["y", "z"]) {
+    await page.getByRole("textbox", { name: `${axis} of at` }).fill("1");
+    await page.keyboard.press("Enter");
+  }
+  await expect(bar).toHaveText("1 wrong");
+  await expect(row).not.toContainText("to fill in");
+  await expect(row).toContainText("1 wrong");
+
+  await page.goto(product.url);
+  const first = page.getByRole("article").filter({ hasText: "half_written" });
+  await expect(first).toContainText("1 wrong");
+  await expect(first).not.toContainText("to fill in");
+  expect(failures).toEqual([]);
+  await context.close();
+});

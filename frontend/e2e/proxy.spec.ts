@@ -4,7 +4,8 @@
  */
 
 import { type Browser, expect, type Page, test } from "@playwright/test";
-import { add, card, saved, start } from "./canvas";
+import { CHROMIUM, LAN_ARGS } from "../playwright.config";
+import { add, card, saved, start, umrfOf } from "./canvas";
 import { freePort, LONG, type Person, Product, TOKEN } from "./product";
 import { type Kind, missing, NAME, ProxyServer } from "./proxies";
 
@@ -50,8 +51,9 @@ async function arrive(
   browser: Browser,
   proxy: ProxyServer,
   link = `/#t=${TOKEN}`,
+  options: Parameters<Browser["newContext"]>[0] = {},
 ): Promise<Person & { refused: string[] }> {
-  const context = await browser.newContext({ ignoreHTTPSErrors: true });
+  const context = await browser.newContext({ ignoreHTTPSErrors: true, ...options });
   const page = await context.newPage();
   const failures: string[] = [];
   const refused: string[] = [];
@@ -219,6 +221,46 @@ test.describe("where the proxy is not as it should be", () => {
       await setting.proxy.end();
     }
   }
+
+  test("the page opens below a path without a server, at a deep link too", async ({ browser }) => {
+    test.setTimeout(120_000);
+    const { product, proxy } = setting;
+    await proxy.start(product.port);
+    // A browser runs no service worker of a certificate that it does not trust, whatever a test says.
+    const trusting = await browser.browserType().launch({
+      executablePath: CHROMIUM,
+      args: [...LAN_ARGS, "--ignore-certificate-errors"],
+    });
+    const { page, context, failures } = await arrive(trusting, proxy, undefined, {
+      serviceWorkers: "allow",
+    });
+    const graph = await product.chain(3);
+    await page.goto(`${proxy.url}/graphs/${graph}`);
+    await saved(page);
+    await add(page, "Kept");
+    await saved(page);
+    await page.evaluate(() => navigator.serviceWorker.ready);
+    await expect.poll(() => page.evaluate(() => caches.keys())).toHaveLength(1);
+    await page.close();
+    await proxy.end();
+
+    const later = await context.newPage();
+    await later.goto(`${proxy.url}/graphs/${graph}`);
+    await expect(card(later, "Kept")).toBeVisible();
+    await add(later, "Alone");
+    await expect(later.getByText(/offline.*1 change/i).first()).toBeVisible();
+    await expect(later.getByRole("button", { name: /^Start v1: not connected/ })).toBeDisabled();
+    await picture(later, "nginx-offline");
+    await proxy.start(product.port);
+    await saved(later);
+    const { actions } = await umrfOf(product, graph);
+    expect(actions.map(({ name }) => name).sort()).toEqual([
+      ...["Alone", "Kept", "Wait", "Wait", "Wait"],
+    ]);
+    expect(failures).toEqual([]);
+    await trusting.close();
+    await proxy.end();
+  });
 
   test("one that passes no sockets on is named, for STOP and for edits", async ({ browser }) => {
     const change = (text: string) => text.replace(/proxy_set_header (Upgrade|Connection) .*/g, "");

@@ -254,6 +254,11 @@ test("values as an action ran with them stand beside those that were sent", asyn
   await page.getByRole("tab", { name: "Parameters" }).click();
   const move = page.getByRole("region", { name: "Parameters of Move 0" });
   await expect(move.getByRole("row", { name: /value/ })).toContainText("5≠ 7");
+  // A dry-run that begins at its end has them, too.
+  await page.getByRole("slider", { name: "Moment of the run" }).press("End");
+  await page.getByRole("link", { name: /^Dry-run from/ }).click();
+  await expect(page.getByRole("region", { name: "Dry-run" })).toBeVisible();
+  await expect(card(page, "Move")).toContainText("7");
 });
 
 test("a run starts again through the dialog of every start, looked at and held", async () => {

@@ -2,8 +2,8 @@
 
 import { mkdirSync } from "node:fs";
 import { resolve } from "node:path";
-import { type Browser, type Page, test } from "@playwright/test";
-import { saved } from "./canvas";
+import { type Browser, expect, type Page, test } from "@playwright/test";
+import { saved, start } from "./canvas";
 import { Product } from "./product";
 
 test.skip(process.env.SCREENS !== "1", "takes pictures to be looked at: make screens");
@@ -31,7 +31,13 @@ const SCREENS = {
   zoomed: { viewport: { width: 720, height: 450 }, deviceScaleFactor: 2 },
 } as const satisfies Record<string, Parameters<Browser["newContext"]>[0]>;
 
-async function make(name: string, actions: readonly string[]): Promise<string> {
+const SAYS = ["on_true -> run", "on_false -> run", "on_error -> stop", "on_stopped -> ignore"];
+
+async function make(
+  name: string,
+  actions: readonly string[],
+  robots: readonly string[] = ["rover", "arm", ""],
+): Promise<string> {
   const named = (i: number) => ({ name: actions[i] ?? "", instance_id: i });
   const last = actions.length - 1;
   const to = (i: number) => (i >= 0 && i <= last ? [named(i)] : []);
@@ -42,9 +48,9 @@ async function make(name: string, actions: readonly string[]): Promise<string> {
     actions: actions.map((_, i) => ({
       ...named(i),
       type: "sync",
-      actor: ["rover", "arm", ""][i % 3],
+      actor: robots[i % robots.length] ?? "",
       input_parameters: { place: { pvf_type: "string", pvf_value: name } },
-      parents: to(i - 1),
+      parents: to(i - 1).map((parent) => ({ ...parent, conditions: SAYS })),
       children: to(i + 1),
     })),
   };
@@ -100,9 +106,21 @@ for (const [name, options] of Object.entries(SCREENS)) {
 test("graphs of every size", async ({ browser }) => {
   const { page, context } = await product.person(browser, "Ada", SCREENS.light);
   for (const size of SIZES) {
-    await editor(page, await make(`size_${size}`, Array(size).fill("Step")));
+    await editor(page, await make(`size_${size}`, Array(size).fill("Step"), ["rover"]));
     await page.getByRole("button", { name: "Fit", exact: true }).click();
+    await expect(page.getByText(/^Arranging/)).toBeHidden({ timeout: 120_000 });
     await taken(page, `size-${size}`);
+    await page.emulateMedia({ colorScheme: "dark" });
+    await taken(page, `size-${size}-dark`);
+    await page.emulateMedia({ colorScheme: "light" });
+    if (size > 300) continue;
+    // Where it runs and what has ended, at one glance.
+    await start(page);
+    await expect(page.getByText("running", { exact: true }).first()).toBeVisible();
+    await page.waitForTimeout(3_500);
+    await page.getByRole("button", { name: "Fit", exact: true }).click();
+    await taken(page, `size-${size}-runs`);
+    await page.getByRole("button", { name: /^Stop run/ }).click();
   }
   await context.close();
 });

@@ -1,10 +1,10 @@
-/** How fast the page is: opening, typing, dragging, tidying, and frames while 20 others edit. */
+/** How fast the page is: opening, typing, dragging, tidying, frames beside 20 others, following a run. */
 
 import { spawn } from "node:child_process";
-import { mkdirSync, writeFileSync } from "node:fs";
+import { mkdirSync, readdirSync, readFileSync, writeFileSync } from "node:fs";
 import { resolve } from "node:path";
 import { expect, type Page, test } from "@playwright/test";
-import { boxOf, saved } from "./canvas";
+import { boxOf, saved, start } from "./canvas";
 import { Product, pause, TOKEN } from "./product";
 
 const ROOT = resolve(import.meta.dirname, "../..");
@@ -13,6 +13,7 @@ const OTHERS = 20;
 const product = new Product();
 const rows: string[][] = [];
 const frames: string[][] = [];
+const followed: string[][] = [];
 
 test.skip(process.env.SPEED === undefined, "measures; started by `make performance`");
 // The recorder of failures takes pictures of the page, which cost as much as what is measured.
@@ -26,6 +27,7 @@ test.afterEach(() => {
   const tables = [
     { head, rows },
     { head: ["1,000 actions", "frame (median)", "95 %", "99 %", "longest", "CPU"], rows: frames },
+    { head: ["a run of 70 actions", "page's thread", "whole browser"], rows: followed },
   ];
   writeFileSync(resolve(ROOT, "frontend/test-results/speed.json"), JSON.stringify(tables));
 });
@@ -107,8 +109,24 @@ async function type(page: Page): Promise<number> {
   return durations.length === 0 ? 16 : share(durations, 0.5);
 }
 
+/** One of the cards on which nothing lies. */
+async function cardInSight(page: Page, which: number) {
+  const keys = await page.locator(".react-flow__node-action").evaluateAll((cards) =>
+    cards
+      .filter((card) => {
+        const { left, top, width, height } = card.getBoundingClientRect();
+        const hits = [0.1, 0.9].map((share) =>
+          document.elementFromPoint(left + width * share, top + height / 2),
+        );
+        return hits.every((hit) => hit !== null && card.contains(hit));
+      })
+      .map((card) => card.getAttribute("data-id")),
+  );
+  return page.locator(`.react-flow__node[data-id="${keys[which]}"]`);
+}
+
 async function dragACard(page: Page): Promise<number[]> {
-  const box = await boxOf(page.locator(".react-flow__node-action").nth(3));
+  const box = await boxOf(await cardInSight(page, 0));
   const [x, y] = [box.x + box.width / 4, box.y + box.height / 2];
   await page.mouse.move(x, y);
   await page.mouse.down();
@@ -132,13 +150,15 @@ for (const size of SIZES) {
     const opened = Date.now() - before;
     const worked = await busy();
     const drag = await dragACard(page);
-    await page.locator(".react-flow__node-action").nth(4).click();
+    const moved = await cardInSight(page, 1);
+    await moved.click();
     const key = await type(page);
-    const moved = page.locator(".react-flow__node-action").nth(4);
     const stood = await moved.getAttribute("style");
     const tidy = Date.now();
     await page.getByRole("button", { name: /^Tidy/ }).first().click();
-    await expect(moved).not.toHaveAttribute("style", stood ?? "", { timeout: 60_000 });
+    // Where it stands now may be out of sight, where nothing is drawn.
+    const stands = async () => ((await moved.count()) === 0 ? "" : moved.getAttribute("style"));
+    await expect.poll(stands, { timeout: 60_000, intervals: [20] }).not.toBe(stood);
     await saved(page);
     const tidied = Date.now() - tidy;
     const figures = [
@@ -163,7 +183,7 @@ test(`a graph of 1,000 actions while ${OTHERS} people edit it`, async ({ browser
   await pause(3000); // what opening leaves to do
   await watch(page, "alone");
   const plan = {
-    ...{ port: product.port, pid: process.pid, dialect: "plain", deed: "idle" },
+    ...{ port: product.port, pid: process.pid, dialect: "plain", operation: "idle" },
     ...{ path: "/api/graphs/{room}/room", rooms: [id], people: OTHERS, rate: 2, seconds: 9 },
     headers: [`Authorization: Bearer ${TOKEN}`],
   };
@@ -179,6 +199,45 @@ test(`a graph of 1,000 actions while ${OTHERS} people edit it`, async ({ browser
   expect(await ended).toBe(0);
   await context.close();
 });
+
+/** How long all processes of browsers on this machine have worked, ms of processor. */
+function browserWorked(): number {
+  const ticks = readdirSync("/proc").flatMap((id) => {
+    try {
+      if (!/^\d+$/.test(id) || !readFileSync(`/proc/${id}/cmdline`, "utf8").includes("chrom"))
+        return [];
+      const [, fields = ""] = readFileSync(`/proc/${id}/stat`, "utf8").split(") ");
+      const [user, system] = fields.split(" ").slice(11, 13).map(Number);
+      return [(user ?? 0) + (system ?? 0)];
+    } catch {
+      return []; // it has just ended
+    }
+  });
+  return 10 * ticks.reduce((sum, each) => sum + each, 0); // 100 ticks a second
+}
+
+for (const reducedMotion of ["no-preference", "reduce"] as const) {
+  test(`a run of 70 actions, motion: ${reducedMotion}`, async ({ browser }) => {
+    const { page, context } = await product.person(browser, "Ada", { reducedMotion });
+    const id = await product.chain(70);
+    await page.goto(`${product.url}/graphs/${id}`);
+    await shown(page);
+    await page.getByRole("button", { name: "Tidy", exact: true }).click();
+    await start(page);
+    await pause(4_000);
+    const busy = await busyWith(page);
+    const profiled = await profile(page, process.env.PROFILE);
+    const [thread, whole, before] = [await busy(), browserWorked(), performance.now()];
+    await pause(30_000);
+    const seconds = (performance.now() - before) / 1000;
+    const share = (worked: number) => `${(worked / (10 * seconds)).toFixed(1)} %`;
+    const motion = reducedMotion === "reduce" ? "with reduced motion" : "followed";
+    await profiled();
+    followed.push([motion, share((await busy()) - thread), share(browserWorked() - whole)]);
+    await page.getByRole("button", { name: /^Stop run/ }).click();
+    await context.close();
+  });
+}
 
 const WATCHED = 5; // s
 

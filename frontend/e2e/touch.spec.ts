@@ -219,6 +219,26 @@ test("a tablet: two fingers zoom, a resting one opens the menu, taps choose seve
   await context.close();
 });
 
+test("a tablet: a finger bends the line of an arrow that was tapped", async ({ browser }) => {
+  const { page, context, failures } = await product.person(browser, "Ada", tablet);
+  const fingers = await Fingers.on(page);
+  await page.goto(`${product.url}/graphs/${await product.chain(2)}`);
+  await saved(page);
+  await page.getByRole("button", { name: "Fit", exact: true }).tap();
+  await page.locator('[aria-label^="Arrow from entry"]').focus();
+  await page.keyboard.press("Enter");
+  const piece = page.getByRole("button", { name: /^Bend the line Entry → Wait 0, piece 1/ });
+  await expect(piece).toHaveCSS("width", "44px");
+  const from = await middle(piece);
+  const scale = await zoom(page);
+  await fingers.move({ from, to: [from[0], from[1] + 90] });
+  await expect(page.getByRole("button", { name: /^Bend 1 of 1 of the line/ })).toBeVisible();
+  expect(await zoom(page)).toBe(scale);
+  await expect(page.getByRole("menu")).toHaveCount(0);
+  expect(failures).toEqual([]);
+  await context.close();
+});
+
 test("a phone: add and connect on the canvas, start in the run tab, stop", async ({ browser }) => {
   const { page, context, failures } = await product.person(browser, "Ada", {
     viewport: { width: 390, height: 844 },

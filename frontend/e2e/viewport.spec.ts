@@ -61,6 +61,18 @@ for (const [what, viewport, least] of [
   });
 }
 
+test("Fit shows all of a graph also when it is pressed before the graph has places", async ({
+  browser,
+}) => {
+  const { page, context } = await product.person(browser, "Ada");
+  await page.goto(`${product.url}/graphs/${await product.chain(80)}`);
+  await page.getByRole("button", { name: "Fit", exact: true }).click();
+  await saved(page);
+  await expect(card(page, "Wait", 79)).toBeInViewport({ ratio: 0.99 });
+  await expect(card(page, "Wait", 0)).toBeInViewport({ ratio: 0.99 });
+  await context.close();
+});
+
 test("the view follows what runs until the person moves it, and again when asked", async ({
   browser,
 }) => {
