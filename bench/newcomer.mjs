@@ -7,6 +7,7 @@
  * do not depend on the machine: 1.1 s to point at something, 0.1 s to press or let go, 0.28 s for a
  * key, 0.4 s to move the hand between mouse and keys, 1.35 s to think before each step.
  */
+import { existsSync } from "node:fs";
 import { createRequire } from "node:module";
 import { resolve } from "node:path";
 
@@ -130,8 +131,10 @@ async function draw() {
   return id;
 }
 
+const SHELL = "/usr/bin/chromium-headless-shell";
+const installed = existsSync(SHELL) ? SHELL : "/usr/bin/chromium";
 const browser = await chromium.launch({
-  executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
+  executablePath: process.env.CHROMIUM ?? installed,
   args: ["--no-sandbox", "--disable-gpu"],
 });
 page = await browser.newPage({ viewport: { width: 1440, height: 900 } });
