@@ -19,6 +19,7 @@ from action_assistant.editor.crdt.update_scan import UpdateOutline, outline
 
 SECONDS: Final = 0.25  # of a processor that one update may take
 _ENDS: Final = 8 * SECONDS  # of a processor, after which the process that tries it ends
+OVERLONG: Final = "This change takes so long that everybody would have to wait for it"
 _INSIDE: Final = 5_000  # structs of an update in which something lies inside something else
 
 
@@ -50,7 +51,7 @@ def tried(state: bytes, update: bytes, released: Sequence[bytes]) -> TriedOutlin
                 doc.apply_update(each)
         spent = time.process_time() - begun
     if spent > SECONDS:
-        raise TooSlow("This change takes so long that everybody would have to wait for it")
+        raise TooSlow(OVERLONG)
     return TriedOutline(
         read.brings, read.needs, placed, read.actions, read.fields, read.structs, opening
     )

@@ -11,12 +11,12 @@ from action_assistant.editor.crdt import messages
 from action_assistant.editor.crdt.document_quota import QuotaExceeded
 from action_assistant.editor.crdt.messages import Malformed
 from action_assistant.editor.crdt.replica import ForeignClient, Panicked, Replica, TooMuchWaits
-from action_assistant.editor.crdt.trial import TooSlow, TriedOutline, tried
+from action_assistant.editor.crdt.trial import OVERLONG, TooSlow, TriedOutline, tried
 from action_assistant.editor.crdt.update_scan import UpdateOutline, outline
 from action_assistant.editor.rooms.member import Member
 from action_assistant.errors import BadInput, Refused, TooLarge
 from action_assistant.web.auth.caller import acting_for
-from action_assistant.web.workers.lanes import Crashed, RunInWorker
+from action_assistant.web.workers.lanes import Crashed, OutOfTime, RunInWorker
 
 LARGE: Final = 8 * 1024  # bytes of an update that is tried on a copy first, and by itself
 _BATCH: Final = 200  # items of one commit
@@ -170,10 +170,12 @@ async def tried_for(
         try:
             with acting_for(person):
                 return await run_in_worker(tried, state, update, released)
+        except OutOfTime as error:
+            raise TooSlow(OVERLONG) from error
         except Crashed as error:
             died += 1
             if died == _DEATHS:  # one may have been for want of memory
-                raise Malformed("an update that ends the process, or takes too long") from error
+                raise Malformed("an update that ends the process") from error
         except TooLarge as error:
             raise TooSlow(f"This change cannot be taken: {error.detail}") from error
         except Refused as error:

@@ -9,6 +9,7 @@ module, with values that can be pickled.
 import asyncio
 import logging
 import pickle
+import signal
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Sequence
 from contextlib import asynccontextmanager, contextmanager
 from multiprocessing.connection import Connection
@@ -22,7 +23,17 @@ from action_assistant.errors import TooLarge, TooMany, Unavailable
 from action_assistant.web.auth.caller import Caller, caller
 from action_assistant.web.workers.child_process import LAST, child, serve, wire
 
-__all__ = ["HOPELESS", "Crashed", "GaveUp", "Lane", "RunInWorker", "child", "kept_warm", "run_here"]
+__all__ = [
+    "HOPELESS",
+    "Crashed",
+    "GaveUp",
+    "Lane",
+    "OutOfTime",
+    "RunInWorker",
+    "child",
+    "kept_warm",
+    "run_here",
+]
 
 log: Final = logging.getLogger(__name__)
 
@@ -31,6 +42,7 @@ T = TypeVar("T")
 _WAITING: Final = 32  # requests of one person
 _ALL_WAITING: Final = 256
 _START_S: Final = 30.0
+_ENDING_S: Final = 5.0  # for which a process whose wire is closed may still be ending
 
 
 class RunInWorker(Protocol):
@@ -49,6 +61,10 @@ async def run_here(work: Callable[..., T], /, *args: Any) -> T:
 
 class Crashed(Unavailable):
     """What would have worked on this has died"""
+
+
+class OutOfTime(Crashed):
+    """What would have worked on this had no processor time left"""
 
 
 class GaveUp(Unavailable):
@@ -139,7 +155,7 @@ class Lane:
                 del self._waiting[person], self._turns[person]
 
     async def _done(self, request: bytes) -> bytes:
-        """The reply of the worker. Raises Crashed, Unavailable."""
+        """The reply of the worker. Raises OutOfTime, Crashed, Unavailable."""
         self._idle = [each for each in self._idle if each.lives]
         worker = self._idle.pop() if self._idle else await self._hired()
         self._busy.add(worker)
@@ -156,6 +172,8 @@ class Lane:
             ) from late
         except (OSError, EOFError) as error:
             log.error("%s: a worker has died (%r)", self._name, error)
+            if await to_thread.run_sync(worker.ran_out, limiter=self._threads):
+                raise OutOfTime("The process that worked on this took too long.") from error
             raise Crashed(
                 "The process that worked on this has died; nothing came of it."
             ) from error
@@ -241,6 +259,11 @@ class _Worker:
         """Have one thing done. Raises OSError, EOFError when the process has died."""
         self._wire.send_bytes(request)
         return self._wire.recv_bytes()
+
+    def ran_out(self) -> bool:
+        """Whether it, being dead, was ended by the timer of its own processor time."""
+        self._process.join(_ENDING_S)
+        return self._process.exitcode == -signal.SIGPROF
 
     def kill(self) -> None:
         """End it, whatever it does. Who waits for it learns at once."""
