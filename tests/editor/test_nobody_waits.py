@@ -216,16 +216,17 @@ async def test_an_update_that_takes_long_is_refused_and_others_go_on(rooms: Room
         assert room.seq == 1
 
 
-@pytest.mark.parametrize("values", [16_000, 40_000], ids=["too long", "never done"])
 async def test_an_update_that_would_hold_the_process_up_is_refused_to_its_sender(
-    editor: Editor, http: httpx.Client, graph: str, values: int
+    editor: Editor, http: httpx.Client, graph: str
 ) -> None:
-    """On a slow machine the process that tries it is ended sooner. Its sender is told the same."""
-
     async def bring() -> None:
-        async with editor.socket(graph) as session:
-            await session.send_bytes(messages.change(at_once(values)))
-            assert await closed(session, 60) == messages.TOO_BIG
+        ended = messages.TOO_SLOW
+        while ended == messages.TOO_SLOW:  # a busy machine asks to come again
+            async with editor.socket(graph) as session:
+                # Three times what may be.
+                await session.send_bytes(messages.change(at_once(16_000)))
+                ended = await closed(session, 60)
+        assert ended == messages.TOO_BIG
 
     await bring()
     longest, took = await longest_silence(editor, bring)
@@ -294,11 +295,6 @@ async def test_what_waits_and_is_harmless_is_let_in(rooms: Rooms) -> None:
         assert (await room.quiet()).waiting == ()
 
 
-def one_more(clock: int, count: int, client: int = 7) -> bytes:
-    """As `at_once`, of a client that goes on."""
-    return at_once(count, client, clock)
-
-
 async def test_many_small_updates_make_no_graph_that_takes_long_to_open(
     rooms: Rooms, journal: Journal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -311,7 +307,7 @@ async def test_many_small_updates_make_no_graph_that_takes_long_to_open(
         ada.map["k"] = "v"
         await settle(ada, eve)
         for clock in range(0, 18_000, 600):
-            eve.deliver(messages.change(one_more(clock, 600)))
+            eve.deliver(messages.change(at_once(600, clock=clock)))
         await settle(ada, eve)
         assert eve.member is not None
         assert await eve.member.ended() == messages.FULL
@@ -335,7 +331,7 @@ async def test_who_opens_it_often_does_not_get_further(
         async with rooms.enter("graph/g") as room:
             eve.join(room)
             await settle(eve)
-            eve.deliver(messages.change(one_more(clock, 600)))
+            eve.deliver(messages.change(at_once(600, clock=clock)))
             await room.quiet()
             assert eve.member is not None
             if eve.member.closed:

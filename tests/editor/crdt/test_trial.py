@@ -90,7 +90,8 @@ async def test_an_edit_that_ends_two_processes_is_refused(journal: Journal, larg
 async def test_an_edit_that_would_take_minutes_costs_seconds(journal: Journal) -> None:
     lane = Lane("edits", 1, 120.0, 0, CapacityLimiter(2), [trial.__name__])
     async with edited(journal, lane, at_once(120_000)) as member:
-        assert await member.ended() == messages.MALFORMED
+        assert await member.ended() == messages.TOO_BIG
+        assert "so long" in (member.said or "")
     lane.close()
 
 
