@@ -107,3 +107,37 @@ test("the view follows what runs until the person moves it, and again when asked
   expect(failures).toEqual([]);
   await context.close();
 });
+
+test("whoever takes hold of the canvas while it glides holds what they see", async ({
+  browser,
+}) => {
+  const { page, context } = await product.person(browser, "Ada");
+  await page.goto(`${product.url}/graphs/${await product.chain(30)}`);
+  await saved(page);
+  const tools = await context.newCDPSession(page);
+  await tools.send("Animation.enable");
+  await tools.send("Animation.setPlaybackRate", { playbackRate: 0.02 }); // 20 s for a glide
+  const sheet = page.locator(".react-flow__viewport");
+  await start(page);
+  // Only the glide animates the sheet of the canvas; the view behind it is where it will end.
+  const glides = () => sheet.evaluate((element) => element.getAnimations().length);
+  await expect.poll(glides, { timeout: 30_000 }).toBe(1);
+  const [x, y] = await freeSpot(page);
+  const place = () =>
+    sheet.evaluate((element) => {
+      const { e, f } = new DOMMatrix(getComputedStyle(element).transform);
+      return [e, f] as const;
+    });
+  await page.mouse.move(x, y);
+  const before = await place();
+  await page.mouse.down();
+  await expect.poll(glides).toBe(0);
+  const held = await place();
+  expect(Math.hypot(held[0] - before[0], held[1] - before[1])).toBeLessThan(60);
+  await page.mouse.move(x + 40, y + 30, { steps: 4 });
+  await page.mouse.up();
+  const [moved] = await place();
+  expect(moved - held[0]).toBeGreaterThan(30);
+  expect(moved - held[0]).toBeLessThan(50);
+  await context.close();
+});

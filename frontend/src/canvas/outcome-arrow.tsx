@@ -96,7 +96,6 @@ function BundleLine({ id, data, line, pill, selected, opened }: BundleProps & { 
       path={pathOf(points)}
       interactionWidth={22}
       markerEnd={`url(#tip-${tone})`}
-      className={style.line ?? ""}
       style={{
         stroke: TIPS[tone],
         strokeWidth: lit ? 2.75 : selected ? 2.5 : 1.8,

@@ -57,7 +57,9 @@ export function StateLabel({ tone, word, more, pill = false, still = false }: Pr
       data-tone={tone}
       data-still={still || undefined}
     >
-      <Sign size={tone === "stopped" ? 9 : 12} stroke={2.8} aria-hidden className={style.sign} />
+      <span className={style.sign} aria-hidden>
+        <Sign size={tone === "stopped" ? 9 : 12} stroke={2.8} />
+      </span>
       {word}
       {more !== undefined && <span className={style.more}>· {more}</span>}
     </span>

@@ -6,6 +6,7 @@ import type { Positions, Sizes } from "../../canvas/geometry/arrange";
 import { type Bounds, boundsOf } from "../../canvas/geometry/viewport";
 import type { Key } from "../../graph/model";
 import type { Progress } from "../../status/progress";
+import { glideTo } from "./composited-glide";
 
 interface FrameRoom {
   readonly width: number;
@@ -117,8 +118,8 @@ interface Followed {
   progress: ReadonlyMap<Key, Progress>;
   /** The folded frames that are drawn instead of what lies in them. */
   blockOf: ReadonlyMap<Key, string> | undefined;
-  /** How the view moves, in so many ms. */
-  glide: (ms: number) => { duration: number; interpolate: "linear" };
+  /** How long a motion of so many ms may take: people may want none. */
+  glide: (ms: number) => { duration: number };
 }
 
 /** Keeps what runs in view until the person moves the view; each run begins anew. */
@@ -137,7 +138,7 @@ export function useFollowRun({ flow, frame, now, run, progress, blockOf, glide }
     const { places, sizes } = now.current ?? { places: new Map(), sizes: new Map() };
     const box = followedBox(going, places, sizes, size, here.zoom);
     const next = box && followingViewport(box, size, here);
-    if (next) void flow.setViewport(next, glide(GLIDE));
+    if (next) glideTo(flow, room, next, glide(GLIDE).duration);
   }, [run, lost, key]);
   return {
     /** A run goes, and the view no longer follows it. */
