@@ -78,3 +78,14 @@ test("one outcome of several is led elsewhere alone: dragged off its pill, or by
   expect(failures).toEqual([]);
   await context.close();
 });
+
+test("the menu of a card opens the dialog that draws an arrow", async ({ browser }) => {
+  const { page, context, failures } = await product.person(browser, "Ada");
+  await page.goto(`${product.url}/graphs/${await product.chain(3)}`);
+  await saved(page);
+  await card(page, "Wait", 1).click({ button: "right" });
+  await page.getByRole("menuitem", { name: "Draw an arrow …" }).click();
+  await expect(page.getByRole("dialog")).toBeVisible();
+  expect(failures).toEqual([]);
+  await context.close();
+});

@@ -47,8 +47,11 @@ const LAYERS: Readonly<Record<string, readonly string[]>> = {
   comments: BELOW_EDITOR,
   find: BELOW_EDITOR,
   outline: BELOW_EDITOR,
+  packages: BELOW_EDITOR,
   inspector: [...BELOW_EDITOR, "people", "comments"],
-  editor: [...BELOW_EDITOR, "people", "comments", "find", "outline", "inspector"],
+  editor: [...BELOW_EDITOR, "people", "comments", "find", "outline", "inspector"].concat([
+    "packages",
+  ]),
   // Features of their own know neither the editor nor each other.
   runs: ["graph", "ui", "api", "status", "canvas"],
   review: ["graph", "ui", "api", "status", "canvas"],

@@ -65,6 +65,7 @@ export const EDIT_ACTIONS: readonly EditAction[] = [
   graph.exportUmrf,
   graph.exportSvg,
   graph.exportPng,
+  graph.packages,
   graph.print,
   graph.copyLink,
 ];

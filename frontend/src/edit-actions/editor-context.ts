@@ -49,6 +49,8 @@ export type Overlay =
   /** The text of a note or frame is being written. */
   | { readonly kind: "note"; readonly key: string }
   | { readonly kind: "menu"; readonly screen: Position }
+  /** The C++ packages of all actions; `action`: the name of the one that is shown first. */
+  | { readonly kind: "packages"; readonly action?: string }
   | { readonly kind: "palette" }
   | { readonly kind: "keys" };
 

@@ -1,14 +1,16 @@
-/** Edit actions for the whole graph: export it, copy a link to it. */
+/** Edit actions for the whole graph: export it, its C++ packages, a link to it. */
 
 import {
   IconDownload,
   IconLink,
+  IconPackage,
   IconPhoto,
   IconPrinter,
   IconVectorTriangle,
 } from "@tabler/icons-react";
 import { copyLinkTo } from "./clipboard";
 import type { EditAction } from "./edit-action";
+import { selectedActions } from "./editor-context";
 import { linkTo } from "./graph-links";
 
 const graph = { group: "Graph", changes: false, enabled: () => true } as const;
@@ -41,6 +43,20 @@ export const exportPng: EditAction = {
   icon: IconPhoto,
   also: "picture image download",
   run: (context) => context.download("png"),
+};
+
+export const packages: EditAction = {
+  ...graph,
+  name: "packages",
+  label: "C++ packages",
+  shortcuts: [],
+  icon: IconPackage,
+  also: "generate code ROS colcon download source header CMake",
+  enabled: (context) => context.graph.actions.some((action) => !action.missing),
+  run: (context) => {
+    const [first] = selectedActions(context);
+    context.openOverlay({ kind: "packages", ...(first ? { action: first.name } : {}) });
+  },
 };
 
 export const print: EditAction = {

@@ -1,6 +1,6 @@
 /** The properties of an action. */
 import { Autocomplete, Button, Group } from "@mantine/core";
-import { IconGhost2 } from "@tabler/icons-react";
+import { IconGhost2, IconPackage } from "@tabler/icons-react";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { adoptGhost, rename, setField } from "../graph/edit";
 import type { Action, Graph } from "../graph/model";
@@ -45,7 +45,7 @@ function Ghost({ action }: { action: Action }) {
 }
 
 export function ActionForm({ action }: { action: Action }) {
-  const { doc, graph } = useEditorContext();
+  const { doc, graph, openOverlay } = useEditorContext();
   if (action.missing) return <Ghost action={action} />;
   return (
     <div className={style.form}>
@@ -114,6 +114,14 @@ export function ActionForm({ action }: { action: Action }) {
             onCommit={(text) => setField(doc, action.key, "type", text.trim())}
           />
         </SharedField>
+        <Button
+          variant="default"
+          mt="sm"
+          leftSection={<IconPackage size={16} aria-hidden />}
+          onClick={() => openOverlay({ kind: "packages", action: action.name })}
+        >
+          C++ package
+        </Button>
       </section>
     </div>
   );

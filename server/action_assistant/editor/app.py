@@ -11,7 +11,15 @@ from litestar import Litestar
 from litestar.types import ASGIApp, ControllerRouterHandler
 
 from action_assistant import paths
-from action_assistant.editor.api import drawing, editor, graphs, invitations, room, versions
+from action_assistant.editor.api import (
+    drawing,
+    editor,
+    graphs,
+    invitations,
+    packages,
+    room,
+    versions,
+)
 from action_assistant.editor.catalogue.people import People
 from action_assistant.editor.log import database_location, epochs
 from action_assistant.editor.log import graph_events as h
@@ -127,6 +135,7 @@ def _routes(
         *graphs.routes(app_state),
         *versions.routes(app_state),
         *drawing.routes(app_state),
+        *packages.routes(app_state),
         *room.routes(app_state),
     ]
 

@@ -19,6 +19,7 @@ _PRELOADED: Final = (
     "action_assistant.editor.interchange.edited_text",
     "action_assistant.editor.crdt.trial",
     "action_assistant.editor.interchange.action_uses",
+    "action_assistant.editor.interchange.action_packages",
 )
 _NICE: Final = 5
 

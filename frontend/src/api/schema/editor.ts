@@ -433,6 +433,51 @@ export interface EditorApi {
         invitation?: string;
     };
     /**
+     * PackageContents
+     * @description All files of the package of an action.
+     */
+    PackageContents: {
+        seq: number;
+        action: string;
+        package: string;
+        files: EditorApi["PackageFile"][];
+    };
+    /**
+     * PackageFile
+     * @description A file of a package.
+     */
+    PackageFile: {
+        path: string;
+        text: string;
+    };
+    /**
+     * PackageList
+     * @description The packages of a graph after its change `seq`: one for each name of an action.
+     */
+    PackageList: {
+        seq: number;
+        packages: EditorApi["PackageOutline"][];
+        refusals: EditorApi["PackageRefusal"][];
+    };
+    /**
+     * PackageOutline
+     * @description A package that can be made: of which action, its name, its files (with `/`).
+     */
+    PackageOutline: {
+        action: string;
+        package: string;
+        files: string[];
+    };
+    /**
+     * PackageRefusal
+     * @description Why an action has no package. `place`: its name, and below it a JSON pointer.
+     */
+    PackageRefusal: {
+        action: string;
+        place: string;
+        reason: string;
+    };
+    /**
      * Participant
      * @description Somebody who acted here. `color`: nobody else has it who is here; grey is nobody's.
      */

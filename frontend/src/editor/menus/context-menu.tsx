@@ -49,7 +49,7 @@ function offered(context: EditorContext): readonly (readonly EditAction[])[] {
     return [
       [editActions.details, editActions.connectTo, editActions.entry, editActions.exit],
       [copy, cut, duplicate, pasteHere],
-      [editActions.frame, editActions.zoomSelection, editActions.copyLink],
+      [editActions.frame, editActions.zoomSelection, editActions.copyLink, editActions.packages],
       [remove, heal],
     ];
   }
@@ -131,6 +131,8 @@ export function ContextMenu({ context, screen, onClose }: Props) {
               return (
                 <Menu.Item
                   key={editAction.name}
+                  // It would close what has been opened meanwhile in its stead.
+                  closeMenuOnClick={false}
                   leftSection={<Sign size={16} aria-hidden />}
                   rightSection={<FirstShortcut editAction={editAction} />}
                   onClick={() => {

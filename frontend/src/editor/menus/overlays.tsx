@@ -15,6 +15,9 @@ const CommandPalette = lazyPart(() =>
 );
 const ContextMenu = lazyPart(() => import("./context-menu").then((part) => part.ContextMenu));
 const GraphPrint = lazyPart(() => import("./graph-print").then((part) => part.GraphPrint));
+const PackagesDialog = lazyPart(() =>
+  import("../../packages/packages-dialog").then((part) => part.PackagesDialog),
+);
 const ShortcutSheet = lazyPart(() => import("./shortcut-sheet").then((part) => part.ShortcutSheet));
 
 interface Props {
@@ -60,6 +63,8 @@ function Opened({ context, known, overlay, onClose }: Props) {
       return <RetargetDialog context={context} {...overlay} onClose={onClose} />;
     case "menu":
       return <ContextMenu context={context} screen={overlay.screen} onClose={onClose} />;
+    case "packages":
+      return <PackagesDialog context={context} {...overlay} onClose={onClose} />;
     case "palette":
       return <CommandPalette context={context} onClose={onClose} />;
     case "keys":

@@ -1,0 +1,43 @@
+/** C++ packages of a graph's actions, as the editor answers them. */
+import { useQuery } from "@tanstack/react-query";
+import { fetchJson } from "./http";
+import { serverPath } from "./page-url";
+import type { EditorApi } from "./schema/editor";
+
+export type PackageList = EditorApi["PackageList"];
+export type PackageOutline = EditorApi["PackageOutline"];
+export type PackageRefusal = EditorApi["PackageRefusal"];
+type PackageContents = EditorApi["PackageContents"];
+
+const below = (graph: string) => `/api/graphs/${encodeURIComponent(graph)}/packages`;
+
+/** The packages that the graph has now, and why some actions have none. */
+export function usePackages(graph: string) {
+  return useQuery({
+    queryKey: ["packages", graph],
+    queryFn: ({ signal }) => fetchJson<PackageList>(below(graph), { signal }),
+    // Once opened it stays the packages of one moment, and what is downloaded is what was seen.
+    staleTime: 0,
+    gcTime: 0,
+    refetchOnWindowFocus: false,
+    refetchOnReconnect: false,
+  });
+}
+
+/** The files of one package, as the graph was after its change `seq`. */
+export function usePackage(graph: string, seq: number, name: string) {
+  return useQuery({
+    queryKey: ["packages", graph, seq, name],
+    queryFn: ({ signal }) =>
+      fetchJson<PackageContents>(`${below(graph)}/${encodeURIComponent(name)}?at=${seq}`, {
+        signal,
+      }),
+    staleTime: Number.POSITIVE_INFINITY,
+  });
+}
+
+/** Where the browser gets one package from, or all of them. */
+export function packageDownload(graph: string, seq: number, name?: string): string {
+  const one = name === undefined ? "" : `&package=${encodeURIComponent(name)}`;
+  return serverPath(`${below(graph)}.zip?at=${seq}${one}`);
+}

@@ -1,0 +1,71 @@
+"""Routes of C++ packages: which a graph's actions have, what is in them, and all of them as a file."""
+
+from typing import Annotated
+
+from litestar import Response, get
+from litestar.params import QueryParameter
+from litestar.types import ControllerRouterHandler
+
+from action_assistant.editor.api.graphs import Seq
+from action_assistant.editor.interchange import action_packages
+from action_assistant.editor.interchange.action_packages import PackageContents, PackageList
+from action_assistant.editor.services import EditorState
+from action_assistant.editor.workers import encoded
+from action_assistant.web.server.openapi import FileBytes, answer
+
+Packages = Annotated[list[str] | None, QueryParameter(name="package", max_items=1000)]
+
+
+def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
+    """Everything about C++ packages. Nothing is stored."""
+
+    @get(
+        "/api/graphs/{graph_id:str}/packages",
+        summary="The C++ packages of a graph's actions, now or after its change `at`, and why some "
+        "have none",
+        operation_id="listPackages",
+    )
+    async def list_packages(graph_id: str, at: Seq | None = None) -> PackageList:
+        services = app_state.services
+        await services.catalogue.require(graph_id)
+        sight = await services.graph_reader.moment(graph_id, at)
+        found: PackageList = encoded(await services.workers.files(action_packages.listed, sight))
+        return found
+
+    @get(
+        "/api/graphs/{graph_id:str}/packages/{package:str}",
+        summary="The files of one of these packages",
+        operation_id="getPackage",
+    )
+    async def get_package(graph_id: str, package: str, at: Seq | None = None) -> PackageContents:
+        services = app_state.services
+        await services.catalogue.require(graph_id)
+        sight = await services.graph_reader.moment(graph_id, at)
+        made = await services.workers.files(action_packages.contents, sight, package)
+        found: PackageContents = encoded(made)
+        return found
+
+    @get(
+        "/api/graphs/{graph_id:str}/packages.zip",
+        summary="These packages, or all that there are, as a ZIP file",
+        operation_id="downloadPackages",
+        responses={200: answer(FileBytes, media="application/zip")},
+    )
+    async def download_packages(
+        graph_id: str, at: Seq | None = None, packages: Packages = None
+    ) -> Response[bytes]:
+        services = app_state.services
+        await services.catalogue.require(graph_id)
+        sight = await services.graph_reader.moment(graph_id, at)
+        made = await services.workers.files(action_packages.archive, sight, packages or [])
+        name = f"{packages[0]}.zip" if packages and len(packages) == 1 else "action_packages.zip"
+        return Response(
+            made,
+            media_type="application/zip",
+            headers={
+                "content-disposition": f'attachment; filename="{name}"',
+                "x-seq": str(sight.seq),
+            },
+        )
+
+    return [list_packages, get_package, download_packages]

@@ -1,0 +1,123 @@
+"""C++ packages of the actions that a graph has, as routes answer them. For workers."""
+
+import io
+import zipfile
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+import msgspec
+
+from action_assistant.editor.documents.contents import GraphAtSeq, read
+from action_assistant.errors import NotFound
+from action_assistant.umrf.model import Action, Graph
+from action_assistant.umrf.packages.choosing import disagreements, distinct_actions
+from action_assistant.umrf.packages.generating import ImpossiblePackage, package_files
+from action_assistant.umrf.packages.naming import check_names, snake_case
+
+_LONG_AGO: Final = (1980, 1, 1, 0, 0, 0)  # what says no time gives the same archive each time
+_MODE: Final = 0o100644 << 16
+
+
+class PackageOutline(msgspec.Struct, frozen=True):
+    """A package that can be made: of which action, its name, its files (with `/`)."""
+
+    action: str
+    package: str
+    files: tuple[str, ...]
+
+
+class PackageRefusal(msgspec.Struct, frozen=True):
+    """Why an action has no package. `place`: its name, and below it a JSON pointer."""
+
+    action: str
+    place: str
+    reason: str
+
+
+class PackageList(msgspec.Struct, frozen=True):
+    """The packages of a graph after its change `seq`: one for each name of an action."""
+
+    seq: int
+    packages: tuple[PackageOutline, ...]
+    refusals: tuple[PackageRefusal, ...]
+
+
+class PackageFile(msgspec.Struct, frozen=True):
+    """A file of a package."""
+
+    path: str
+    text: str
+
+
+class PackageContents(msgspec.Struct, frozen=True):
+    """All files of the package of an action."""
+
+    seq: int
+    action: str
+    package: str
+    files: tuple[PackageFile, ...]
+
+
+def listed(sight: GraphAtSeq) -> bytes:
+    """JSON of a `PackageList`."""
+    graph = read(sight).moment.graph
+    refusals = tuple(dict.fromkeys(_refusals(graph)))
+    refused = {refusal.action for refusal in refusals}
+    packages = tuple(
+        PackageOutline(action.name, snake_case(action.name), tuple(package_files(action)))
+        for action in distinct_actions(graph)
+        if action.name not in refused
+    )
+    return msgspec.json.encode(PackageList(sight.seq, packages, refusals))
+
+
+def contents(sight: GraphAtSeq, package: str) -> bytes:
+    """JSON of `PackageContents`. Raises NotFound."""
+    action = _chosen(sight, (package,))[0]
+    files = tuple(
+        PackageFile(path, content.decode()) for path, content in package_files(action).items()
+    )
+    return msgspec.json.encode(PackageContents(sight.seq, action.name, package, files))
+
+
+def archive(sight: GraphAtSeq, packages: Sequence[str]) -> bytes:
+    """A ZIP file with a folder for each of these packages; of all that can be made if none is named.
+    The same bytes for the same actions. Raises NotFound."""
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as file:
+        for action in _chosen(sight, packages):
+            for path, content in package_files(action).items():
+                entry = zipfile.ZipInfo(f"{snake_case(action.name)}/{path}", _LONG_AGO)
+                entry.compress_type = zipfile.ZIP_DEFLATED
+                entry.external_attr = _MODE
+                file.writestr(entry, content)
+    return packed.getvalue()
+
+
+def _chosen(sight: GraphAtSeq, packages: Sequence[str]) -> tuple[Action, ...]:
+    """The actions of packages that can be made, in the order of the graph. Raises NotFound."""
+    graph = read(sight).moment.graph
+    refused = {refusal.action for refusal in _refusals(graph)}
+    able = {
+        snake_case(action.name): action
+        for action in distinct_actions(graph)
+        if action.name not in refused
+    }
+    missing = [package for package in packages if package not in able]
+    if missing:
+        raise NotFound(f"No action of this graph has a package “{missing[0]}”.")
+    if not able:
+        raise NotFound("No action of this graph has a package.")
+    return tuple(able[package] for package in dict.fromkeys(packages or able))
+
+
+def _refusals(graph: Graph) -> Iterator[PackageRefusal]:
+    actions = distinct_actions(graph)
+    for about in (*check_names(action.name for action in actions), *disagreements(graph)):
+        yield PackageRefusal(about.place, about.place, about.reason)
+    for action in actions:
+        try:
+            package_files(action)
+        except ImpossiblePackage as error:
+            for each in error.refusals:
+                yield PackageRefusal(action.name, each.place, each.reason)
