@@ -48,10 +48,20 @@ def _siblings(drawn: list[tuple[str, Any]]) -> dict[str, Any]:
     return {f"{key}q{index}": value for index, (key, value) in enumerate(drawn)}
 
 
+def _allowing(kind: str, values: st.SearchStrategy[Any]) -> st.SearchStrategy[dict[str, Any]]:
+    return st.lists(values, max_size=2).map(
+        lambda allowed: {"pvf_type": kind, "pvf_allowed_values": allowed}
+    )
+
+
+leaves: st.SearchStrategy[dict[str, Any]] = st.one_of(
+    kinds.map(lambda kind: {"pvf_type": kind}),
+    _allowing("string", hostile_texts),
+    _allowing("number", st.floats(allow_nan=False, allow_infinity=False)),
+    _allowing("bool", st.booleans()),
+)
 groups: st.SearchStrategy[dict[str, Any]] = st.recursive(
-    st.lists(st.tuples(keys, kinds.map(lambda kind: {"pvf_type": kind})), max_size=4).map(
-        _siblings
-    ),
+    st.lists(st.tuples(keys, leaves), max_size=4).map(_siblings),
     lambda inner: st.lists(st.tuples(keys, inner), max_size=3).map(_siblings),
     max_leaves=12,
 )

@@ -106,6 +106,9 @@ def test_a_text_of_one_language_is_none_of_another() -> None:
         ({"a": 5}, "`pvf_type`"),
         ({"a": {"pvf_type": 5}}, "`pvf_type`"),
         ({"a": {"pvf_type": "geometry_msgs/Pose", "pvf_value": 5}}, "reads no value of the type"),
+        ({"a": {"pvf_type": "Pose", "pvf_allowed_values": [5]}}, "reads no value of the type"),
+        ({"a": {"pvf_type": "number", "pvf_value": "5"}}, "a value that is no number"),
+        ({"a": {"pvf_type": "bool", "pvf_allowed_values": [True, 1]}}, "a value that is no bool"),
     ],
 )
 def test_parameters_that_cannot_be_are_named_with_the_reason(
@@ -117,6 +120,34 @@ def test_parameters_that_cannot_be_are_named_with_the_reason(
         (refusal,) = error.value.refusals
         assert refusal.place.startswith(f"TaTry/{side}/")
         assert words in refusal.reason
+
+
+@pytest.mark.parametrize(
+    ("kind", "allowed", "initial"),
+    [
+        ("string", ['*/ "yes"', "no"], '{"*/ \\"yes\\""}'),
+        ("string", ["ends \x00 in C++", "whole"], '{"whole"}'),
+        ("number", [2, 0.1], "{2.0}"),
+        ("number", [-1e300], "{-1e+300}"),
+        ("bool", [True], "{true}"),
+        ("string", [], "{}"),
+        ("strings", [], "{}"),
+    ],
+)
+def test_an_output_is_its_first_allowed_value_until_the_action_says_otherwise(
+    kind: str, allowed: list[object], initial: str
+) -> None:
+    both = {"x": {"pvf_type": kind, "pvf_allowed_values": allowed}}
+    files = package_files(described(input_parameters=both, output_parameters=both))
+    assert f" x{initial};" in files["include/ta_try/output_parameters.hpp"].decode()
+    assert " x{};" in files["include/ta_try/input_parameters.hpp"].decode()
+
+
+def test_a_list_with_allowed_values_is_no_output() -> None:
+    listed = {"a": {"pvf_type": "numbers", "pvf_allowed_values": [[1.5]]}}
+    assert package_files(described(input_parameters=listed))
+    with pytest.raises(ImpossiblePackage, match="no list as an output"):
+        package_files(described(output_parameters=listed))
 
 
 def graph(*actions: dict[str, object]) -> str:

@@ -34,10 +34,11 @@ def with_text(text: str) -> Action:
     """A text in every place that takes one."""
     key = text.replace(":", "") or "key"
     leaf: dict[str, Any] = {"pvf_type": f"{text} type"}
+    chosen = {"pvf_type": "string", "pvf_allowed_values": [text]}
     return described(
         description=f"x{text}",
         input_parameters={key: {key: {"pvf_type": "number"}}, f"{key}q": leaf},
-        output_parameters={key: leaf},
+        output_parameters={key: leaf, f"{key}q": chosen},
     )
 
 

@@ -4,6 +4,7 @@ What stands in a template is ours; what is put into it was written by anybody. A
 but the types that its language lists, so a text that no filter has made safe cannot get into a file.
 """
 
+import math
 import re
 from collections.abc import Callable
 from typing import Any, Final
@@ -49,6 +50,12 @@ class CppString(SafeText):
     __slots__ = ()
 
 
+class CppInitial(SafeText):
+    """What a member is at first, in braces."""
+
+    __slots__ = ()
+
+
 class CppComment(SafeText):
     """What stands inside `/* */`, or after `//` where it has one line."""
 
@@ -87,7 +94,7 @@ class Blanks(SafeText):
 
 #: What templates of each language take.
 ACCEPTED: Final[dict[str, tuple[type[SafeText], ...]]] = {
-    "cpp": (CppName, CppType, CppString, CppComment, PackageName, Blanks),
+    "cpp": (CppName, CppType, CppString, CppInitial, CppComment, PackageName, Blanks),
     "cmake": (CMakeString, PackageName),
     "xml": (XmlText, PackageName),
     "markdown": (MarkdownText, PackageName),
@@ -117,6 +124,17 @@ def cpp_string(text: str) -> CppString:
 
     escaped = text.translate(_CPP_ESCAPES).replace("\t", "\\t").replace("\n", "\\n")
     return CppString(f'"{_CONTROLS.sub(octal, escaped)}"')
+
+
+def cpp_initial(value: str | float | bool | None) -> CppInitial:
+    """Empty braces for None. Raises ValueError for numbers that are none."""
+    if isinstance(value, str):
+        return CppInitial(f"{{{cpp_string(value)}}}")
+    if isinstance(value, bool) or value is None:
+        return CppInitial("{}" if value is None else f"{{{value}}}".lower())
+    if not math.isfinite(value):
+        raise ValueError(f"no literal: {value!r}")
+    return CppInitial(f"{{{float(value)!r}}}")
 
 
 def cpp_comment(text: str, indent: int = 0) -> CppComment:

@@ -97,6 +97,7 @@ def environment(language: str) -> Environment:
         "cpp_name": escapes.cpp_name,
         "cpp_type": escapes.cpp_type,
         "cpp_string": escapes.cpp_string,
+        "cpp_initial": escapes.cpp_initial,
         "cpp_comment": escapes.cpp_comment,
         "package_name": escapes.package_name,
         "cmake": escapes.cmake,

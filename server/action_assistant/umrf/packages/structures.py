@@ -1,14 +1,15 @@
 """Parameters of an action as C++ has them: structs in structs, a member for each value."""
 
+import math
 from collections.abc import Iterator
 from typing import Final, Literal, TypeAlias
 
 import msgspec
 
-from action_assistant.umrf.json.text import Json, parse_small
+from action_assistant.umrf.json.text import Json, Number, parse_small
 from action_assistant.umrf.model import Action, Parameter
 from action_assistant.umrf.packages.naming import NameRefusal, member_name
-from action_assistant.umrf.parameters import MAX_PATH, flat_name, keys_of
+from action_assistant.umrf.parameters import MAX_PATH, fits, flat_name, keys_of
 
 Field: TypeAlias = Literal["input_parameters", "output_parameters"]
 
@@ -26,12 +27,13 @@ OPAQUE: Final = "boost::any"
 
 class StructValue(msgspec.Struct, frozen=True):
     """One parameter. `flat`: its name in the engine (`pose::x`); `access`: below the outermost struct
-    (`pose.x`); `kind` as in the file."""
+    (`pose.x`); `kind` as in the file. `initial`: what it is until somebody says otherwise; None: empty."""
 
     flat: str
     access: str
     kind: str
     required: bool
+    initial: str | float | bool | None = None
 
     @property
     def cpp_type(self) -> str:
@@ -80,6 +82,7 @@ class _StructReader:
         self.values: list[StructValue] = []
         self.refusals: list[NameRefusal] = []
         self.place = f"{action.name}/{field}"
+        self.gives = field == "output_parameters"
 
     def refuse(self, path: str, reason: str) -> None:
         self.refusals.append(NameRefusal(f"{self.place}/{path}", reason))
@@ -88,7 +91,7 @@ class _StructReader:
         keys, leaf = keys_of(parameter.path), parse_small(parameter.text)
         if leaf == {}:
             return  # an empty group has nothing in it
-        reason = _against(keys, leaf)
+        reason = _against(keys, leaf) or (_against_output(leaf) if self.gives else None)
         if reason is not None:
             self.refuse(parameter.path, reason)
             return
@@ -105,6 +108,7 @@ class _StructReader:
             access=".".join(names),
             kind=str(leaf["pvf_type"]),
             required=leaf.get("pvf_required") is not False,
+            initial=_first_allowed(leaf) if self.gives else None,
         )
         other, there = group.members.setdefault(names[-1], (keys[-1], value))
         if there is not value:
@@ -161,6 +165,33 @@ def _against(keys: tuple[str, ...], leaf: Json) -> str | None:
     kind = leaf.get("pvf_type") if isinstance(leaf, dict) else None
     if not isinstance(leaf, dict) or not isinstance(kind, str) or not kind or "\x00" in kind:
         return "It has no `pvf_type` that is a text; the engine refuses the file."
-    if kind not in CPP_TYPES and "pvf_value" in leaf:
+    values = [*_allowed(leaf), *([leaf["pvf_value"]] if "pvf_value" in leaf else [])]
+    if kind not in CPP_TYPES and values:
         return f"The engine reads no value of the type “{kind}”, and refuses the file that has one."
+    if not all(fits(kind, value) for value in values):
+        return f"It has a value that is no {kind}; the engine refuses the file."
+    return None
+
+
+def _against_output(leaf: Json) -> str | None:
+    """Engines compare single values alone, so that no list is among allowed ones."""
+    assert isinstance(leaf, dict)
+    if leaf["pvf_type"] in {"strings", "numbers", "bools"} and _allowed(leaf):
+        return "The engine takes no list as an output that has allowed values."
+    return None
+
+
+def _allowed(leaf: dict[str, Json]) -> list[Json]:
+    allowed = leaf.get("pvf_allowed_values")
+    return allowed if isinstance(allowed, list) else [] if allowed is None else [allowed]
+
+
+def _first_allowed(leaf: dict[str, Json]) -> str | float | bool | None:
+    """An engine aborts at the end of an action that leaves such an output without value, so there is
+    one from the beginning. A text with NUL would end there in C++."""
+    for value in _allowed(leaf):
+        if isinstance(value, bool) or (isinstance(value, str) and "\x00" not in value):
+            return value
+        if isinstance(value, Number) and math.isfinite(value.value):
+            return value.value
     return None

@@ -34,6 +34,7 @@ public:
     }
 
     // params_out.weight is a double
+    // params_out.unit is a std::string
     // params_out.stable is a bool
     // params_out.samples is a std::vector<double>
     return actionOk();

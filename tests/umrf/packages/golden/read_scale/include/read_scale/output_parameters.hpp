@@ -9,6 +9,7 @@ namespace read_scale_action
 struct output_parameters_t
 {
   double weight{};
+  std::string unit{"kg"};
   bool stable{};
   std::vector<double> samples{};
 };

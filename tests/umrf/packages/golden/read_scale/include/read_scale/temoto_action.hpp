@@ -14,6 +14,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
+#include <stdexcept>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -79,11 +80,19 @@ public:
   output_parameters_t params_out;
 
 private:
+  /// Hands out an output, also an empty one, since a graph that waits for one that never comes has no end.
+  /// One that the engine does not take is an error of an action that was not stopped: engines may abort
+  /// where it is waited for.
   void give(const std::string& name, const std::string& type, const boost::any& value)
   {
-    if (!value.empty() && !getUmrfNode().getOutputParametersNc().setParameter(name, type, value))
+    if (getUmrfNode().getOutputParametersNc().setParameter(name, type, value))
     {
-      writeLog("The engine did not take the output " + name + ".");
+      return;
+    }
+    writeLog("The engine did not take the output " + name + ".");
+    if (actionOk())
+    {
+      throw std::runtime_error("The engine did not take the output " + name + ".");
     }
   }
 
@@ -94,6 +103,7 @@ private:
   void setOutputParameters() override
   {
     give("weight", "number", boost::any(params_out.weight));
+    give("unit", "string", boost::any(params_out.unit));
     give("stable", "bool", boost::any(params_out.stable));
     give("samples", "numbers", boost::any(params_out.samples));
   }

@@ -15,6 +15,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
+#include <stdexcept>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -99,11 +100,19 @@ private:
     }
   }
 
+  /// Hands out an output, also an empty one, since a graph that waits for one that never comes has no end.
+  /// One that the engine does not take is an error of an action that was not stopped: engines may abort
+  /// where it is waited for.
   void give(const std::string& name, const std::string& type, const boost::any& value)
   {
-    if (!value.empty() && !getUmrfNode().getOutputParametersNc().setParameter(name, type, value))
+    if (getUmrfNode().getOutputParametersNc().setParameter(name, type, value))
     {
-      writeLog("The engine did not take the output " + name + ".");
+      return;
+    }
+    writeLog("The engine did not take the output " + name + ".");
+    if (actionOk())
+    {
+      throw std::runtime_error("The engine did not take the output " + name + ".");
     }
   }
 
