@@ -64,6 +64,11 @@ PARTS: Final[dict[str, Part]] = {
         {"FUZZ_EXAMPLES": "10000"},
         ("tests/fuzz",),
     ),
+    "packages": Part(
+        "500 generated packages and those of all real actions compiled, 5,000 texts in sources",
+        {"TEST_EXAMPLES": "12.5"},
+        ("-s", "tests/umrf/packages"),
+    ),
     "properties": Part(
         "20 times as many generated graphs, files, edits and histories for every property",
         {"TEST_EXAMPLES": "20"},
