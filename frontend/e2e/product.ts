@@ -1,6 +1,7 @@
 /** The real product for browser tests: `action-assistant serve` on free ports, killable at any moment. */
 
 import { type ChildProcess, execFile, spawn } from "node:child_process";
+import { randomInt } from "node:crypto";
 import { mkdtempSync, openSync, readFileSync, rmSync } from "node:fs";
 import { createServer } from "node:net";
 import { tmpdir } from "node:os";
@@ -190,17 +191,16 @@ async function answers(url: string): Promise<boolean> {
   }
 }
 
-/** The first of two neighbouring ports that nobody listens on. */
+/**
+ * The first of two neighbouring ports that nobody listens on. Of those that the system hands out to
+ * whoever connects, any may be taken again while the product is away.
+ */
 async function freePorts(): Promise<number> {
   for (;;) {
-    const first = await listen(0);
-    const port = first.port;
-    const second = await listen(port + 1).catch(() => undefined);
-    await first.close();
-    if (second !== undefined) {
-      await second.close();
-      return port;
-    }
+    const port = 10_000 + 2 * randomInt(11_000);
+    const held = await Promise.allSettled([listen(port), listen(port + 1)]);
+    for (const each of held) if (each.status === "fulfilled") await each.value.close();
+    if (held.every(({ status }) => status === "fulfilled")) return port;
   }
 }
 
