@@ -18,6 +18,8 @@ const CALM = 0.12;
 /** Where what runs comes to stand: graphs go on to the right and down, and the view shall rest there. */
 const AIM = { x: 0.26, y: 0.36 };
 const GLIDE = 400; // ms
+/** What counts as standing at an edge: the view that was aimed at may be off by a rounding. */
+const SLACK = 0.5; // px
 
 /** The actions that run, the latest first; what lies in a folded frame is where its block is. */
 export function runningKeys(
@@ -37,9 +39,10 @@ export function followingViewport(box: Bounds, frame: FrameRoom, view: Viewport)
   const [width, height] = [box.width * zoom, box.height * zoom];
   const [left, top] = [box.x * zoom + view.x, box.y * zoom + view.y];
   const calm = { x: frame.width * CALM, y: frame.height * CALM };
-  const within = (from: number, size: number, edge: number, room: number) =>
-    from >= Math.min(edge, (room - size) / 2) &&
-    from + size <= room - Math.min(edge, (room - size) / 2);
+  const within = (from: number, size: number, calm: number, room: number) => {
+    const edge = Math.min(calm, (room - size) / 2) - SLACK;
+    return from >= edge && from + size <= room - edge;
+  };
   const seen =
     within(left, width, calm.x, frame.width) && within(top, height, calm.y, frame.height);
   if (seen) return null;
