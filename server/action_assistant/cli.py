@@ -33,7 +33,9 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
     "check": CommandEntry("files", "say what is wrong with UMRF files; exit 1 if any has an error"),
     "convert": CommandEntry("files", "print a file of any dialect as canonical UMRF"),
     "simulate": CommandEntry("files", "run a file in the simulator, without a server or a robot"),
-    "package": CommandEntry("package", "write C++ packages of actions, as the engine loads them"),
+    "package": CommandEntry(
+        "packages.package", "write C++ packages of actions, as the engine loads them"
+    ),
     "import": CommandEntry("remote", "bring UMRF files in as graphs", described=True),
     "export": CommandEntry("remote", "print a graph as UMRF", described=True),
     "graphs": CommandEntry("remote", "list the graphs", described=True),

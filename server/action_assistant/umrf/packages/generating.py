@@ -29,6 +29,10 @@ _FILES: Final = {
 }
 
 
+#: Where sources lie that are written once, for people to go on with.
+_SOURCES: Final = ("src/", "test/")
+
+
 class ImpossiblePackage(Exception):
     """There can be no package of the action; `refusals` say why."""
 
@@ -61,6 +65,16 @@ def package_files(action: Action) -> dict[str, bytes]:
     }
     found[f"{package}.umrf.json"] = write_action(_described(action)).encode()
     return dict(sorted(found.items()))
+
+
+def possible_files(package: str) -> frozenset[str]:
+    """All paths that `package_files` may have for a package of this name."""
+    return frozenset(path.format(package) for path in (*_FILES, "{}.umrf.json"))
+
+
+def is_source(path: str) -> bool:
+    """Whether what is generated there is a beginning, which people go on with."""
+    return path.startswith(_SOURCES)
 
 
 def _wanted(template: str, inputs: ParameterStruct, outputs: ParameterStruct) -> bool:

@@ -1,13 +1,21 @@
 """The command `package`: C++ packages of the actions that a file describes."""
 
 import argparse
-import difflib
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from action_assistant.commands.package_folder import FolderComparison, compared, write_new
+from action_assistant.commands.packages import workspace
+from action_assistant.commands.packages.folder import write_all
+from action_assistant.commands.packages.planning import PackagesPlan, plan
+from action_assistant.commands.packages.telling import (
+    print_difference,
+    tell_changes,
+    tell_notes,
+    tell_refusals,
+    tell_refused,
+)
 from action_assistant.errors import CannotStart
 from action_assistant.safe_text import one_line
 from action_assistant.umrf.files import codec
@@ -21,18 +29,18 @@ from action_assistant.umrf.packages.naming import NameRefusal, check_names, snak
 def _add_package(package: argparse.ArgumentParser) -> None:
     package.epilog = "example: action-assistant package open_gripper.umrf.json --output ~/ws/src"
     package.add_argument("file", type=Path, metavar="FILE", help="of one action, or a graph")
-    package.add_argument(
-        "--output",
-        type=Path,
-        required=True,
-        metavar="DIR",
-        help="in which each package has a folder",
+    place = package.add_mutually_exclusive_group(required=True)
+    place.add_argument(
+        "--output", type=Path, metavar="DIR", help="in which each package has a folder"
+    )
+    place.add_argument(
+        "--into", type=Path, metavar="DIR", help="the same, of a colcon workspace: its src"
     )
     package.add_argument(
         "--name", nargs="+", metavar="NAME", help="of a graph's actions: these only"
     )
     package.add_argument(
-        "--diff", action="store_true", help="show what would change, and write nothing"
+        "--diff", action="store_true", help="show what would be written, and write nothing"
     )
     package.add_argument(
         "--check", action="store_true", help="write nothing; exit 1 if anything would change"
@@ -50,19 +58,31 @@ def _package(options: argparse.Namespace) -> int:
         place = f"{options.file}:{error.line}:{error.column}"
         print(f"{place}: {error.message}", file=sys.stderr)
         return 1
-    files, more = _files(actions)
+    packages, more = _packages(actions)
     if refusals := (*refusals, *more):
         for refusal in dict.fromkeys(refusals):
             print(f"{options.file}: {one_line(refusal.sentence)}", file=sys.stderr)
         return 1
-    found = compared(options.output, files)
-    if options.diff:
-        _print_difference(files, found)
+    root = options.into or options.output
+    duplicates = () if options.into is None else workspace.against(options.into, packages)
+    for sentence in duplicates:
+        print(one_line(sentence), file=sys.stderr)
+    return 1 if duplicates else _regenerated(root, plan(root, packages), options)
+
+
+def _regenerated(root: Path, found: PackagesPlan, options: argparse.Namespace) -> int:
+    writing = not options.diff and not options.check
+    tell_refusals(root, found)
     if options.check:
-        return _checked(options.output, found)
+        tell_changes(root, found)
+    if writing and not found.refused:
+        return _written(root, found)
+    tell_notes(root, found, with_lines=False)
     if options.diff:
-        return 1 if _told_barred(options.output, found) else 0
-    return _written(options.output, files, found)
+        print_difference(found)
+    if writing:
+        tell_refused(found)
+    return 1 if found.refused or (options.check and found.steps) else 0
 
 
 def _chosen(
@@ -92,60 +112,25 @@ def _chosen(
     )
 
 
-def _files(actions: Sequence[Action]) -> tuple[dict[str, bytes], tuple[NameRefusal, ...]]:
-    """All files of all packages, each below the folder of its own; or what stands against them."""
-    files: dict[str, bytes] = {}
+def _packages(
+    actions: Sequence[Action],
+) -> tuple[dict[str, dict[str, bytes]], tuple[NameRefusal, ...]]:
+    """The files of all packages, by folder and path; or what stands against them."""
+    packages: dict[str, dict[str, bytes]] = {}
     refusals = list(check_names(action.name for action in actions))
     for action in actions:
         try:
-            made = package_files(action)
+            packages[snake_case(action.name)] = package_files(action)
         except ImpossiblePackage as error:
             refusals += error.refusals
-        else:
-            folder = snake_case(action.name)
-            files |= {f"{folder}/{path}": content for path, content in made.items()}
-    return files, tuple(refusals)
+    return packages, tuple(refusals)
 
 
-def _told_barred(root: Path, found: FolderComparison) -> bool:
-    for path, reason in found.barred.items():
-        print(f"{root / path}: {reason}.", file=sys.stderr)
-    return bool(found.barred)
-
-
-def _checked(root: Path, found: FolderComparison) -> int:
-    barred = _told_barred(root, found)
-    for path in found.missing:
-        print(f"{root / path}: is not there.", file=sys.stderr)
-    for path in found.changed:
-        print(f"{root / path}: differs.", file=sys.stderr)
-    return 1 if barred or found.missing or found.changed else 0
-
-
-def _written(root: Path, files: Mapping[str, bytes], found: FolderComparison) -> int:
-    barred = _told_barred(root, found)
-    for path in found.changed:
-        print(f"{root / path}: is there and differs; `--diff` shows how.", file=sys.stderr)
-    if barred or found.changed:
-        print("Nothing was written.", file=sys.stderr)
-        return 1
-    write_new(root, {path: files[path] for path in found.missing})
-    for path in found.missing:
+def _written(root: Path, found: PackagesPlan) -> int:
+    write_all(root, found.steps, found.there)
+    for path in found.writes:
         print(root / path)
+    for path in found.removals:
+        print(f"{root / path}: is no longer generated, and was removed.", file=sys.stderr)
+    tell_notes(root, found, with_lines=True)
     return 0
-
-
-def _print_difference(files: Mapping[str, bytes], found: FolderComparison) -> None:
-    """As `diff -u` prints it; files that are not there are compared with `/dev/null`."""
-    for path in sorted({*found.missing, *found.changed}):
-        there = found.changed.get(path)
-        lines = difflib.unified_diff(
-            (there or b"").decode(errors="replace").splitlines(keepends=True),
-            files[path].decode().splitlines(keepends=True),
-            "/dev/null" if there is None else f"a/{path}",
-            f"b/{path}",
-        )
-        for line in lines:
-            sys.stdout.write(
-                line if line.endswith("\n") else f"{line}\n\\ No newline at end of file\n"
-            )

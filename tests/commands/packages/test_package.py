@@ -1,6 +1,5 @@
 """`package`, as a person or a script runs it."""
 
-import json
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -9,12 +8,8 @@ from typing import Any
 import pytest
 
 from action_assistant.cli import main
+from commands.packages.trees import ONE, everything
 
-ONE: dict[str, Any] = {
-    "name": "OpenGripper",
-    "type": "sync",
-    "input_parameters": {"width": {"pvf_type": "number"}},
-}
 GRAPH: dict[str, Any] = {
     "graph_name": "g",
     "graph_entry": [{"name": "Look"}],
@@ -24,27 +19,6 @@ GRAPH: dict[str, Any] = {
         {"name": "Grasp", "type": "sync", "parents": [{"name": "Look"}]},
     ],
 }
-
-
-@pytest.fixture
-def package(tmp_path: Path) -> Callable[..., int]:
-    """Runs the command on a description; packages go into `out`."""
-
-    def run(value: object, *options: str) -> int:
-        path = tmp_path / "given.json"
-        path.write_text(value if isinstance(value, str) else json.dumps(value))
-        return main(["package", str(path), "--output", str(tmp_path / "out"), *options])
-
-    return run
-
-
-def everything(folder: Path) -> dict[str, bytes]:
-    """Contents of all files below, by path."""
-    return {
-        str(path.relative_to(folder)): path.read_bytes()
-        for path in folder.rglob("*")
-        if path.is_file() and not path.is_symlink()
-    }
 
 
 def test_a_package_is_written_and_every_file_named(
@@ -70,20 +44,21 @@ def test_what_is_there_already_is_left_and_not_told(
     assert (tmp_path / "out/open_gripper/own.cpp").read_text() == "mine"
 
 
-def test_a_file_that_differs_is_named_and_nothing_is_written(
+def test_a_file_that_differs_from_what_nobody_remembers_is_named_and_nothing_is_written(
     package: Callable[..., int], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    package(ONE)
     source = tmp_path / "out/open_gripper/src/open_gripper.cpp"
+    source.parent.mkdir(parents=True)
     source.write_text("// work of a person\n")
-    (tmp_path / "out/open_gripper/README.md").unlink()
     before = everything(tmp_path / "out")
-    capsys.readouterr()
     assert package(ONE) == 1
+    assert package(ONE, "--check") == 1
     assert everything(tmp_path / "out") == before
     told = capsys.readouterr()
     assert f"{source}: is there and differs" in told.err
     assert told.out == ""
+    assert package(ONE, "--diff") == 1
+    assert "-// work of a person\n+#include" in capsys.readouterr().out
 
 
 def test_diff_shows_what_would_change_and_writes_nothing(
@@ -93,14 +68,15 @@ def test_diff_shows_what_would_change_and_writes_nothing(
     assert not (tmp_path / "out").exists()
     assert "--- /dev/null\n+++ b/open_gripper/CMakeLists.txt\n" in capsys.readouterr().out
     package(ONE)
-    source = tmp_path / "out/open_gripper/src/open_gripper.cpp"
-    source.write_text("// work of a person")
+    readme = tmp_path / "out/open_gripper/README.md"
+    readme.write_text("words of a person")
     capsys.readouterr()
     assert package(ONE, "--diff") == 0
-    shown = capsys.readouterr().out
-    assert "-// work of a person\n\\ No newline at end of file\n+#include" in shown
-    assert "CMakeLists" not in shown
-    assert source.read_text() == "// work of a person"
+    assert capsys.readouterr().out == ""
+    (tmp_path / "out/open_gripper/package.xml").unlink()
+    assert package(ONE, "--diff") == 0
+    assert "--- /dev/null\n+++ b/open_gripper/package.xml\n" in capsys.readouterr().out
+    assert not (tmp_path / "out/open_gripper/package.xml").exists()
 
 
 def test_check_says_whether_anything_would_change(
@@ -110,13 +86,13 @@ def test_check_says_whether_anything_would_change(
     assert not (tmp_path / "out").exists()
     package(ONE)
     assert package(ONE, "--check") == 0
-    source = tmp_path / "out/open_gripper/src/open_gripper.cpp"
-    source.write_text("// work of a person\n")
+    readme = tmp_path / "out/open_gripper/README.md"
+    readme.unlink()
     capsys.readouterr()
     assert package(ONE, "--check", "--diff") == 1
     told = capsys.readouterr()
-    assert f"{source}: differs." in told.err
-    assert "-// work of a person" in told.out
+    assert told.err == f"{readme}: is not there.\n"
+    assert "+# open_gripper" in told.out
 
 
 def test_a_graph_gives_a_package_for_each_action_or_for_those_named(
