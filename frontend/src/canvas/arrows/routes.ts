@@ -107,7 +107,9 @@ class Routing {
   routed(known: Ways): Routed {
     const { raster } = this;
     if (!raster) return { lines: simpleLines(this.scene), ways: new Map(), searched: 0 };
-    const fresh = this.tasks.filter((task) => !this.keeps(task, known.get(task.dock.line.id)));
+    const fresh = this.allStand(known)
+      ? []
+      : this.tasks.filter((task) => !this.keeps(task, known.get(task.dock.line.id)));
     const between = (start: number, end: number) =>
       Math.abs((start % raster.width) - (end % raster.width)) +
       Math.abs(Math.floor(start / raster.width) - Math.floor(end / raster.width));
@@ -156,17 +158,37 @@ class Routing {
     return cells !== null && cells.length === 2;
   }
 
-  /** Takes a way that is known, if nothing stands on it now. */
+  /** Takes all ways where nothing has changed: also those on others for which there was no room, or
+   * they would be looked for again, and might turn out otherwise, without anybody having moved anything. */
+  private allStand(known: Ways): boolean {
+    if (known.size !== this.tasks.length) return false;
+    const found = this.tasks.map((task) => {
+      const way = known.get(task.dock.line.id);
+      const corners = way && this.standing(task, way);
+      return way && corners ? { task, way, corners } : null;
+    });
+    if (found.includes(null)) return false;
+    for (const each of found) if (each) this.put(each.task, each.corners, each.way);
+    return true;
+  }
+
+  /** Takes a way that is known, if nothing stands or lies on it now. */
   private keeps(task: Task, way: Way | undefined): boolean {
-    const { raster } = this;
-    if (!raster || way?.ends !== this.endsNow(task)) return false;
-    const corners = way.corners.map(([column, row]) => raster.cellAt(column, row));
-    if (corners.includes(-1) || this.nearness(corners) > way.near) return false;
+    const corners = way && this.standing(task, way);
+    if (!corners) return false;
     this.put(task, corners, way);
     if (!this.liesOnOther(task)) return true;
     this.mark(task, -1);
     task.cells = null;
     return false;
+  }
+
+  /** The corners of a way, if its ends are as they were and no card came nearer to it. */
+  private standing(task: Task, way: Way): number[] | null {
+    const { raster } = this;
+    if (!raster || way.ends !== this.endsNow(task)) return null;
+    const corners = way.corners.map(([column, row]) => raster.cellAt(column, row));
+    return corners.includes(-1) || this.nearness(corners) > way.near ? null : corners;
   }
 
   /** Its ends, and which of its waypoints it can visit. */

@@ -101,7 +101,8 @@ test("the same bent lines are found again, and kept while nothing moves", () => 
       expect(routed(structuredClone(given)).lines).toEqual(first.lines);
       expect(routed(given, first.ways).lines).toEqual(first.lines);
     }),
-    { numRuns: 8 },
+    // Of these some lines lie on others, since there is no more room.
+    { numRuns: 8, examples: [[363461999, "right"] as const] },
   );
 });
 
