@@ -16,6 +16,7 @@ from action_assistant.editor.api import (
     editor,
     graphs,
     invitations,
+    library,
     packages,
     room,
     versions,
@@ -136,6 +137,7 @@ def _routes(
         *versions.routes(app_state),
         *drawing.routes(app_state),
         *packages.routes(app_state),
+        *library.routes(app_state),
         *room.routes(app_state),
     ]
 

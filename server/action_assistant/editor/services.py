@@ -5,6 +5,7 @@ from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.catalogue.history import GraphHistory
 from action_assistant.editor.catalogue.invitations import Invitations
 from action_assistant.editor.catalogue.library import Library
+from action_assistant.editor.catalogue.library_edits import LibraryEdits
 from action_assistant.editor.catalogue.people import People
 from action_assistant.editor.catalogue.versions import Versions
 from action_assistant.editor.rooms.colours import PersonColours
@@ -43,6 +44,9 @@ class EditorServices:
         self.catalogue = Catalogue(journal, self.rooms, self.graph_reader, workers.files)
         self.versions = Versions(journal, self.graph_reader)
         self.library = Library(journal, self.graph_reader)
+        self.library_edits = LibraryEdits(
+            journal, self.rooms, self.graph_reader, self.catalogue, self.library, workers.files
+        )
         self.invitations = Invitations(journal, people, Keys.of(settings.data), revoked)
         self.history = GraphHistory(journal, people, self.versions)
 

@@ -8,7 +8,8 @@ from action_assistant.schema.log_tables import NAMES, log_tables
 
 EDITOR: Final = MetaData(naming_convention=NAMES)
 editor_event, editor_head, editor_snapshot = log_tables(EDITOR)
-#: A graph of the catalogue. `name` and `description` follow the document.
+#: A graph of the catalogue, or an action of the library (`kind`). `name` and `description` follow the
+#: document.
 graph: Final = Table(
     "graph",
     EDITOR,
@@ -18,6 +19,7 @@ graph: Final = Table(
     Column("made_at", BigInteger, nullable=False),
     Column("made_by", Text, nullable=False),
     Column("deleted_at", BigInteger),
+    Column("kind", Text, nullable=False, server_default="graph"),
 )
 #: A published version. Its UMRF stands in the body of the event `(stream, event_seq)`.
 version: Final = Table(

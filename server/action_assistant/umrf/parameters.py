@@ -77,6 +77,15 @@ def with_example(parameter: Parameter) -> Parameter:
     return Parameter(parameter.path, dump({**leaf, "pvf_value": value}))
 
 
+def without_value(parameter: Parameter) -> Parameter:
+    """The parameter as an action's file describes it, which gives no value to nodes of graphs."""
+    leaf = parse_small(parameter.text)
+    if not isinstance(leaf, dict) or "pvf_value" not in leaf:
+        return parameter
+    rest = {name: value for name, value in leaf.items() if name != "pvf_value"}
+    return Parameter(parameter.path, dump(rest))
+
+
 #: Types of which the engine reads values.
 NATIVE: Final = ("string", "number", "bool", "strings", "numbers", "bools")
 

@@ -12,10 +12,8 @@ from litestar.response import ServerSentEvent, ServerSentEventMessage
 from litestar.types import ControllerRouterHandler
 
 from action_assistant import paths
-from action_assistant.editor.interchange.action_uses import LibraryAction
 from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.services import EditorState
-from action_assistant.editor.workers import encoded
 from action_assistant.errors import BadInput
 from action_assistant.journal.events import Event
 from action_assistant.umrf.json.embedded import UmrfGraph
@@ -97,15 +95,6 @@ def routes(app_state: EditorState, addresses: Addresses) -> list[ControllerRoute
         ]
 
     @get(
-        "/api/actions",
-        summary="The actions that all graphs together know, by name",
-        operation_id="listActions",
-    )
-    async def list_actions() -> list[LibraryAction]:
-        known: list[LibraryAction] = encoded(await app_state.services.library.all())
-        return known
-
-    @get(
         "/api/events",
         summary="What is stored, as server-sent events; `after` and Last-Event-ID are positions",
         operation_id="followEvents",
@@ -122,7 +111,7 @@ def routes(app_state: EditorState, addresses: Addresses) -> list[ControllerRoute
             after = int(last)
         return ServerSentEvent(_told(app_state, after))
 
-    return [get_config, list_people, list_examples, list_actions, follow_events]
+    return [get_config, list_people, list_examples, follow_events]
 
 
 async def _told(app_state: EditorState, after: int | None) -> AsyncIterator[ServerSentEventMessage]:

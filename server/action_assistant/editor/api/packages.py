@@ -27,9 +27,11 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
     )
     async def list_packages(graph_id: str, at: Seq | None = None) -> PackageList:
         services = app_state.services
-        await services.catalogue.require(graph_id)
+        kind = await services.catalogue.require(graph_id)
         sight = await services.graph_reader.moment(graph_id, at)
-        found: PackageList = encoded(await services.workers.files(action_packages.listed, sight))
+        found: PackageList = encoded(
+            await services.workers.files(action_packages.listed, sight, kind)
+        )
         return found
 
     @get(
@@ -39,9 +41,9 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
     )
     async def get_package(graph_id: str, package: str, at: Seq | None = None) -> PackageContents:
         services = app_state.services
-        await services.catalogue.require(graph_id)
+        kind = await services.catalogue.require(graph_id)
         sight = await services.graph_reader.moment(graph_id, at)
-        made = await services.workers.files(action_packages.contents, sight, package)
+        made = await services.workers.files(action_packages.contents, sight, kind, package)
         found: PackageContents = encoded(made)
         return found
 
@@ -55,9 +57,9 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         graph_id: str, at: Seq | None = None, packages: Packages = None
     ) -> Response[bytes]:
         services = app_state.services
-        await services.catalogue.require(graph_id)
+        kind = await services.catalogue.require(graph_id)
         sight = await services.graph_reader.moment(graph_id, at)
-        made = await services.workers.files(action_packages.archive, sight, packages or [])
+        made = await services.workers.files(action_packages.archive, sight, kind, packages or [])
         name = f"{packages[0]}.zip" if packages and len(packages) == 1 else "action_packages.zip"
         return Response(
             made,

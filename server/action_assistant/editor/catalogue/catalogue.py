@@ -1,4 +1,4 @@
-"""The graphs that there are: made, imported, named, deleted and brought back."""
+"""The graphs that there are, and the documents of the library's actions: made, imported, named, deleted and brought back."""
 
 from datetime import datetime
 from typing import Any, Final
@@ -18,7 +18,7 @@ from action_assistant.journal.events import Addition, Draft
 from action_assistant.journal.journal import Journal
 from action_assistant.schema import editor_tables
 from action_assistant.umrf.check import check
-from action_assistant.umrf.model import Graph
+from action_assistant.umrf.model import Action, Graph
 from action_assistant.web.auth.keys import PersonRef
 from action_assistant.web.workers.lanes import RunInWorker, run_here
 
@@ -27,7 +27,8 @@ DESCRIPTION_LIMIT: Final = 10_000
 
 
 class GraphView(msgspec.Struct, frozen=True, omit_defaults=True):
-    """A graph as lists and pages show it. `seq` counts the changes of its document.
+    """A graph, or an action of the library, as lists and pages show it. `seq` counts the changes of its
+    document.
 
     `damaged`: the first change that cannot be read; the graph is what it was before, and nobody can
     change it. `people`: who is in it now. `problems` counts what the check found; `wrong` and
@@ -49,6 +50,7 @@ class GraphView(msgspec.Struct, frozen=True, omit_defaults=True):
     people: tuple[PersonRef, ...] = ()
     deleted_at: datetime | None = None
     damaged: int | None = None
+    kind: h.DocumentKind = "graph"
 
 
 class NewGraph(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -73,18 +75,23 @@ class Catalogue:
         self._rooms = rooms
         self._graph_reader = graph_reader
 
-    async def require(self, graph: str) -> None:
-        """Be sure that there is such a graph."""
-        await self._row(graph)
+    async def require(self, graph: str, kind: h.DocumentKind | None = None) -> h.DocumentKind:
+        """Be sure that there is such a document; what it is of."""
+        found: h.DocumentKind = (await self._row(graph, kind=kind)).kind
+        return found
 
     async def get(self, graph: str) -> GraphView:
         """One graph."""
         return await self._view(await self._row(graph))
 
-    async def all(self, *, deleted: bool = False) -> list[GraphView]:
-        """Every graph, the last changed first; or those that were deleted."""
+    async def all(
+        self, *, deleted: bool = False, kind: h.DocumentKind = "graph"
+    ) -> list[GraphView]:
+        """Every document of a kind, the last changed first; or those that were deleted."""
         gone = editor_tables.graph.c.deleted_at
-        chosen = _rows().where(gone.is_not(None) if deleted else gone.is_(None))
+        chosen = _rows().where(
+            editor_tables.graph.c.kind == kind, gone.is_not(None) if deleted else gone.is_(None)
+        )
         rows = await self._journal.query(chosen)
         views = [await self._view(row) for row in rows]
         return sorted(views, key=lambda view: view.updated_at, reverse=True)
@@ -99,7 +106,7 @@ class Catalogue:
             wanted = msgspec.json.decode(body, type=NewGraph)
         except (msgspec.DecodeError, RecursionError, UnicodeDecodeError):
             return await self.bring(body, author)
-        name, description = _fit(wanted.name, wanted.description)
+        name, description = fit(wanted.name, wanted.description)
         graph = Graph(name=name, description=description, direction="right")
         made = h.draft(h.CREATED, author, h.GraphCreated(name, description))
         about = info_of(graph, check(graph))
@@ -124,7 +131,7 @@ class Catalogue:
     ) -> GraphView:
         """Give a graph another name or description. It is an edit of its document."""
         row = await self._row(graph)
-        new_name, new_description = _fit(
+        new_name, new_description = fit(
             row.name if name is None else name,
             row.description if description is None else description,
         )
@@ -132,6 +139,7 @@ class Catalogue:
             await server_edits.rename(
                 room,
                 author,
+                kind=row.kind,
                 name=None if name is None else new_name,
                 description=None if description is None else new_description,
                 run_in_worker=self._run_in_worker,
@@ -151,6 +159,16 @@ class Catalogue:
             await self._journal.append(h.about_stream(graph), [h.draft(h.RECOVERED, author)])
         return await self.get(graph)
 
+    async def add_action(
+        self, action: Action, author: str, about: h.GraphCreated, file: bytes | None = None
+    ) -> GraphView:
+        """The document of an action of the library; with the file that it came from, if it did."""
+        graph = Graph(name=action.name, actions=(action,), direction="right")
+        drafts = [h.draft(h.CREATED, author, about)]
+        if file is not None:
+            drafts.append(Draft(h.IMPORTED, author, file))
+        return await self._add(changes.first(graph), info_of(graph, check(graph)), drafts, author)
+
     async def _add(
         self, update: bytes, of: GraphInfo, about: list[Draft], author: str
     ) -> GraphView:
@@ -165,16 +183,21 @@ class Catalogue:
         self._graph_reader.made(made, update, of)
         return await self.get(made)
 
-    async def _row(self, graph: str, *, deleted: bool = False) -> Row[Any]:
+    async def _row(
+        self, graph: str, *, deleted: bool = False, kind: h.DocumentKind | None = None
+    ) -> Row[Any]:
         rows = await self._journal.query(_rows().where(editor_tables.graph.c.id == graph))
         if not rows or (rows[0].deleted_at is not None and not deleted):
-            raise NotFound(f"There is no graph {graph!r}.")
+            raise NotFound(f"There is no {kind or 'graph'} {graph!r}.")
+        if kind not in {None, rows[0].kind}:
+            raise NotFound(f"{graph!r} is no {kind}; it is a {rows[0].kind}.")
         return rows[0]
 
     async def _view(self, row: Row[Any]) -> GraphView:
         summary = await self._graph_reader.summary(row.id, row.seq)
-        name = row.name if summary.name is None else summary.name
-        description = row.description if summary.description is None else summary.description
+        its_name, its_description = summary.called(row.kind)
+        name = row.name if its_name is None else its_name
+        description = row.description if its_description is None else its_description
         if (name, description) != (row.name, row.description):
             now = h.GraphDescribed(name, description, summary.seq)
             await self._journal.append(
@@ -198,6 +221,7 @@ class Catalogue:
             people=() if room is None else room.attendance.people(),
             deleted_at=None if row.deleted_at is None else h.when(row.deleted_at),
             damaged=summary.damaged,
+            kind=row.kind,
         )
 
 
@@ -214,7 +238,7 @@ def _rows() -> Select[Any]:
     return select(graph, last.scalar_subquery().label("seq"), at.scalar_subquery().label("at"))
 
 
-def _fit(name: str, description: str) -> tuple[str, str]:
+def fit(name: str, description: str) -> tuple[str, str]:
     name = name.strip()
     if not name or len(name) > NAME_LIMIT:
         raise BadInput(f"A name has 1 to {NAME_LIMIT} characters.", where={"path": "/name"})

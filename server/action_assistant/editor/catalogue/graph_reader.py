@@ -11,7 +11,7 @@ from action_assistant.editor.crdt.loading import stored
 from action_assistant.editor.crdt.replica import ReplicaState
 from action_assistant.editor.documents import contents
 from action_assistant.editor.documents.contents import Counts, GraphAtSeq, GraphInfo
-from action_assistant.editor.log.graph_events import graph_stream
+from action_assistant.editor.log.graph_events import DocumentKind, graph_stream
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import Conflict, NotFound, Unavailable
 from action_assistant.journal.journal import Journal
@@ -27,8 +27,9 @@ _COUNTED: Final = 5000
 
 
 class GraphSummary(msgspec.Struct, frozen=True):
-    """What a list shows of a graph. `damaged`: the first change that cannot be read. What is None is
-    not known, since finding it out takes more than it may."""
+    """What a list shows of a graph. `damaged`: the first change that cannot be read. `first`: name and
+    description of its first action. What is None is not known, since finding it out takes more than it
+    may."""
 
     seq: int
     name: str | None = None
@@ -39,6 +40,11 @@ class GraphSummary(msgspec.Struct, frozen=True):
     robots: tuple[str, ...] = ()
     labels: tuple[str, ...] = ()
     damaged: int | None = None
+    first: tuple[str, str] | None = None
+
+    def called(self, kind: DocumentKind) -> tuple[str | None, str | None]:
+        """Name and description; of an action they are those of the action itself."""
+        return (self.name, self.description) if kind == "graph" or not self.first else self.first
 
 
 class GraphReader:
@@ -157,6 +163,7 @@ def _summary(seq: int, about: GraphInfo, newest: int = 0) -> GraphSummary:
         about.robots,
         about.labels,
         seq + 1 if seq < newest else None,
+        about.first,
     )
 
 

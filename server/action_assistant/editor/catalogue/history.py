@@ -19,15 +19,28 @@ _ONE_GO: Final = 5 * 60  # seconds between two edits of one entry
 _CHANGES: Final = 10_000  # changes of the document that one answer looks at
 
 Kind: TypeAlias = Literal[
-    "created", "imported", "edited", "published", "restored", "deleted", "recovered"
+    "created", "imported", "edited", "published", "restored", "adapted", "deleted", "recovered"
 ]
+
+
+class TakenFrom(msgspec.Struct, frozen=True):
+    """The document whose parameters were taken over, its change then, and the name of the action."""
+
+    document: str
+    seq: int
+    action: str
+
+
+#: The change that was gone back to, or of what parameters were taken over.
+_Special: TypeAlias = int | TakenFrom
 
 
 class HistoryEntry(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """Something that was done to a graph, between `at` and `until`.
 
     `seq` is the change of the document that `…/umrf?at=` and `…/restore` take to see the graph as it
-    was after that edit; edits begin at `from_seq`. `restored` is the change that was gone back to.
+    was after that edit; edits begin at `from_seq`. `restored` is the change that was gone back to,
+    `adapted` that of which parameters were taken over.
     """
 
     kind: Kind
@@ -37,6 +50,7 @@ class HistoryEntry(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True
     seq: int
     from_seq: int | None = None
     restored: int | None = None
+    adapted: TakenFrom | None = None
     version: VersionView | None = None
 
 
@@ -52,8 +66,8 @@ class GraphHistory:
         """Up to `limit` entries, newest first; with `before` only what was before that change."""
         rows = await self._rows(graph, before)
         versions = await self._versions.by_event(graph)
-        restored = await self._restored(graph)
-        found = list(_entries(reversed(rows), self._people, versions, restored))
+        special = await self._special(graph)
+        found = list(_entries(reversed(rows), self._people, versions, special))
         return found[::-1][:limit]
 
     async def _rows(self, graph: str, before: int | None) -> list[Row[Any]]:
@@ -70,22 +84,28 @@ class GraphHistory:
             chosen = chosen.where(event.position < there.scalar_subquery())
         return await self._journal.query(chosen)
 
-    async def _restored(self, graph: str) -> dict[int, int]:
-        """Which changes went back to which."""
+    async def _special(self, graph: str) -> dict[int, _Special]:
+        """Changes that went back to others, or took over parameters, by their number."""
         event = editor_tables.editor_event.c
-        chosen = select(event.body).where(
-            event.stream == h.about_stream(graph), event.kind == h.RESTORED
+        chosen = select(event.kind, event.body).where(
+            event.stream == h.about_stream(graph), event.kind.in_([h.RESTORED, h.ADAPTED])
         )
-        rows = await self._journal.query(chosen)
-        restorings = (msgspec.json.decode(row.body, type=h.GraphRestored) for row in rows)
-        return {restored.seq: restored.restored for restored in restorings}
+        found: dict[int, _Special] = {}
+        for row in await self._journal.query(chosen):
+            if row.kind == h.RESTORED:
+                restored = msgspec.json.decode(row.body, type=h.GraphRestored)
+                found[restored.seq] = restored.restored
+            else:
+                adapted = msgspec.json.decode(row.body, type=h.GraphAdapted)
+                found[adapted.seq] = TakenFrom(adapted.source, adapted.at, adapted.name)
+        return found
 
 
 def _entries(
     rows: Iterable[Row[Any]],
     people: People,
     versions: Mapping[int, VersionView],
-    restored: Mapping[int, int],
+    special: Mapping[int, _Special],
 ) -> Iterator[HistoryEntry]:
     """Entries in order of time from events in order of time."""
     seq = 1
@@ -100,8 +120,8 @@ def _entries(
                 continue  # what the graph was created with
             case h.UPDATED | h.DEFERRED:
                 seq = row.seq
-                if seq in restored:
-                    entry = replace(entry, kind="restored", seq=seq, restored=restored[seq])
+                if (how := special.get(seq)) is not None:
+                    entry = _specially(replace(entry, seq=seq), how)
                 elif last is not None and _same_go(last, entry):
                     last = replace(last, until=at, seq=seq)
                     continue
@@ -120,6 +140,12 @@ def _entries(
         last = entry
     if last is not None:
         yield last
+
+
+def _specially(entry: HistoryEntry, how: _Special) -> HistoryEntry:
+    if isinstance(how, TakenFrom):
+        return replace(entry, kind="adapted", adapted=how)
+    return replace(entry, kind="restored", restored=how)
 
 
 def _of_the_whole(

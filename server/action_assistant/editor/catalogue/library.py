@@ -1,16 +1,17 @@
-"""The action library: the actions that all graphs use, each name once."""
+"""The action library: the actions that have a document, and those that graphs use, each name once."""
 
 from sqlalchemy import select
 
 from action_assistant.editor.catalogue.graph_reader import GraphReader
-from action_assistant.editor.interchange.action_uses import NOTHING, GraphUse, merged, used
+from action_assistant.editor.interchange.action_uses import NOTHING, ActionSource, found, merged
+from action_assistant.editor.log.graph_events import DocumentKind
 from action_assistant.journal.journal import Journal
 from action_assistant.schema import editor_tables
 from action_assistant.web.workers.lanes import HOPELESS
 
 
 class Library:
-    """Reads a graph again only when it has changed."""
+    """Reads a document again only when it has changed."""
 
     def __init__(self, journal: Journal, graph_reader: GraphReader) -> None:
         self._journal = journal
@@ -19,8 +20,8 @@ class Library:
         self._shown: tuple[dict[str, int], bytes] = {}, b"[]"
 
     async def all(self) -> bytes:
-        """Every action that a graph uses, by name: JSON of a list of `Known`. Graphs that cannot be
-        read are left out."""
+        """Every action by name: JSON of a list of `LibraryAction`. Documents that cannot be read are
+        left out."""
         graph, event = editor_tables.graph, editor_tables.editor_event
         last = (
             select(event.c.seq)
@@ -32,6 +33,7 @@ class Library:
             select(
                 graph.c.id,
                 graph.c.made_at,
+                graph.c.kind,
                 last.scalar_subquery().label("seq"),
                 last.with_only_columns(event.c.at).scalar_subquery().label("at"),
             )
@@ -39,21 +41,24 @@ class Library:
             .order_by(graph.c.made_at, graph.c.id)
         )
         for row in rows:
-            await self._refresh(row.id, row.seq)
+            await self._refresh(row.id, row.seq, row.kind)
         seqs = {row.id: self._read[row.id][0] for row in rows}
         if self._shown[0] != seqs:
             self._read = {row.id: self._read[row.id] for row in rows}
             newest_first = sorted(rows, key=lambda row: row.at, reverse=True)
-            uses = [(GraphUse(row.id, row.made_at), self._read[row.id][1]) for row in newest_first]
-            self._shown = seqs, await self._graph_reader.ask(merged, uses)
+            sources = [
+                (ActionSource(row.id, row.made_at, seqs[row.id], row.kind), self._read[row.id][1])
+                for row in newest_first
+            ]
+            self._shown = seqs, await self._graph_reader.ask(merged, sources)
         return self._shown[1]
 
-    async def _refresh(self, graph: str, seq: int) -> None:
+    async def _refresh(self, graph: str, seq: int, kind: DocumentKind) -> None:
         known = self._read.get(graph)
         if known is None or known[0] < seq:
             try:
                 sight = await self._graph_reader.now(graph)
-                seq, actions = sight.seq, await self._graph_reader.ask(used, sight)
+                seq, actions = sight.seq, await self._graph_reader.ask(found, sight, kind)
             except HOPELESS:
                 actions = NOTHING
             self._read[graph] = seq, actions

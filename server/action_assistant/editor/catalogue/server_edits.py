@@ -1,6 +1,7 @@
 """Edits that the server makes itself: on a copy, entering the room as the difference (rule R9)."""
 
 from action_assistant.editor.interchange.changes import renaming, restoring
+from action_assistant.editor.log.graph_events import DocumentKind
 from action_assistant.editor.rooms.room import Room
 from action_assistant.web.workers.lanes import RunInWorker, run_here
 
@@ -11,11 +12,13 @@ async def rename(
     *,
     name: str | None,
     description: str | None,
+    kind: DocumentKind = "graph",
     run_in_worker: RunInWorker = run_here,
 ) -> int:
-    """Give the graph another name or description; the seq."""
+    """Give the graph or action another name or description; the seq."""
     state = await room.look(lambda replica, _: replica.doc.get_update())
-    return await room.submit(await run_in_worker(renaming, state, name, description), author)
+    update = await run_in_worker(renaming, state, name, description, kind)
+    return await room.submit(update, author)
 
 
 async def restore(

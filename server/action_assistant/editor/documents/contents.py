@@ -19,7 +19,7 @@ from action_assistant.umrf.difference import difference
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.json.text import parse_small
-from action_assistant.umrf.model import Graph, Problem
+from action_assistant.umrf.model import Action, Graph, Problem
 from action_assistant.umrf.problem_kinds import ToldCounts, told_counts
 
 _REMEMBERED: Final = 4  # moments of graphs
@@ -52,7 +52,7 @@ class Counts(msgspec.Struct, frozen=True):
 
 class GraphInfo(msgspec.Struct, frozen=True):
     """What lists say of a graph. `told`: of its problems, those that people are told to mend or to
-    fill in, one thing once."""
+    fill in, one thing once. `first`: name and description of its first action."""
 
     name: str
     description: str
@@ -61,6 +61,7 @@ class GraphInfo(msgspec.Struct, frozen=True):
     told: ToldCounts
     robots: tuple[str, ...]
     labels: tuple[str, ...]
+    first: tuple[str, str] | None = None
 
 
 class Read:
@@ -115,7 +116,14 @@ def info_of(graph: Graph, problems: list[Problem]) -> GraphInfo:
         told_counts(problems, graph),
         tuple(sorted({action.actor for action in graph.actions} - {""})),
         labels_of(graph),
+        None if (action := first_action(graph)) is None else (action.name, action.description),
     )
+
+
+def first_action(graph: Graph) -> Action | None:
+    """The action of which the document of a library's action tells. Clients may write anything: of
+    several it is the first."""
+    return next((action for action in graph.actions if not action.missing), None)
 
 
 def problems(sight: GraphAtSeq) -> bytes:

@@ -7,7 +7,8 @@ from typing import Final
 
 import msgspec
 
-from action_assistant.editor.documents.contents import GraphAtSeq, read
+from action_assistant.editor.documents.contents import GraphAtSeq, first_action, read
+from action_assistant.editor.log.graph_events import DocumentKind
 from action_assistant.errors import NotFound
 from action_assistant.umrf.model import Action, Graph
 from action_assistant.umrf.packages.choosing import disagreements, distinct_actions
@@ -58,34 +59,34 @@ class PackageContents(msgspec.Struct, frozen=True):
     files: tuple[PackageFile, ...]
 
 
-def listed(sight: GraphAtSeq) -> bytes:
+def listed(sight: GraphAtSeq, kind: DocumentKind) -> bytes:
     """JSON of a `PackageList`."""
-    graph = read(sight).moment.graph
-    refusals = tuple(dict.fromkeys(_refusals(graph)))
+    graph = _of(sight, kind)
+    refusals = tuple(dict.fromkeys(_refusals(graph, kind)))
     refused = {refusal.action for refusal in refusals}
     packages = tuple(
         PackageOutline(action.name, snake_case(action.name), tuple(package_files(action)))
-        for action in distinct_actions(graph)
+        for action in _actions(graph, kind)
         if action.name not in refused
     )
     return msgspec.json.encode(PackageList(sight.seq, packages, refusals))
 
 
-def contents(sight: GraphAtSeq, package: str) -> bytes:
+def contents(sight: GraphAtSeq, kind: DocumentKind, package: str) -> bytes:
     """JSON of `PackageContents`. Raises NotFound."""
-    action = _chosen(sight, (package,))[0]
+    action = _chosen(sight, kind, (package,))[0]
     files = tuple(
         PackageFile(path, content.decode()) for path, content in package_files(action).items()
     )
     return msgspec.json.encode(PackageContents(sight.seq, action.name, package, files))
 
 
-def archive(sight: GraphAtSeq, packages: Sequence[str]) -> bytes:
+def archive(sight: GraphAtSeq, kind: DocumentKind, packages: Sequence[str]) -> bytes:
     """A ZIP file with a folder for each of these packages; of all that can be made if none is named.
     The same bytes for the same actions. Raises NotFound."""
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as file:
-        for action in _chosen(sight, packages):
+        for action in _chosen(sight, kind, packages):
             for path, content in package_files(action).items():
                 entry = zipfile.ZipInfo(f"{snake_case(action.name)}/{path}", _LONG_AGO)
                 entry.compress_type = zipfile.ZIP_DEFLATED
@@ -94,13 +95,28 @@ def archive(sight: GraphAtSeq, packages: Sequence[str]) -> bytes:
     return packed.getvalue()
 
 
-def _chosen(sight: GraphAtSeq, packages: Sequence[str]) -> tuple[Action, ...]:
-    """The actions of packages that can be made, in the order of the graph. Raises NotFound."""
+def _of(sight: GraphAtSeq, kind: DocumentKind) -> Graph:
+    """The graph; of a library's document one with its action alone."""
     graph = read(sight).moment.graph
-    refused = {refusal.action for refusal in _refusals(graph)}
+    if kind == "graph":
+        return graph
+    action = first_action(graph)
+    return Graph(name=graph.name, actions=() if action is None else (action,))
+
+
+def _actions(graph: Graph, kind: DocumentKind) -> tuple[Action, ...]:
+    """One action of each name. What the library gives as a value is the action's own; in graphs each
+    node gives its own."""
+    return distinct_actions(graph) if kind == "graph" else graph.actions
+
+
+def _chosen(sight: GraphAtSeq, kind: DocumentKind, packages: Sequence[str]) -> tuple[Action, ...]:
+    """The actions of packages that can be made, in the order of the graph. Raises NotFound."""
+    graph = _of(sight, kind)
+    refused = {refusal.action for refusal in _refusals(graph, kind)}
     able = {
         snake_case(action.name): action
-        for action in distinct_actions(graph)
+        for action in _actions(graph, kind)
         if action.name not in refused
     }
     missing = [package for package in packages if package not in able]
@@ -111,8 +127,8 @@ def _chosen(sight: GraphAtSeq, packages: Sequence[str]) -> tuple[Action, ...]:
     return tuple(able[package] for package in dict.fromkeys(packages or able))
 
 
-def _refusals(graph: Graph) -> Iterator[PackageRefusal]:
-    actions = distinct_actions(graph)
+def _refusals(graph: Graph, kind: DocumentKind) -> Iterator[PackageRefusal]:
+    actions = _actions(graph, kind)
     for about in (*check_names(action.name for action in actions), *disagreements(graph)):
         yield PackageRefusal(about.place, about.place, about.reason)
     for action in actions:

@@ -1,21 +1,26 @@
-"""The actions of graphs as a library tells of them: each name once. For workers."""
+"""The actions of the library's documents and of graphs, as a list tells of them: each name once. For
+workers."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from datetime import datetime
 from typing import Final
 
 import msgspec
 
-from action_assistant.editor.documents.contents import GraphAtSeq, read
+from action_assistant.editor.documents.contents import GraphAtSeq, first_action, labels_of, read
 from action_assistant.editor.log.document_events import when
-from action_assistant.umrf.json.text import dump, parse_small
+from action_assistant.editor.log.graph_events import DocumentKind
+from action_assistant.umrf.action_updates import is_like
+from action_assistant.umrf.json.text import parse_small
 from action_assistant.umrf.model import Action, Graph, JsonText, Parameter
+from action_assistant.umrf.parameters import without_value
 
 
 class LibraryParameter(msgspec.Struct, frozen=True):
     """One parameter. `path` joins keys with `/` as in UMRF; no `pvf_type`: the file names none.
 
-    `text` is its JSON as a new use begins with it: without a value.
+    `text` is its JSON as a new use begins with it: without a value that a graph gave it, and with the
+    value that a document of the library has.
     """
 
     path: str
@@ -24,11 +29,13 @@ class LibraryParameter(msgspec.Struct, frozen=True):
     text: JsonText
 
 
-class LibraryAction(msgspec.Struct, frozen=True):
-    """An action of the library.
+class LibraryAction(msgspec.Struct, frozen=True, kw_only=True):
+    """An action that the library has, or that graphs use.
 
-    Parameters are those of all graphs together; of what they say differently, and of descriptions
-    and types, the graph changed last counts. `first_seen` is when the first of them was made.
+    `document` is its document in the library, `seq` the last change of that. Without one, parameters
+    are those of all graphs together; of what they say differently, and of descriptions and types, the
+    graph changed last counts. `differs_in`: of `used_in`, the graphs that use it with other parameters
+    than the document has. `first_seen` is when the first of them was made.
     """
 
     name: str
@@ -38,66 +45,137 @@ class LibraryAction(msgspec.Struct, frozen=True):
     outputs: tuple[LibraryParameter, ...]
     used_in: tuple[str, ...]
     first_seen: datetime
+    document: str | None = None
+    seq: int | None = None
+    labels: tuple[str, ...] = ()
+    differs_in: tuple[str, ...] = ()
 
 
-class GraphUse(msgspec.Struct, frozen=True):
-    """A graph that uses actions, and when it was made, in microseconds."""
+class ActionSource(msgspec.Struct, frozen=True):
+    """A document that has actions, and when it was made, in microseconds."""
 
-    graph: str
+    document: str
     made_at: int
+    seq: int
+    kind: DocumentKind
 
 
-#: Of a graph that cannot be read.
-NOTHING: Final = msgspec.msgpack.encode(())
+class FoundActions(msgspec.Struct, frozen=True):
+    """The actions of a document that differ in what a library says of them, and its labels."""
+
+    actions: tuple[Action, ...] = ()
+    labels: tuple[str, ...] = ()
 
 
-def used(sight: GraphAtSeq) -> bytes:
-    """The actions of a graph that differ in what a library says of them."""
-    return msgspec.msgpack.encode(_distinct(read(sight).moment.graph))
+#: Of a document that cannot be read.
+NOTHING: Final = msgspec.msgpack.encode(FoundActions())
 
 
-def merged(graphs: list[tuple[GraphUse, bytes]]) -> bytes:
-    """JSON of what several graphs know, the last changed first."""
-    uses: dict[str, list[tuple[GraphUse, Action]]] = {}
-    for graph, actions in graphs:
-        for action in msgspec.msgpack.decode(actions, type=tuple[Action, ...]):
-            uses.setdefault(action.name, []).append((graph, action))
-    return msgspec.json.encode([_known(name, uses[name]) for name in sorted(uses)])
+def found(sight: GraphAtSeq, kind: DocumentKind) -> bytes:
+    """The actions of a document, as msgpack of `FoundActions`."""
+    graph = read(sight).moment.graph
+    if kind == "graph":
+        return msgspec.msgpack.encode(FoundActions(_distinct(graph)))
+    action = first_action(graph)
+    actions = () if action is None or not action.name else (action,)
+    return msgspec.msgpack.encode(FoundActions(actions, labels_of(graph)))
 
 
-def _known(name: str, uses: list[tuple[GraphUse, Action]]) -> LibraryAction:
-    by_age = sorted({(use.made_at, use.graph) for use, _ in uses})
-    actions = [action for _, action in uses]
+def merged(sources: list[tuple[ActionSource, bytes]]) -> bytes:
+    """JSON of what the library and several graphs know, the last changed first."""
+    uses: dict[str, list[tuple[ActionSource, Action]]] = {}
+    known: list[tuple[ActionSource, Action, tuple[str, ...]]] = []
+    for source, text in sources:
+        of = msgspec.msgpack.decode(text, type=FoundActions)
+        for action in of.actions:
+            if source.kind == "action":
+                known.append((source, action, of.labels))
+            else:
+                uses.setdefault(action.name, []).append((source, action))
+    listed = [
+        _of_document(source, action, labels, uses.get(action.name, []))
+        for source, action, labels in known
+    ]
+    names = {action.name for _, action, _ in known}
+    listed += [_of_uses(name, each) for name, each in uses.items() if name not in names]
+    # Two documents of one name are possible, since people rename at the same time.
+    return msgspec.json.encode(sorted(listed, key=lambda each: (each.name, each.first_seen)))
+
+
+def _by_age(uses: list[tuple[ActionSource, Action]]) -> tuple[str, ...]:
+    """The graphs, the oldest first."""
+    ordered = sorted(uses, key=lambda use: (use[0].made_at, use[0].document))
+    return tuple(dict.fromkeys(source.document for source, _ in ordered))
+
+
+def _of_document(
+    source: ActionSource,
+    action: Action,
+    labels: tuple[str, ...],
+    uses: list[tuple[ActionSource, Action]],
+) -> LibraryAction:
+    differing = {use.document for use, its in uses if not is_like(its, action)}
+    used_in = _by_age(uses)
     return LibraryAction(
-        name=name,
-        description=next((a.description for a in actions if a.description), ""),
-        type=actions[0].type,
-        inputs=_together(action.inputs for action in actions),
-        outputs=_together(action.outputs for action in actions),
-        used_in=tuple(graph for _, graph in by_age),
-        first_seen=when(by_age[0][0]),
+        name=action.name,
+        description=action.description,
+        type=action.type,
+        inputs=tuple(map(_described, action.inputs)),
+        outputs=tuple(map(_described, action.outputs)),
+        used_in=used_in,
+        first_seen=when(min([source.made_at, *(use.made_at for use, _ in uses)])),
+        document=source.document,
+        seq=source.seq,
+        labels=labels,
+        differs_in=tuple(graph for graph in used_in if graph in differing),
     )
 
 
-def _together(lists: Iterable[tuple[Parameter, ...]]) -> tuple[LibraryParameter, ...]:
-    found: dict[str, LibraryParameter] = {}
+def _of_uses(name: str, uses: list[tuple[ActionSource, Action]]) -> LibraryAction:
+    action = together(name, [action for _, action in uses])
+    return LibraryAction(
+        name=name,
+        description=action.description,
+        type=action.type,
+        inputs=tuple(map(_described, action.inputs)),
+        outputs=tuple(map(_described, action.outputs)),
+        used_in=_by_age(uses),
+        first_seen=when(min(source.made_at for source, _ in uses)),
+    )
+
+
+def together(name: str, uses: Sequence[Action]) -> Action:
+    """One action of what several uses say, the first before the others; without their values."""
+    return Action(
+        key="",
+        name=name,
+        description=next((a.description for a in uses if a.description), ""),
+        type=uses[0].type,
+        inputs=_together(action.inputs for action in uses),
+        outputs=_together(action.outputs for action in uses),
+    )
+
+
+def _together(lists: Iterable[tuple[Parameter, ...]]) -> tuple[Parameter, ...]:
+    found: dict[str, Parameter] = {}
     for parameters in lists:
         for parameter in parameters:
             if parameter.path not in found:
-                found[parameter.path] = _taking(parameter)
+                found[parameter.path] = without_value(parameter)
     return tuple(found.values())
 
 
-def _taking(parameter: Parameter) -> LibraryParameter:
-    leaf = parse_small(parameter.text)
+def _described(parameter: Parameter) -> LibraryParameter:
+    text = parameter.text
+    leaf = parse_small(text)
     if not isinstance(leaf, dict):
-        return LibraryParameter(parameter.path, None, required=True, text=parameter.text)
+        return LibraryParameter(parameter.path, None, required=True, text=text)
     kind = leaf.get("pvf_type")
     return LibraryParameter(
         parameter.path,
         kind if isinstance(kind, str) else None,
         required=leaf.get("pvf_required") is not False,
-        text=dump({name: value for name, value in leaf.items() if name != "pvf_value"}),
+        text=text,
     )
 
 

@@ -8,8 +8,9 @@ from pycrdt import Doc, merge_updates
 
 from action_assistant.editor.crdt.messages import NOTHING_NEW
 from action_assistant.editor.documents import document
-from action_assistant.editor.documents.contents import maps_of
+from action_assistant.editor.documents.contents import first_action, maps_of
 from action_assistant.editor.documents.document import Maps
+from action_assistant.editor.log.graph_events import DocumentKind
 from action_assistant.umrf.model import Graph
 
 
@@ -33,20 +34,35 @@ def first(graph: Graph) -> bytes:
     return difference(b"", lambda doc: document.fill(doc, graph))
 
 
-def renaming(state: bytes, name: str | None, description: str | None) -> bytes:
-    """The update that gives another name or description."""
+def renaming(
+    state: bytes, name: str | None, description: str | None, kind: DocumentKind = "graph"
+) -> bytes:
+    """The update that gives a graph, or the action of a library's document, another name or
+    description."""
 
-    def edit(doc: Doc[Any]) -> None:
+    def renamed(old: Graph) -> Graph:
+        action = first_action(old)
+        name_now = old.name if name is None else name
+        if kind == "graph" or action is None:
+            told = old.description if description is None else description
+            return replace(old, name=name_now, description=told)
+        told = action.description if description is None else description
+        new = replace(action, name=name_now, description=told)
+        actions = tuple(new if each is action else each for each in old.actions)
+        return replace(old, name=name_now, actions=actions)
+
+    return editing(state, renamed)
+
+
+def editing(state: bytes, edit: Callable[[Graph], Graph]) -> bytes:
+    """The update that makes what `edit` makes of the graph, and touches nothing else."""
+
+    def edited(doc: Doc[Any]) -> None:
         maps = document.maps_of(doc)
         old = document.read_maps(maps)
-        new = replace(
-            old,
-            name=old.name if name is None else name,
-            description=old.description if description is None else description,
-        )
-        document.change(doc, changed(maps, old, new))
+        document.change(doc, changed(maps, old, edit(old)))
 
-    return difference(state, edit)
+    return difference(state, edited)
 
 
 def restoring(state: bytes, then: bytes) -> bytes:

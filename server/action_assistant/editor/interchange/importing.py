@@ -70,7 +70,7 @@ class ImportedFile(msgspec.Struct, frozen=True):
 
 def imported(body: bytes) -> ImportedFile:
     """What is stored of a file. Raises BadInput, NotUmrf, TooLarge with the place."""
-    found = _fitting(read_graph(body))
+    found = fitting(read_graph(body))
     update = changes.first(_directed(found.graph))
     refuse_too_long(update)
     told = ImportReport(found.dialect, found.notes, found.problems, found.remarks)
@@ -80,7 +80,7 @@ def imported(body: bytes) -> ImportedFile:
 
 def preview(body: bytes) -> bytes:
     """What importing a file would make, as JSON of a `Preview`. Raises as `imported` does."""
-    found = _fitting(read_graph(body))
+    found = fitting(read_graph(body))
     graph = found.graph
     problems = (*found.problems, *found.placed(check(graph)))
     actions = sum(not action.missing for action in graph.actions)
@@ -91,7 +91,7 @@ def preview(body: bytes) -> bytes:
 
 def pieces(body: bytes) -> bytes:
     """JSON of `Pieces`. Raises as `imported` does."""
-    found = _fitting(read(body))
+    found = fitting(read(body))
     maps = document.flatten(document.with_aids(found.graph))
     return msgspec.json.encode(
         Pieces(
@@ -125,7 +125,7 @@ def _directed(graph: Graph) -> Graph:
     return graph if placed else replace(graph, direction="right")
 
 
-def _fitting(found: codec.Reading) -> codec.Reading:
+def fitting(found: codec.Reading) -> codec.Reading:
     """Raises TooLarge for more than a document may hold."""
     refuse_too_much(found.graph, found.dialect)
     refuse_too_wide(document.flatten(document.with_aids(found.graph)))

@@ -5,7 +5,7 @@ document. Everything else about a graph is in `about/ID`; names of people are in
 """
 
 from collections.abc import Sequence
-from typing import Any, Final
+from typing import Any, Final, Literal, TypeAlias
 
 import msgspec
 from sqlalchemy import Executable, delete, insert, update
@@ -21,6 +21,7 @@ CREATED: Final = "graph.created.v1"
 IMPORTED: Final = "graph.imported.v1"  # the body is the file as it came
 DESCRIBED: Final = "graph.described.v1"
 RESTORED: Final = "graph.restored.v1"
+ADAPTED: Final = "graph.adapted.v1"
 DELETED: Final = "graph.deleted.v1"
 RECOVERED: Final = "graph.recovered.v1"
 PUBLISHED: Final = "version.published.v1"
@@ -37,13 +38,18 @@ SERVER: Final = "server"
 EXAMPLES: Final = "examples"
 
 
+#: What a document is of. An action of the library is a document with that action alone.
+DocumentKind: TypeAlias = Literal["graph", "action"]
+
+
 class GraphCreated(msgspec.Struct, frozen=True):
-    """A graph came to be. `dialect` and `notes` speak of the file it was read from."""
+    """A graph or action came to be. `dialect` and `notes` speak of the file it was read from."""
 
     name: str
     description: str
     dialect: str | None = None
     notes: tuple[str, ...] = ()
+    kind: DocumentKind = "graph"
 
 
 class GraphDescribed(msgspec.Struct, frozen=True):
@@ -59,6 +65,17 @@ class GraphRestored(msgspec.Struct, frozen=True):
 
     restored: int
     seq: int
+
+
+class GraphAdapted(msgspec.Struct, frozen=True):
+    """The edit `seq` brought parameters to what another document says: the uses of a library's action
+    in a graph to that action, or an action of the library to its use in a graph. `source` is that other
+    document, `at` its change, `name` the action."""
+
+    seq: int
+    source: str
+    at: int
+    name: str
 
 
 class VersionPublished(msgspec.Struct, frozen=True):
@@ -186,6 +203,7 @@ def _about(event: Event, graph: str) -> Sequence[Executable]:
                 "description": created.description,
                 "made_at": event.at,
                 "made_by": event.author,
+                "kind": created.kind,
             }
             return [insert(editor_tables.graph).values(row)]
         case "graph.described.v1":

@@ -4,9 +4,9 @@ from collections.abc import Iterator
 
 import msgspec
 
-from action_assistant.umrf.json.text import dump, parse_small
-from action_assistant.umrf.model import Action, Graph, Parameter
+from action_assistant.umrf.model import Action, Graph
 from action_assistant.umrf.packages.naming import NameRefusal
+from action_assistant.umrf.parameters import without_value
 from action_assistant.umrf.signatures import signature_of
 
 
@@ -43,13 +43,6 @@ def _disagreements(graph: Graph) -> Iterator[NameRefusal]:
 def _without_values(action: Action) -> Action:
     return msgspec.structs.replace(
         action,
-        inputs=tuple(map(_without_value, action.inputs)),
-        outputs=tuple(map(_without_value, action.outputs)),
+        inputs=tuple(map(without_value, action.inputs)),
+        outputs=tuple(map(without_value, action.outputs)),
     )
-
-
-def _without_value(parameter: Parameter) -> Parameter:
-    leaf = parse_small(parameter.text)
-    if not isinstance(leaf, dict) or "pvf_value" not in leaf:
-        return parameter
-    return Parameter(parameter.path, dump({k: v for k, v in leaf.items() if k != "pvf_value"}))

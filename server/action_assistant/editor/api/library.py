@@ -1,0 +1,173 @@
+"""Routes of the action library: its actions, what graphs make of them, and taking over either way."""
+
+from typing import Annotated, Any
+from urllib.parse import unquote
+
+import msgspec
+from litestar import Request, Response, get, post
+from litestar.params import QueryParameter
+from litestar.types import ControllerRouterHandler
+
+from action_assistant.editor.api.graphs import MadeGraph, Seq
+from action_assistant.editor.catalogue.catalogue import GraphView
+from action_assistant.editor.catalogue.library_edits import GraphMoment, UpdatedGraph
+from action_assistant.editor.interchange import library_updates
+from action_assistant.editor.interchange.action_uses import LibraryAction
+from action_assistant.editor.interchange.importing import Preview
+from action_assistant.editor.interchange.library_updates import ActionUse
+from action_assistant.editor.services import EditorState
+from action_assistant.editor.workers import encoded
+from action_assistant.errors import BadInput
+from action_assistant.umrf.action_updates import Renames
+from action_assistant.umrf.json.embedded import JsonObject
+from action_assistant.web.auth.access import Needs, person_of
+from action_assistant.web.server.application import BODY_LIMIT
+from action_assistant.web.server.openapi import answer, reads
+
+Asking = Request[Any, Any, Any]
+Pairs = Annotated[list[str] | None, QueryParameter(max_items=1000)]
+
+
+class ActionUses(msgspec.Struct, frozen=True):
+    """Who uses an action, and what bringing them to its change `seq` would change."""
+
+    seq: int
+    uses: tuple[ActionUse, ...]
+
+
+class UpdatingUses(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Which uses to bring to the action's change `seq`, and what is called otherwise since."""
+
+    seq: int
+    graphs: tuple[GraphMoment, ...]
+    renames: Renames = Renames()
+
+
+class TakingOver(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Of which graph, and of which of its actions; without one the first that differs."""
+
+    graph: str
+    aid: str | None = None
+
+
+def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
+    """Everything about the library."""
+    return [*_actions(app_state), *_uses(app_state)]
+
+
+def _actions(app_state: EditorState) -> list[ControllerRouterHandler]:
+    @get(
+        "/api/actions",
+        summary="The actions of the library, and those that only graphs know, by name",
+        operation_id="listActions",
+    )
+    async def list_actions() -> list[LibraryAction]:
+        known: list[LibraryAction] = encoded(await app_state.services.library.all())
+        return known
+
+    @get(
+        "/api/actions/deleted",
+        summary="Actions that were taken out of the library; each can be recovered as a graph can",
+        operation_id="listDeletedActions",
+    )
+    async def list_deleted_actions() -> list[GraphView]:
+        return await app_state.services.catalogue.all(deleted=True, kind="action")
+
+    @post(
+        "/api/actions",
+        summary="Make an action of its UMRF file, an empty one of {name}, or with `from_graphs` what "
+        "graphs know of it; with `preview` only say what a file would become, and store nothing",
+        operation_id="createAction",
+        guards=[Needs("edit")],
+        opt=reads(JsonObject),
+        responses={
+            200: answer(Preview, text="What the file would become"),
+            201: answer(MadeGraph, text="Made"),
+        },
+        request_max_body_size=BODY_LIMIT,
+    )
+    async def create_action(
+        request: Asking, preview: bool = False
+    ) -> Response[MadeGraph] | Response[Preview]:
+        services, person = app_state.services, person_of(request)
+        body = await request.body()
+        if preview:
+            found = await services.workers.files(library_updates.preview, body)
+            return Response(encoded(found), status_code=200)
+        await services.people.seen(person)
+        made, told = await services.library_edits.create(body, person.id)
+        reading = None if told is None else encoded(told)
+        whole = MadeGraph(**msgspec.structs.asdict(made), reading=reading)
+        return Response(whole, status_code=201, headers={"location": f"/api/graphs/{made.id}"})
+
+    @get(
+        "/api/actions/{action_id:str}/umrf",
+        summary="The UMRF file of an action, now or after its change `at`",
+        operation_id="getActionUmrf",
+        responses={200: answer(JsonObject)},
+    )
+    async def get_action_umrf(action_id: str, at: Seq | None = None) -> Response[bytes]:
+        services = app_state.services
+        await services.catalogue.require(action_id, "action")
+        sight = await services.graph_reader.moment(action_id, at)
+        text = await services.graph_reader.ask(library_updates.written, sight)
+        return Response(text, media_type="application/json", headers={"x-seq": str(sight.seq)})
+
+    return [list_actions, list_deleted_actions, create_action, get_action_umrf]
+
+
+def _uses(app_state: EditorState) -> list[ControllerRouterHandler]:
+    @get(
+        "/api/actions/{action_id:str}/uses",
+        summary="The graphs that use an action, and what an update would change in each; `inputs` and "
+        "`outputs` are renames, OLD:NEW, each of both percent-encoded",
+        operation_id="listUses",
+    )
+    async def list_uses(action_id: str, inputs: Pairs = None, outputs: Pairs = None) -> ActionUses:
+        services = app_state.services
+        await services.catalogue.require(action_id, "action")
+        renames = Renames(_pairs("inputs", inputs), _pairs("outputs", outputs))
+        seq, found = await services.library_edits.uses(action_id, renames)
+        return ActionUses(seq, encoded(found))
+
+    @post(
+        "/api/actions/{action_id:str}/uses",
+        status_code=200,
+        summary="Bring the uses in some graphs to what the action says: an edit of each, that can be "
+        "taken back by its history",
+        operation_id="updateUses",
+        guards=[Needs("edit")],
+    )
+    async def update_uses(
+        action_id: str, data: UpdatingUses, request: Asking
+    ) -> list[UpdatedGraph]:
+        services, person = app_state.services, person_of(request)
+        await services.catalogue.require(action_id, "action")
+        await services.people.seen(person)
+        return await services.library_edits.update_uses(
+            action_id, data.seq, data.graphs, data.renames, person.id
+        )
+
+    @post(
+        "/api/actions/{action_id:str}/take",
+        status_code=200,
+        summary="Give an action the parameters that a graph's use of it has",
+        operation_id="takeOver",
+        guards=[Needs("edit")],
+    )
+    async def take_over(action_id: str, data: TakingOver, request: Asking) -> GraphView:
+        services, person = app_state.services, person_of(request)
+        await services.people.seen(person)
+        return await services.library_edits.take(action_id, data.graph, data.aid, person.id)
+
+    return [list_uses, update_uses, take_over]
+
+
+def _pairs(place: str, texts: list[str] | None) -> tuple[tuple[str, str], ...]:
+    pairs = []
+    for text in texts or ():
+        old, colon, new = text.partition(":")
+        if not colon or not old or not new:
+            raise BadInput("A rename is OLD:NEW.", where={"path": f"/{place}"})
+        pairs.append((unquote(old), unquote(new)))
+    return tuple(pairs)

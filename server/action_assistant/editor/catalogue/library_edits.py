@@ -1,0 +1,203 @@
+"""What people do with the library: actions made and brought, and taken over either way."""
+
+from collections.abc import Sequence
+from contextlib import AsyncExitStack
+from typing import Any
+
+import anyio
+import msgspec
+
+from action_assistant.editor.catalogue.catalogue import Catalogue, GraphView, fit
+from action_assistant.editor.catalogue.graph_reader import GraphReader
+from action_assistant.editor.catalogue.library import Library
+from action_assistant.editor.documents.contents import GraphAtSeq
+from action_assistant.editor.documents.document import new_aid
+from action_assistant.editor.interchange import library_updates
+from action_assistant.editor.interchange.action_uses import LibraryAction
+from action_assistant.editor.log import graph_events as h
+from action_assistant.editor.rooms.open_rooms import Rooms
+from action_assistant.editor.rooms.room import Room
+from action_assistant.errors import BadInput, Conflict
+from action_assistant.journal.journal import Journal
+from action_assistant.umrf.action_updates import Renames
+from action_assistant.umrf.model import Action
+from action_assistant.web.workers.lanes import RunInWorker
+
+
+class NewAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """An action without parameters, or, `from_graphs`, with those that graphs know of it."""
+
+    name: str
+    description: str = ""
+    from_graphs: bool = False
+
+
+class GraphMoment(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A graph, and its change that somebody has seen."""
+
+    graph: str
+    seq: int
+
+
+class UpdatedGraph(msgspec.Struct, frozen=True):
+    """A graph after an update of its uses. `seq`: its newest change; `changed`: whether that is new."""
+
+    graph: str
+    seq: int
+    changed: bool
+
+
+class LibraryEdits:
+    """Commands of people; each has been permitted already."""
+
+    def __init__(
+        self,
+        journal: Journal,
+        rooms: Rooms,
+        graph_reader: GraphReader,
+        catalogue: Catalogue,
+        library: Library,
+        files: RunInWorker,
+    ) -> None:
+        self._journal = journal
+        self._rooms = rooms
+        self._graph_reader = graph_reader
+        self._catalogue = catalogue
+        self._library = library
+        self._files = files
+        self._making = anyio.Lock()
+
+    async def create(self, body: bytes, author: str) -> tuple[GraphView, bytes | None]:
+        """The document of an action from a `NewAction` or its file; with JSON of an `ImportReport` in
+        the second case. Raises BadInput, NotUmrf, TooLarge with the place, Conflict, NotFound."""
+        try:
+            wanted = msgspec.json.decode(body, type=NewAction)
+        except (msgspec.DecodeError, RecursionError, UnicodeDecodeError):
+            return await self._bring(body, author)
+        name, description = fit(wanted.name, wanted.description)
+        action = Action(key=new_aid(), name=name, description=description)
+        if wanted.from_graphs:
+            known = await self._of_graphs(name)
+            action = msgspec.structs.replace(
+                known, key=action.key, description=description or known.description
+            )
+        about = h.GraphCreated(action.name, action.description, kind="action")
+        return await self._add(action, author, about), None
+
+    async def _bring(self, body: bytes, author: str) -> tuple[GraphView, bytes]:
+        found = await self._files(library_updates.brought, body)
+        name, description = fit(found.action.name, found.action.description)
+        about = h.GraphCreated(name, description, found.dialect, found.notes, "action")
+        action = msgspec.structs.replace(found.action, key=new_aid())
+        return await self._add(action, author, about, body), found.reading
+
+    async def _add(
+        self, action: Action, author: str, about: h.GraphCreated, file: bytes | None = None
+    ) -> GraphView:
+        async with self._making:  # of two of one name at a time, one is refused
+            for view in await self._catalogue.all(kind="action"):
+                if view.name == action.name:
+                    raise Conflict(
+                        f"The library has an action {action.name!r} already.",
+                        where={"graph": view.id},
+                    )
+            return await self._catalogue.add_action(action, author, about, file)
+
+    async def _of_graphs(self, name: str) -> Action:
+        sights = await self._using(name)
+        action: Action = await self._graph_reader.ask(library_updates.of_graphs, name, sights)
+        return action
+
+    async def uses(self, action: str, renames: Renames) -> tuple[int, bytes]:
+        """The change of the action that was looked at, and JSON of a list of `ActionUse`."""
+        sight = await self._graph_reader.now(action)
+        name = (await self._catalogue.get(action)).name
+        graphs = await self._using(name)
+        found: bytes = await self._graph_reader.ask(library_updates.uses, sight, graphs, renames)
+        return sight.seq, found
+
+    async def update_uses(
+        self, action: str, seq: int, graphs: Sequence[GraphMoment], renames: Renames, author: str
+    ) -> list[UpdatedGraph]:
+        """Brings the uses in graphs to what the action was after its change `seq`, one edit for each
+        graph. Raises Conflict, before anything is written, for a graph that has changed meanwhile."""
+        sight = await self._graph_reader.at(action, seq)
+        name = (await self._catalogue.get(action)).name
+        if len({each.graph for each in graphs}) < len(graphs):
+            raise BadInput("A graph is named twice.", where={"path": "/graphs"})
+        async with AsyncExitStack() as open_rooms:
+            updates: list[tuple[GraphMoment, Room, bytes]] = []
+            for each in graphs:
+                await self._catalogue.require(each.graph, "graph")
+                room = await open_rooms.enter_async_context(
+                    self._rooms.enter(h.graph_stream(each.graph))
+                )
+                then = await _seen(room, each)
+                update = await self._graph_reader.ask(
+                    library_updates.updating, sight, then, renames
+                )
+                updates.append((each, room, update))
+            for each, room, _ in updates:
+                if room.seq != each.seq:
+                    raise _changed(each, room.seq)
+            return [
+                await self._adapt(room, each.graph, update, author, sight, name)
+                for each, room, update in updates
+            ]
+
+    async def take(self, action: str, graph: str, aid: str | None, author: str) -> GraphView:
+        """The action takes over the parameters that a graph's use of it has. Raises NotFound."""
+        await self._catalogue.require(action, "action")
+        await self._catalogue.require(graph, "graph")
+        source = await self._graph_reader.now(graph)
+        name = (await self._catalogue.get(action)).name
+        async with self._rooms.enter(h.graph_stream(action)) as room:
+            state = await room.look(lambda replica, seq: (replica.doc.get_update(), seq))
+            sight = GraphAtSeq(action, state[1], state[0])
+            update = await self._graph_reader.ask(library_updates.taking, sight, source, aid)
+            await self._adapt(room, action, update, author, source, name)
+        return await self._catalogue.get(action)
+
+    async def _adapt(
+        self,
+        room: Room,
+        document: str,
+        update: bytes,
+        author: str,
+        source: GraphAtSeq,
+        name: str,
+    ) -> UpdatedGraph:
+        before = room.seq
+        seq = await room.submit(update, author)
+        if seq > before:
+            adapted = h.GraphAdapted(seq, source.graph, source.seq, name)
+            await self._journal.append(
+                h.about_stream(document), [h.draft(h.ADAPTED, author, adapted)]
+            )
+        return UpdatedGraph(document, seq, seq > before)
+
+    async def _using(self, name: str) -> list[GraphAtSeq]:
+        """The graphs that use an action, the last changed first."""
+        known = msgspec.json.decode(await self._library.all(), type=list[LibraryAction])
+        used_in = {graph for each in known if each.name == name for graph in each.used_in}
+        views = [view for view in await self._catalogue.all() if view.id in used_in]
+        return [await self._graph_reader.now(view.id) for view in views]
+
+
+async def _seen(room: Room, moment: GraphMoment) -> GraphAtSeq:
+    """The graph that somebody has seen, if it still is so."""
+    found: GraphAtSeq = await room.look(
+        lambda replica, seq: GraphAtSeq(moment.graph, seq, replica.doc.get_update())
+    )
+    if found.seq != moment.seq:
+        raise _changed(moment, found.seq)
+    return found
+
+
+def _changed(moment: GraphMoment, seq: int) -> Conflict:
+    where: dict[str, Any] = {"graph": moment.graph}
+    return Conflict(
+        f"Somebody has changed this graph: it was seen after its change {moment.seq}, and now has "
+        f"{seq}. Nothing was written.",
+        where=where,
+    )

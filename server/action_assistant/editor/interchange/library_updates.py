@@ -1,0 +1,150 @@
+"""What the library's documents and the graphs that use them would make of each other. For workers."""
+
+from collections.abc import Sequence
+
+import msgspec
+from msgspec.structs import replace
+
+from action_assistant.editor.documents.contents import GraphAtSeq, first_action, read
+from action_assistant.editor.interchange import importing
+from action_assistant.editor.interchange.action_uses import together
+from action_assistant.editor.interchange.changes import editing
+from action_assistant.errors import NotFound, NotUmrf
+from action_assistant.umrf.action_updates import Renames, is_like, suggested, updated, uses_of
+from action_assistant.umrf.check import check
+from action_assistant.umrf.difference import Difference, difference
+from action_assistant.umrf.files.action_files import ACTION_DIALECTS, read_action, write_action
+from action_assistant.umrf.model import Action, Graph
+from action_assistant.umrf.parameters import without_value
+
+
+class ActionUse(msgspec.Struct, frozen=True, kw_only=True):
+    """A graph that uses an action of the library. `seq`: its change that was looked at; `count`: how
+    many of its actions are uses.
+
+    `changed`: whether an update would change the graph; `difference` is what it would change, and
+    `suggested` are renames that are likely, of which none is in it unless it was asked for.
+    """
+
+    graph: str
+    name: str
+    seq: int
+    count: int
+    changed: bool
+    difference: Difference | None = None
+    suggested: Renames = Renames()
+
+
+class BroughtAction(msgspec.Struct, frozen=True):
+    """An action as its file describes it. `reading` is JSON of an `ImportReport`."""
+
+    action: Action
+    dialect: str
+    notes: tuple[str, ...]
+    reading: bytes
+
+
+def brought(body: bytes) -> BroughtAction:
+    """The action of a UMRF file of one action. Raises BadInput, NotUmrf, TooLarge with the place."""
+    found = importing.read(body)
+    if found.dialect not in ACTION_DIALECTS:
+        raise NotUmrf(
+            f"This is the file of a graph, {found.graph.name or 'without a name'}, and not of one "
+            "action. Import it as a graph: its actions are in the library's list then.",
+            where={"code": "graph-file", "line": 1, "column": 1},
+        )
+    importing.fitting(found)
+    file = read_action(body)
+    alone = check(Graph(name=file.action.name, actions=(file.action,)))
+    # What is wrong with the graph around it is not told: there is none.
+    own = [problem for problem in alone if problem.where.path.startswith("/actions/0")]
+    told = importing.ImportReport(
+        file.dialect, file.notes, (*file.problems, *file.placed(own)), file.remarks
+    )
+    return BroughtAction(file.action, file.dialect, file.notes, msgspec.json.encode(told))
+
+
+def preview(body: bytes) -> bytes:
+    """What bringing a file would make, as JSON of a `Preview`. Raises as `brought` does."""
+    found = brought(body)
+    report = msgspec.json.decode(found.reading, type=importing.ImportReport)
+    return msgspec.json.encode(
+        importing.Preview(
+            found.dialect, found.notes, report.problems, found.action.name, 1, report.remarks
+        )
+    )
+
+
+def of_graphs(name: str, sights: Sequence[GraphAtSeq]) -> Action:
+    """What graphs say of an action, without values. Raises NotFound."""
+    uses = [use for sight in sights for use in uses_of(read(sight).moment.graph, name)]
+    if not uses:
+        raise NotFound(f"No graph has an action {name!r}.", where={"path": "/name"})
+    return together(name, uses)
+
+
+def written(sight: GraphAtSeq) -> bytes:
+    """The file of the action of a library's document. Raises NotFound for a document without one."""
+    return write_action(_action_of(sight)).encode()
+
+
+def uses(sight: GraphAtSeq, graphs: Sequence[GraphAtSeq], renames: Renames) -> bytes:
+    """JSON of an `ActionUse` for each of the graphs that has one."""
+    action = _action_of(sight)
+    found = (_use(action, each, renames) for each in graphs)
+    return msgspec.json.encode([use for use in found if use is not None])
+
+
+def _use(action: Action, sight: GraphAtSeq, renames: Renames) -> ActionUse | None:
+    graph = read(sight).moment.graph
+    count = len(uses_of(graph, action.name))
+    if count == 0:
+        return None
+    after = updated(graph, action, renames)
+    changed = after != graph
+    return ActionUse(
+        graph=sight.graph,
+        name=graph.name,
+        seq=sight.seq,
+        count=count,
+        changed=changed,
+        difference=difference((sight.seq, graph), (sight.seq, after)) if changed else None,
+        suggested=suggested(graph, action),
+    )
+
+
+def updating(sight: GraphAtSeq, graph: GraphAtSeq, renames: Renames) -> bytes:
+    """The update of a graph's document that brings its uses to what the library says."""
+    action = _action_of(sight)
+    return editing(graph.state, lambda old: updated(old, action, renames))
+
+
+def taking(sight: GraphAtSeq, graph: GraphAtSeq, aid: str | None) -> bytes:
+    """The update of the library's document that takes over the parameters of a graph's use: of the one
+    that is named, or of the first that differs. Values stay the library's. Raises NotFound."""
+    action = _action_of(sight)
+    found = [
+        use
+        for use in uses_of(read(graph).moment.graph, action.name)
+        if aid is None or use.key == aid
+    ]
+    if not found:
+        raise NotFound(f"The graph has no such action {action.name!r}.", where={"path": "/aid"})
+    use = next((use for use in found if not is_like(use, action)), found[0])
+    known = replace(
+        use,
+        inputs=tuple(map(without_value, use.inputs)),
+        outputs=tuple(map(without_value, use.outputs)),
+    )
+
+    def taken(old: Graph) -> Graph:
+        return updated(old, replace(known, name=action.name))
+
+    return editing(sight.state, taken)
+
+
+def _action_of(sight: GraphAtSeq) -> Action:
+    action = first_action(read(sight).moment.graph)
+    if action is None:
+        raise NotFound("This document of the library has no action; somebody has taken it out.")
+    return action
