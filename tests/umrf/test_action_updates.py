@@ -4,7 +4,7 @@ import msgspec
 from hypothesis import given
 from hypothesis import strategies as st
 
-from action_assistant.umrf.action_updates import Renames, is_like, suggested, updated
+from action_assistant.umrf.action_updates import NO_RENAMES, Renames, is_like, suggested, updated
 from action_assistant.umrf.json.text import parse_small
 from action_assistant.umrf.model import Action, Graph, Parameter, Relation, Remap
 
@@ -59,14 +59,14 @@ def test_a_renaming_that_nobody_has_asked_for_is_no_renaming() -> None:
     known = action("", "Go", takes=parameters(velocity=leaf()))
     graph = Graph(name="g", actions=(action("a", "Go", takes=parameters(speed=leaf(pvf_value=2))),))
     assert values(updated(graph, known), "a") == {"velocity": None}
-    assert suggested(graph, known) == Renames(inputs=(("speed", "velocity"),))
+    assert suggested(graph, known) == Renames((("speed", "velocity"),), ())
     assert values(updated(graph, known, suggested(graph, known)), "a") == {"velocity": 2}
 
 
 def test_of_two_that_could_be_it_none_is_suggested() -> None:
     known = action("", "Go", takes=parameters(velocity=leaf(), torque=leaf()))
     graph = Graph(name="g", actions=(action("a", "Go", takes=parameters(speed=leaf())),))
-    assert suggested(graph, known) == Renames()
+    assert suggested(graph, known) == NO_RENAMES
 
 
 def test_what_flowed_along_an_arrow_flows_on_after_renamings() -> None:

@@ -30,8 +30,11 @@ _DEFINED: Final = frozenset({*_CONTRACT, "pvf_example", "pvf_unit", "pvf_descrip
 class Renames(msgspec.Struct, frozen=True):
     """Parameters that are called otherwise now: pairs of old and new path."""
 
-    inputs: tuple[tuple[str, str], ...] = ()
-    outputs: tuple[tuple[str, str], ...] = ()
+    inputs: tuple[tuple[str, str], ...]
+    outputs: tuple[tuple[str, str], ...]
+
+
+NO_RENAMES: Final = Renames((), ())
 
 
 def uses_of(graph: Graph, name: str) -> tuple[Action, ...]:
@@ -54,9 +57,6 @@ def suggested(graph: Graph, known: Action) -> Renames:
         _swapped([use.inputs for use in uses], known.inputs),
         _swapped([use.outputs for use in uses], known.outputs),
     )
-
-
-NO_RENAMES: Final = Renames()
 
 
 def updated(graph: Graph, known: Action, renames: Renames = NO_RENAMES) -> Graph:

@@ -171,23 +171,27 @@ def test_uses_that_differ_are_told_with_what_an_update_would_change(
         f"{name}_1",
     }
 
+
+def test_uses_are_updated_with_the_renames_that_were_asked_for(
+    http: httpx.Client, name: str
+) -> None:
+    goals = [leaf("string", pvf_value=place) for place in ("dock", "door")]
+    uses = [action(name, i, goal=goal) for i, goal in enumerate(goals)]
+    other = graph(http, "other", *uses, action("Wait"))
+    document = brought(http, action(name, **TAKES))
     updated = http.post(
         f"/api/actions/{document}/uses",
         json={
-            "seq": told["seq"],
-            "graphs": [{"graph": other, "seq": uses[other]["seq"]}],
-            "renames": {"inputs": [["goal", "place"]]},
+            "seq": 1,
+            "graphs": [{"graph": other, "seq": 1}],
+            "renames": {"inputs": [["goal", "place"]], "outputs": []},
         },
     )
     assert updated.status_code == 200, updated.text
     assert updated.json() == [{"graph": other, "seq": 2, "changed": True}]
     assert listed(http, name)["differs_in"] == []
     actions = http.get(f"/api/graphs/{other}/umrf").json()["actions"]
-    assert [each.get("input_parameters", {}).get("place") for each in actions] == [
-        leaf("string", pvf_value="dock"),
-        leaf("string", pvf_value="door"),
-        None,
-    ]
+    assert [each.get("input_parameters", {}).get("place") for each in actions] == [*goals, None]
 
 
 def test_an_update_is_told_in_the_history_and_can_be_taken_back(

@@ -12,6 +12,31 @@ export interface EditorApi {
         fields: EditorApi["Field"][];
     };
     /**
+     * ActionUse
+     * @description A graph that uses an action of the library. `seq`: its change that was looked at; `count`: how
+     *     many of its actions are uses.
+     *
+     *     `changed`: whether an update would change the graph; `difference` is what it would change, and
+     *     `suggested` are renames that are likely, of which none is in it unless it was asked for.
+     */
+    ActionUse: {
+        graph: string;
+        name: string;
+        seq: number;
+        count: number;
+        changed: boolean;
+        difference: EditorApi["Difference"] | null;
+        suggested: EditorApi["Renames"];
+    };
+    /**
+     * ActionUses
+     * @description Who uses an action, and what bringing them to its change `seq` would change.
+     */
+    ActionUses: {
+        seq: number;
+        uses: EditorApi["ActionUse"][];
+    };
+    /**
      * Behaviour
      * @description One call of an action. Times are seconds.
      *
@@ -139,6 +164,14 @@ export interface EditorApi {
         after: unknown;
     };
     /**
+     * GraphMoment
+     * @description A graph, and its change that somebody has seen.
+     */
+    GraphMoment: {
+        graph: string;
+        seq: number;
+    };
+    /**
      * GraphResultEvent
      * @description The exit of a graph was satisfied with this result.
      */
@@ -162,7 +195,8 @@ export interface EditorApi {
     };
     /**
      * GraphView
-     * @description A graph as lists and pages show it. `seq` counts the changes of its document.
+     * @description A graph, or an action of the library, as lists and pages show it. `seq` counts the changes of its
+     *     document.
      *
      *     `damaged`: the first change that cannot be read; the graph is what it was before, and nobody can
      *     change it. `people`: who is in it now. `problems` counts what the check found; `wrong` and
@@ -189,6 +223,11 @@ export interface EditorApi {
         people?: EditorApi["PersonRef"][];
         deleted_at?: string;
         damaged?: number;
+        /**
+         * @default graph
+         * @enum {string}
+         */
+        kind?: "action" | "graph";
     };
     /**
      * Guest
@@ -224,11 +263,12 @@ export interface EditorApi {
      * @description Something that was done to a graph, between `at` and `until`.
      *
      *     `seq` is the change of the document that `…/umrf?at=` and `…/restore` take to see the graph as it
-     *     was after that edit; edits begin at `from_seq`. `restored` is the change that was gone back to.
+     *     was after that edit; edits begin at `from_seq`. `restored` is the change that was gone back to,
+     *     `adapted` that of which parameters were taken over.
      */
     HistoryEntry: {
         /** @enum {string} */
-        kind: "created" | "deleted" | "edited" | "imported" | "published" | "recovered" | "restored";
+        kind: "adapted" | "created" | "deleted" | "edited" | "imported" | "published" | "recovered" | "restored";
         author: EditorApi["PersonRef"];
         /** Format: date-time */
         at: string;
@@ -237,6 +277,7 @@ export interface EditorApi {
         seq: number;
         from_seq?: number;
         restored?: number;
+        adapted?: EditorApi["TakenFrom"];
         version?: EditorApi["VersionView"];
     };
     /**
@@ -312,10 +353,12 @@ export interface EditorApi {
     };
     /**
      * LibraryAction
-     * @description An action of the library.
+     * @description An action that the library has, or that graphs use.
      *
-     *     Parameters are those of all graphs together; of what they say differently, and of descriptions
-     *     and types, the graph changed last counts. `first_seen` is when the first of them was made.
+     *     `document` is its document in the library, `seq` the last change of that. Without one, parameters
+     *     are those of all graphs together; of what they say differently, and of descriptions and types, the
+     *     graph changed last counts. `differs_in`: of `used_in`, the graphs that use it with other parameters
+     *     than the document has. `first_seen` is when the first of them was made.
      */
     LibraryAction: {
         name: string;
@@ -326,12 +369,17 @@ export interface EditorApi {
         used_in: string[];
         /** Format: date-time */
         first_seen: string;
+        document: string | null;
+        seq: number | null;
+        labels: string[];
+        differs_in: string[];
     };
     /**
      * LibraryParameter
      * @description One parameter. `path` joins keys with `/` as in UMRF; no `pvf_type`: the file names none.
      *
-     *     `text` is its JSON as a new use begins with it: without a value.
+     *     `text` is its JSON as a new use begins with it: without a value that a graph gave it, and with the
+     *     value that a document of the library has.
      */
     LibraryParameter: {
         path: string;
@@ -364,6 +412,11 @@ export interface EditorApi {
         people?: EditorApi["PersonRef"][];
         deleted_at?: string;
         damaged?: number;
+        /**
+         * @default graph
+         * @enum {string}
+         */
+        kind?: "action" | "graph";
         reading?: EditorApi["ImportReport"];
     };
     /**
@@ -624,6 +677,20 @@ export interface EditorApi {
         fields: EditorApi["Field"][];
     };
     /**
+     * Renames
+     * @description Parameters that are called otherwise now: pairs of old and new path.
+     */
+    Renames: {
+        inputs: [
+            string,
+            string
+        ][];
+        outputs: [
+            string,
+            string
+        ][];
+    };
+    /**
      * Restoring
      * @description The change after which the graph was as it shall be again.
      */
@@ -699,6 +766,24 @@ export interface EditorApi {
         graph?: string;
     };
     /**
+     * TakenFrom
+     * @description The document whose parameters were taken over, its change then, and the name of the action.
+     */
+    TakenFrom: {
+        document: string;
+        seq: number;
+        action: string;
+    };
+    /**
+     * TakingOver
+     * @description Of which graph, and of which of its actions; without one the first that differs.
+     */
+    TakingOver: {
+        graph: string;
+        /** @default null */
+        aid?: string | null;
+    };
+    /**
      * TextEdit
      * @description What an edited text would change after `seq`, and the errors that the graph would then have
      *     and does not have yet, with their places in that text.
@@ -707,6 +792,30 @@ export interface EditorApi {
         seq: number;
         changes: EditorApi["KeyChange"][];
         problems: EditorApi["Problem"][];
+    };
+    /**
+     * UpdatedGraph
+     * @description A graph after an update of its uses. `seq`: its newest change; `changed`: whether that is new.
+     */
+    UpdatedGraph: {
+        graph: string;
+        seq: number;
+        changed: boolean;
+    };
+    /**
+     * UpdatingUses
+     * @description Which uses to bring to the action's change `seq`, and what is called otherwise since.
+     */
+    UpdatingUses: {
+        seq: number;
+        graphs: EditorApi["GraphMoment"][];
+        /**
+         * @default {
+         *       "inputs": [],
+         *       "outputs": []
+         *     }
+         */
+        renames?: EditorApi["Renames"];
     };
     /**
      * VersionView

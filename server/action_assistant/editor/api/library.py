@@ -18,7 +18,7 @@ from action_assistant.editor.interchange.library_updates import ActionUse
 from action_assistant.editor.services import EditorState
 from action_assistant.editor.workers import encoded
 from action_assistant.errors import BadInput
-from action_assistant.umrf.action_updates import Renames
+from action_assistant.umrf.action_updates import NO_RENAMES, Renames
 from action_assistant.umrf.json.embedded import JsonObject
 from action_assistant.web.auth.access import Needs, person_of
 from action_assistant.web.server.application import BODY_LIMIT
@@ -40,7 +40,7 @@ class UpdatingUses(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     seq: int
     graphs: tuple[GraphMoment, ...]
-    renames: Renames = Renames()
+    renames: Renames = NO_RENAMES
 
 
 class TakingOver(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -10,7 +10,14 @@ from action_assistant.editor.interchange import importing
 from action_assistant.editor.interchange.action_uses import together
 from action_assistant.editor.interchange.changes import editing
 from action_assistant.errors import NotFound, NotUmrf
-from action_assistant.umrf.action_updates import Renames, is_like, suggested, updated, uses_of
+from action_assistant.umrf.action_updates import (
+    NO_RENAMES,
+    Renames,
+    is_like,
+    suggested,
+    updated,
+    uses_of,
+)
 from action_assistant.umrf.check import check
 from action_assistant.umrf.difference import Difference, difference
 from action_assistant.umrf.files.action_files import ACTION_DIALECTS, read_action, write_action
@@ -32,7 +39,7 @@ class ActionUse(msgspec.Struct, frozen=True, kw_only=True):
     count: int
     changed: bool
     difference: Difference | None = None
-    suggested: Renames = Renames()
+    suggested: Renames = NO_RENAMES
 
 
 class BroughtAction(msgspec.Struct, frozen=True):
