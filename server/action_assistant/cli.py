@@ -36,7 +36,11 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
     "package": CommandEntry(
         "packages.package", "write C++ packages of actions, as the engine loads them"
     ),
-    "import": CommandEntry("remote", "bring UMRF files in as graphs", described=True),
+    "import": CommandEntry(
+        "import_files",
+        "bring UMRF files in: graphs, and actions, which go into the library",
+        described=True,
+    ),
     "export": CommandEntry("remote", "print a graph as UMRF", described=True),
     "graphs": CommandEntry("remote", "list the graphs", described=True),
     "runs": CommandEntry("remote", "list the runs, newest first", described=True),

@@ -1,4 +1,4 @@
-"""Commands that talk to a running server: import, export, graphs, runs, run, stop."""
+"""Commands that talk to a running server: export, graphs, runs, run, stop."""
 
 import argparse
 import sys
@@ -27,12 +27,6 @@ _POLL: Final = 0.2  # seconds
 _INSIST_S: Final = 5.0
 
 Run: TypeAlias = dict[str, Any]
-
-
-def _add_import(bring: argparse.ArgumentParser) -> None:
-    add_server(bring, "patrol.umrf.graph.json")
-    bring.add_argument("files", type=Path, nargs="+", metavar="FILE")
-    bring.set_defaults(handler=_import)
 
 
 def _add_export(export: argparse.ArgumentParser) -> None:
@@ -103,33 +97,12 @@ def _add_stop(stop: argparse.ArgumentParser) -> None:
 
 
 COMMANDS: Final = {
-    "import": _add_import,
     "export": _add_export,
     "graphs": _add_graphs,
     "runs": _add_runs,
     "run": _add_run,
     "stop": _add_stop,
 }
-
-
-def _import(options: argparse.Namespace) -> int:
-    code = 0
-    with running(options) as server:
-        for path in options.files:
-            try:
-                body = path.read_bytes()
-            except OSError as error:
-                raise CannotStart(f"Cannot read {path}: {error.strerror}.") from error
-            try:
-                made = server.editor("POST", "/api/graphs", content=body, headers=_JSON).json()
-            except No as error:
-                code = refused(No(f"{path}: {error}"))
-                continue
-            print(one_line(f"{made['id']}  {made['name']}"))
-    return code
-
-
-_JSON: Final = {"content-type": "application/json"}
 
 
 def _export(options: argparse.Namespace) -> int:

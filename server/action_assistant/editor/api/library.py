@@ -4,7 +4,7 @@ from typing import Annotated, Any
 from urllib.parse import unquote
 
 import msgspec
-from litestar import Request, Response, get, post
+from litestar import Request, Response, get, post, put
 from litestar.params import QueryParameter
 from litestar.types import ControllerRouterHandler
 
@@ -113,7 +113,21 @@ def _actions(app_state: EditorState) -> list[ControllerRouterHandler]:
         text = await services.graph_reader.ask(library_updates.written, sight)
         return Response(text, media_type="application/json", headers={"x-seq": str(sight.seq)})
 
-    return [list_actions, list_deleted_actions, create_action, get_action_umrf]
+    @put(
+        "/api/actions/{action_id:str}/umrf",
+        summary="Make an action what its UMRF file says, as an edit that can be taken back",
+        operation_id="replaceAction",
+        guards=[Needs("edit")],
+        opt=reads(JsonObject),
+        request_max_body_size=BODY_LIMIT,
+    )
+    async def replace_action(action_id: str, request: Asking) -> GraphView:
+        services, person = app_state.services, person_of(request)
+        body = await request.body()
+        await services.people.seen(person)
+        return await services.library_edits.replace(action_id, body, person.id)
+
+    return [list_actions, list_deleted_actions, create_action, get_action_umrf, replace_action]
 
 
 def _uses(app_state: EditorState) -> list[ControllerRouterHandler]:

@@ -24,7 +24,8 @@ Kind: TypeAlias = Literal[
 
 
 class TakenFrom(msgspec.Struct, frozen=True):
-    """The document whose parameters were taken over, its change then, and the name of the action."""
+    """The document whose parameters were taken over, "" for a file, its change then, and the name of
+    the action."""
 
     document: str
     seq: int

@@ -152,10 +152,20 @@ class LibraryEdits:
         source = await self._graph_reader.now(graph)
         name = (await self._catalogue.get(action)).name
         async with self._rooms.enter(h.graph_stream(action)) as room:
-            state = await room.look(lambda replica, seq: (replica.doc.get_update(), seq))
-            sight = GraphAtSeq(action, state[1], state[0])
+            sight = await _now(room, action)
             update = await self._graph_reader.ask(library_updates.taking, sight, source, aid)
             await self._adapt(room, action, update, author, source, name)
+        return await self._catalogue.get(action)
+
+    async def replace(self, action: str, body: bytes, author: str) -> GraphView:
+        """The action becomes what its file says. Raises BadInput, NotUmrf, TooLarge with the place,
+        Conflict for the file of another."""
+        await self._catalogue.require(action, "action")
+        name = (await self._catalogue.get(action)).name
+        async with self._rooms.enter(h.graph_stream(action)) as room:
+            sight = await _now(room, action)
+            update = await self._files(library_updates.replacing, sight, body)
+            await self._adapt(room, action, update, author, GraphAtSeq("", 0, b""), name)
         return await self._catalogue.get(action)
 
     async def _adapt(
@@ -184,11 +194,13 @@ class LibraryEdits:
         return [await self._graph_reader.now(view.id) for view in views]
 
 
+async def _now(room: Room, document: str) -> GraphAtSeq:
+    return await room.look(lambda replica, seq: GraphAtSeq(document, seq, replica.doc.get_update()))
+
+
 async def _seen(room: Room, moment: GraphMoment) -> GraphAtSeq:
     """The graph that somebody has seen, if it still is so."""
-    found: GraphAtSeq = await room.look(
-        lambda replica, seq: GraphAtSeq(moment.graph, seq, replica.doc.get_update())
-    )
+    found = await _now(room, moment.graph)
     if found.seq != moment.seq:
         raise _changed(moment, found.seq)
     return found

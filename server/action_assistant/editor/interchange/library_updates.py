@@ -9,7 +9,7 @@ from action_assistant.editor.documents.contents import GraphAtSeq, first_action,
 from action_assistant.editor.interchange import importing
 from action_assistant.editor.interchange.action_uses import together
 from action_assistant.editor.interchange.changes import editing
-from action_assistant.errors import NotFound, NotUmrf
+from action_assistant.errors import Conflict, NotFound, NotUmrf
 from action_assistant.umrf.action_updates import (
     NO_RENAMES,
     Renames,
@@ -148,6 +148,23 @@ def taking(sight: GraphAtSeq, graph: GraphAtSeq, aid: str | None) -> bytes:
         return updated(old, replace(known, name=action.name))
 
     return editing(sight.state, taken)
+
+
+def replacing(sight: GraphAtSeq, body: bytes) -> bytes:
+    """The update that makes the action what a file says of it, all but its place. Raises as `brought`
+    does, and Conflict for the file of another action."""
+    action, file = _action_of(sight), brought(body).action
+    if file.name != action.name:
+        raise Conflict(
+            f"This is the file of {file.name!r}, and the action is {action.name!r}.",
+            where={"path": "/name"},
+        )
+
+    def replaced(old: Graph) -> Graph:
+        new = replace(file, key=action.key, position=action.position)
+        return replace(old, actions=tuple(new if a.key == new.key else a for a in old.actions))
+
+    return editing(sight.state, replaced)
 
 
 def _action_of(sight: GraphAtSeq) -> Action:

@@ -69,8 +69,8 @@ class GraphRestored(msgspec.Struct, frozen=True):
 
 class GraphAdapted(msgspec.Struct, frozen=True):
     """The edit `seq` brought parameters to what another document says: the uses of a library's action
-    in a graph to that action, or an action of the library to its use in a graph. `source` is that other
-    document, `at` its change, `name` the action."""
+    in a graph to that action, or an action of the library to its use in a graph or to a file. `source` is
+    that other document, "" for a file, `at` its change, `name` the action."""
 
     seq: int
     source: str

@@ -25,7 +25,8 @@ from action_assistant.runner.runs import views
 from action_assistant.runner.start.preflight import Preflight
 from action_assistant.runner.start.start_checks import GroupRequest, read_group
 from action_assistant.umrf.files import codec
-from action_assistant.umrf.json.embedded import UmrfGraph
+from action_assistant.umrf.files.action_files import write_action
+from action_assistant.umrf.json.embedded import JsonObject, UmrfGraph
 from action_assistant.umrf.model import Signature
 from action_assistant.web.auth.access import Needs
 from action_assistant.web.network.connection_limits import ConcurrencyLimit
@@ -161,6 +162,19 @@ def _one_robot(services: RobotServices) -> list[ControllerRouterHandler]:
         actions = [_action(action, index.actions[action]) for action in sorted(index.actions)]
         return RobotKnowledge(actions, sorted(index.graphs), index.unread)
 
+    @get(
+        "/api/robots/{name:str}/known/{action:str}",
+        summary="An action that a robot has indexed, as its UMRF file",
+        responses={200: answer(JsonObject)},
+    )
+    async def known_action(name: str, action: str) -> Response[bytes]:
+        index = await services.control.robots.index(name)
+        found = index.described.get(action)
+        if found is None:
+            raise NotFound(f"{name} has not indexed an action {action!r}.")
+        file = await services.run_in_worker(write_action, found)
+        return Response(file.encode(), media_type="application/json")
+
     @get("/api/robots/{name:str}/events", summary="What others told a robot, newest first")
     async def events(name: str) -> list[RobotLogLine]:
         services.control.robots.registration(name)
@@ -212,7 +226,7 @@ def _one_robot(services: RobotServices) -> list[ControllerRouterHandler]:
     async def stop(name: str, request: _Asking) -> RobotStopped:
         return RobotStopped(*services.control.stop_robot(name, author_of(request)))
 
-    return [robot, known, events, commanded, held, recorded, recording, stop]
+    return [robot, known, known_action, events, commanded, held, recorded, recording, stop]
 
 
 def _starts(services: RobotServices) -> list[ControllerRouterHandler]:

@@ -29,7 +29,7 @@ from action_assistant.runner.links.port import (
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.files import codec
-from action_assistant.umrf.model import Graph, Signature
+from action_assistant.umrf.model import Action, Graph, Signature
 from action_assistant.umrf.signatures import signature_of
 
 log: Final = logging.getLogger(__name__)
@@ -47,10 +47,11 @@ RunInAnyWay = Callable[..., Awaitable[T]]
 
 
 class EngineIndex(msgspec.Struct, frozen=True, kw_only=True):
-    """What an engine can do: actions and graphs that it has indexed, by name. `unread`: texts of its
-    index that cannot be read."""
+    """What an engine can do: actions and graphs that it has indexed, by name. `described`: what the
+    files of these actions say. `unread`: texts of its index that cannot be read."""
 
     actions: dict[str, Signature] = {}
+    described: dict[str, Action] = {}
     graphs: dict[str, Graph] = {}
     unread: int = 0
 
@@ -292,7 +293,7 @@ class KnownEngine:
 
 def read_index(actions: tuple[str, ...], graphs: tuple[str, ...]) -> EngineIndex:
     """The index of an engine from its texts. What cannot be read is counted."""
-    known: dict[str, Signature] = {}
+    described: dict[str, Action] = {}
     whole: dict[str, Graph] = {}
     unread = 0
     for text in actions:
@@ -301,7 +302,7 @@ def read_index(actions: tuple[str, ...], graphs: tuple[str, ...]) -> EngineIndex
         except codec.Unreadable:
             unread += 1
         else:
-            known.setdefault(action.name, signature_of(action))  # the engine takes the first, too
+            described.setdefault(action.name, action)  # the engine takes the first, too
     for text in graphs:
         try:
             graph = codec.read(text).graph
@@ -309,7 +310,8 @@ def read_index(actions: tuple[str, ...], graphs: tuple[str, ...]) -> EngineIndex
             unread += 1
         else:
             whole.setdefault(graph.name, graph)
-    return EngineIndex(actions=known, graphs=whole, unread=unread)
+    known = {name: signature_of(action) for name, action in described.items()}
+    return EngineIndex(actions=known, described=described, graphs=whole, unread=unread)
 
 
 def _held(answer: Answer) -> list[tuple[str, str, str | None, bool]]:
