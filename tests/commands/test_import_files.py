@@ -1,4 +1,4 @@
-"""The command `import`: graphs, actions for the library, and all actions of a folder."""
+"""The commands `import`, which fills the library, and `package`, which takes actions out of it."""
 
 import json
 from collections.abc import Iterator
@@ -93,3 +93,16 @@ def test_what_cannot_be_read_is_told_with_its_file_and_the_others_come(
     assert "was read from" in answer.stderr
     assert "AfterAll" in library(product)
     assert product.cli("import", str(tmp_path / "none")).returncode == 2
+
+
+def test_packages_are_made_of_the_library_by_name(product: Product, tmp_path: Path) -> None:
+    written(tmp_path, lift=action("LiftBox"), drop=action("DropBox"))
+    product.cli("import", str(tmp_path))
+    answer = product.cli("package", "--name", "LiftBox", "--output", str(tmp_path / "src"))
+    assert answer.returncode == 0, answer.stderr
+    assert [each.name for each in (tmp_path / "src").iterdir()] == ["lift_box"]
+    file = json.loads((tmp_path / "src/lift_box/lift_box.umrf.json").read_text())
+    assert file["input_parameters"] == {"speed": {"pvf_type": "number"}}
+    unknown = product.cli("package", "--name", "Nothing", "--output", str(tmp_path / "src"))
+    assert (unknown.returncode, "no action 'Nothing'" in unknown.stderr) == (1, True)
+    assert product.cli("package", "--output", str(tmp_path / "src")).returncode == 2

@@ -242,6 +242,23 @@ def test_the_library_takes_over_what_a_graph_has_and_keeps_its_own_values(
     assert newest["adapted"]["document"] == other
 
 
+def test_an_action_can_be_made_what_a_file_says_and_back(http: httpx.Client, name: str) -> None:
+    document = brought(http, action(name, **TAKES))
+    newer = {**action(name, place=leaf("string", pvf_value="dock")), "mine": 1}
+    assert http.put(f"/api/actions/{document}/umrf", json=newer).status_code == 200
+    file = http.get(f"/api/actions/{document}/umrf").json()
+    assert file["input_parameters"] == {"place": leaf("string", pvf_value="dock")}
+    assert file["mine"] == 1
+    newest = http.get(f"/api/graphs/{document}/history").json()[0]
+    assert (newest["kind"], newest["adapted"]["document"]) == ("adapted", "")
+    http.post(f"/api/graphs/{document}/restore", json={"seq": 1}).raise_for_status()
+    file = http.get(f"/api/actions/{document}/umrf").json()
+    assert file["input_parameters"] == TAKES
+    of_another = http.put(f"/api/actions/{document}/umrf", json=action("Another"))
+    assert of_another.status_code == 409
+    assert http.put(f"/api/actions/{document}/umrf", content=b"{").status_code == 400
+
+
 def test_a_graph_is_no_action_and_an_action_no_graph_to_update(
     http: httpx.Client, name: str
 ) -> None:

@@ -271,6 +271,7 @@ def test_pause_and_resume(process: RunnerProcess) -> None:
         ("POST", "/api/runs/nothing/pause"),
         ("GET", "/api/runs/nothing/events"),
         ("GET", "/api/robots/nobody"),
+        ("GET", "/api/robots/nobody/known/Work"),
     ],
 )
 def test_what_is_not_there_is_not_found(process: RunnerProcess, method: str, path: str) -> None:

@@ -21,11 +21,14 @@ from runner.registered_robots import NEVER, Open, RegisteredRobots, fleet
 
 @virtual
 async def test_a_robot_that_answers_says_so_and_what_it_has() -> None:
-    async with fleet(Harness(), David=Open()) as control:
+    david = Open()
+    async with fleet(Harness(), David=david) as control:
         robot = control.robots.robot("David")
         assert (robot.state, robot.why, robot.actions, robot.servers) == ("answering", "", 1, 1)
         index = await control.robots.index("David")
         assert list(index.actions) == ["Work"]
+        # As its file says, so that the library can take it over.
+        assert index.described["Work"] == codec.read_action(david.known_actions[0]).action
 
 
 @virtual

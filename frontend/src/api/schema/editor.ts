@@ -767,7 +767,8 @@ export interface EditorApi {
     };
     /**
      * TakenFrom
-     * @description The document whose parameters were taken over, its change then, and the name of the action.
+     * @description The document whose parameters were taken over, "" for a file, its change then, and the name of
+     *     the action.
      */
     TakenFrom: {
         document: string;

@@ -1,4 +1,4 @@
-"""The command `package`: C++ packages of the actions that a file describes."""
+"""The command `package`: C++ packages of the actions that a file describes, or that a library has."""
 
 import argparse
 import sys
@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
+from action_assistant.commands.client import No, add_server, refused, running
 from action_assistant.commands.packages import workspace
 from action_assistant.commands.packages.folder import write_all
 from action_assistant.commands.packages.planning import PackagesPlan, plan
@@ -27,8 +28,14 @@ from action_assistant.umrf.packages.naming import NameRefusal, check_names, snak
 
 
 def _add_package(package: argparse.ArgumentParser) -> None:
-    package.epilog = "example: action-assistant package open_gripper.umrf.json --output ~/ws/src"
-    package.add_argument("file", type=Path, metavar="FILE", help="of one action, or a graph")
+    add_server(package, "open_gripper.umrf.json --output ~/ws/src")
+    package.add_argument(
+        "file",
+        type=Path,
+        nargs="?",
+        metavar="FILE",
+        help="of one action, or a graph; without, --name is asked of the library of a running server",
+    )
     place = package.add_mutually_exclusive_group(required=True)
     place.add_argument(
         "--output", type=Path, metavar="DIR", help="in which each package has a folder"
@@ -37,7 +44,10 @@ def _add_package(package: argparse.ArgumentParser) -> None:
         "--into", type=Path, metavar="DIR", help="the same, of a colcon workspace: its src"
     )
     package.add_argument(
-        "--name", nargs="+", metavar="NAME", help="of a graph's actions: these only"
+        "--name",
+        nargs="+",
+        metavar="NAME",
+        help="of a graph's actions, or of the library's: these only",
     )
     package.add_argument(
         "--diff", action="store_true", help="show what would be written, and write nothing"
@@ -52,16 +62,23 @@ COMMANDS: Final = {"package": _add_package}
 
 
 def _package(options: argparse.Namespace) -> int:
+    source = options.file or "library"
+    refusals: tuple[NameRefusal, ...] = ()
     try:
-        actions, refusals = _chosen(options.file, options.name)
+        if options.file is None:
+            actions = _of_library(options)
+        else:
+            actions, refusals = _chosen(options.file, options.name)
     except codec.Unreadable as error:
         place = f"{options.file}:{error.line}:{error.column}"
         print(f"{place}: {error.message}", file=sys.stderr)
         return 1
+    except No as error:
+        return refused(error)
     packages, more = _packages(actions)
     if refusals := (*refusals, *more):
         for refusal in dict.fromkeys(refusals):
-            print(f"{options.file}: {one_line(refusal.sentence)}", file=sys.stderr)
+            print(f"{source}: {one_line(refusal.sentence)}", file=sys.stderr)
         return 1
     root = options.into or options.output
     duplicates = () if options.into is None else workspace.against(options.into, packages)
@@ -83,6 +100,23 @@ def _regenerated(root: Path, found: PackagesPlan, options: argparse.Namespace) -
     if writing:
         tell_refused(found)
     return 1 if found.refused or (options.check and found.steps) else 0
+
+
+def _of_library(options: argparse.Namespace) -> tuple[Action, ...]:
+    """The actions of the library that are asked for. Raises No, and CannotStart without a server."""
+    if not options.name:
+        raise CannotStart("Which action? Name a FILE, or with --name actions of the library.")
+    with running(options) as server:
+        listed = server.editor("GET", "/api/actions").json()
+        known = {each["name"]: each["document"] for each in reversed(listed) if each["document"]}
+        missing = [name for name in options.name if name not in known]
+        if missing:
+            raise No(f"The library has no action {missing[0]!r}.")
+        files = [
+            server.editor("GET", f"/api/actions/{known[name]}/umrf").text
+            for name in dict.fromkeys(options.name)
+        ]
+    return tuple(codec.read_action(file).action for file in files)
 
 
 def _chosen(
