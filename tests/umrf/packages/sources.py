@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 import subprocess
+import sys
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -109,6 +110,19 @@ def compile_errors(package: Path, *options: str) -> str:
         timeout=60,
     )
     return answer.stderr if answer.returncode else ""
+
+
+def layout_faults(sources: Iterable[str]) -> str:
+    """What clang-format would change, by the style that lies beside the sources."""
+    program = Path(sys.executable).with_name("clang-format")
+    answer = subprocess.run(
+        [str(program), "--style=file", "--fallback-style=none", "--dry-run", *sources],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=60,
+    )
+    return answer.stderr
 
 
 _CPP: Final = re.compile(

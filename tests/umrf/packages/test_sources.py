@@ -24,6 +24,7 @@ from umrf.packages.sources import (
     described,
     hostile_texts,
     laid_out,
+    layout_faults,
     odd_actions,
     token_kinds,
 )
@@ -56,11 +57,22 @@ def shape(action: Action) -> dict[str, object]:
     return found
 
 
+@pytest.mark.timeout(900)  # a compiler for each of them
 @given(action=odd_actions())
 @settings(max_examples=examples(40), deadline=None)
 def test_the_package_of_any_description_compiles_without_a_warning(action: Action) -> None:
     with tempfile.TemporaryDirectory() as folder:
         assert compile_errors(laid_out(package_files(action), Path(folder))) == ""
+
+
+@given(action=odd_actions())
+@settings(max_examples=examples(40), deadline=None)
+def test_the_package_of_any_description_is_laid_out_as_its_style_says(action: Action) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        root = laid_out(package_files(action), Path(folder))
+        sources = [str(path) for path in root.rglob("*.[ch]pp")]
+        assert len(sources) >= 3
+        assert layout_faults(sources) == ""
 
 
 @given(text=hostile_texts)

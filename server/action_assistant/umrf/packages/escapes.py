@@ -98,6 +98,7 @@ ACCEPTED: Final[dict[str, tuple[type[SafeText], ...]]] = {
     "cmake": (CMakeString, PackageName),
     "xml": (XmlText, PackageName),
     "markdown": (MarkdownText, PackageName),
+    "yaml": (),
 }
 
 

@@ -18,6 +18,7 @@ _TEMPLATES: Final = Path(__file__).with_name("templates")
 _CPP: Final = "cpp"
 #: Template and language by path; `{}` is the name of the package.
 _FILES: Final = {
+    ".clang-format": ("clang_format", "yaml"),
     "CMakeLists.txt": ("cmake_lists", "cmake"),
     "README.md": ("readme", "markdown"),
     "include/{}/input_parameters.hpp": ("input_parameters", _CPP),

@@ -4,7 +4,6 @@
 #include "temoto_action_engine/util/error.hpp"
 #include "temoto_action_engine/util/logging.hpp"
 
-
 #include <boost/any.hpp>
 #include <boost/config.hpp>
 #include <boost/dll/alias.hpp>
@@ -74,7 +73,6 @@ public:
     changed_.wait(lock, [this] { return !paused_ || !actionOk(); });
     return actionOk();
   }
-
 
 private:
   void getInputParameters() override
