@@ -22,6 +22,7 @@ from action_assistant.safe_text import one_line
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.files.action_files import ACTION_DIALECTS
 from action_assistant.umrf.model import Action
+from action_assistant.umrf.packages.bundling import bundle_files
 from action_assistant.umrf.packages.choosing import disagreements, distinct_actions
 from action_assistant.umrf.packages.generating import ImpossiblePackage, package_files
 from action_assistant.umrf.packages.naming import NameRefusal, check_names, snake_case
@@ -50,6 +51,11 @@ def _add_package(package: argparse.ArgumentParser) -> None:
         help="of a graph's actions, or of the library's: these only",
     )
     package.add_argument(
+        "--together",
+        metavar="PACKAGE",
+        help="one package of this name with all the actions, instead of one for each",
+    )
+    package.add_argument(
         "--diff", action="store_true", help="show what would be written, and write nothing"
     )
     package.add_argument(
@@ -75,7 +81,7 @@ def _package(options: argparse.Namespace) -> int:
         return 1
     except No as error:
         return refused(error)
-    packages, more = _packages(actions)
+    packages, more = _packages(actions, options.together)
     if refusals := (*refusals, *more):
         for refusal in dict.fromkeys(refusals):
             print(f"{source}: {one_line(refusal.sentence)}", file=sys.stderr)
@@ -147,9 +153,14 @@ def _chosen(
 
 
 def _packages(
-    actions: Sequence[Action],
+    actions: Sequence[Action], together: str | None
 ) -> tuple[dict[str, dict[str, bytes]], tuple[NameRefusal, ...]]:
     """The files of all packages, by folder and path; or what stands against them."""
+    if together is not None:
+        try:
+            return {together: bundle_files(together, actions)}, ()
+        except ImpossiblePackage as error:
+            return {}, error.refusals
     packages: dict[str, dict[str, bytes]] = {}
     refusals = list(check_names(action.name for action in actions))
     for action in actions:

@@ -60,7 +60,7 @@ def package_files(action: Action) -> dict[str, bytes]:
         "outputs": outputs,
     }
     found = {
-        path.format(package): _rendered(template, language, known)
+        path.format(package): rendered(template, language, known)
         for path, (template, language) in _FILES.items()
         if _wanted(template, inputs, outputs)
     }
@@ -89,7 +89,8 @@ def _described(action: Action) -> Action:
     return msgspec.structs.replace(action, instance_id=0, actor="", position=None, extra=extra)
 
 
-def _rendered(template: str, language: str, known: dict[str, Any]) -> bytes:
+def rendered(template: str, language: str, known: dict[str, Any]) -> bytes:
+    """A template of a language, filled in."""
     text = environment(language).get_template(f"{template}.jinja").render(known)
     return text.encode()
 

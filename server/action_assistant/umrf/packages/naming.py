@@ -68,6 +68,12 @@ def check_names(names: Iterable[str]) -> tuple[NameRefusal, ...]:
     return tuple(found)
 
 
+def check_package(package: str) -> tuple[NameRefusal, ...]:
+    """What stands against a package of this name."""
+    reason = next(_against_package(package), None)
+    return () if reason is None else (NameRefusal(package, reason),)
+
+
 def _against(name: str) -> Iterator[str]:
     """Reasons, the gravest first."""
     package = snake_case(name)
@@ -80,8 +86,6 @@ def _against(name: str) -> Iterator[str]:
             f"“{name}” is no name of a C++ class: it may have letters of ASCII, digits and _, and "
             "begins with no digit."
         )
-    if len(package) > MAX_NAME:
-        yield f"The package would be called by {len(package)} characters; it may be {MAX_NAME}."
     if name in CPP_KEYWORDS:
         yield f"“{name}” is a word of C++ itself, and no name of a class."
     if name in MACROS | LOWER_MACROS:
@@ -90,6 +94,12 @@ def _against(name: str) -> Iterator[str]:
         yield f"“{name}” is a class that the engine or the package has already."
     if name in C_FUNCTIONS:
         yield f"“{name}” is a function of C; the library would give its own to the engine."
+    yield from _against_package(package)
+
+
+def _against_package(package: str) -> Iterator[str]:
+    if len(package) > MAX_NAME:
+        yield f"The package would be called by {len(package)} characters; it may be {MAX_NAME}."
     if not _ROS_NAME.fullmatch(package):
         yield (
             f"The package would be “{package}”, and ROS takes small letters and digits with single _ "

@@ -12,6 +12,7 @@ from action_assistant.umrf.packages.bases import (
     digest,
     write_base,
 )
+from action_assistant.umrf.packages.bundling import is_of_bundle
 from action_assistant.umrf.packages.generating import is_source, possible_files
 from action_assistant.umrf.packages.merging import MergeConflict, merged
 
@@ -91,10 +92,9 @@ def regenerated(
 ) -> Regeneration:
     """`now`: what `package_files` gives; `there`: what the package has at these paths and at those that
     the base names."""
-    possible = possible_files(package)
     # The base is a file, which anybody may have written: it may name what we make, and nothing else.
     settled = (base or GenerationBase()).settled(there)
-    last = {path: text for path, text in settled.items() if path in possible}
+    last = {path: text for path, text in settled.items() if _is_possible(package, now, path)}
     reader = _PackageReader()
     for path, text in now.items():
         reader.look_at(path, last.get(path), there.get(path), text)
@@ -128,8 +128,16 @@ def readable_paths(
 ) -> tuple[str, ...]:
     """The paths at which `regenerated` has to know what is there."""
     known = base or GenerationBase()
-    possible = possible_files(package)
-    return tuple(sorted({*now, *possible.intersection([*known.files, *known.unfinished])}))
+    told = (*known.files, *known.unfinished)
+    return tuple(sorted({*now, *(path for path in told if _is_possible(package, now, path))}))
+
+
+def _is_possible(package: str, now: Mapping[str, bytes], path: str) -> bool:
+    """Whether a generation for this package could have made a file. What several actions had together
+    has files of actions that are no longer among them."""
+    if f"{package}.umrf.json" in now:
+        return path in possible_files(package)
+    return is_of_bundle(path)
 
 
 def _against(path: str, before: bytes, content: bytes) -> str | None:
