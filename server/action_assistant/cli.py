@@ -36,6 +36,11 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
     "package": CommandEntry(
         "packages.package", "write C++ packages of actions, as the engine loads them"
     ),
+    "builds": CommandEntry(
+        "builds.builds",
+        "show errors of the last `colcon build` at the actions of the library; exit 1 if any failed",
+        described=True,
+    ),
     "import": CommandEntry(
         "import_files",
         "bring UMRF files in: graphs, and actions, which go into the library",

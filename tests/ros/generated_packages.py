@@ -137,12 +137,16 @@ class Workspace:
         for name in ("wheels", "prefix"):
             (self.lab / name).symlink_to((lab / name).resolve())
 
-    def write(self, graph: Graph) -> list[Path]:
-        """The packages of the actions of a graph, by the command that people use."""
+    def write(self, graph: Graph, together: str | None = None) -> list[Path]:
+        """The packages of the actions of a graph, or one of all, by the command that people use."""
         file = self._folder / f"{graph.name}.umrf.graph.json"
         file.write_text(codec.write(graph, codec.Stamp("g", "v", None)))
         command = [sys.executable, "-m", "action_assistant", "package", str(file)]
+        if together is not None:
+            command += ["--together", together]
         subprocess.run([*command, "--output", str(self.sources)], check=True)
+        if together is not None:
+            return [self.sources / together]
         return [self.sources / snake_case(action.name) for action in graph.actions]
 
     def build(self, packages: list[Path]) -> None:
@@ -157,8 +161,12 @@ class Workspace:
         self._run("cmake", "-S", str(package), "-B", build, install, "-DBUILD_TESTING=OFF")
         self._run("cmake", "--build", build)
         self._run("cmake", "--install", build)
-        assert (self._installed / "lib" / f"lib{package.name}.so").exists()
-        assert (self._installed / f"share/{package.name}/{package.name}.umrf.json").exists()
+        described = list(package.glob("*.umrf.json"))
+        assert described
+        for file in described:
+            library = file.name.removesuffix(".umrf.json")
+            assert (self._installed / "lib" / f"lib{library}.so").exists()
+            assert (self._installed / "share" / package.name / file.name).exists()
 
     def test(self, package: Path) -> None:
         """Run its unit tests; raises AssertionError with what was said."""

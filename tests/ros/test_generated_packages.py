@@ -95,7 +95,7 @@ def engine(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Told]:
     fill_in(give, after=GIVE)
     fill_in(take, before=TELL)
     fill_in(step, before='note("begin");', step='note("step");', after='note("end");')
-    packages += [give, take, step, wrong]
+    packages += [give, take, step, wrong, *workspace.write(TOGETHER, together="kitchen_actions")]
     workspace.build(packages)
     sys.stdout.write(f"{len(packages)} packages in {time.monotonic() - began:.0f} s\n")
     with told.log.open("w") as log:
@@ -126,6 +126,8 @@ NOT_ALLOWED = graph_of(
         "output_parameters": {"answer": {"pvf_type": "string", "pvf_allowed_values": ["yes"]}},
     },
 )
+#: Both in one package.
+TOGETHER = graph_of("together", {"name": "StirPot"}, {"name": "PourCup"})
 _numbers = count()
 
 
@@ -167,6 +169,13 @@ async def started(bench: Bench, graph: Graph) -> Started:
 def alone(fields: dict[str, Any], word: str) -> Graph:
     """A graph with one action."""
     return graph_of(f"{word}_{fields['name']}"[:60], fields)
+
+
+async def test_actions_that_lie_in_one_package_run_one_after_the_other(engine: Told) -> None:
+    async with robot() as bench:
+        begun = await started(bench, TOGETHER)
+        ended = await begun.seen("FINISHED", "ERROR", "STOPPED")
+        assert (ended.state, set(ended.nodes.values())) == ("FINISHED", {"FINISHED"})
 
 
 async def test_the_engine_knows_each_package_and_each_ends_as_it_was_generated(

@@ -1,6 +1,17 @@
 /** What the editor takes and answers. Made by `make types`; changes are lost. */
 export interface EditorApi {
     /**
+     * ActionBuilt
+     * @description Somebody told how the last build of the package of an action went; `at` is when that ended.
+     */
+    ActionBuilt: {
+        package: string;
+        ended_well: boolean;
+        /** Format: date-time */
+        at: string;
+        errors: EditorApi["BuildFault"][];
+    };
+    /**
      * ActionChange
      * @description An action that came, went or changed. `name` is its full name, the newer one.
      */
@@ -71,6 +82,28 @@ export interface EditorApi {
         outputs?: Record<string, unknown> | null;
         /** @default null */
         message?: string | null;
+    };
+    /**
+     * BuildFault
+     * @description An error of a compiler or of CMake. `file` is below the package, "" where none was named; `line`
+     *     and `column` are from 1.
+     */
+    BuildFault: {
+        message: string;
+        file: string;
+        line: number | null;
+        column: number | null;
+    };
+    /**
+     * BuildReport
+     * @description How the last build of an action's package went; `at` is when that ended.
+     */
+    BuildReport: {
+        package: string;
+        ended_well: boolean;
+        /** Format: date-time */
+        at: string;
+        errors: EditorApi["BuildFault"][];
     };
     /**
      * Command
@@ -350,6 +383,13 @@ export interface EditorApi {
         before?: unknown;
         /** @description Any JSON value */
         after?: unknown;
+    };
+    /**
+     * LastBuild
+     * @description What was told last of builds of an action's package; null if nobody told of one.
+     */
+    LastBuild: {
+        build: EditorApi["ActionBuilt"] | null;
     };
     /**
      * LibraryAction

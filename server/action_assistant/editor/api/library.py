@@ -1,5 +1,6 @@
 """Routes of the action library: its actions, what graphs make of them, and taking over either way."""
 
+from datetime import datetime
 from typing import Annotated, Any
 from urllib.parse import unquote
 
@@ -15,6 +16,7 @@ from action_assistant.editor.interchange import library_updates
 from action_assistant.editor.interchange.action_uses import LibraryAction
 from action_assistant.editor.interchange.importing import Preview
 from action_assistant.editor.interchange.library_updates import ActionUse
+from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.services import EditorState
 from action_assistant.editor.workers import encoded
 from action_assistant.errors import BadInput
@@ -50,9 +52,24 @@ class TakingOver(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     aid: str | None = None
 
 
+class BuildReport(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """How the last build of an action's package went; `at` is when that ended."""
+
+    package: Annotated[str, msgspec.Meta(max_length=200)]
+    ended_well: bool
+    at: datetime
+    errors: Annotated[tuple[h.BuildFault, ...], msgspec.Meta(max_length=100)]
+
+
+class LastBuild(msgspec.Struct, frozen=True):
+    """What was told last of builds of an action's package; None if nobody told of one."""
+
+    build: h.ActionBuilt | None
+
+
 def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
     """Everything about the library."""
-    return [*_actions(app_state), *_uses(app_state)]
+    return [*_actions(app_state), *_uses(app_state), *_builds(app_state)]
 
 
 def _actions(app_state: EditorState) -> list[ControllerRouterHandler]:
@@ -175,6 +192,31 @@ def _uses(app_state: EditorState) -> list[ControllerRouterHandler]:
         return await services.library_edits.take(action_id, data.graph, data.aid, person.id)
 
     return [list_uses, update_uses, take_over]
+
+
+def _builds(app_state: EditorState) -> list[ControllerRouterHandler]:
+    @get(
+        "/api/actions/{action_id:str}/build",
+        summary="How the last build of an action's package went, as `action-assistant builds` told",
+        operation_id="getBuild",
+    )
+    async def get_build(action_id: str) -> LastBuild:
+        return LastBuild(await app_state.services.library_edits.last_build(action_id))
+
+    @put(
+        "/api/actions/{action_id:str}/build",
+        status_code=204,
+        summary="Tell how the last build of an action's package went",
+        operation_id="putBuild",
+        guards=[Needs("edit")],
+    )
+    async def put_build(action_id: str, data: BuildReport, request: Asking) -> None:
+        services, person = app_state.services, person_of(request)
+        await services.people.seen(person)
+        build = h.ActionBuilt(data.package, data.ended_well, data.at, data.errors)
+        await services.library_edits.built(action_id, build, person.id)
+
+    return [get_build, put_build]
 
 
 def _pairs(place: str, texts: list[str] | None) -> tuple[tuple[str, str], ...]:

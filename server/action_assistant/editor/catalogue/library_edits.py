@@ -6,6 +6,7 @@ from typing import Any
 
 import anyio
 import msgspec
+from sqlalchemy import select
 
 from action_assistant.editor.catalogue.catalogue import Catalogue, GraphView, fit
 from action_assistant.editor.catalogue.graph_reader import GraphReader
@@ -19,6 +20,7 @@ from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.editor.rooms.room import Room
 from action_assistant.errors import BadInput, Conflict
 from action_assistant.journal.journal import Journal
+from action_assistant.schema import editor_tables
 from action_assistant.umrf.action_updates import Renames
 from action_assistant.umrf.model import Action
 from action_assistant.web.workers.lanes import RunInWorker
@@ -167,6 +169,25 @@ class LibraryEdits:
             update = await self._files(library_updates.replacing, sight, body)
             await self._adapt(room, action, update, author, GraphAtSeq("", 0, b""), name)
         return await self._catalogue.get(action)
+
+    async def built(self, action: str, build: h.ActionBuilt, author: str) -> None:
+        """Somebody tells how a build of its package went."""
+        await self._catalogue.require(action, "action")
+        await self._journal.append(h.about_stream(action), [h.draft(h.BUILT, author, build)])
+
+    async def last_build(self, action: str) -> h.ActionBuilt | None:
+        """What was told last of builds of its package; None if nobody told of one."""
+        await self._catalogue.require(action, "action")
+        event = editor_tables.editor_event.c
+        chosen = (
+            select(event.body)
+            .where(event.stream == h.about_stream(action), event.kind == h.BUILT)
+            .order_by(event.seq.desc())
+            .limit(1)
+        )
+        for row in await self._journal.query(chosen):
+            return msgspec.json.decode(row.body, type=h.ActionBuilt)
+        return None
 
     async def _adapt(
         self,

@@ -5,7 +5,8 @@ document. Everything else about a graph is in `about/ID`; names of people are in
 """
 
 from collections.abc import Sequence
-from typing import Any, Final, Literal, TypeAlias
+from datetime import datetime
+from typing import Annotated, Any, Final, Literal, TypeAlias
 
 import msgspec
 from sqlalchemy import Executable, delete, insert, update
@@ -22,6 +23,7 @@ IMPORTED: Final = "graph.imported.v1"  # the body is the file as it came
 DESCRIBED: Final = "graph.described.v1"
 RESTORED: Final = "graph.restored.v1"
 ADAPTED: Final = "graph.adapted.v1"
+BUILT: Final = "action.built.v1"
 DELETED: Final = "graph.deleted.v1"
 RECOVERED: Final = "graph.recovered.v1"
 PUBLISHED: Final = "version.published.v1"
@@ -76,6 +78,25 @@ class GraphAdapted(msgspec.Struct, frozen=True):
     source: str
     at: int
     name: str
+
+
+class BuildFault(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """An error of a compiler or of CMake. `file` is below the package, "" where none was named; `line`
+    and `column` are from 1."""
+
+    message: Annotated[str, msgspec.Meta(max_length=1000)]
+    file: Annotated[str, msgspec.Meta(max_length=1000)]
+    line: int | None
+    column: int | None
+
+
+class ActionBuilt(msgspec.Struct, frozen=True):
+    """Somebody told how the last build of the package of an action went; `at` is when that ended."""
+
+    package: str
+    ended_well: bool
+    at: datetime
+    errors: tuple[BuildFault, ...]
 
 
 class VersionPublished(msgspec.Struct, frozen=True):

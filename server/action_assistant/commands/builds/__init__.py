@@ -1,0 +1,1 @@
+"""What colcon said of the packages of actions."""
