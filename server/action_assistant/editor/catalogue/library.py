@@ -1,5 +1,8 @@
 """The action library: the actions that have a document, and those that graphs use, each name once."""
 
+from typing import Final
+
+from anyio import CapacityLimiter, Lock, create_task_group
 from sqlalchemy import select
 
 from action_assistant.editor.catalogue.graph_reader import GraphReader
@@ -9,6 +12,8 @@ from action_assistant.journal.journal import Journal
 from action_assistant.schema import editor_tables
 from action_assistant.web.workers.lanes import HOPELESS
 
+_AT_ONCE: Final = 4  # documents that are read
+
 
 class Library:
     """Reads a document again only when it has changed."""
@@ -17,11 +22,16 @@ class Library:
         self._journal = journal
         self._graph_reader = graph_reader
         self._read: dict[str, tuple[int, bytes]] = {}
+        self._reading = Lock()
         self._shown: tuple[dict[str, int], bytes] = {}, b"[]"
 
     async def all(self) -> bytes:
         """Every action by name: JSON of a list of `LibraryAction`. Documents that cannot be read are
         left out."""
+        async with self._reading:  # what one request reads the next one has
+            return await self._all()
+
+    async def _all(self) -> bytes:
         graph, event = editor_tables.graph, editor_tables.editor_event
         last = (
             select(event.c.seq)
@@ -40,8 +50,10 @@ class Library:
             .where(graph.c.deleted_at.is_(None))
             .order_by(graph.c.made_at, graph.c.id)
         )
-        for row in rows:
-            await self._refresh(row.id, row.seq, row.kind)
+        limit = CapacityLimiter(_AT_ONCE)
+        async with create_task_group() as reading:
+            for row in rows:
+                reading.start_soon(self._refresh, row.id, row.seq, row.kind, limit)
         seqs = {row.id: self._read[row.id][0] for row in rows}
         if self._shown[0] != seqs:
             self._read = {row.id: self._read[row.id] for row in rows}
@@ -53,12 +65,16 @@ class Library:
             self._shown = seqs, await self._graph_reader.ask(merged, sources)
         return self._shown[1]
 
-    async def _refresh(self, graph: str, seq: int, kind: DocumentKind) -> None:
+    async def _refresh(
+        self, graph: str, seq: int, kind: DocumentKind, limit: CapacityLimiter
+    ) -> None:
         known = self._read.get(graph)
-        if known is None or known[0] < seq:
+        if known is not None and known[0] >= seq:
+            return
+        async with limit:
             try:
                 sight = await self._graph_reader.now(graph)
                 seq, actions = sight.seq, await self._graph_reader.ask(found, sight, kind)
             except HOPELESS:
                 actions = NOTHING
-            self._read[graph] = seq, actions
+        self._read[graph] = seq, actions
