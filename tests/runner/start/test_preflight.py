@@ -11,6 +11,7 @@ from action_assistant.runner.links.port import (
 from action_assistant.runner.robots.robot_events import StopWasProven
 from action_assistant.runner.runs.events import Override
 from action_assistant.umrf.files import codec
+from action_assistant.umrf.model import Parameter
 from runner.harness import ANN, BEN, Harness, order, sequence, until, virtual
 from runner.registered_robots import NEVER, Open, fleet, given, group, verdicts
 
@@ -110,3 +111,22 @@ async def test_the_simulator_that_plays_a_robot_refuses_what_the_robot_would() -
             await control.start(order(graph, like="David"), ANN)
         await control.register(Registration(name="David", profile={"synchronises": True}), ANN)
         assert (await control.start(order(graph, like="David"), ANN)).run.like == "David"
+
+
+@virtual
+async def test_a_robot_that_has_an_action_as_it_was_before_is_not_started() -> None:
+    """Its index says so: the graph has a parameter that the robot's file of the action does not."""
+    david, graph = Open(), sequence()
+    newer = tuple(
+        msgspec.structs.replace(
+            action, inputs=(Parameter("torque", '{"pvf_type": "number", "pvf_value": 1}'),)
+        )
+        for action in graph.actions
+    )
+    async with fleet(Harness(), David=david) as control:
+        asked = group(msgspec.structs.replace(graph, actions=newer), "David", digest="")
+        (look,) = await control.look(asked)
+        assert verdicts(look)["actions"] == "blocked"
+        (item,) = [each for each in look.items if each.code == "actions"]
+        assert "torque" in msgspec.json.encode(item).decode()
+    assert david.starts == []
