@@ -3,6 +3,7 @@
 from action_assistant.umrf.semantics.engine import Engine, GraphNow
 from action_assistant.umrf.semantics.graphs import GraphRefused
 from action_assistant.umrf.semantics.parts import Execution
+from action_assistant.umrf.semantics.performing import Call, Performer, Returned
 from action_assistant.umrf.semantics.script import SCRIPT, Behaviour, Script, script_from
 from action_assistant.umrf.semantics.simulate import CUT_OFF, simulate
 from action_assistant.umrf.semantics.trace import (
@@ -21,6 +22,7 @@ __all__ = [
     "CUT_OFF",
     "SCRIPT",
     "Behaviour",
+    "Call",
     "Dispatch",
     "EdgeEval",
     "Engine",
@@ -33,6 +35,8 @@ __all__ = [
     "NodeResultEvent",
     "NodeStateEvent",
     "NotReady",
+    "Performer",
+    "Returned",
     "Script",
     "Trace",
     "script_from",

@@ -7,6 +7,8 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from math import inf
 
+from msgspec.structs import replace
+
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics.clock import Clock, Task
@@ -20,6 +22,12 @@ from action_assistant.umrf.semantics.parts import (
     Outcome,
     Running,
     linked_nodes,
+)
+from action_assistant.umrf.semantics.performing import (
+    PERFORMED,
+    PerformedCalls,
+    Performer,
+    Returned,
 )
 from action_assistant.umrf.semantics.script import OUTCOMES, Script
 from action_assistant.umrf.semantics.trace import (
@@ -46,9 +54,15 @@ class Core(Clock):
     """The propagation of results and the life of actions. `Engine` adds the commands."""
 
     def __init__(
-        self, facts: EngineFacts, script: Script, library: Mapping[str, Graph], actor: str
+        self,
+        facts: EngineFacts,
+        script: Script,
+        library: Mapping[str, Graph],
+        actor: str,
+        performer: Performer | None = None,
     ) -> None:
         super().__init__(facts)
+        self._performed = PerformedCalls(performer)
         self.script = script
         self.library = library
         self.actor = actor
@@ -236,6 +250,8 @@ class Core(Clock):
         self._state(graph, node, "RUNNING")
         node.execution = Execution(graph.name, node.full_name, self.now)
         self._executions = [*self.executing(self.now), node.execution]
+        if node.call is PERFORMED:
+            self._performed.begin(graph, node)
         duration = self._takes_ms(node)
         if node.type == "spontaneous":
             duration = max(duration, 1.0)
@@ -259,6 +275,28 @@ class Core(Clock):
     def _returns(self, graph: Running, node: Node, token: int) -> None:
         if node.token == token:
             self._ended(graph, node, _OUTCOMES[node.call.result])
+
+    def _performed_returns(self, returned: Returned) -> None:
+        """Nothing of a call goes on any more that somebody has performed."""
+        found = self._performed.take(returned.number)
+        if found is None:
+            return
+        graph, node, execution = found
+        execution.ends_ms = self.now
+        if node.execution is not execution or self.graphs.get(graph.name) is not graph:
+            return
+        if node.rest_ms is not None and node.state not in HELD and not self.facts.pauses_safely:
+            return  # it was paused when it was stopped: the engine waits for its thread for ever
+        if node.busy_until == inf:
+            node.busy_until = self.now
+        if node.active:
+            node.call = replace(
+                PERFORMED,
+                result=returned.result,
+                outputs=returned.outputs,
+                message=returned.message,
+            )
+            self._ended(graph, node, _OUTCOMES[returned.result])
 
     def _ended(self, graph: Running, node: Node, result: Outcome) -> None:
         """`onRun` returned, or threw (`on_error`)."""
@@ -295,7 +333,8 @@ class Core(Clock):
             self._run(graph, node)
 
     def _result(self, graph: Running, node: Node, result: str) -> None:
-        said = node.call.message if result != "on_stopped" else None
+        scripted = node.execution is None or not node.execution.number
+        said = node.call.message if result != "on_stopped" or not scripted else None
         self._out.append(NodeResultEvent(self._t(), graph.name, node.full_name, result, said))
 
     # Stop and pause of one action
@@ -337,6 +376,7 @@ class Core(Clock):
 
     def _stop_code(self, node: Node, held: bool) -> float:
         """`onStop`: when the action's own code returns now."""
+        self._performed.stop(node)
         ends = self.now + node.rest_ms if held and node.rest_ms is not None else node.due_ms
         if ends is None:
             ends = inf
@@ -357,6 +397,8 @@ class Core(Clock):
             return
         node.token += 1
         graph.stop_failed = True
+        if said := self._performed.give_up(node):
+            node.call = replace(node.call, message=said)
         self._state(graph, node, "ERROR")
         self._result(graph, node, "on_error")
         self._inform(graph, node, "on_error")
@@ -409,6 +451,7 @@ class Core(Clock):
         if node.subgraph is not None or not node.call.pauses:
             return False
         self._state(graph, node, "PAUSED")
+        self._performed.pause(node)
         if node.due_ms is not None:
             node.rest_ms = node.due_ms - self.now
             node.token += 1

@@ -14,6 +14,7 @@ from action_assistant.umrf.facts import SIMULATED, EngineFacts
 from action_assistant.umrf.model import Graph, Key, Signature
 from action_assistant.umrf.semantics.graphs import GraphRefused, Graphs
 from action_assistant.umrf.semantics.parts import Running
+from action_assistant.umrf.semantics.performing import Performer, Returned
 from action_assistant.umrf.semantics.script import Script
 from action_assistant.umrf.semantics.trace import GraphStateEvent, Trace
 
@@ -35,7 +36,8 @@ class Engine(Graphs):
 
     `library`: graphs that can be sub-graphs, by name. `actor`: the engine's name; without one it
     plays the only actor that a graph names. `signatures`: the actions that it has; without them it
-    has every action with any parameters. `serial`: commands wait for each other as they do over
+    has every action with any parameters. `performer`: carries out the actions that it says are its
+    own; the script says what the others do. `serial`: commands wait for each other as they do over
     ROS; otherwise a second stop during a stop reaches the engine and kills it. `loading_ms`: see
     `Core`.
     """
@@ -50,8 +52,9 @@ class Engine(Graphs):
         signatures: Mapping[str, Signature] | None = None,
         serial: bool = True,
         loading_ms: float = 0.0,
+        performer: Performer | None = None,
     ) -> None:
-        super().__init__(facts, script or Script(), library or {}, actor, signatures)
+        super().__init__(facts, script or Script(), library or {}, actor, signatures, performer)
         self.loading_ms = loading_ms
         self.serial = serial
 
@@ -151,6 +154,13 @@ class Engine(Graphs):
         old = self.graphs.get(graph.name)
         if old is not None and not self.crashed and not self.locked:
             self._command(partial(self._modify_graph, old, graph, continue_from))
+        return self._taken()
+
+    def returned(self, returned: Returned, at_ms: float) -> list[Trace]:
+        """A call that the performer was given has ended, all of it."""
+        self._run_until(at_ms)
+        if not self.crashed:
+            self._performed_returns(returned)
         return self._taken()
 
     # How commands come in

@@ -22,6 +22,7 @@ from action_assistant.umrf.semantics.parts import (
     build,
     restructure,
 )
+from action_assistant.umrf.semantics.performing import PERFORMED, Performer
 from action_assistant.umrf.semantics.script import Script
 from action_assistant.umrf.semantics.trace import HazardEvent, NodeStateEvent
 
@@ -44,8 +45,9 @@ class Graphs(Core):
         library: Mapping[str, Graph],
         actor: str,
         signatures: Mapping[str, Signature] | None,
+        performer: Performer | None = None,
     ) -> None:
-        super().__init__(facts, script, library, actor)
+        super().__init__(facts, script, library, actor, performer)
         self.signatures = signatures
         self._busy = False
         self._waiting: deque[Task] = deque()
@@ -73,7 +75,9 @@ class Graphs(Core):
     def _built(self, name: str, graph: Graph, above: Node | None, home: Running | None) -> Running:
         running = Running(name, graph, above, home)
         behaviours = {
-            a.key: self.script.calls_of(name, graph.name, a.full_name, a.name)
+            a.key: (PERFORMED,)
+            if self._performed.performs(a.name)
+            else self.script.calls_of(name, graph.name, a.full_name, a.name)
             for a in graph.actions
         }
         build(running, behaviours)
@@ -303,6 +307,7 @@ class Graphs(Core):
             elif node.rest_ms is not None:
                 self._let_run(graph, node, node.rest_ms)
                 node.rest_ms = None
+                self._performed.resume(node)
         if node_to_run := graph.nodes.get(continue_from):
             self._run(graph, node_to_run)
 

@@ -59,16 +59,18 @@ class Execution:
     """One call of an action's own code, whatever the engine says of the action meanwhile: after five
     seconds an engine calls one that ignores stop ERROR, and its code goes on.
 
-    `ends_ms`: when the code returns; inf while nothing will end it, also while it is held.
+    `ends_ms`: when the code returns; inf while nothing will end it, also while it is held. `number`:
+    of a call that somebody performs; 0 where the script says what is done.
     """
 
-    __slots__ = ("began_ms", "ends_ms", "graph", "node")
+    __slots__ = ("began_ms", "ends_ms", "graph", "node", "number")
 
     def __init__(self, graph: str, node: str, began_ms: float) -> None:
         self.graph = graph
         self.node = node
         self.began_ms = began_ms
         self.ends_ms = inf
+        self.number = 0
 
 
 class Node:

@@ -1,0 +1,129 @@
+"""The folder of behaviours: which file an action has, and what is in it. No other file is ever read."""
+
+import errno
+import os
+import re
+import stat
+import sys
+from collections.abc import Iterable
+from contextlib import contextmanager
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+from action_assistant.errors import CannotStart
+from action_assistant.umrf.packages.naming import check_name, snake_case
+
+_LARGEST: Final = 1 << 20  # bytes of a file
+_FILE: Final = re.compile(r"([a-z][a-z0-9]*(?:_[a-z0-9]+)*)\.py", re.ASCII)
+_MOST: Final = 1_000  # names of a list
+
+
+class Unusable(Exception):
+    """What stands for an action in the folder cannot be run; the message is a sentence."""
+
+
+class BehaviourList(msgspec.Struct, frozen=True):
+    """The behaviours that there are. `names`: in snake case, as the files are called without `.py`;
+    `refused`: those that cannot be run, and why."""
+
+    names: tuple[str, ...] = ()
+    refused: dict[str, str] = {}
+
+
+class BehaviourFolder(msgspec.Struct, frozen=True):
+    """A folder with a file for each action that it has, as the administrator named it."""
+
+    path: Path
+
+    @classmethod
+    def opened(cls, path: Path) -> "BehaviourFolder":
+        """The folder. Raises CannotStart when there is none, or where there can be none."""
+        if sys.platform != "linux":
+            raise CannotStart("Behaviours need Linux, which ends their processes for certain.")
+        found = cls(path.absolute())
+        try:
+            with found._entered():
+                pass
+        except OSError as error:
+            why = error.strerror or str(error)
+            raise CannotStart(f"There is no folder of behaviours {path}: {why}.") from error
+        return found
+
+    def has(self, name: str) -> bool:
+        """Whether something stands there for actions of this name, be it usable or not."""
+        if (file := file_of(name)) is None:
+            return False
+        try:
+            with self._entered() as folder:
+                os.stat(file, dir_fd=folder, follow_symlinks=False)
+        except FileNotFoundError:
+            return False
+        except OSError:
+            return True  # why it cannot be run is told when it is read
+        return True
+
+    def source(self, name: str) -> str:
+        """The text of an action's behaviour. Raises Unusable."""
+        file = file_of(name)
+        if file is None:
+            raise Unusable(f"“{name}” is no name that a behaviour can have.")
+        try:
+            with self._entered() as folder:
+                return _text(file, folder)
+        except OSError as error:
+            why = error.strerror or str(error)
+            if error.errno == errno.ELOOP:
+                why = "it is a link, and no link is followed"
+            raise Unusable(f"The behaviour {file} cannot be read: {why}.") from error
+
+    def listed(self, names: Iterable[str] | None = None) -> BehaviourList:
+        """What there is; of actions of these names only, if any are given. Raises Unusable when the
+        folder is not there any more."""
+        try:
+            with self._entered() as folder:
+                there = {found[1] for each in os.listdir(folder) if (found := _FILE.fullmatch(each))}
+        except OSError as error:
+            why = error.strerror or str(error)
+            raise Unusable(f"The folder of behaviours cannot be read: {why}.") from error
+        wanted = there if names is None else there & {snake_case(n) for n in names if file_of(n)}
+        good: list[str] = []
+        refused: dict[str, str] = {}
+        for name in sorted(wanted)[:_MOST]:
+            try:
+                self.source(name)
+                good.append(name)
+            except Unusable as error:
+                refused[name] = str(error)
+        return BehaviourList(tuple(good), refused)
+
+    @contextmanager
+    def _entered(self) -> Iterator[int]:
+        """The folder itself, whatever its path leads to meanwhile. Raises OSError."""
+        folder = os.open(self.path, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+        try:
+            yield folder
+        finally:
+            os.close(folder)
+
+
+def file_of(name: str) -> str | None:
+    """The file of an action of this name; None for names that no action package can have."""
+    return None if check_name(name) else f"{snake_case(name)}.py"
+
+
+def _text(file: str, folder: int) -> str:
+    """A regular file. Raises OSError, Unusable."""
+    flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
+    with open(os.open(file, flags, dir_fd=folder), "rb") as opened:
+        if not stat.S_ISREG(os.fstat(opened.fileno()).st_mode):
+            raise Unusable(f"The behaviour {file} is no regular file.")
+        raw = opened.read(_LARGEST + 1)
+    if len(raw) > _LARGEST:
+        raise Unusable(f"The behaviour {file} is larger than {_LARGEST >> 20} MB.")
+    try:
+        return raw.decode()
+    except UnicodeDecodeError as error:
+        raise Unusable(f"The behaviour {file} is not UTF-8: {error.reason}.") from error

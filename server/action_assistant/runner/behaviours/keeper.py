@@ -1,0 +1,133 @@
+"""Our end of a call's process: begun, told, and ended for certain."""
+
+import logging
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from contextlib import ExitStack, suppress
+from pathlib import Path
+from typing import Final, Self
+
+from action_assistant.runner.behaviours import inside
+
+log: Final = logging.getLogger(__name__)
+
+_KEEPER_S: Final = 1.0  # that it has to end all that descends from it
+_AGAIN_S: Final = 0.05
+_LONG_S: Final = 10.0  # after so much somebody should know
+#: All of our environment that a behaviour sees. The last one says that this Python, which `make ros` has
+#: made, was started anew already to find its libraries.
+_KNOWN: Final = (
+    *("PATH", "HOME", "LANG", "LC_ALL", "TZ", "LD_LIBRARY_PATH"),
+    "_ROS_WHEELS_BOOTSTRAP_COMPLETE",
+)
+
+
+class Keeper:
+    """The process that begins a behaviour and ends all that descends from it, when the behaviour ends,
+    when it is let go of, or when we die. To be used on one thread."""
+
+    def __init__(self) -> None:
+        """Begin it. Raises OSError."""
+        with ExitStack() as opened:
+            ours, theirs = (opened.enter_context(each) for each in socket.socketpair())
+            self._lifeline, lifeline = (opened.enter_context(each) for each in socket.socketpair())
+            self._process = subprocess.Popen(
+                [sys.executable, "-I", "-P", "-B", str(Path(inside.__file__)), str(lifeline.fileno())],
+                stdin=theirs,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                pass_fds=(lifeline.fileno(),),
+                env={name: os.environ[name] for name in _KNOWN if name in os.environ},
+                cwd="/",
+                start_new_session=True,
+            )
+            assert self._process.stdout is not None
+            assert self._process.stderr is not None
+            theirs.close()
+            lifeline.close()
+            self._commands = ours
+            self._opened = opened.pop_all()
+        for each in (ours, self._lifeline):
+            each.setblocking(False)
+        self.said = self._process.stdout.fileno()
+        self.printed = self._process.stderr.fileno()
+        for number in (self.said, self.printed):
+            os.set_blocking(number, False)
+        self.end_sign = os.pidfd_open(self._process.pid)
+        self._opened.callback(os.close, self.end_sign)
+        self._opened.enter_context(self._process.stdout)
+        self._opened.enter_context(self._process.stderr)
+        self._child = 0
+        self._let_go: float | None = None
+        self._warned = False
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._opened.close()
+
+    @property
+    def commands(self) -> int:
+        """Where commands are written, as a file that never waits."""
+        return self._commands.fileno()
+
+    def write(self, text: bytes) -> int:
+        """Tell it; how many bytes were taken."""
+        try:
+            return self._commands.send(text)
+        except BlockingIOError:
+            return 0
+        except OSError:
+            return len(text)  # it has ended: nobody will read it
+
+    @property
+    def patience(self) -> float | None:
+        """For how many seconds nothing has to be done, as long as nothing is heard."""
+        return None if self._let_go is None else _AGAIN_S
+
+    def let_go(self) -> None:
+        """All that descends from it shall end now."""
+        if self._let_go is None:
+            self._let_go = time.monotonic()
+            with suppress(OSError):
+                self._lifeline.shutdown(socket.SHUT_WR)
+
+    def is_over(self) -> bool:
+        """Whether it has ended. One that takes too long is killed itself."""
+        if self._process.poll() is not None:
+            return True
+        waited = 0.0 if self._let_go is None else time.monotonic() - self._let_go
+        if waited > _KEEPER_S:
+            self._kill_group()
+            self._process.kill()
+        if waited > _LONG_S and not self._warned:
+            self._warned = True
+            log.error("the process %d of a behaviour cannot be killed", self._process.pid)
+        return False
+
+    def ended(self) -> int:
+        """After it has ended: how the behaviour's process has, as its code or minus the signal. Waits
+        until nothing of it is left."""
+        code = self._process.wait()
+        if code >= 0:  # it has waited for all of it
+            return code if code < 128 else 128 - code
+        while self._kill_group():
+            time.sleep(_AGAIN_S)
+        return -signal.SIGKILL
+
+    def _kill_group(self) -> bool:
+        """Whether there was anything to kill."""
+        with suppress(OSError, ValueError):
+            self._child = self._child or int(self._lifeline.recv(32) or b"0")
+        if not self._child:
+            return False
+        try:
+            os.killpg(self._child, signal.SIGKILL)
+        except ProcessLookupError:
+            return False
+        return True

@@ -1,0 +1,104 @@
+"""Behaviours as what an engine gives its calls to. Whoever drives the engine takes what came of them."""
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+from typing import Final
+
+from action_assistant.runner.behaviours.call_process import CallProcess
+from action_assistant.runner.behaviours.folder import BehaviourFolder
+from action_assistant.umrf.semantics import Call, Returned
+
+log: Final = logging.getLogger(__name__)
+
+#: Calls at a time in one engine; each takes two processes.
+MOST: Final = 32
+_ENDING_S: Final = 3.0
+_GIVEN_UP: Final = "It went on for 5 s after a stop, and was killed."
+_OVER: Final = "The engine has ended."
+
+
+class BehaviourPerformer:
+    """The calls of one engine. `wake` is called on other threads when there is something to take."""
+
+    def __init__(self, folder: BehaviourFolder, wake: Callable[[], None] = lambda: None) -> None:
+        self.wake = wake
+        self._folder = folder
+        self._calls: dict[int, CallProcess] = {}
+        self._given_up: set[int] = set()
+        self._returned: list[Returned] = []
+        self._lock = threading.Lock()
+
+    @property
+    def is_killing(self) -> bool:
+        """Whether anything that was given up may still go on."""
+        with self._lock:
+            return bool(self._given_up)
+
+    def performs(self, name: str) -> bool:
+        """Whether there is a file for actions of this name, be it usable or not."""
+        return self._folder.has(name)
+
+    def begin(self, call: Call) -> None:
+        """Begin its process, on a thread of its own."""
+        with self._lock:
+            if len(self._calls) >= MOST:
+                why = f"{MOST} behaviours run already."
+                self._returned.append(Returned(number=call.number, result="on_error", message=why))
+            else:
+                process = self._calls[call.number] = CallProcess(self._folder, call, self._end)
+                process.begin()
+                return
+        self.wake()
+
+    def stop(self, number: int) -> None:
+        """Tell it; it has as long as the engine waits."""
+        self._tell(number, "stop")
+
+    def pause(self, number: int) -> None:
+        """Tell it: its `sleep` lasts until it may go on."""
+        self._tell(number, "pause")
+
+    def resume(self, number: int) -> None:
+        """Tell it."""
+        self._tell(number, "resume")
+
+    def give_up(self, number: int) -> str | None:
+        """Kill it; what it had to say."""
+        with self._lock:
+            process = self._calls.get(number)
+            if process is None:
+                return None
+            self._given_up.add(number)
+        return process.kill(_GIVEN_UP)
+
+    def taken(self) -> list[Returned]:
+        """What has ended since the last time."""
+        with self._lock:
+            taken, self._returned = self._returned, []
+            self._given_up -= {each.number for each in taken}
+        return taken
+
+    def end(self) -> None:
+        """Kill all of it, and wait until nothing is left."""
+        with self._lock:
+            going = list(self._calls.values())
+        for process in going:
+            process.kill(_OVER)
+        deadline = time.monotonic() + _ENDING_S
+        if not all([each.joined(max(0.0, deadline - time.monotonic())) for each in going]):
+            log.error("behaviours go on that cannot be killed")
+
+    def _tell(self, number: int, command: str) -> None:
+        with self._lock:
+            process = self._calls.get(number)
+        if process is not None:
+            process.tell(command)
+
+    def _end(self, returned: Returned) -> None:
+        """On the thread of a call."""
+        with self._lock:
+            self._calls.pop(returned.number, None)
+            self._returned.append(returned)
+        self.wake()

@@ -1,0 +1,180 @@
+"""What the process of a call says: lines of JSON that are believed only as far as they are checked."""
+
+import math
+from collections.abc import Callable
+from typing import Any, Final, TypeAlias
+
+import msgspec
+
+from action_assistant.safe_text import printable
+
+_LINE: Final = 1 << 20  # bytes of a line
+_TOLD: Final = 20  # messages that are kept, and as many printed lines
+_TEXT: Final = 500  # characters of each
+
+
+class Unbelievable(Exception):
+    """What it says breaks the rules; the message is a sentence. It is ended for that."""
+
+
+class OutputSaid(msgspec.Struct, frozen=True, tag_field="kind", tag="output"):
+    """An output has this value now."""
+
+    name: str
+    value: Any
+
+
+class MessageSaid(msgspec.Struct, frozen=True, tag_field="kind", tag="message"):
+    """Something for people."""
+
+    text: str
+
+
+class DoneSaid(msgspec.Struct, frozen=True, tag_field="kind", tag="done"):
+    """It has ended; with `error` the result does not count."""
+
+    result: bool
+    error: str | None = None
+
+
+_Said: TypeAlias = OutputSaid | MessageSaid | DoneSaid
+
+
+class Lines:
+    """Bytes in, whole lines out. Raises Unbelievable for a line that is too long."""
+
+    def __init__(self, hear: Callable[[bytes], None], *, cut: bool) -> None:
+        self._hear = hear
+        self._cut = cut  # rather than refuse: the rest of a long line is dropped
+        self._rest = bytearray()
+        self._drops = False
+
+    def take(self, chunk: bytes) -> None:
+        """What was read."""
+        *whole, rest = chunk.split(b"\n")
+        for each in whole:
+            self._add(each)
+            if not self._drops:
+                self._hear(bytes(self._rest))
+            self._rest.clear()
+            self._drops = False
+        self._add(rest)
+
+    def end(self) -> None:
+        """Nothing more comes: what has no end of line counts as one."""
+        if self._rest and not self._drops:
+            self._hear(bytes(self._rest))
+        self._rest.clear()
+
+    def _add(self, part: bytes) -> None:
+        most = 4 * _TEXT if self._cut else _LINE
+        if self._drops:
+            return
+        if len(self._rest) + len(part) <= most:
+            self._rest += part
+        elif self._cut:
+            self._hear(bytes(self._rest + part[:most]))
+            self._rest.clear()
+            self._drops = True
+        else:
+            raise Unbelievable(f"The behaviour said more than {most >> 20} MB in one line.")
+
+
+class Sayings:
+    """All that one call has said. `types`: of its outputs, by flat name."""
+
+    def __init__(self, types: dict[str, str]) -> None:
+        self._types = types
+        self.outputs: dict[str, Any] = {}
+        self.done: DoneSaid | None = None
+        self._messages = _Kept()
+        self._printed = _Kept()
+
+    def hear(self, line: bytes) -> None:
+        """A line of the protocol. Raises Unbelievable."""
+        try:
+            said = msgspec.json.decode(line, type=_Said)
+        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+            raise Unbelievable(f"The behaviour said what nobody can read: {error}.") from error
+        match said:
+            case OutputSaid(name=name, value=value):
+                self.outputs[name] = self._checked(name, value)
+            case MessageSaid(text=text):
+                self._messages.add(text)
+            case DoneSaid():
+                self.done = self.done or said
+
+    def hear_print(self, line: bytes) -> None:
+        """A line that was printed."""
+        self._printed.add(line.decode(errors="replace"))
+
+    def told(self, *more: str) -> str | None:
+        """All of it that is for people, and more; None if there is nothing."""
+        lines = [*self._messages.told("messages"), *self._printed.told("printed lines"), *more]
+        return "\n".join(lines) or None
+
+    def _checked(self, name: str, value: Any) -> Any:
+        if name not in self._types:
+            raise Unbelievable(f"The action has no output “{name[:80]}”.")
+        kind = self._types[name]
+        try:
+            return value_of(kind, value)
+        except (ValueError, OverflowError):
+            given = type(value).__name__
+            raise Unbelievable(f"The output “{name[:80]}” is a {kind}, not {given}.") from None
+
+
+class _Kept:
+    """The first lines, and how many more there were."""
+
+    def __init__(self) -> None:
+        self._lines: list[str] = []
+        self._more = 0
+
+    def add(self, text: str) -> None:
+        if len(self._lines) < _TOLD:
+            shown = printable(text.strip("\n"))
+            self._lines.append(shown if len(shown) <= _TEXT else f"{shown[:_TEXT]}…")
+        else:
+            self._more += 1
+
+    def told(self, what: str) -> list[str]:
+        more = [f"… and {self._more:,} more {what}"] if self._more else []
+        return [*self._lines, *more]
+
+
+def value_of(kind: str, value: Any) -> Any:
+    """A value as an engine holds one of this type, numbers as doubles. What is no native type may be
+    anything. Raises ValueError, OverflowError."""
+    if kind.endswith("s") and (one := kind[:-1]) in _NATIVE:
+        if not isinstance(value, list):
+            raise ValueError
+        return [_NATIVE[one](each) for each in value]
+    return _NATIVE[kind](value) if kind in _NATIVE else value
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise ValueError
+    return value
+
+
+def _number(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError
+    if not math.isfinite(number := float(value)):
+        raise ValueError
+    return number
+
+
+def _truth(value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise ValueError
+    return value
+
+
+_NATIVE: Final[dict[str, Callable[[Any], Any]]] = {
+    "string": _text,
+    "number": _number,
+    "bool": _truth,
+}
