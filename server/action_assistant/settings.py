@@ -72,7 +72,8 @@ class Keep(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class RunnerSettings(msgspec.Struct, frozen=True, kw_only=True):
-    """How the runner runs. `page_port` is the port of the page that may talk to it."""
+    """How the runner runs. `page_port` is the port of the page that may talk to it, `behaviours` the
+    folder of Python files that simulated actions may be run with."""
 
     data: Path
     host: str = "127.0.0.1"
@@ -84,6 +85,7 @@ class RunnerSettings(msgspec.Struct, frozen=True, kw_only=True):
     tls: bool = False
     keep: Keep | None = None
     reached: Reachability = Reachability()
+    behaviours: Path | None = None
 
 
 def check_environment(environ: Mapping[str, str] = os.environ) -> None:

@@ -41,6 +41,7 @@ class ServePlan(msgspec.Struct, frozen=True, kw_only=True):
     tls: bool
     opens: bool
     reached: Reachability = Reachability()
+    behaviours: Path | None = None
 
 
 class EndSignal:
@@ -171,6 +172,7 @@ def _children(plan: ServePlan) -> list[Child]:
     address = ["--data", str(plan.data), "--host", plan.host]
     address += [flag for flag, on in (("--share", plan.share), ("--tls", plan.tls)) if on]
     database = {"ACTION_ASSISTANT_DATABASE": plan.database} if plan.database else {}
+    behaviours = ["--behaviours", str(plan.behaviours)] if plan.behaviours is not None else []
     switch = ["--switch-database"] if plan.switch_database else []
     ports = str(plan.port), str(plan.port + 1)
     settings = _as_settings(plan.reached)
@@ -188,7 +190,7 @@ def _children(plan: ServePlan) -> list[Child]:
         ),
         Child(
             "runner",
-            ["runner", *address, "--port", ports[1], "--page-port", ports[0]],
+            ["runner", *address, *behaviours, "--port", ports[1], "--page-port", ports[0]],
             plan.port + 1,
             speaking,
             settings,

@@ -22,8 +22,9 @@ BEARER = {"authorization": f"Bearer {TOKEN}"}
 class RunnerProcess:
     """A runner. `kill` and `start` may be called in turn."""
 
-    def __init__(self, data: Path) -> None:
+    def __init__(self, data: Path, *flags: str) -> None:
         self.data = data
+        self._flags = flags
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
             self.port: int = free.getsockname()[1]
@@ -44,6 +45,7 @@ class RunnerProcess:
                     *wrapper,
                     *(sys.executable, "-m", "action_assistant", "runner"),
                     *("--data", str(self.data), "--port", str(self.port)),
+                    *self._flags,
                 ],
                 env={**os.environ, "ACTION_ASSISTANT_TOKEN": TOKEN},
                 stdout=log,

@@ -20,6 +20,7 @@ def _add_serve(both: argparse.ArgumentParser) -> None:
     _address(both, port=8000)
     _database(both, switch=True)
     _sharing(both)
+    _behaviours(both)
     both.add_argument("--no-open", action="store_true", help="do not open a browser")
     both.set_defaults(handler=_serve)
 
@@ -39,6 +40,7 @@ def _add_runner(runner: argparse.ArgumentParser) -> None:
     runner.epilog = "example: action-assistant runner --port 8001 --page-port 8000"
     _address(runner, port=8001)
     _sharing(runner)
+    _behaviours(runner)
     runner.add_argument(
         "--page-port", type=port_number, metavar="N", help="default: the port before"
     )
@@ -117,6 +119,16 @@ def _sharing(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _behaviours(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--behaviours",
+        type=Path,
+        metavar="DIR",
+        help="of Python files with which simulated runs may carry actions out; whoever may start a "
+        "simulation runs them as this user",
+    )
+
+
 def _reached(options: argparse.Namespace) -> settings.Reachability:
     return settings.reached(options.public_url, options.trusted_proxies)
 
@@ -190,6 +202,7 @@ def _serve(options: argparse.Namespace) -> int:
             share=options.share,
             tls=options.tls,
             reached=_reached(options),
+            behaviours=options.behaviours,
             opens=not options.no_open,
         )
     )
@@ -231,6 +244,7 @@ def _runner(options: argparse.Namespace) -> int:
         tls=options.tls,
         keep=settings.keep(data),
         reached=_reached(options),
+        behaviours=options.behaviours,
     )
     listen(
         lambda: create_app(chosen),

@@ -24,6 +24,7 @@ from action_assistant.runner.api.runs import routes
 from action_assistant.runner.api.services import RunnerServices
 from action_assistant.runner.archives.archive_store import ArchiveStore
 from action_assistant.runner.archives.retention import Retention
+from action_assistant.runner.behaviours.folder import BehaviourFolder
 from action_assistant.runner.clock import utc_us
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import Reach
@@ -52,6 +53,8 @@ async def open_services(
 ) -> AsyncIterator[RunnerServices]:
     """Everything the routes need, working. Raises CannotStart."""
     services = services or RunnerServices()
+    if settings.behaviours is not None:
+        services.behaviours = BehaviourFolder.opened(settings.behaviours)
     sys.setswitchinterval(_SWITCH_S)
     journal = await Journal.open(_database(settings), branch="runner", fold=projection.fold)
     try:
@@ -105,6 +108,7 @@ async def _executing(
                 clock_us=utc_us,
                 run_in_worker=workers.starts,
                 simulator=Simulators(),
+                behaviours=services.behaviours,
                 # What moves again is read whole.
                 past=lambda run, whole: (ours if whole else asked).past(run, whole),
             ) as control,
@@ -135,6 +139,8 @@ def _database(settings: RunnerSettings) -> str:
 
 def create_app(settings: RunnerSettings) -> ASGIApp:
     """The runner as an ASGI application. Raises CannotStart."""
+    if settings.behaviours is not None:
+        BehaviourFolder.opened(settings.behaviours)
     Journal.prepare(_database(settings), "runner")
     revoked = Revocations(settings.data)
     services = RunnerServices()

@@ -7,8 +7,9 @@ import msgspec
 from litestar import Request, Response, delete, get, patch, post
 from litestar.types import ControllerRouterHandler
 
-from action_assistant.errors import BadInput, NotFound
+from action_assistant.errors import BadInput, NotFound, Refused
 from action_assistant.runner.api.caller import COUNTED, GRAPH_BODY, author_of, body_of
+from action_assistant.runner.behaviours.folder import BehaviourFolder, BehaviourList
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import SIMULATOR, Candidate, Registration
 from action_assistant.runner.robots.recordings import Recording
@@ -43,13 +44,16 @@ class RobotServices(Protocol):
     control: ExecutionService
     body_limit: ConcurrencyLimit
     run_in_worker: RunInWorker
+    behaviours: BehaviourFolder | None
 
 
 class ReachStatus(msgspec.Struct, frozen=True):
-    """All engines. `no_reach`: why this runner reaches none over ROS 2; "" when it can."""
+    """All engines. `no_reach`: why this runner reaches none over ROS 2; "" when it can. `behaviours`:
+    those that simulated runs can have; null where nobody has named a folder of them."""
 
     engines: list[Robot]
     no_reach: str
+    behaviours: BehaviourList | None = None
 
 
 class RobotChange(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -120,7 +124,8 @@ def _registry(services: RobotServices) -> list[ControllerRouterHandler]:
 
     @get("/api/reach", summary="Whether robots can be reached over ROS 2 from here")
     async def reach() -> ReachStatus:
-        return ReachStatus(list(services.control.robots.all()), services.control.robots.no_reach)
+        robots = services.control.robots
+        return ReachStatus(list(robots.all()), robots.no_reach, await _behaviours(services))
 
     @get("/api/candidates", summary="Engines in sight that nobody registered yet")
     async def candidates() -> list[Candidate]:
@@ -292,6 +297,16 @@ def _told(seq: int, event: RobotEvent) -> RobotLogLine:
             )
         case _:
             assert_never(event)
+
+
+async def _behaviours(services: RobotServices) -> BehaviourList | None:
+    """What there is; an answer without it would look like a runner that is out of reach."""
+    if services.behaviours is None:
+        return None
+    try:
+        return await services.run_in_worker(services.behaviours.listed)
+    except Refused as refused:
+        return BehaviourList(problem=refused.detail)
 
 
 async def _umrf(services: RobotServices, text: str) -> Response[bytes]:

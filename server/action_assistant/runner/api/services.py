@@ -6,6 +6,7 @@ from weakref import WeakKeyDictionary
 from action_assistant.journal.journal import Journal
 from action_assistant.runner.api.live import Hub
 from action_assistant.runner.archives.retention import Retention
+from action_assistant.runner.behaviours.folder import BehaviourFolder
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.review.service import ReviewService
@@ -29,8 +30,10 @@ class RunnerServices:
     retention: Retention
     body_limit: ConcurrencyLimit
     run_in_worker: RunInWorker
+    behaviours: BehaviourFolder | None
     sent: WeakKeyDictionary[OpenRun, views.Sent]
 
     def __init__(self) -> None:
+        self.behaviours = None
         self.sent = WeakKeyDictionary()
         self.body_limit = ConcurrencyLimit(_BODIES)

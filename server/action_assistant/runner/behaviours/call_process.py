@@ -21,7 +21,9 @@ from action_assistant.umrf.semantics import Call, Returned
 _CHUNK: Final = 65_536  # bytes that are read at once, as many as a pipe holds
 _PACE_S: Final = 0.025  # after so much: who floods is heard slowly, and waits
 _LAST: Final = 64  # chunks that are read of what it has left behind
-_PENDING: Final = 65_536  # bytes of commands that it does not read; what comes after them is dropped
+_PENDING: Final = (
+    65_536  # bytes of commands that it does not read; what comes after them is dropped
+)
 
 
 class CallProcess:

@@ -5,9 +5,8 @@ import os
 import re
 import stat
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
@@ -27,10 +26,12 @@ class Unusable(Exception):
 
 class BehaviourList(msgspec.Struct, frozen=True):
     """The behaviours that there are. `names`: in snake case, as the files are called without `.py`;
-    `refused`: those that cannot be run, and why."""
+    `refused`: those that cannot be run, and why. `problem`: why the folder cannot be read; "" if it
+    can."""
 
     names: tuple[str, ...] = ()
     refused: dict[str, str] = {}
+    problem: str = ""
 
 
 class BehaviourFolder(msgspec.Struct, frozen=True):
@@ -77,17 +78,19 @@ class BehaviourFolder(msgspec.Struct, frozen=True):
             why = error.strerror or str(error)
             if error.errno == errno.ELOOP:
                 why = "it is a link, and no link is followed"
+            if error.errno == errno.EISDIR:
+                why = "it is no regular file"
             raise Unusable(f"The behaviour {file} cannot be read: {why}.") from error
 
     def listed(self, names: Iterable[str] | None = None) -> BehaviourList:
-        """What there is; of actions of these names only, if any are given. Raises Unusable when the
-        folder is not there any more."""
+        """What there is; of actions of these names only, if any are given."""
         try:
-            with self._entered() as folder:
-                there = {found[1] for each in os.listdir(folder) if (found := _FILE.fullmatch(each))}
+            with self._entered() as folder, os.scandir(folder) as entries:
+                found = [_FILE.fullmatch(each.name) for each in entries]
         except OSError as error:
             why = error.strerror or str(error)
-            raise Unusable(f"The folder of behaviours cannot be read: {why}.") from error
+            return BehaviourList(problem=f"The folder of behaviours cannot be read: {why}.")
+        there = {each[1] for each in found if each is not None}
         wanted = there if names is None else there & {snake_case(n) for n in names if file_of(n)}
         good: list[str] = []
         refused: dict[str, str] = {}
@@ -117,9 +120,9 @@ def file_of(name: str) -> str | None:
 def _text(file: str, folder: int) -> str:
     """A regular file. Raises OSError, Unusable."""
     flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
-    with open(os.open(file, flags, dir_fd=folder), "rb") as opened:
+    with os.fdopen(os.open(file, flags, dir_fd=folder), "rb") as opened:
         if not stat.S_ISREG(os.fstat(opened.fileno()).st_mode):
-            raise Unusable(f"The behaviour {file} is no regular file.")
+            raise Unusable(f"The behaviour {file} cannot be read: it is no regular file.")
         raw = opened.read(_LARGEST + 1)
     if len(raw) > _LARGEST:
         raise Unusable(f"The behaviour {file} is larger than {_LARGEST >> 20} MB.")

@@ -4,6 +4,7 @@ Two processes: the keeper waits, and when its lifeline ends, or the behaviour do
 descends from it, waits for all of that, and ends itself. The other one runs the behaviour.
 """
 
+import contextlib
 import ctypes
 import json
 import linecache
@@ -120,11 +121,10 @@ def keep(lifeline: int) -> NoReturn:
         os.setpgid(0, 0)
         os.close(lifeline)
         _live()
-    try:
+    with contextlib.suppress(OSError):  # it has ended already
         os.setpgid(child, child)
-    except OSError:
-        pass  # it has ended already
-    os.write(lifeline, b"%d\n" % child)
+    with contextlib.suppress(OSError):  # nobody is there any more: then this is the end
+        os.write(lifeline, b"%d\n" % child)
     nothing = os.open(os.devnull, os.O_RDWR)
     for number in (0, 1, 2):
         os.dup2(nothing, number)
@@ -155,15 +155,14 @@ def _end_all(child: int) -> int:
 
 def _children() -> Iterable[int]:
     """What descends from here directly, and what its parents have left to us."""
-    with open(f"/proc/self/task/{os.getpid()}/children", "rb") as listed:
-        return [int(each) for each in listed.read().split()]
+    listed = os.open(f"/proc/self/task/{os.getpid()}/children", os.O_RDONLY)
+    with os.fdopen(listed, "rb") as children:
+        return [int(each) for each in children.read().split()]
 
 
 def _kill(process: int) -> None:
-    try:
+    with contextlib.suppress(ProcessLookupError):
         os.kill(process, signal.SIGKILL)
-    except ProcessLookupError:
-        pass
 
 
 # --- the behaviour --------------------------------------------------------------------------------
@@ -199,11 +198,10 @@ def _wired() -> tuple[TextIO, _Saying]:
 def _bounded() -> None:
     """What it may take. Others go first when processor or memory run short."""
     os.nice(_NICE)
-    try:
-        with open("/proc/self/oom_score_adj", "w") as score:
-            score.write("1000")
-    except OSError:
-        pass  # some containers have none: then the kernel chooses by size
+    with contextlib.suppress(OSError):  # some containers have none: the kernel chooses by size then
+        score = os.open("/proc/self/oom_score_adj", os.O_WRONLY)
+        os.write(score, b"1000")
+        os.close(score)
     for kind, most in (
         (resource.RLIMIT_CORE, 0),
         (resource.RLIMIT_CPU, _PROCESSOR_S),
@@ -218,7 +216,7 @@ def _bounded() -> None:
 
 def _obey(commands: TextIO, action: PerformedAction) -> None:
     for line in commands:
-        action._told(json.loads(line)["kind"])
+        action._told(json.loads(line)["kind"])  # noqa: SLF001 - not for behaviours
 
 
 def _result(file: str, source: str, action: PerformedAction) -> tuple[bool, str | None]:
@@ -233,7 +231,7 @@ def _result(file: str, source: str, action: PerformedAction) -> tuple[bool, str 
         result = run(action)
     except MemoryError:
         return False, f"MemoryError: it may have {_MEMORY >> 20} MB."
-    except BaseException as error:  # whatever it raises is how the action ends
+    except BaseException as error:  # noqa: BLE001 - whatever it raises is how the action ends
         return False, _told_of(error, file)
     if result is None or isinstance(result, bool):
         return result is not False, None
@@ -242,7 +240,9 @@ def _result(file: str, source: str, action: PerformedAction) -> tuple[bool, str 
 
 def _told_of(error: BaseException, file: str) -> str:
     """An error in a line, with its place in the file."""
-    places = [each.lineno for each in traceback.extract_tb(error.__traceback__) if each.filename == file]
+    places = [
+        each.lineno for each in traceback.extract_tb(error.__traceback__) if each.filename == file
+    ]
     if isinstance(error, SyntaxError):
         places = [error.lineno]
     what = "".join(traceback.format_exception_only(error)[-1:]).strip()

@@ -36,8 +36,15 @@ class Keeper:
             ours, theirs = (opened.enter_context(each) for each in socket.socketpair())
             self._lifeline, lifeline = (opened.enter_context(each) for each in socket.socketpair())
             self._process = subprocess.Popen(
-                [sys.executable, "-I", "-P", "-B", str(Path(inside.__file__)), str(lifeline.fileno())],
-                stdin=theirs,
+                [
+                    sys.executable,
+                    "-I",
+                    "-P",
+                    "-B",
+                    str(Path(inside.__file__)),
+                    str(lifeline.fileno()),
+                ],
+                stdin=theirs.fileno(),
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,
                 pass_fds=(lifeline.fileno(),),
@@ -113,7 +120,7 @@ class Keeper:
     def ended(self) -> int:
         """After it has ended: how the behaviour's process has, as its code or minus the signal. Waits
         until nothing of it is left."""
-        code = self._process.wait()
+        code: int = self._process.wait()
         if code >= 0:  # it has waited for all of it
             return code if code < 128 else 128 - code
         while self._kill_group():

@@ -80,15 +80,25 @@ class BehaviourPerformer:
             self._given_up -= {each.number for each in taken}
         return taken
 
-    def end(self) -> None:
-        """Kill all of it, and wait until nothing is left."""
+    @property
+    def has_returned(self) -> bool:
+        """Whether there is something to take."""
+        return bool(self._returned)
+
+    def kill_all(self) -> list[CallProcess]:
+        """End all of it by force; what that was."""
         with self._lock:
             going = list(self._calls.values())
         for process in going:
             process.kill(_OVER)
+        return going
+
+    def end(self) -> None:
+        """The same, and wait until nothing is left of it, 3 s at most."""
         deadline = time.monotonic() + _ENDING_S
-        if not all([each.joined(max(0.0, deadline - time.monotonic())) for each in going]):
-            log.error("behaviours go on that cannot be killed")
+        for process in self.kill_all():
+            if not process.joined(max(0.0, deadline - time.monotonic())):
+                log.error("a behaviour goes on that cannot be killed")
 
     def _tell(self, number: int, command: str) -> None:
         with self._lock:

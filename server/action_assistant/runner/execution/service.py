@@ -14,6 +14,7 @@ from anyio.abc import TaskGroup
 from sqlalchemy import Row
 
 from action_assistant.errors import BadInput, Conflict, NotFound, Refused
+from action_assistant.runner.behaviours.folder import BehaviourFolder
 from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.execution import interventions
 from action_assistant.runner.execution.run_loop import OpenRun
@@ -64,6 +65,7 @@ class ExecutionService:
         run_in_worker: RunInWorker,
         simulator: Simulator,
         past: Past | None = None,
+        behaviours: BehaviourFolder | None = None,
     ) -> None:
         self.robots = robots
         self.history = RunHistory(ledger, past)
@@ -85,6 +87,7 @@ class ExecutionService:
             going=self._going,
             settled=self._settled_on,
             simulator=simulator,
+            behaviours=behaviours,
         )
         self._late_activity = LateActivity(
             self.open, self.history, robots, self._tasks, clock_us=clock_us, reopen=self._reopen
@@ -105,9 +108,10 @@ class ExecutionService:
         run_in_worker: RunInWorker = anyio.to_thread.run_sync,
         simulator: Simulator = in_this_process,
         past: Past | None = None,
+        behaviours: BehaviourFolder | None = None,
     ) -> "AsyncIterator[ExecutionService]":
         """The service, after it has taken up what an earlier process left. `past` reads runs that
-        are over, `simulator` makes what simulated ones run on."""
+        are over, `simulator` makes what simulated ones run on, some of them with `behaviours`."""
         async with anyio.create_task_group() as tasks:
             control = cls(
                 ledger,
@@ -117,6 +121,7 @@ class ExecutionService:
                 run_in_worker=run_in_worker,
                 simulator=simulator,
                 past=past,
+                behaviours=behaviours,
             )
             await control._take_up()
             try:

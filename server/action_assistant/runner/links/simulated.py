@@ -22,6 +22,8 @@ import msgspec
 from anyio import to_thread
 
 from action_assistant.errors import TooMany
+from action_assistant.runner.behaviours.folder import BehaviourFolder
+from action_assistant.runner.behaviours.performer import BehaviourPerformer
 from action_assistant.runner.links.listeners import Listeners
 from action_assistant.runner.links.port import (
     Answer,
@@ -45,10 +47,13 @@ _HEAD: Final = 4  # bytes of a length
 _CHANGES: Final = 100  # of one report; the runner does nothing else while it takes one in
 #: Simulated runs at a time; each takes 15 MB, and its part of the processors.
 MOST: Final = 64
+#: Of these, runs with behaviours; each may have many processes.
+MOST_WITH_BEHAVIOURS: Final = 8
 _WAITING: Final = 16_384  # bytes on the way; an answer comes after what was said before it
 _NICE: Final = 10
 _REST: Final = 3  # for so many times as long as reports took, all simulated runs wait together
 _START_S: Final = 4.0  # less than a start may take
+_ENDING_S: Final = 4.0  # that an engine has to end its behaviours
 _GONE: Final = "The simulated engine was switched off."
 _DIED: Final = "The process of the simulated engine has died, and the engine with it."
 
@@ -63,12 +68,21 @@ class Simulators:
         self._links: WeakSet[SimulatedLink] = WeakSet()
 
     def __call__(
-        self, facts: EngineFacts, script: str, clock_us: Callable[[], int]
+        self,
+        facts: EngineFacts,
+        script: str,
+        clock_us: Callable[[], int],
+        behaviours: BehaviourFolder | None = None,
     ) -> "SimulatedLink":
         """A simulated engine. Its process begins with its first start. Raises TooMany."""
-        if sum(each.is_alive for each in self._links) >= MOST:
+        going = [each for each in self._links if each.is_alive]
+        if len(going) >= MOST:
             raise TooMany(f"{MOST} simulated runs go on already; stop some, or wait.")
-        link = SimulatedLink(facts, script, clock_us, self.take)
+        with_behaviours = sum(each.has_behaviours for each in going)
+        if behaviours is not None and with_behaviours >= MOST_WITH_BEHAVIOURS:
+            most = MOST_WITH_BEHAVIOURS
+            raise TooMany(f"{most} runs with behaviours go on already; stop some, or wait.")
+        link = SimulatedLink(_Made(facts, script, behaviours), clock_us, self.take)
         self._links.add(link)
         return link
 
@@ -80,6 +94,14 @@ class Simulators:
             await anyio.sleep(_REST * (time.perf_counter() - began))
 
 
+class _Made(msgspec.Struct, frozen=True):
+    """What a simulated engine is made of."""
+
+    facts: EngineFacts
+    script: str
+    behaviours: BehaviourFolder | None
+
+
 class SimulatedLink:
     """A simulated engine in another process."""
 
@@ -88,13 +110,11 @@ class SimulatedLink:
 
     def __init__(
         self,
-        facts: EngineFacts,
-        script: str,
+        made: _Made,
         clock_us: Callable[[], int],
         take: Callable[[Callable[[], None]], Awaitable[None]],
     ) -> None:
-        self._facts = facts
-        self._script = script
+        self._made = made
         self._clock_us = clock_us
         self._take = take
         self._incarnation = secrets.token_hex(8)
@@ -120,6 +140,11 @@ class SimulatedLink:
     def is_alive(self) -> bool:
         """Whether it has a process."""
         return self._process is not None and self._state != "gone"
+
+    @property
+    def has_behaviours(self) -> bool:
+        """Whether actions of it may be processes of their own."""
+        return self._made.behaviours is not None
 
     async def start(self, order: Order) -> None:
         """Start at this moment; the first start begins the process. Raises NotSent, EngineRefused."""
@@ -165,7 +190,11 @@ class SimulatedLink:
         return self._subscribers.listening(hear)
 
     async def aclose(self) -> None:
-        """End the engine, and its process."""
+        """End the engine, and its process. One with behaviours ends them first, and itself."""
+        if self.has_behaviours and self._process is not None and self._writer is not None:
+            self._writer.close()
+            with anyio.CancelScope(shield=True):
+                await to_thread.run_sync(self._process.join, _ENDING_S)
         self._end(_GONE)
         if self._reading is not None:
             self._reading.cancel()
@@ -176,7 +205,7 @@ class SimulatedLink:
         try:
             with anyio.fail_after(_START_S):
                 self._process = await to_thread.run_sync(
-                    _born, theirs, self._facts, self._script, abandon_on_cancel=True
+                    _born, theirs, self._made, abandon_on_cancel=True
                 )
         except (OSError, EOFError, TimeoutError) as error:
             ours.close()
@@ -245,9 +274,9 @@ class SimulatedLink:
             self._subscribers.tell(EngineChanged(at=self._clock_us(), state="gone", why=self._why))
 
 
-def _born(theirs: socket.socket, facts: EngineFacts, script: str) -> Any:
+def _born(theirs: socket.socket, made: _Made) -> Any:
     with theirs:
-        return child(_live, theirs, facts, script, name="simulated engine", nice=_NICE)
+        return child(_live, theirs, made, name="simulated engine", nice=_NICE)
 
 
 def _framed(value: object) -> bytes:
@@ -258,16 +287,25 @@ def _framed(value: object) -> bytes:
 # --- in the process -------------------------------------------------------------------------------
 
 
-def _live(wire: socket.socket, facts: EngineFacts, script: str) -> None:
+def _live(wire: socket.socket, made: _Made) -> None:
     """One engine, until nobody listens any more."""
-    with suppress(asyncio.IncompleteReadError, ConnectionError, BrokenPipeError):
-        anyio.run(_serve, wire, facts, script)
+    performer = BehaviourPerformer(made.behaviours) if made.behaviours is not None else None
+    try:
+        with suppress(asyncio.IncompleteReadError, ConnectionError, BrokenPipeError):
+            anyio.run(_serve, wire, made, performer)
+    finally:
+        if performer is not None:
+            performer.end()
 
 
-async def _serve(wire: socket.socket, facts: EngineFacts, script: str) -> None:
+async def _serve(wire: socket.socket, made: _Made, performer: BehaviourPerformer | None) -> None:
     reader, writer = await asyncio.open_connection(sock=wire)
     writer.transport.set_write_buffer_limits(high=_WAITING)
-    link = SimulatorLink(engine_of(facts, script), clock_us=_now)
+    engine = engine_of(made.facts, made.script, performer)
+    link = SimulatorLink(engine, clock_us=_now, performer=performer)
+    if performer is not None:
+        loop = asyncio.get_running_loop()
+        performer.wake = partial(_woken, loop, link)
 
     def hear(report: Report) -> None:
         for part in _parts(report):
@@ -290,6 +328,12 @@ async def _serve(wire: socket.socket, facts: EngineFacts, script: str) -> None:
             tasks = group.cancel_scope
             group.start_soon(live)
             group.start_soon(obey)
+
+
+def _woken(loop: asyncio.AbstractEventLoop, link: SimulatorLink) -> None:
+    """On a thread of a behaviour: the engine has something to take."""
+    with suppress(RuntimeError):  # the loop has ended, and the engine with it
+        loop.call_soon_threadsafe(link.wake)
 
 
 async def _obeyed(link: SimulatorLink, command: str, args: tuple[Any, ...]) -> object:

@@ -8,11 +8,14 @@ import math
 import secrets
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
-from typing import Final, TypeAlias, assert_never
+from typing import Final, Protocol, assert_never
 
 import anyio
 import msgspec
 
+from action_assistant.errors import Unavailable
+from action_assistant.runner.behaviours.folder import BehaviourFolder
+from action_assistant.runner.behaviours.performer import BehaviourPerformer
 from action_assistant.runner.links.listeners import Listeners
 from action_assistant.runner.links.observations import (
     Exact,
@@ -50,29 +53,54 @@ _QUICKEST_S: Final = 0.01
 _GRAIN_MS: Final = 0.01  # clocks are not finer: what is due so soon is due now
 _SLICE: Final = 50  # engine steps between two turns of the event loop
 
-#: What makes a simulated engine of these facts that follows a script (JSON; "" for none).
-Simulator: TypeAlias = Callable[[EngineFacts, str, Callable[[], int]], Link]
+
+class Simulator(Protocol):
+    """What makes a simulated engine of these facts."""
+
+    def __call__(
+        self,
+        facts: EngineFacts,
+        script: str,
+        clock_us: Callable[[], int],
+        behaviours: BehaviourFolder | None = None,
+    ) -> Link:
+        """One that follows a script (JSON; "" for none), and behaviours before that."""
 
 
 def in_this_process(
-    facts: EngineFacts, script: str, clock_us: Callable[[], int]
+    facts: EngineFacts,
+    script: str,
+    clock_us: Callable[[], int],
+    behaviours: BehaviourFolder | None = None,
 ) -> "SimulatorLink":
-    """A simulated engine that shares the event loop: where time is virtual."""
+    """A simulated engine that shares the event loop: where time is virtual, and nothing real is."""
+    if behaviours is not None:
+        raise Unavailable("Behaviours need a simulated engine in a process of its own.")
     return SimulatorLink(engine_of(facts, script), clock_us=clock_us)
 
 
-def engine_of(facts: EngineFacts, script: str) -> semantics.Engine:
+def engine_of(
+    facts: EngineFacts, script: str, performer: BehaviourPerformer | None = None
+) -> semantics.Engine:
     """An engine that follows a script which was admitted."""
-    behaviours = slowed(semantics.script_from(msgspec.json.decode(script))) if script else None
-    return semantics.Engine(facts=facts, script=behaviours)
+    chosen = slowed(semantics.script_from(msgspec.json.decode(script))) if script else None
+    return semantics.Engine(facts=facts, script=chosen, performer=performer)
 
 
 class SimulatorLink:
-    """A simulated engine in this process. `clock_us` gives microseconds UTC."""
+    """A simulated engine in this process. `clock_us` gives microseconds UTC. `performer`: the one of
+    its behaviours, if it has any; they need a clock that is not virtual."""
 
     simulated: Final = True
 
-    def __init__(self, engine: semantics.Engine, *, clock_us: Callable[[], int]) -> None:
+    def __init__(
+        self,
+        engine: semantics.Engine,
+        *,
+        clock_us: Callable[[], int],
+        performer: BehaviourPerformer | None = None,
+    ) -> None:
+        self._performer = performer
         self._engine = engine
         self._clock_us = clock_us
         self._origin = anyio.current_time()
@@ -137,9 +165,12 @@ class SimulatorLink:
             raise EngineRefused(str(refused)) from refused
 
     async def get(self) -> Answer:
-        """What the engine holds right now."""
+        """What the engine holds right now. While a behaviour is being killed it says nothing: whoever
+        asks shall not take that action for over."""
         self._alive()
         self._advance()
+        if self._performer is not None and self._performer.is_killing:
+            raise NoAnswer("A behaviour that did not stop is being killed.")
         at = self._clock_us()
         graphs = tuple(
             Snapshot(
@@ -168,14 +199,22 @@ class SimulatorLink:
                 await anyio.lowlevel.checkpoint()
             await heard()
             self._wake = anyio.Event()
+            if self._performer is not None and self._performer.has_returned:
+                self._wake.set()
 
     def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:
         """Every transition from now on."""
         return self._subscribers.listening(hear)
 
     async def aclose(self) -> None:
-        """End the engine."""
+        """End the engine, and its behaviours."""
         self._dead = "the simulated engine was switched off"
+        if self._performer is not None:
+            await anyio.to_thread.run_sync(self._performer.end, abandon_on_cancel=True)
+
+    def wake(self) -> None:
+        """Look again at what there is to do; to be called on the thread of the loop."""
+        self._wake.set()
 
     def _now(self) -> float:
         return (anyio.current_time() - self._origin) * 1000
@@ -187,6 +226,8 @@ class SimulatorLink:
     def _advance(self) -> bool:
         """Catch up with the clock, a slice at most. Whether nothing is left to do now."""
         told: list[semantics.Trace] = []
+        for returned in self._performer.taken() if self._performer is not None else ():
+            told += self._engine.returned(returned, self._now())
         for _ in range(_SLICE):
             due = self._engine.due
             if self._idle(due):
@@ -234,6 +275,8 @@ class SimulatorLink:
         what = "has crashed" if hazard.effect == "crash" else "hangs"
         why = f"The simulated engine {what} ({hazard.code}). {hazard.message}".rstrip()
         self._dead = why
+        if hazard.effect == "crash" and self._performer is not None:
+            self._performer.kill_all()  # their code ends with the engine's process
         state: EngineState = "gone" if hazard.effect == "crash" else "busy"
         self._subscribers.tell(EngineChanged(at=self._at(hazard.t_ms), state=state, why=why))
 

@@ -68,6 +68,7 @@ class Requested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     group: str | None = None  # shared by runs that one request has started together
     like: str | None = None  # the robot whose engine the simulator played
     laps: Laps | None = None  # None: found in `umrf`
+    behaviours: bool = False  # whether the simulator had Python behaviours
 
 
 class Published(msgspec.Struct, frozen=True, omit_defaults=True):

@@ -77,6 +77,7 @@ def begin(event: Requested) -> Run:
         despite=event.despite,
         group=event.group,
         like=event.like,
+        behaviours=event.behaviours,
         actions={
             name: ActionRun(aid=aid, once=name in once, joined=name in joined)
             for name, aid in event.actions.items()

@@ -63,6 +63,7 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     despite: tuple[Overridden, ...] = ()
     group: str | None = None
     like: str | None = None
+    behaviours: bool = False
     desired: Desired = "running"
     incarnation: str | None = None  # None: nothing has been sent, as far as is known
     process: EngineProcess | None = None  # of the engine, where it can be seen to end

@@ -123,9 +123,10 @@ class Listed(RunSummary, frozen=True, kw_only=True):
 
 class RunShown(RunSummary, frozen=True, kw_only=True):
     """A run with its actions, by full name, and the newest lines of its engine's log. `like`: the
-    robot whose engine the simulator plays."""
+    robot whose engine the simulator plays; `behaviours`: whether its actions have Python behaviours."""
 
     like: str | None
+    behaviours: bool
     actions: dict[str, ActionShown]
     log: list[MessageShown]
 
@@ -189,7 +190,13 @@ def shown(run: Run, *, recorded: bool = True, memo: Memo | None = None) -> RunSh
     """A run with its actions and their newest visits."""
     actions = _actions(run, _LIVE, memo)
     fields = _fields(run, recorded)
-    return RunShown(**fields, like=run.like, actions=actions, log=_log(run, _LINES))
+    return RunShown(
+        **fields,
+        like=run.like,
+        behaviours=run.behaviours,
+        actions=actions,
+        log=_log(run, _LINES),
+    )
 
 
 class Sent(msgspec.Struct, frozen=True):
@@ -218,6 +225,7 @@ def whole(
     return RunWhole(
         **_fields(run, recorded),
         like=run.like,
+        behaviours=run.behaviours,
         actions=actions,
         log=_log(run, len(run.log)),
         umrf=raw,

@@ -34,7 +34,8 @@ class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     """A start: the version by value, and where it shall run.
 
     `digest` is what the person saw; `request_id` is made by the asker, once per intended start.
-    `like`: the robot whose engine the simulator plays, with its hazards.
+    `like`: the robot whose engine the simulator plays, with its hazards. `behaviours`: actions that
+    have a Python behaviour on the runner do what it does, before what the script says.
     """
 
     version: str
@@ -46,6 +47,7 @@ class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     script: Annotated[msgspec.Raw, SCRIPT] = msgspec.field(default_factory=msgspec.Raw)
     override: Override | None = None
     like: str | None = None
+    behaviours: bool = False
 
 
 class Admitted(msgspec.Struct, frozen=True, kw_only=True):

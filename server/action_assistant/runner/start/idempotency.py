@@ -51,6 +51,7 @@ def booked(
         despite=cleared.despite,
         group=group,
         like=asked.like,
+        behaviours=asked.behaviours,
         laps=ready.laps,
     )
     targets = () if cleared.own else (asked.engine,)

@@ -9,6 +9,7 @@ import anyio
 import msgspec
 
 from action_assistant.errors import BadInput, Conflict, Refused, Unavailable
+from action_assistant.runner.behaviours.folder import BehaviourFolder
 from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.links.port import SIMULATOR, Answer, Link, NoAnswer
 from action_assistant.runner.links.simulator import Simulator
@@ -44,6 +45,7 @@ class GroupRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     graph: str | None = None
     override: Override | None = None
     like: str | None = None
+    behaviours: bool = False
 
     def of(self, engine: str) -> StartRequest:
         """The start on one of them."""
@@ -56,6 +58,7 @@ class GroupRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
             graph=self.graph,
             override=self.override,
             like=self.like if engine == SIMULATOR else None,
+            behaviours=self.behaviours and engine == SIMULATOR,
         )
 
 
@@ -97,7 +100,7 @@ class Grouped(msgspec.Struct, frozen=True):
 class StartChecks:
     """Looks before starts. `taken(engine)` is the run that an engine has from here, if any;
     `going(engine)` the ids of all that go on there; `settled(engine)` what somebody has seen at rest
-    there."""
+    there; `behaviours` is the folder of them, if there is one."""
 
     def __init__(
         self,
@@ -109,6 +112,7 @@ class StartChecks:
         going: Callable[[str], Collection[str]],
         settled: Callable[[str], Sequence[Settled]],
         simulator: Simulator,
+        behaviours: BehaviourFolder | None = None,
     ) -> None:
         self._robots = robots
         self._clock_us = clock_us
@@ -117,13 +121,15 @@ class StartChecks:
         self._going = going
         self._settled = settled
         self._simulator = simulator
+        self._behaviours = behaviours
 
     async def cleared(self, asked: StartRequest) -> Cleared:
         """Look, and refuse what stands in the way. Raises Refused of many kinds."""
         if asked.engine == SIMULATOR:
             facts = self._simulated(asked)
             ready = await self._run_in_worker(prepared, asked, facts, secrets.token_urlsafe(9))
-            link = self._simulator(facts, ready.script, self._clock_us)
+            behaviours = await self._folder(ready) if asked.behaviours else None
+            link = self._simulator(facts, ready.script, self._clock_us, behaviours)
             return Cleared(
                 ready=ready,
                 link=link,
@@ -134,6 +140,8 @@ class StartChecks:
         robot = self._robots.reachable(asked.engine)
         if asked.like is not None:
             raise BadInput("Only the simulator plays a robot.", where={"path": "/like"})
+        if asked.behaviours:
+            raise BadInput("Only the simulator runs behaviours.", where={"path": "/behaviours"})
         ready = await self._run_in_worker(prepared, asked, robot.facts, secrets.token_urlsafe(9))
         free = preflight.of_taken(asked.engine, self._taken(asked.engine))
         preflight.check_items([free], ())
@@ -209,6 +217,8 @@ class StartChecks:
         try:
             ready = await self._run_in_worker(partial(prepared, approved=False), asked, facts, "")
             items.append(preflight.of_graph(ready))
+            if asked.behaviours:
+                await self._folder(ready)
         except Refused as refused:
             items.append(preflight.of_refusal("graph", refused))
         if robot is not None:
@@ -248,6 +258,20 @@ class StartChecks:
             open_runs=going,
             settled=tuple(self._settled(name)),
         )
+
+    async def _folder(self, ready: Prepared) -> BehaviourFolder:
+        """Where the behaviours of a graph are, all of which can be run. Raises Conflict."""
+        where: dict[str, object] = {"path": "/behaviours"}
+        if self._behaviours is None:
+            raise Conflict(
+                "This runner has no behaviours: whoever starts it names their folder.", where=where
+            )
+        names = sorted({each.rpartition("_")[0] for each in ready.actions})
+        found = await self._run_in_worker(self._behaviours.listed, names)
+        if found.problem or found.refused:
+            told = " ".join([found.problem, *found.refused.values()]).strip()
+            raise Conflict(f"{told} Nothing was started.", where=where)
+        return self._behaviours
 
     def _simulated(self, asked: StartRequest) -> EngineFacts:
         """What is true of the simulator, as itself or playing a robot. Raises NotFound."""

@@ -1,0 +1,81 @@
+"""Behaviours and graphs for tests, and what is left of their processes."""
+
+import itertools
+import textwrap
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import psutil
+
+from action_assistant.runner.behaviours import inside
+from action_assistant.umrf.model import (
+    ENTRY,
+    ENTRY_CONDITIONS,
+    EXIT,
+    Action,
+    Graph,
+    Parameter,
+    Relation,
+)
+from runner.harness import GO_ON
+
+OK = "def run(action):\n    return True\n"
+#: Neither sleeps nor hears of a stop.
+DEAF = "def run(action):\n    while True:\n        pass\n"
+#: Waits for its stop, and obeys it.
+WAITS = "def run(action):\n    while action.sleep(3600):\n        pass\n"
+
+
+def write(folder: Path, **sources: str) -> Path:
+    """A file for each; the folder."""
+    folder.mkdir(exist_ok=True)
+    for name, source in sources.items():
+        (folder / f"{name}.py").write_text(textwrap.dedent(source))
+    return folder
+
+
+def parameter(name: str, kind: str, value: Any = None, **more: Any) -> Parameter:
+    """One of an action; without a value somebody has to give it."""
+    leaf = {"pvf_type": kind, **({} if value is None else {"pvf_value": value}), **more}
+    return Parameter(path=name.replace("::", "/"), text=msgspec.json.encode(leaf).decode())
+
+
+def action(
+    name: str, inputs: Sequence[Parameter] = (), outputs: Sequence[Parameter] = ()
+) -> Action:
+    """The only one of its name."""
+    return Action(key=f"aid{name}", name=name, inputs=tuple(inputs), outputs=tuple(outputs))
+
+
+def chain(*actions: Action | str, name: str = "chain") -> Graph:
+    """One after the other, whatever becomes of each."""
+    nodes = tuple(each if isinstance(each, Action) else action(each) for each in actions)
+    keys = [ENTRY, *(each.key for each in nodes), EXIT]
+    pairs = itertools.pairwise(keys)
+    relations = tuple(
+        Relation(parent=a, child=b, conditions=ENTRY_CONDITIONS if a == ENTRY else GO_ON)
+        for a, b in pairs
+    )
+    return Graph(name=name, actions=nodes, relations=relations)
+
+
+def processes() -> list[psutil.Process]:
+    """Of behaviours that go on, and their keepers: those of this test alone, if only one runs."""
+    found = []
+    for each in psutil.process_iter(["cmdline", "status"]):
+        words = each.info["cmdline"] or ()
+        if str(Path(inside.__file__)) in words and each.info["status"] != psutil.STATUS_ZOMBIE:
+            found.append(each)
+    return found
+
+
+def until(true: Callable[[], Any], patience: float = 30.0) -> Any:
+    """Wait for something that must happen; what it gave."""
+    deadline = time.monotonic() + patience
+    while not (found := true()):
+        assert time.monotonic() < deadline, "it did not happen"
+        time.sleep(0.02)
+    return found
