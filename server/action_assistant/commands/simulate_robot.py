@@ -12,6 +12,8 @@ from typing import Any, Final
 import msgspec
 
 from action_assistant.errors import CannotStart
+from action_assistant.runner.behaviours.folder import BehaviourFolder
+from action_assistant.runner.behaviours.performer import BehaviourPerformer
 from action_assistant.runner.emulator.engine import EmulatedEngine
 from action_assistant.runner.emulator.messages import (
     EmulatedIndex,
@@ -46,6 +48,13 @@ def _add_simulate_robot(robot: argparse.ArgumentParser) -> None:
         "without, it has every action",
     )
     robot.add_argument("--script", type=Path, metavar="S.json", help="what the actions do")
+    robot.add_argument(
+        "--behaviours",
+        type=Path,
+        metavar="DIR",
+        help="of Python files that say what actions do, before the script; whoever may start a graph "
+        "on this domain runs them as this user",
+    )
     robot.add_argument(
         "--quirk",
         action="append",
@@ -93,6 +102,7 @@ def _simulate_robot(options: argparse.Namespace) -> int:
     facts = facts_for(options.facts) if options.facts else PINNED
     quirks = msgspec.convert(dict(options.quirk), EngineTraits)
     script, index = _script(options.script), _index(options.actions)
+    behaviours = BehaviourFolder.opened(options.behaviours) if options.behaviours else None
     extra = tuple(word for word in options.wake_words.split(",") if word)
     domain = int(os.environ.get("ROS_DOMAIN_ID", "0")) if options.domain is None else options.domain
 
@@ -106,6 +116,7 @@ def _simulate_robot(options: argparse.Namespace) -> int:
             extra_wake_words=extra,
             seed=epoch_ms,
             epoch_ms=epoch_ms,
+            performer=BehaviourPerformer(behaviours) if behaviours is not None else None,
         )
 
     try:

@@ -2,6 +2,7 @@
 
 import math
 import os
+import shutil
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -31,18 +32,33 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "pidfd_open"), reason="behaviour
 QUICK = {"*": [{"after_s": 0.02}]}
 
 
-@pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    """Where the behaviours are."""
-    return write(tmp_path / "behaviours")
-
-
-@pytest.fixture
-def runner(tmp_path: Path, folder: Path) -> Iterator[RunnerProcess]:
-    """A runner that has them."""
-    process = RunnerProcess(tmp_path / "data", "--behaviours", str(folder)).start()
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunnerProcess]:
+    """A runner that has a folder of them, for all tests."""
+    place = tmp_path_factory.mktemp("runner")
+    process = RunnerProcess(
+        place / "data", "--behaviours", str(write(place / "behaviours"))
+    ).start()
     yield process
     process.end()
+    until(lambda: not processes())
+
+
+@pytest.fixture
+def folder(shared: RunnerProcess) -> Iterator[Path]:
+    """Where the behaviours are: none yet."""
+    found = shared.data.parent / "behaviours"
+    yield found
+    shutil.rmtree(found)
+    found.mkdir()
+
+
+@pytest.fixture
+def runner(shared: RunnerProcess) -> Iterator[RunnerProcess]:
+    """The runner; whatever a test leaves running is stopped."""
+    yield shared
+    with shared.client() as client:
+        client.post("/api/stop")
     until(lambda: not processes())
 
 
@@ -313,6 +329,7 @@ def test_a_link_is_refused_with_the_reason_before_anything_is_started(
 ) -> None:
     write(tmp_path / "elsewhere", secret=OK)
     (folder / "open_gripper.py").symlink_to(tmp_path / "elsewhere" / "secret.py")
+    before = client.get("/api/runs").json()
     asked = order(chain("OpenGripper"), script=QUICK, behaviours=True)
     answer = client.post("/api/runs", content=body(asked))
     assert answer.status_code == 409
@@ -320,7 +337,7 @@ def test_a_link_is_refused_with_the_reason_before_anything_is_started(
         "The behaviour open_gripper.py cannot be read: it is a link, and no link is followed."
     )
     assert answer.json()["where"] == {"path": "/behaviours"}
-    assert client.get("/api/runs").json() == []
+    assert client.get("/api/runs").json() == before
 
 
 def test_the_behaviours_that_there_are_are_listed_with_what_cannot_be_run(
@@ -342,6 +359,7 @@ def test_a_folder_that_has_gone_meanwhile_refuses_the_start(
     folder.rename(folder.with_name("away"))
     asked = order(chain("Waits"), script=QUICK, behaviours=True)
     answer = client.post("/api/runs", content=body(asked))
+    folder.with_name("away").rename(folder)
     assert answer.status_code == 409
     assert "folder of behaviours cannot be read" in answer.json()["detail"]
 

@@ -14,6 +14,7 @@ from itertools import count
 from math import inf
 from typing import Final, TypeAlias, assert_never
 
+from action_assistant.runner.behaviours.performer import BehaviourPerformer
 from action_assistant.runner.emulator.inbox import Inbox
 from action_assistant.runner.emulator.messages import (
     EmulatedIndex,
@@ -53,7 +54,7 @@ class EmulatedEngine:
     """One life of one engine. `hear` and `ask` bring messages, `advance` gives what it has to say.
 
     `born_ms` is the moment of its start, which its feedback keeps time with; `epoch_ms` is 0 ms as
-    milliseconds since 1970.
+    milliseconds since 1970. `performer`: of its behaviours, where time is real.
     """
 
     def __init__(
@@ -68,7 +69,9 @@ class EmulatedEngine:
         seed: int = 0,
         born_ms: float = 0.0,
         epoch_ms: int = 0,
+        performer: BehaviourPerformer | None = None,
     ) -> None:
+        self.performer = performer
         self.wake_words = frozenset({name, *extra_wake_words})
         first = extra_wake_words[0] if extra_wake_words and quirks.extra_is_actor else name
         self.actor = first
@@ -76,7 +79,7 @@ class EmulatedEngine:
         self.gone = ""  # why its process has ended
         self._facts = facts
         self._index = index
-        self._engine = engine_inside(index, quirks, facts, script, first)
+        self._engine = engine_inside(index, quirks, facts, script, first, performer)
         self._now = self._tick = born_ms
         self._out: list[Said] = []
         self._tasks: list[tuple[float, int, Callable[[], None]]] = []
@@ -97,7 +100,7 @@ class EmulatedEngine:
     @property
     def due(self) -> float | None:
         """When it does something next by itself, in ms; None if nothing is planned."""
-        if self._out:
+        if self._out or (self.performer is not None and self.performer.has_returned):
             return self._now
         if self._frozen or self.gone:
             return None
@@ -180,6 +183,9 @@ class EmulatedEngine:
             else:
                 self._take(self._engine.advance(self._now))
         self._now = max(self._now, to_ms)
+        if self.performer is not None and not self._frozen and not self.gone:
+            for returned in self.performer.taken():
+                self._take(self._engine.returned(returned, self._now))
 
     def _next(self) -> tuple[float, float]:
         """When the node and when the engine in it do something next."""

@@ -10,7 +10,7 @@ from action_assistant.umrf import check as checks
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph, Key, Signature
-from action_assistant.umrf.semantics import Engine, Script
+from action_assistant.umrf.semantics import Engine, Performer, Script
 from action_assistant.umrf.semantics.printing import printed_action
 from action_assistant.umrf.signatures import signature_of
 
@@ -227,7 +227,12 @@ def index_of(actions: Iterable[str], graphs: Iterable[str]) -> EmulatedIndex:
 
 
 def engine_inside(
-    index: EmulatedIndex, quirks: EngineTraits, facts: EngineFacts, script: Script, actor: str
+    index: EmulatedIndex,
+    quirks: EngineTraits,
+    facts: EngineFacts,
+    script: Script,
+    actor: str,
+    performer: Performer | None,
 ) -> Engine:
     """What runs the graphs, without the node around it."""
     return Engine(
@@ -237,6 +242,7 @@ def engine_inside(
         actor=actor,
         signatures=index.actions if index.actions and quirks.checks_actions else None,
         loading_ms=quirks.loading_ms,
+        performer=performer,
     )
 
 

@@ -80,6 +80,8 @@ class EmulatorNode:
             Log, "/rosout", QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         )
         self.robot = make(round(time.time() * 1000))
+        if self.robot.performer is not None:
+            self.robot.performer.wake = self._executor.wake
         self._listen(facts, self.robot.quirks.depth or _WAITING)
         self._node.create_service(UmrfGraphGet, facts.get_service, self._ask)
         self._executor.add_node(self._node)
@@ -132,6 +134,8 @@ class EmulatorNode:
                 for said in self.robot.advance(self._now()):
                     self._say(said)
         finally:
+            if self.robot.performer is not None:
+                self.robot.performer.end()  # before what they wake is gone
             self._executor.shutdown()
             self._node.destroy_node()
             self._context.try_shutdown()
