@@ -3,13 +3,14 @@
 import argparse
 import json
 import sys
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
 import msgspec
 
 from action_assistant.errors import CannotStart
+from action_assistant.safe_text import one_line
 from action_assistant.umrf import check as checks
 from action_assistant.umrf import semantics
 from action_assistant.umrf.codes import rank
@@ -69,6 +70,12 @@ def _add_simulate(simulate: argparse.ArgumentParser) -> None:
     )
     simulate.add_argument("file", type=Path, metavar="FILE")
     simulate.add_argument("--script", type=Path, metavar="S.json", help="what the actions do")
+    simulate.add_argument(
+        "--behaviours",
+        type=Path,
+        metavar="DIR",
+        help="of Python files that say what actions do, before the script; in real time then",
+    )
     simulate.add_argument("--graphs", type=Path, metavar="DIR", help="of sub-graphs")
     simulate.add_argument(
         "--at",
@@ -236,19 +243,8 @@ def _simulate(options: argparse.Namespace) -> int:
         if refusals := checks.refused_by_parser(reading):
             _print_refusals(options.file, refusals)
             return 1
-        script = _script(options.script) if options.script else semantics.Script({})
-        trace = semantics.simulate(
-            reading.graph,
-            script=script,
-            library=_library(options.graphs),
-            facts=SIMULATED,
-            commands=options.at,
-            until_ms=options.seconds * 1000,
-            max_events=_EVENTS,
-            states=reading.states,
-        )
         cut_off = None
-        for event in trace:
+        for event in _trace(options, reading):
             _report(event, as_json=options.trace)
             if isinstance(event, semantics.HazardEvent) and event.code == semantics.CUT_OFF:
                 cut_off = event
@@ -259,6 +255,25 @@ def _simulate(options: argparse.Namespace) -> int:
         return 0
     print(f"{options.file}: {cut_off.message}", file=sys.stderr)
     return 1
+
+
+def _trace(options: argparse.Namespace, reading: codec.Reading) -> Iterator[semantics.Trace]:
+    script = _script(options.script) if options.script else semantics.Script({})
+    asked = {
+        "script": script,
+        "library": _library(options.graphs),
+        "commands": options.at,
+        "until_ms": options.seconds * 1000,
+        "max_events": _EVENTS,
+        "states": reading.states,
+    }
+    if options.behaviours is None:
+        return semantics.simulate(reading.graph, facts=SIMULATED, **asked)
+    from action_assistant.runner.behaviours.folder import BehaviourFolder
+    from action_assistant.runner.behaviours.real_time import simulate_in_real_time
+
+    folder = BehaviourFolder.opened(options.behaviours)
+    return simulate_in_real_time(reading.graph, folder, **asked)
 
 
 def _print_refusals(path: Path, refusals: Sequence[Problem]) -> None:
@@ -305,7 +320,11 @@ def _actions(folder: Path) -> Mapping[str, Signature]:
 
 def _report(event: semantics.Trace, *, as_json: bool) -> None:
     if isinstance(event, semantics.NodeResultEvent):
-        return  # what an action answered is ours to know; the engine sends no such thing
+        # What an action answered is ours to know; the engine sends no such thing.
+        if event.message and not as_json:
+            said = one_line(event.message)
+            print(f"{event.t_ms / 1000:10.3f} s  {event.graph}  {event.node} says: {said}")
+        return
     if as_json:
         print(msgspec.json.encode(event).decode())
         return

@@ -125,8 +125,10 @@ def _text(file: str, folder: int) -> str:
             raise Unusable(f"The behaviour {file} cannot be read: it is no regular file.")
         raw = opened.read(_LARGEST + 1)
     if len(raw) > _LARGEST:
-        raise Unusable(f"The behaviour {file} is larger than {_LARGEST >> 20} MB.")
+        raise Unusable(
+            f"The behaviour {file} cannot be read: it is larger than {_LARGEST >> 20} MB."
+        )
     try:
         return raw.decode()
     except UnicodeDecodeError as error:
-        raise Unusable(f"The behaviour {file} is not UTF-8: {error.reason}.") from error
+        raise Unusable(f"The behaviour {file} cannot be read: it is not UTF-8.") from error

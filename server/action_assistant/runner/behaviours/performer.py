@@ -81,6 +81,12 @@ class BehaviourPerformer:
         return taken
 
     @property
+    def is_busy(self) -> bool:
+        """Whether any call goes on, or there is something to take."""
+        with self._lock:
+            return bool(self._calls or self._returned)
+
+    @property
     def has_returned(self) -> bool:
         """Whether there is something to take."""
         return bool(self._returned)

@@ -34,7 +34,7 @@ def simulate(
     event, the hazard `events`."""
     engine = Engine(facts=facts, script=script, library=library, actor=actor, serial=False)
     pending = sorted(commands, key=lambda command: command[0])
-    traces = _started(engine, graph, states)
+    traces = started(engine, graph, states)
     left = max_events
     while True:
         yield from traces[:left]
@@ -48,19 +48,25 @@ def simulate(
             at_ms, verb, name = pending.pop(0)
             if at_ms > until_ms:
                 return
-            traces = engine.advance(at_ms) + _commanded(engine, at_ms, verb, name or graph.name)
+            traces = engine.advance(at_ms) + commanded(engine, at_ms, verb, name or graph.name)
         elif due is None or due > until_ms:
             return
         else:
             traces = engine.advance(due)
+    yield cut_off(engine, graph, max_events)
+
+
+def cut_off(engine: Engine, graph: Graph, max_events: int) -> Trace:
+    """The last event of a trace that has more events than were asked for."""
     message = (
         f"The simulation ends here, after {max_events:,} events; the graph does not. How it goes on is "
         "not known."
     )
-    yield HazardEvent(engine.now, graph.name, CUT_OFF, "cut off", None, message)
+    return HazardEvent(engine.now, graph.name, CUT_OFF, "cut off", None, message)
 
 
-def _started(engine: Engine, graph: Graph, states: Mapping[Key, str] | None) -> list[Trace]:
+def started(engine: Engine, graph: Graph, states: Mapping[Key, str] | None) -> list[Trace]:
+    """The start at 0 ms; one that the engine refuses ends in a hazard."""
     try:
         return engine.start(graph, 0.0, states)
     except GraphRefused as e:
@@ -68,7 +74,8 @@ def _started(engine: Engine, graph: Graph, states: Mapping[Key, str] | None) -> 
         return [*engine.advance(0.0), refused]
 
 
-def _commanded(engine: Engine, at_ms: float, verb: str, name: str) -> list[Trace]:
+def commanded(engine: Engine, at_ms: float, verb: str, name: str) -> list[Trace]:
+    """`stop`, `pause` or `resume` at this moment, of the graph that runs as `name`."""
     match verb:
         case "stop":
             return engine.stop(name, at_ms)
