@@ -1,9 +1,11 @@
 """Behaviours and graphs for tests, and what is left of their processes."""
 
 import itertools
+import os
 import textwrap
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +23,11 @@ from action_assistant.umrf.model import (
     Relation,
 )
 from runner.harness import GO_ON
+
+#: Nobody looks for a program there. What we start has it in its environment, however it is orphaned;
+#: other processes that run such tests have another one.
+_OURS = f"/nowhere/{os.getpid()}"
+os.environ["PATH"] += os.pathsep + _OURS
 
 OK = "def run(action):\n    return True\n"
 #: Neither sleeps nor hears of a stop.
@@ -63,12 +70,13 @@ def chain(*actions: Action | str, name: str = "chain") -> Graph:
 
 
 def processes() -> list[psutil.Process]:
-    """Of behaviours that go on, and their keepers: those of this test alone, if only one runs."""
+    """Of behaviours that go on, and their keepers, as far as tests of this process have begun them."""
     found = []
-    for each in psutil.process_iter(["cmdline", "status"]):
-        words = each.info["cmdline"] or ()
-        if str(Path(inside.__file__)) in words and each.info["status"] != psutil.STATUS_ZOMBIE:
-            found.append(each)
+    for each in psutil.process_iter():
+        with suppress(psutil.Error):
+            ours = str(Path(inside.__file__)) in each.cmdline()
+            if ours and each.environ()["PATH"].endswith(_OURS):
+                found.append(each)
     return found
 
 
