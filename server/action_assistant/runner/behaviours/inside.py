@@ -177,7 +177,9 @@ def _live() -> NoReturn:
     action = PerformedAction(order["inputs"], say)
     threading.Thread(target=_obey, args=(commands, action), daemon=True).start()
     result, error = _result(order["file"], order["source"], action)
-    sys.stdout.flush()
+    for printed in (sys.stdout, sys.stderr):
+        with contextlib.suppress(AttributeError, OSError, ValueError):  # it may have closed them
+            printed.flush()
     say(kind="done", result=result, error=error)
     os._exit(0)
 
