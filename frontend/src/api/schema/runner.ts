@@ -159,6 +159,19 @@ export interface RunnerApi {
         message?: string | null;
     };
     /**
+     * BehaviourList
+     * @description The behaviours that there are. `names`: in snake case, as the files are called without `.py`;
+     *     `refused`: those that cannot be run, and why. `problem`: why the folder cannot be read; "" if it
+     *     can.
+     */
+    BehaviourList: {
+        names: string[];
+        refused: {
+            [key: string]: string;
+        };
+        problem: string;
+    };
+    /**
      * Candidate
      * @description An engine that discovery shows. One at rest does not say its name: `actor` is "" until its
      *     feedback was heard, and a person has to know the name.
@@ -324,6 +337,8 @@ export interface RunnerApi {
         override?: RunnerApi["Override"] | null;
         /** @default null */
         like?: string | null;
+        /** @default false */
+        behaviours?: boolean;
     };
     /**
      * GroupShown
@@ -600,11 +615,13 @@ export interface RunnerApi {
     };
     /**
      * ReachStatus
-     * @description All engines. `no_reach`: why this runner reaches none over ROS 2; "" when it can.
+     * @description All engines. `no_reach`: why this runner reaches none over ROS 2; "" when it can. `behaviours`:
+     *     those that simulated runs can have; null where nobody has named a folder of them.
      */
     ReachStatus: {
         engines: RunnerApi["Robot"][];
         no_reach: string;
+        behaviours: RunnerApi["BehaviourList"] | null;
     };
     /**
      * Readiness
@@ -861,7 +878,7 @@ export interface RunnerApi {
     /**
      * RunShown
      * @description A run with its actions, by full name, and the newest lines of its engine's log. `like`: the
-     *     robot whose engine the simulator plays.
+     *     robot whose engine the simulator plays; `behaviours`: whether its actions have Python behaviours.
      */
     RunShown: {
         id: string;
@@ -894,6 +911,7 @@ export interface RunnerApi {
         alarms: RunnerApi["AlarmShown"][];
         recorded: boolean;
         like: string | null;
+        behaviours: boolean;
         actions: {
             [key: string]: RunnerApi["ActionShown"];
         };
@@ -971,6 +989,7 @@ export interface RunnerApi {
         alarms: RunnerApi["AlarmShown"][];
         recorded: boolean;
         like: string | null;
+        behaviours: boolean;
         actions: {
             [key: string]: RunnerApi["ActionShown"];
         };
@@ -1023,7 +1042,8 @@ export interface RunnerApi {
      * @description A start: the version by value, and where it shall run.
      *
      *     `digest` is what the person saw; `request_id` is made by the asker, once per intended start.
-     *     `like`: the robot whose engine the simulator plays, with its hazards.
+     *     `like`: the robot whose engine the simulator plays, with its hazards. `behaviours`: actions that
+     *     have a Python behaviour on the runner do what it does, before what the script says.
      */
     StartRequest: {
         version: string;
@@ -1041,6 +1061,8 @@ export interface RunnerApi {
         override?: RunnerApi["Override"] | null;
         /** @default null */
         like?: string | null;
+        /** @default false */
+        behaviours?: boolean;
     };
     /**
      * StartShown
