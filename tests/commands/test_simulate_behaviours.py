@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from action_assistant.umrf.files import codec
-from runner.behaviours.written import DEAF, WAITS, chain, processes, write
+from runner.links.behaviours.written import DEAF, WAITS, chain, processes, write
 from support.product import COMMAND
 
 

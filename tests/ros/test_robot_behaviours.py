@@ -11,7 +11,7 @@ pytest.importorskip(
 
 from ros.robots import RobotProcess
 from ros.test_contract import reached
-from runner.behaviours.written import DEAF, WAITS, chain, processes, until, write
+from runner.links.behaviours.written import DEAF, WAITS, chain, processes, until, write
 from runner.links.contract import Bench, answer, placed, shown
 
 QUICK = {"*": [{"after_s": 0.02}]}

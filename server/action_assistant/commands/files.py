@@ -269,8 +269,8 @@ def _trace(options: argparse.Namespace, reading: codec.Reading) -> Iterator[sema
     }
     if options.behaviours is None:
         return semantics.simulate(reading.graph, facts=SIMULATED, **asked)
-    from action_assistant.runner.behaviours.folder import BehaviourFolder
-    from action_assistant.runner.behaviours.real_time import simulate_in_real_time
+    from action_assistant.runner.links.behaviours.folder import BehaviourFolder
+    from action_assistant.runner.links.behaviours.real_time import simulate_in_real_time
 
     folder = BehaviourFolder.opened(options.behaviours)
     return simulate_in_real_time(reading.graph, folder, **asked)

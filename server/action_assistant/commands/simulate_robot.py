@@ -12,8 +12,6 @@ from typing import Any, Final
 import msgspec
 
 from action_assistant.errors import CannotStart
-from action_assistant.runner.behaviours.folder import BehaviourFolder
-from action_assistant.runner.behaviours.performer import BehaviourPerformer
 from action_assistant.runner.emulator.engine import EmulatedEngine
 from action_assistant.runner.emulator.messages import (
     EmulatedIndex,
@@ -23,6 +21,8 @@ from action_assistant.runner.emulator.messages import (
     Said,
     index_of,
 )
+from action_assistant.runner.links.behaviours.folder import BehaviourFolder
+from action_assistant.runner.links.behaviours.performer import BehaviourPerformer
 from action_assistant.safe_text import one_line
 from action_assistant.umrf.facts import PINNED, facts_for
 from action_assistant.umrf.semantics import Script, script_from

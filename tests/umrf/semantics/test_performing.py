@@ -175,7 +175,7 @@ def test_what_outlives_its_graph_or_is_told_twice_changes_nothing() -> None:
 
 
 def test_its_outputs_are_what_the_children_begin_with() -> None:
-    from runner.behaviours.written import action, chain, parameter
+    from runner.links.behaviours.written import action, chain, parameter
 
     performer = Performing("Gives", "Takes")
     engine = made(performer)

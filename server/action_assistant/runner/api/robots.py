@@ -9,8 +9,8 @@ from litestar.types import ControllerRouterHandler
 
 from action_assistant.errors import BadInput, NotFound, Refused
 from action_assistant.runner.api.caller import COUNTED, GRAPH_BODY, author_of, body_of
-from action_assistant.runner.behaviours.folder import BehaviourFolder, BehaviourList
 from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.links.behaviours.folder import BehaviourFolder, BehaviourList
 from action_assistant.runner.links.port import SIMULATOR, Candidate, Registration
 from action_assistant.runner.robots.recordings import Recording
 from action_assistant.runner.robots.registration import Robot

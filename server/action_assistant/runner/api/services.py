@@ -6,9 +6,9 @@ from weakref import WeakKeyDictionary
 from action_assistant.journal.journal import Journal
 from action_assistant.runner.api.live import Hub
 from action_assistant.runner.archives.retention import Retention
-from action_assistant.runner.behaviours.folder import BehaviourFolder
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.links.behaviours.folder import BehaviourFolder
 from action_assistant.runner.review.service import ReviewService
 from action_assistant.runner.review.worker_queries import WorkerQueries
 from action_assistant.runner.runs import views

@@ -14,7 +14,6 @@ from itertools import count
 from math import inf
 from typing import Final, TypeAlias, assert_never
 
-from action_assistant.runner.behaviours.performer import BehaviourPerformer
 from action_assistant.runner.emulator.inbox import Inbox
 from action_assistant.runner.emulator.messages import (
     EmulatedIndex,
@@ -39,6 +38,7 @@ from action_assistant.runner.emulator.messages import (
     unknown,
 )
 from action_assistant.runner.emulator.view import PublishedGraphs
+from action_assistant.runner.links.behaviours.performer import BehaviourPerformer
 from action_assistant.umrf.facts import PINNED, EngineFacts
 from action_assistant.umrf.semantics import Execution, GraphRefused, Script, Trace
 

@@ -14,10 +14,10 @@ from anyio.abc import TaskGroup
 from sqlalchemy import Row
 
 from action_assistant.errors import BadInput, Conflict, NotFound, Refused
-from action_assistant.runner.behaviours.folder import BehaviourFolder
 from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.execution import interventions
 from action_assistant.runner.execution.run_loop import OpenRun
+from action_assistant.runner.links.behaviours.folder import BehaviourFolder
 from action_assistant.runner.links.port import SIMULATOR, ForeignCommand, Link, Order, Registration
 from action_assistant.runner.links.simulator import Simulator, in_this_process
 from action_assistant.runner.links.unreachable import UnreachableLink
@@ -94,8 +94,7 @@ class ExecutionService:
         )
         self._robot_watchers: list[Callable[[], None]] = []
         self._settled: dict[str, Settled] = {}
-        self._number = 0
-        self._stops = StopOrder()
+        self._number, self._stops = 0, StopOrder()
 
     @classmethod
     @asynccontextmanager

@@ -22,8 +22,8 @@ import msgspec
 from anyio import to_thread
 
 from action_assistant.errors import TooMany
-from action_assistant.runner.behaviours.folder import BehaviourFolder
-from action_assistant.runner.behaviours.performer import BehaviourPerformer
+from action_assistant.runner.links.behaviours.folder import BehaviourFolder
+from action_assistant.runner.links.behaviours.performer import BehaviourPerformer
 from action_assistant.runner.links.listeners import Listeners
 from action_assistant.runner.links.port import (
     Answer,

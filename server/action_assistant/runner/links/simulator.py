@@ -14,8 +14,8 @@ import anyio
 import msgspec
 
 from action_assistant.errors import Unavailable
-from action_assistant.runner.behaviours.folder import BehaviourFolder
-from action_assistant.runner.behaviours.performer import BehaviourPerformer
+from action_assistant.runner.links.behaviours.folder import BehaviourFolder
+from action_assistant.runner.links.behaviours.performer import BehaviourPerformer
 from action_assistant.runner.links.listeners import Listeners
 from action_assistant.runner.links.observations import (
     Exact,

@@ -9,8 +9,8 @@ import anyio
 import msgspec
 
 from action_assistant.errors import BadInput, Conflict, Refused, Unavailable
-from action_assistant.runner.behaviours.folder import BehaviourFolder
 from action_assistant.runner.clock import ClockUs
+from action_assistant.runner.links.behaviours.folder import BehaviourFolder
 from action_assistant.runner.links.port import SIMULATOR, Answer, Link, NoAnswer
 from action_assistant.runner.links.simulator import Simulator
 from action_assistant.runner.robots.engine import KnownEngine
@@ -126,17 +126,7 @@ class StartChecks:
     async def cleared(self, asked: StartRequest) -> Cleared:
         """Look, and refuse what stands in the way. Raises Refused of many kinds."""
         if asked.engine == SIMULATOR:
-            facts = self._simulated(asked)
-            ready = await self._run_in_worker(prepared, asked, facts, secrets.token_urlsafe(9))
-            behaviours = await self._folder(ready) if asked.behaviours else None
-            link = self._simulator(facts, ready.script, self._clock_us, behaviours)
-            return Cleared(
-                ready=ready,
-                link=link,
-                own=True,
-                incarnation=link.standing.incarnation,
-                despite=_despite(ready, ()),
-            )
+            return await self._cleared_simulation(asked)
         robot = self._robots.reachable(asked.engine)
         if asked.like is not None:
             raise BadInput("Only the simulator plays a robot.", where={"path": "/like"})
@@ -166,6 +156,19 @@ class StartChecks:
             own=False,
             incarnation=view.answer.incarnation,
             despite=_despite(ready, items),
+        )
+
+    async def _cleared_simulation(self, asked: StartRequest) -> Cleared:
+        facts = self._simulated(asked)
+        ready = await self._run_in_worker(prepared, asked, facts, secrets.token_urlsafe(9))
+        behaviours = await self._folder(ready) if asked.behaviours else None
+        link = self._simulator(facts, ready.script, self._clock_us, behaviours)
+        return Cleared(
+            ready=ready,
+            link=link,
+            own=True,
+            incarnation=link.standing.incarnation,
+            despite=_despite(ready, ()),
         )
 
     async def all_cleared(self, starts: Sequence[StartRequest]) -> list[Cleared]:

@@ -6,8 +6,8 @@ import time
 from collections.abc import Callable
 from typing import Final
 
-from action_assistant.runner.behaviours.call_process import CallProcess
-from action_assistant.runner.behaviours.folder import BehaviourFolder
+from action_assistant.runner.links.behaviours.call_process import CallProcess
+from action_assistant.runner.links.behaviours.folder import BehaviourFolder
 from action_assistant.umrf.semantics import Call, Returned
 
 log: Final = logging.getLogger(__name__)

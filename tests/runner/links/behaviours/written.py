@@ -12,7 +12,7 @@ from typing import Any
 import msgspec
 import psutil
 
-from action_assistant.runner.behaviours import inside
+from action_assistant.runner.links.behaviours import inside
 from action_assistant.umrf.model import (
     ENTRY,
     ENTRY_CONDITIONS,

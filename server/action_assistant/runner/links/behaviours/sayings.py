@@ -40,7 +40,7 @@ class DoneSaid(msgspec.Struct, frozen=True, tag_field="kind", tag="done"):
 _Said: TypeAlias = OutputSaid | MessageSaid | DoneSaid
 
 
-class Lines:
+class LineReader:
     """Bytes in, whole lines out. Raises Unbelievable for a line that is too long."""
 
     def __init__(self, hear: Callable[[bytes], None], *, cut: bool) -> None:

@@ -5,8 +5,8 @@ import time
 from collections.abc import Iterable, Iterator, Mapping
 from math import inf
 
-from action_assistant.runner.behaviours.folder import BehaviourFolder
-from action_assistant.runner.behaviours.performer import BehaviourPerformer
+from action_assistant.runner.links.behaviours.folder import BehaviourFolder
+from action_assistant.runner.links.behaviours.performer import BehaviourPerformer
 from action_assistant.umrf.facts import SIMULATED
 from action_assistant.umrf.model import Graph, Key
 from action_assistant.umrf.semantics import Engine, Script, Trace

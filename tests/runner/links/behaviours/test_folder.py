@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from action_assistant.errors import CannotStart
-from action_assistant.runner.behaviours.folder import BehaviourFolder, Unusable, file_of
-from runner.behaviours.written import OK, write
+from action_assistant.runner.links.behaviours.folder import BehaviourFolder, Unusable, file_of
+from runner.links.behaviours.written import OK, write
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "pidfd_open"), reason="behaviours need Linux")
 

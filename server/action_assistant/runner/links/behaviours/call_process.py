@@ -13,9 +13,9 @@ from typing import Final
 
 import msgspec
 
-from action_assistant.runner.behaviours.folder import BehaviourFolder, Unusable, file_of
-from action_assistant.runner.behaviours.keeper import Keeper
-from action_assistant.runner.behaviours.sayings import Lines, Sayings, Unbelievable
+from action_assistant.runner.links.behaviours.folder import BehaviourFolder, Unusable, file_of
+from action_assistant.runner.links.behaviours.keeper import Keeper
+from action_assistant.runner.links.behaviours.sayings import LineReader, Sayings, Unbelievable
 from action_assistant.umrf.semantics import Call, Returned
 
 _CHUNK: Final = 65_536  # bytes that are read at once, as many as a pipe holds
@@ -119,8 +119,8 @@ class CallProcess:
     def _hear_out(self, keeper: Keeper) -> None:
         """Tell and hear it until its keeper has ended."""
         ears = {
-            keeper.said: Lines(self._sayings.hear, cut=False),
-            keeper.printed: Lines(self._sayings.hear_print, cut=True),
+            keeper.said: LineReader(self._sayings.hear, cut=False),
+            keeper.printed: LineReader(self._sayings.hear_print, cut=True),
         }
         with selectors.DefaultSelector() as selector:
             for number in (keeper.end_sign, self._nudge, *ears):
@@ -153,7 +153,7 @@ class CallProcess:
         elif not waits and keeper.commands in selector.get_map():
             selector.unregister(keeper.commands)
 
-    def _hear(self, number: int, lines: Lines) -> bool:
+    def _hear(self, number: int, lines: LineReader) -> bool:
         """Read once; whether more may come."""
         try:
             chunk = os.read(number, _CHUNK)

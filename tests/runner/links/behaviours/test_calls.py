@@ -10,10 +10,10 @@ from pathlib import Path
 import psutil
 import pytest
 
-from action_assistant.runner.behaviours.folder import BehaviourFolder
-from action_assistant.runner.behaviours.performer import MOST, BehaviourPerformer
+from action_assistant.runner.links.behaviours.folder import BehaviourFolder
+from action_assistant.runner.links.behaviours.performer import MOST, BehaviourPerformer
 from action_assistant.umrf.semantics import Call, Returned
-from runner.behaviours.written import DEAF, WAITS, processes, until, write
+from runner.links.behaviours.written import DEAF, WAITS, processes, until, write
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "pidfd_open"), reason="behaviours need Linux")
 

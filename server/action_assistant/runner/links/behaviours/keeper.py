@@ -11,10 +11,9 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Final, Self
 
-from action_assistant.runner.behaviours import inside
-
 log: Final = logging.getLogger(__name__)
 
+_INSIDE: Final = Path(__file__).with_name("inside.py")
 _KEEPER_S: Final = 1.0  # that it has to end all that descends from it
 _AGAIN_S: Final = 0.05
 _LONG_S: Final = 10.0  # after so much somebody should know
@@ -41,7 +40,7 @@ class Keeper:
                     "-I",
                     "-P",
                     "-B",
-                    str(Path(inside.__file__)),
+                    str(_INSIDE),
                     str(lifeline.fileno()),
                 ],
                 stdin=theirs.fileno(),
