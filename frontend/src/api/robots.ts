@@ -96,7 +96,9 @@ export function runPreflight(
   runner: string,
   umrf: string,
   engines: readonly string[],
+  behaviours: boolean,
   signal: AbortSignal,
 ): Promise<Preflight[]> {
-  return fetchJson(`${runner}/api/preflight`, { method: "POST", body: { engines, umrf }, signal });
+  const body = { engines, ...(behaviours ? { behaviours } : {}), umrf };
+  return fetchJson(`${runner}/api/preflight`, { method: "POST", body, signal });
 }

@@ -76,6 +76,8 @@ export interface StartOrder {
   request: string;
   /** What actions do; only the simulator follows one. */
   script?: RunnerApi["Script"];
+  /** Whether actions do what their Python behaviours say; only in the simulator. */
+  behaviours?: boolean;
   override?: RunnerApi["Override"];
 }
 
@@ -94,6 +96,7 @@ export async function startRun(order: StartOrder): Promise<Started> {
     request_id: order.request,
     ...(order.override === undefined ? {} : { override: order.override }),
     ...(order.script === undefined ? {} : { script: order.script }),
+    ...(order.behaviours === true ? { behaviours: true } : {}),
     umrf: order.umrf,
   };
   if (!alone) return fetchJson(`${order.runner}/api/groups`, { method: "POST", body });

@@ -12,6 +12,7 @@ import { useMay } from "../../api/use-person";
 import { EngineLabel } from "../../status/engine-label";
 import { HoldButton } from "../../ui/floating/hold-button";
 import { colorOfName } from "../../ui/name-colors";
+import { BehavioursChoice } from "./behaviours-choice";
 import { PreflightList } from "./preflight-list";
 import style from "./start-dialog.module.css";
 import { rememberEngines, useStart } from "./use-start";
@@ -30,7 +31,7 @@ interface Props {
 const LOOK_AGAIN = 5_000; // ms
 
 /** The text of the moment, and what the runner sees when it looks at the chosen engines now. */
-function useLook(graph: string, seq: number, engines: readonly string[]) {
+function useLook(graph: string, seq: number, engines: readonly string[], behaviours: boolean) {
   const { runner } = useLive();
   const umrf = useQuery({
     queryKey: ["umrf", graph, seq],
@@ -39,8 +40,9 @@ function useLook(graph: string, seq: number, engines: readonly string[]) {
     staleTime: Number.POSITIVE_INFINITY,
   });
   const look = useQuery({
-    queryKey: ["preflight", graph, seq, ...engines],
-    queryFn: ({ signal }) => runPreflight(runner ?? "", umrf.data ?? "", engines, signal),
+    queryKey: ["preflight", graph, seq, behaviours, ...engines],
+    queryFn: ({ signal }) =>
+      runPreflight(runner ?? "", umrf.data ?? "", engines, behaviours, signal),
     enabled: umrf.data !== undefined && runner !== undefined && engines.length > 0,
     refetchInterval: LOOK_AGAIN,
     gcTime: 0,
@@ -150,7 +152,10 @@ export function StartDialog(props: Props) {
   const [engines, setEngines] = useState<readonly string[]>(chosen);
   const [reason, setReason] = useState("");
   const { now } = useLive();
-  const { look, error } = useLook(graph, seq, engines);
+  const [chosenBehaviours, setBehaviours] = useState(false);
+  const simulated = engines.includes(SIMULATOR);
+  const behaviours = chosenBehaviours && simulated;
+  const { look, error } = useLook(graph, seq, engines, behaviours);
   const start = useStart(graph);
   const looks = look.data;
   const codes = [...new Set((looks ?? []).flatMap((each) => each.override))];
@@ -174,7 +179,7 @@ export function StartDialog(props: Props) {
       onClose();
       onStarted?.(runs);
     };
-    start.mutate({ seq, engines, digest, ...override }, { onSuccess: done });
+    start.mutate({ seq, engines, digest, behaviours, ...override }, { onSuccess: done });
   };
   const where = engines.map((engine) => (engine === SIMULATOR ? "the simulator" : engine));
   return (
@@ -186,6 +191,7 @@ export function StartDialog(props: Props) {
       size="lg"
     >
       <Where engines={engines} onToggle={choose} />
+      {simulated && <BehavioursChoice on={behaviours} onChange={setBehaviours} />}
       {engines.length > 0 && (
         <section
           className={style.looks}

@@ -18,6 +18,8 @@ export interface StartInput {
   digest: string | null;
   /** What actions do in the simulator. */
   script?: Script;
+  /** Whether they do what their Python behaviours say, there too. */
+  behaviours?: boolean;
   override?: NonNullable<StartOrder["override"]>;
 }
 
@@ -46,7 +48,7 @@ export function useStart(graph: string) {
   const { live, runner } = useLive();
   const client = useQueryClient();
   return useMutation({
-    mutationFn: async ({ seq, engines, digest, script, override }: StartInput) => {
+    mutationFn: async ({ seq, engines, digest, script, behaviours, override }: StartInput) => {
       if (runner === undefined) throw new Error("The runner is not known yet.");
       const { version, umrf } = await publishedVersion(graph, await seq);
       void client.invalidateQueries({ queryKey: queryKeys.versions(graph) });
@@ -64,6 +66,7 @@ export function useStart(graph: string) {
         engines,
         request: newAid(),
         ...(script === undefined ? {} : { script }),
+        ...(behaviours === undefined ? {} : { behaviours }),
         ...(override === undefined ? {} : { override }),
       });
       for (const run of started.runs) live?.learn(run);
