@@ -1,6 +1,7 @@
 /** Whether actions of a simulated run do what their Python behaviours say, where the administrator has
  * named a folder of them. The page chooses and never sends any. */
 import { Text } from "@mantine/core";
+import { type ReactNode, useState } from "react";
 import { useLive } from "../../api/live/use-live";
 import { useRosReach } from "../../api/robots";
 import style from "./start-dialog.module.css";
@@ -12,7 +13,7 @@ function listed(names: readonly string[]): string {
   return names.slice(0, NAMED).join(", ") + (more > 0 ? ` and ${more} more` : "");
 }
 
-export function BehavioursChoice(props: { on: boolean; onChange: (on: boolean) => void }) {
+function BehavioursChoice(props: { on: boolean; onChange: (on: boolean) => void }) {
   const { runner } = useLive();
   const there = useRosReach(runner).data?.behaviours ?? null;
   if (there === null) return null;
@@ -47,4 +48,11 @@ export function BehavioursChoice(props: { on: boolean; onChange: (on: boolean) =
       )}
     </fieldset>
   );
+}
+
+/** Whether behaviours were chosen, and what they are chosen with; neither where nothing is simulated. */
+export function useBehaviours(simulated: boolean): { behaviours: boolean; choice: ReactNode } {
+  const [chosen, choose] = useState(false);
+  const choice = simulated ? <BehavioursChoice on={chosen} onChange={choose} /> : null;
+  return { behaviours: chosen && simulated, choice };
 }

@@ -12,7 +12,7 @@ import { useMay } from "../../api/use-person";
 import { EngineLabel } from "../../status/engine-label";
 import { HoldButton } from "../../ui/floating/hold-button";
 import { colorOfName } from "../../ui/name-colors";
-import { BehavioursChoice } from "./behaviours-choice";
+import { useBehaviours } from "./behaviours-choice";
 import { PreflightList } from "./preflight-list";
 import style from "./start-dialog.module.css";
 import { rememberEngines, useStart } from "./use-start";
@@ -152,9 +152,7 @@ export function StartDialog(props: Props) {
   const [engines, setEngines] = useState<readonly string[]>(chosen);
   const [reason, setReason] = useState("");
   const { now } = useLive();
-  const [chosenBehaviours, setBehaviours] = useState(false);
-  const simulated = engines.includes(SIMULATOR);
-  const behaviours = chosenBehaviours && simulated;
+  const { behaviours, choice } = useBehaviours(engines.includes(SIMULATOR));
   const { look, error } = useLook(graph, seq, engines, behaviours);
   const start = useStart(graph);
   const looks = look.data;
@@ -191,7 +189,7 @@ export function StartDialog(props: Props) {
       size="lg"
     >
       <Where engines={engines} onToggle={choose} />
-      {simulated && <BehavioursChoice on={behaviours} onChange={setBehaviours} />}
+      {choice}
       {engines.length > 0 && (
         <section
           className={style.looks}
