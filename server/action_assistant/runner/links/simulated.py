@@ -23,7 +23,10 @@ from anyio import to_thread
 
 from action_assistant.errors import TooMany
 from action_assistant.runner.links.behaviours.folder import BehaviourFolder
-from action_assistant.runner.links.behaviours.performer import BehaviourPerformer
+from action_assistant.runner.links.behaviours.performer import (
+    BehaviourPerformer,
+    bound_address_space,
+)
 from action_assistant.runner.links.listeners import Listeners
 from action_assistant.runner.links.port import (
     Answer,
@@ -192,6 +195,7 @@ class SimulatedLink:
     async def aclose(self) -> None:
         """End the engine, and its process. One with behaviours ends them first, and itself."""
         if self.has_behaviours and self._process is not None and self._writer is not None:
+            self._why = self._why or _GONE
             self._writer.close()
             with anyio.CancelScope(shield=True):
                 await to_thread.run_sync(self._process.join, _ENDING_S)
@@ -289,7 +293,10 @@ def _framed(value: object) -> bytes:
 
 def _live(wire: socket.socket, made: _Made) -> None:
     """One engine, until nobody listens any more."""
-    performer = BehaviourPerformer(made.behaviours) if made.behaviours is not None else None
+    performer = None
+    if made.behaviours is not None:
+        bound_address_space()
+        performer = BehaviourPerformer(made.behaviours)
     try:
         with suppress(asyncio.IncompleteReadError, ConnectionError, BrokenPipeError):
             anyio.run(_serve, wire, made, performer)

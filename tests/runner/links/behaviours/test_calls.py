@@ -248,3 +248,16 @@ def test_the_end_of_the_performer_leaves_nothing(bench: Bench) -> None:
     until(lambda: len(processes()) == 6)
     bench.performer.end()
     assert not processes()
+
+
+def test_where_no_process_can_be_had_the_call_is_an_error(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuses(*_: object) -> None:
+        raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr(threading.Thread, "start", refuses)
+    bench.begin()
+    (returned,) = bench.returned()
+    assert returned.result == "on_error"
+    assert returned.message == "The behaviour could not be begun: can't start new thread."

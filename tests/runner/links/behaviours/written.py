@@ -69,6 +69,14 @@ def chain(*actions: Action | str, name: str = "chain") -> Graph:
     return Graph(name=name, actions=nodes, relations=relations)
 
 
+def side_by_side(count: int, source: str, name: str = "wide") -> Graph:
+    """So many of one action at once, each of which leads to the end."""
+    nodes = tuple(Action(key=f"aid{i}", name=source, instance_id=i) for i in range(count))
+    entries = [Relation(parent=ENTRY, child=n.key, conditions=ENTRY_CONDITIONS) for n in nodes]
+    exits = [Relation(parent=each.key, child=EXIT, conditions=GO_ON) for each in nodes]
+    return Graph(name=name, actions=nodes, relations=(*entries, *exits))
+
+
 def processes() -> list[psutil.Process]:
     """Of behaviours that go on, and their keepers, as far as tests of this process have begun them."""
     found = []

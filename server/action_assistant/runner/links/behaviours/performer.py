@@ -1,5 +1,6 @@
 """Behaviours as what an engine gives its calls to. Whoever drives the engine takes what came of them."""
 
+import ctypes
 import logging
 import threading
 import time
@@ -17,6 +18,18 @@ MOST: Final = 32
 _ENDING_S: Final = 3.0
 _GIVEN_UP: Final = "It went on for 5 s after a stop, and was killed."
 _OVER: Final = "The engine has ended."
+
+
+_STACK: Final = 1 << 20  # bytes
+_ARENA_MAX: Final = -8  # M_ARENA_MAX of glibc
+
+
+def bound_address_space() -> None:
+    """For processes that have little of it: threads with small stacks, and one heap for all of them
+    (else glibc reserves 64 MB for each)."""
+    threading.stack_size(_STACK)
+    if mallopt := getattr(ctypes.CDLL(None), "mallopt", None):
+        mallopt(_ARENA_MAX, 1)
 
 
 class BehaviourPerformer:
@@ -43,14 +56,18 @@ class BehaviourPerformer:
     def begin(self, call: Call) -> None:
         """Begin its process, on a thread of its own."""
         with self._lock:
-            if len(self._calls) >= MOST:
-                why = f"{MOST} behaviours run already."
-                self._returned.append(Returned(number=call.number, result="on_error", message=why))
-            else:
-                process = self._calls[call.number] = CallProcess(self._folder, call, self._end)
+            going = len(self._calls)
+        why = f"{MOST} behaviours run already."
+        if going < MOST:
+            try:
+                process = CallProcess(self._folder, call, self._end)
+                with self._lock:
+                    self._calls[call.number] = process
                 process.begin()
                 return
-        self.wake()
+            except (OSError, RuntimeError) as failed:  # no file or no thread can be had
+                why = f"The behaviour could not be begun: {failed}."
+        self._end(Returned(number=call.number, result="on_error", message=why))
 
     def stop(self, number: int) -> None:
         """Tell it; it has as long as the engine waits."""
@@ -113,7 +130,7 @@ class BehaviourPerformer:
             process.tell(command)
 
     def _end(self, returned: Returned) -> None:
-        """On the thread of a call."""
+        """Nothing of a call is left; mostly told on its thread."""
         with self._lock:
             self._calls.pop(returned.number, None)
             self._returned.append(returned)
