@@ -118,23 +118,23 @@ class CallProcess:
 
     def _hear_out(self, keeper: Keeper) -> None:
         """Tell and hear it until its keeper has ended."""
-        ears = {
+        readers = {
             keeper.said: LineReader(self._sayings.hear, cut=False),
             keeper.printed: LineReader(self._sayings.hear_print, cut=True),
         }
         with selectors.DefaultSelector() as selector:
-            for number in (keeper.end_sign, self._nudge, *ears):
+            for number in (keeper.end_sign, self._nudge, *readers):
                 selector.register(number, selectors.EVENT_READ)
             while not keeper.is_over():
                 self._tell_on(keeper, selector)
                 for key, _ in selector.select(keeper.patience):
                     if key.fd == self._nudge:
                         os.eventfd_read(self._nudge)
-                    elif key.fd in ears and not self._hear(key.fd, ears[key.fd]):
+                    elif key.fd in readers and not self._hear(key.fd, readers[key.fd]):
                         selector.unregister(key.fd)
                 if self._wrong or self._sayings.done is not None:
                     keeper.let_go()
-        for number, lines in ears.items():
+        for number, lines in readers.items():
             for _ in range(_LAST):
                 if not self._hear(number, lines):
                     break
