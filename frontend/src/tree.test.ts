@@ -43,6 +43,7 @@ const LAYERS: Readonly<Record<string, readonly string[]>> = {
   sync: ["graph", "api"],
   "dry-run": ["graph", "api", "status"],
   "edit-actions": ["graph", "ui", "api", "canvas", "dry-run"],
+  history: ["graph", "ui", "api"],
   people: BELOW_EDITOR,
   comments: BELOW_EDITOR,
   find: BELOW_EDITOR,
@@ -50,19 +51,23 @@ const LAYERS: Readonly<Record<string, readonly string[]>> = {
   packages: BELOW_EDITOR,
   inspector: [...BELOW_EDITOR, "people", "comments"],
   editor: [...BELOW_EDITOR, "people", "comments", "find", "outline", "inspector"].concat([
+    "history",
     "packages",
   ]),
   // Features of their own know neither the editor nor each other.
   runs: ["graph", "ui", "api", "status", "canvas"],
-  review: ["graph", "ui", "api", "status", "canvas"],
+  review: ["graph", "ui", "api", "status", "canvas", "history"],
   robots: ["ui", "api", "status"],
   library: ["graph", "ui", "api", "status", "canvas"],
+  // The page of actions is an editor of its own, with the same forms and rooms.
+  actions: [...BELOW_EDITOR, "people", "history", "inspector", "packages", "editor", "library"],
   account: ["ui", "api"],
   app: ["graph", "ui", "api", "status", "offline", "canvas", "sync", "dry-run", "editor"].concat([
     "runs",
     "review",
     "robots",
     "library",
+    "actions",
     "account",
   ]),
 };

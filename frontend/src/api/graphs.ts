@@ -16,11 +16,14 @@ export type ProblemPlace = EditorApi["Where"];
 /** `also`: the other places of the same thing, which is told once. */
 export type Problem = EditorApi["Problem"];
 export type Problems = EditorApi["Problems"];
+/** What one moment of a document has otherwise than another. */
+export type GraphDifference = EditorApi["Difference"];
 
 export const queryKeys = {
   config: ["config"] as const,
   graphs: ["graphs"] as const,
   deleted: ["deleted graphs"] as const,
+  actions: ["actions"] as const,
   graph: (id: string) => ["graphs", id] as const,
   problems: (id: string, seq: number) => ["graphs", id, "problems", seq] as const,
   versions: (id: string) => ["graphs", id, "versions"] as const,
@@ -51,15 +54,6 @@ export function useDeletedGraphs(wanted: boolean) {
     enabled: wanted,
     queryKey: queryKeys.deleted,
     queryFn: ({ signal }) => fetchJson<GraphSummary[]>("/api/graphs?deleted=true", { signal }),
-  });
-}
-
-/** Every action that all graphs together know, by name. */
-export function useActions() {
-  return useQuery({
-    queryKey: ["actions"],
-    queryFn: ({ signal }) => fetchJson<KnownActionAnswer[]>("/api/actions", { signal }),
-    refetchInterval: 15_000,
   });
 }
 

@@ -1,5 +1,5 @@
 /** C++ packages of a graph's actions, as the editor answers them. */
-import { useQuery } from "@tanstack/react-query";
+import { keepPreviousData, useQuery } from "@tanstack/react-query";
 import { fetchJson } from "./http";
 import { serverPath } from "./page-url";
 import type { EditorApi } from "./schema/editor";
@@ -21,6 +21,18 @@ export function usePackages(graph: string) {
     gcTime: 0,
     refetchOnWindowFocus: false,
     refetchOnReconnect: false,
+  });
+}
+
+/** The same as the document is edited: `seq` is the moment on screen, from 1 on. */
+export function usePackagesAt(graph: string, seq: number) {
+  return useQuery({
+    enabled: seq > 0,
+    queryKey: ["packages", graph, "now", seq],
+    queryFn: ({ signal }) => fetchJson<PackageList>(below(graph), { signal }),
+    placeholderData: keepPreviousData,
+    staleTime: Number.POSITIVE_INFINITY,
+    gcTime: 60_000,
   });
 }
 

@@ -1,5 +1,5 @@
 /** Robots as the runner tells them, and what it looks at before a start. */
-import { useQuery } from "@tanstack/react-query";
+import { useQueries, useQuery } from "@tanstack/react-query";
 import { fetchJson, fetchText } from "./http";
 import type { RunnerApi } from "./schema/runner";
 
@@ -51,6 +51,24 @@ export function useIndexedByRobot(runner: string | undefined, robot: string, on:
     queryFn: ({ signal }) => fetchJson<IndexedByRobot>(`${path(runner, robot)}/known`, { signal }),
     enabled: on && runner !== undefined,
     refetchInterval: 10_000,
+  });
+}
+
+/** The same of several at once; null of those that have not answered. */
+export function useIndexedByRobots(
+  runner: string | undefined,
+  robots: readonly string[],
+): readonly { readonly robot: string; readonly indexed: IndexedByRobot | null }[] {
+  return useQueries({
+    queries: robots.map((robot) => ({
+      queryKey: ["robots", "known", robot],
+      queryFn: ({ signal }: { signal: AbortSignal }) =>
+        fetchJson<IndexedByRobot>(`${path(runner, robot)}/known`, { signal }),
+      enabled: runner !== undefined,
+      refetchInterval: 30_000,
+    })),
+    combine: (answers) =>
+      answers.map(({ data }, i) => ({ robot: robots[i] ?? "", indexed: data ?? null })),
   });
 }
 

@@ -21,6 +21,7 @@ import type { Crumb } from "../ui/top-bar";
 import { DropFiles } from "./drop-files";
 import { importReviews } from "./import-review";
 import {
+  ActionsScreen,
   CompareScreen,
   GraphScreen,
   HomeScreen,
@@ -79,6 +80,13 @@ function Screens() {
         {({ id }) => (
           <Screen crumbs={[graphs]} key={id}>
             <GraphScreen id={id} />
+          </Screen>
+        )}
+      </Route>
+      <Route path="/actions/:id?">
+        {({ id }) => (
+          <Screen crumbs={[graphs, { label: "Actions" }]}>
+            <ActionsScreen id={id ?? null} />
           </Screen>
         )}
       </Route>

@@ -15,6 +15,9 @@ export const GraphScreen = lazyPart(() =>
 export const RobotsScreen = lazyPart(() =>
   import("./robots-screen").then((part) => part.RobotsScreen),
 );
+export const ActionsScreen = lazyPart(() =>
+  import("./actions-screen").then((part) => part.ActionsScreen),
+);
 export const RunsScreen = lazyPart(() => review().then((part) => part.RunsScreen));
 export const RunScreen = lazyPart(() => review().then((part) => part.RunScreen));
 export const CompareScreen = lazyPart(() => review().then((part) => part.CompareScreen));
@@ -25,6 +28,7 @@ const PLACES: readonly (readonly [start: string, part: Pick<LazyPart<never>, "pr
   ["/graphs/", GraphScreen],
   ["/runs", RunsScreen],
   ["/robots", RobotsScreen],
+  ["/actions", ActionsScreen],
   ["/", HomeScreen],
 ];
 

@@ -1,6 +1,6 @@
 /** What every screen has: the bar with STOP on top, the screen below. */
 import { Button } from "@mantine/core";
-import { IconHistory, IconRobot, IconShare } from "@tabler/icons-react";
+import { IconBolt, IconHistory, IconRobot, IconShare } from "@tabler/icons-react";
 import { memo, type ReactNode, useState } from "react";
 import { Link } from "wouter";
 import { AccountMenu } from "../account/account-menu";
@@ -26,7 +26,7 @@ interface Props {
   /** The graph on screen. */
   graph?: string;
   /** The screen is one of those that the bar leads to. */
-  at?: "runs" | "robots";
+  at?: "runs" | "robots" | "actions";
 }
 
 interface WayProps {
@@ -85,6 +85,7 @@ export function PageBar({ crumbs, status, actions, start, graph, at }: Props) {
       actions={
         <>
           {actions}
+          {at !== "actions" && <Way to="/actions" icon={IconBolt} name="Actions" {...ways} />}
           {at !== "robots" && <Way to="/robots" icon={IconRobot} name="Robots" {...ways} />}
           {at !== "runs" && <Way to="/runs" icon={IconHistory} name="Runs" {...ways} />}
           {mayShare && (

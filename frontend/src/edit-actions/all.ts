@@ -66,6 +66,7 @@ export const EDIT_ACTIONS: readonly EditAction[] = [
   graph.exportSvg,
   graph.exportPng,
   graph.packages,
+  graph.history,
   graph.print,
   graph.copyLink,
 ];

@@ -51,6 +51,8 @@ export type Overlay =
   | { readonly kind: "menu"; readonly screen: Position }
   /** The C++ packages of all actions; `action`: the name of the one that is shown first. */
   | { readonly kind: "packages"; readonly action?: string }
+  /** What was done to the graph. */
+  | { readonly kind: "history" }
   | { readonly kind: "palette" }
   | { readonly kind: "keys" };
 

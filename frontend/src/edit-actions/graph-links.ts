@@ -58,3 +58,8 @@ export function present(graph: Graph, selection: readonly string[]): string[] {
   ]);
   return selection.filter((id) => known.has(id));
 }
+
+/** Whether an address asks for what was done to the graph. */
+export function asksForHistory(search: string): boolean {
+  return new URLSearchParams(search).has("history");
+}

@@ -1,7 +1,8 @@
-/** Edit actions for the whole graph: export it, its C++ packages, a link to it. */
+/** Edit actions for the whole graph: export it, its C++ packages, its history, a link to it. */
 
 import {
   IconDownload,
+  IconHistory,
   IconLink,
   IconPackage,
   IconPhoto,
@@ -57,6 +58,16 @@ export const packages: EditAction = {
     const [first] = selectedActions(context);
     context.openOverlay({ kind: "packages", ...(first ? { action: first.name } : {}) });
   },
+};
+
+export const history: EditAction = {
+  ...graph,
+  name: "history",
+  label: "What was done to this graph",
+  shortcuts: [],
+  icon: IconHistory,
+  also: "history restore earlier version changes back",
+  run: (context) => context.openOverlay({ kind: "history" }),
 };
 
 export const print: EditAction = {

@@ -3,7 +3,7 @@ import { notifications } from "@mantine/notifications";
 import { useEffect, useRef } from "react";
 import { useSearch } from "wouter";
 import type { EditorContext } from "../edit-actions/editor-context";
-import { present, targetOf } from "../edit-actions/graph-links";
+import { asksForHistory, present, targetOf } from "../edit-actions/graph-links";
 import { shownKeys } from "../edit-actions/view";
 import { focusField } from "../ui/focus-field";
 
@@ -13,6 +13,9 @@ export function useGraphLink(context: EditorContext, begun: boolean): void {
   const search = useSearch();
   const now = useRef(context);
   now.current = context;
+  useEffect(() => {
+    if (begun && asksForHistory(search)) now.current.openOverlay({ kind: "history" });
+  }, [search, begun]);
   useEffect(() => {
     const target = begun ? targetOf(search) : null;
     if (target === null) return;

@@ -52,6 +52,11 @@ function membersOf(text: string): [name: string, text: string][] {
   return found;
 }
 
+/** The names of all members of the object that `text` is, in order. */
+export function memberNames(text: string): string[] {
+  return membersOf(text).map(([name]) => name);
+}
+
 /** The text of the member `name` of the object that `text` is; null when it has none. */
 export function memberText(text: string, name: string): string | null {
   return membersOf(text).find(([known]) => known === name)?.[1] ?? null;

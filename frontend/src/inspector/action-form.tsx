@@ -7,6 +7,7 @@ import type { Action, Graph } from "../graph/model";
 import { DraftInput } from "../ui/draft-input";
 import { colorOfName } from "../ui/name-colors";
 import { ArrowList } from "./arrow-list";
+import { DescriptionField, NameField, TypeField } from "./fields/action-fields";
 import { SharedField } from "./fields/shared-field";
 import style from "./inspector.module.css";
 import { ParameterList } from "./parameters/parameter-list";
@@ -50,14 +51,7 @@ export function ActionForm({ action }: { action: Action }) {
   return (
     <div className={style.form}>
       <div className={style.nameRow}>
-        <SharedField of={action.key} field="name">
-          <DraftInput
-            label="Name"
-            value={action.name}
-            check={(draft) => (draft.trim() === "" ? "An action has a name." : null)}
-            onCommit={(name) => rename(doc, action.key, name.trim())}
-          />
-        </SharedField>
+        <NameField action={action} onRename={(name) => rename(doc, action.key, name)} />
         <SharedField of={action.key} field="number">
           <DraftInput
             label="Number"
@@ -91,29 +85,13 @@ export function ActionForm({ action }: { action: Action }) {
           onOptionSubmit={(value) => setField(doc, action.key, "actor", value)}
         />
       </SharedField>
-      <SharedField of={action.key} field="description">
-        <DraftInput
-          label="Description"
-          lines
-          value={action.description}
-          placeholder="What it does, for people"
-          onCommit={(text) => setField(doc, action.key, "description", text)}
-        />
-      </SharedField>
+      <DescriptionField action={action} />
       <ParameterList action={action} side="in" />
       <RunConditions of={action.key} title="When" />
       <ArrowList action={action} />
       <ParameterList action={action} side="out" />
       <section className={style.section}>
-        <SharedField of={action.key} field="type">
-          <DraftInput
-            label="Type"
-            value={action.type}
-            description="sync and async behave alike; spontaneous may report again and again"
-            check={(draft) => (draft.trim() === "" ? "The engine wants one, usually sync." : null)}
-            onCommit={(text) => setField(doc, action.key, "type", text.trim())}
-          />
-        </SharedField>
+        <TypeField action={action} />
         <Button
           variant="default"
           mt="sm"

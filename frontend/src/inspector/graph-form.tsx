@@ -1,5 +1,4 @@
 /** The properties of the graph itself, and how to begin. */
-import { TagsInput } from "@mantine/core";
 import { add, connectTo, palette, removeSelection, showShortcuts, undo } from "../edit-actions/all";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { FirstShortcut } from "../edit-actions/keys/shortcut-keys";
@@ -8,7 +7,7 @@ import { DraftInput } from "../ui/draft-input";
 import { useHasFingersOnly } from "../ui/hooks/use-screen-size";
 import { SharedField } from "./fields/shared-field";
 import style from "./inspector.module.css";
-import { graphLabels, setLabels } from "./labels";
+import { LabelsField } from "./labels-field";
 
 export function GraphForm() {
   const { doc, graph } = useEditorContext();
@@ -32,14 +31,7 @@ export function GraphForm() {
           onCommit={(text) => setGraphDescription(doc, text)}
         />
       </SharedField>
-      <TagsInput
-        label="Labels"
-        size="sm"
-        placeholder="night shift, demo …"
-        maxTags={20}
-        value={graphLabels(graph)}
-        onChange={(labels) => setLabels(doc, labels)}
-      />
+      <LabelsField />
       <p className={style.hint}>
         {graph.actions.length === 1 ? "1 action" : `${graph.actions.length} actions`},{" "}
         {arrows === 1 ? "1 arrow" : `${arrows} arrows`}

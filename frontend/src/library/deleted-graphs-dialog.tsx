@@ -1,4 +1,4 @@
-/** Graphs that were deleted: when, how large, and the way back. */
+/** Graphs, or actions of the library, that were deleted: when, how large, and the way back. */
 import { Button, Modal, Skeleton } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconRestore } from "@tabler/icons-react";
@@ -6,6 +6,7 @@ import { useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
 import { type GraphSummary, recoverGraph, refreshGraphs, useDeletedGraphs } from "../api/graphs";
 import { errorText } from "../api/http";
+import { refreshLibrary, useDeletedActions } from "../api/library";
 import { useMay } from "../api/use-person";
 import { ago, instant, useNow } from "../ui/times";
 import style from "./deleted-graphs-dialog.module.css";
@@ -16,7 +17,12 @@ function byDeletion(graphs: readonly GraphSummary[]): GraphSummary[] {
   return [...graphs].sort((a, b) => at(b) - at(a));
 }
 
-function Row({ graph, now }: { graph: GraphSummary; now: number }) {
+const actionsOf = ({ actions = 0 }: GraphSummary) =>
+  actions === 1 ? "1 action" : `${actions} actions`;
+
+type Kind = "graph" | "action";
+
+function Row({ graph, kind, now }: { graph: GraphSummary; kind: Kind; now: number }) {
   const client = useQueryClient();
   const mayEdit = useMay("edit");
   const [busy, setBusy] = useState(false);
@@ -28,7 +34,7 @@ function Row({ graph, now }: { graph: GraphSummary; now: number }) {
     } catch (error) {
       notifications.show({ color: "red", title: "Not brought back", message: errorText(error) });
     } finally {
-      await refreshGraphs(client);
+      await Promise.all([refreshGraphs(client), refreshLibrary(client)]);
       setBusy(false);
     }
   };
@@ -37,8 +43,10 @@ function Row({ graph, now }: { graph: GraphSummary; now: number }) {
       <span className={style.text}>
         <bdi className={style.name}>{graph.name || "Untitled"}</bdi>
         <span className={style.sub}>
-          {graph.actions === 1 ? "1 action" : `${graph.actions ?? 0} actions`}
-          {at !== null && ` · deleted ${ago(at, now)}`}
+          {[
+            ...(kind === "graph" ? [actionsOf(graph)] : []),
+            ...(at === null ? [] : [`deleted ${ago(at, now)}`]),
+          ].join(" · ")}
         </span>
       </span>
       {mayEdit && (
@@ -54,9 +62,11 @@ function Row({ graph, now }: { graph: GraphSummary; now: number }) {
   );
 }
 
-function List() {
+function List({ kind }: { kind: Kind }) {
   const now = useNow(20_000);
-  const deleted = useDeletedGraphs(true);
+  const deletedGraphs = useDeletedGraphs(kind === "graph");
+  const deletedActions = useDeletedActions(kind === "action");
+  const deleted = kind === "graph" ? deletedGraphs : deletedActions;
   const graphs = byDeletion(deleted.data ?? []);
   if (deleted.isPending) return <Skeleton height={40} />;
   if (deleted.isError) return <p role="alert">{errorText(deleted.error)}</p>;
@@ -64,16 +74,22 @@ function List() {
   return (
     <ul className={style.list}>
       {graphs.map((graph) => (
-        <Row key={graph.id} graph={graph} now={now} />
+        <Row key={graph.id} graph={graph} kind={kind} now={now} />
       ))}
     </ul>
   );
 }
 
-export function DeletedGraphsDialog(props: { opened: boolean; onClose: () => void }) {
+interface Props {
+  kind: Kind;
+  opened: boolean;
+  onClose: () => void;
+}
+
+export function DeletedGraphsDialog({ kind, ...props }: Props) {
   return (
-    <Modal {...props} title="Deleted graphs" size="lg">
-      <List />
+    <Modal {...props} title={kind === "graph" ? "Deleted graphs" : "Deleted actions"} size="lg">
+      <List kind={kind} />
     </Modal>
   );
 }

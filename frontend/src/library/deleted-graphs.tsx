@@ -1,4 +1,4 @@
-/** The way to graphs that were deleted. */
+/** The way to graphs, or actions of the library, that were deleted. */
 import { Button } from "@mantine/core";
 import { IconTrash } from "@tabler/icons-react";
 import { useState } from "react";
@@ -9,7 +9,7 @@ const DeletedGraphsDialog = lazyPart(() =>
   import("./deleted-graphs-dialog").then((part) => part.DeletedGraphsDialog),
 );
 
-export function DeletedGraphs() {
+export function DeletedGraphs({ kind = "graph" }: { kind?: "graph" | "action" }) {
   // Null until it was asked for: from then on it stays, and gives the focus back when it closes.
   const [open, setOpen] = useState<boolean | null>(null);
   return (
@@ -20,10 +20,12 @@ export function DeletedGraphs() {
         leftSection={<IconTrash size={15} aria-hidden />}
         onClick={() => setOpen(true)}
       >
-        Deleted graphs
+        {kind === "graph" ? "Deleted graphs" : "Deleted actions"}
       </Button>
       <OverlayBoundary>
-        {open !== null && <DeletedGraphsDialog opened={open} onClose={() => setOpen(false)} />}
+        {open !== null && (
+          <DeletedGraphsDialog kind={kind} opened={open} onClose={() => setOpen(false)} />
+        )}
       </OverlayBoundary>
     </>
   );

@@ -1,11 +1,14 @@
-/** The actions that can be added: what the graphs of this server use, each once. */
+/** The actions that can be added: those of the library and what graphs use besides, each once. */
 import { useMemo } from "react";
-import { type KnownActionAnswer, useActions } from "../api/graphs";
+import type { KnownActionAnswer } from "../api/graphs";
+import { type LibraryAction, useLibrary } from "../api/library";
 import type { NewAction } from "../graph/edit";
 import { pathWords } from "../graph/value-text";
 
 export interface KnownAction {
   readonly template: NewAction;
+  /** Its document in the library; null: only graphs use it. */
+  readonly document: string | null;
   /** The graphs that use it, by id. */
   readonly usedIn: readonly string[];
   /** Its parameters with their types, for people. */
@@ -21,21 +24,22 @@ const words = (list: Parameters): string[] =>
       `${pathWords(path)}: ${pvf_type ?? "no type"}${required ? "" : ", optional"}`,
   );
 
-function knownAction(answer: KnownActionAnswer): KnownAction {
-  const { name, type, description, inputs, outputs, used_in } = answer;
+function knownAction(answer: LibraryAction): KnownAction {
+  const { name, type, description, inputs, outputs, used_in, document } = answer;
   const bare = (list: Parameters) => list.map(({ path, text }) => ({ path, text }));
   return {
     template: { name, type, description, inputs: bare(inputs), outputs: bare(outputs) },
+    document,
     usedIn: used_in,
     takes: words(inputs),
     gives: words(outputs),
   };
 }
 
-const NONE: readonly KnownActionAnswer[] = [];
+const NONE: readonly LibraryAction[] = [];
 
 export function useKnownActions(): { actions: readonly KnownAction[]; ready: boolean } {
-  const { data = NONE, isPending } = useActions();
+  const { data = NONE, isPending } = useLibrary();
   const actions = useMemo(() => data.map(knownAction), [data]);
   return { actions, ready: !isPending };
 }

@@ -35,7 +35,7 @@ function ActionList({ search, onPlace }: { search: string; onPlace: (t: NewActio
       ))}
       {fresh !== "" && !exact && (
         <ActionRow
-          known={{ template: { name: fresh }, usedIn: [], takes: [], gives: [] }}
+          known={{ template: { name: fresh }, document: null, usedIn: [], takes: [], gives: [] }}
           onPlace={onPlace}
         />
       )}

@@ -30,6 +30,7 @@ import {
   removeParameter,
   removeRelation,
   rename,
+  renameDocument,
   renameParameter,
   setDirection,
   setEntry,
@@ -72,6 +73,15 @@ test("an added action has what the library says of it, and the lowest free numbe
     position: [10, 20],
   });
   expect(graphIn(doc).actions.map(fullName)).toEqual(["Scan_1", "Grip_0", "Scan_0"]);
+});
+
+test("a document of the library has the name of its action, changed by one edit", () => {
+  const [doc, key] = docWith("Scan") as [Y.Doc, Key];
+  expect(updatesOf(doc, () => renameDocument(doc, key, "Look"))).toBe(1);
+  expect(actionIn(doc, key)?.name).toBe("Look");
+  expect(graphIn(doc).name).toBe("Look");
+  expect(updatesOf(doc, () => renameDocument(doc, "gone", "Other"))).toBe(0);
+  expect(graphIn(doc).name).toBe("Look");
 });
 
 test("each edit is one update for the others, and one that changes nothing is none", () => {

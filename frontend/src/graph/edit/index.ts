@@ -12,6 +12,7 @@ import { noteKey, rootOf } from "../document-keys";
 import { newAid } from "../ids";
 import type { Direction, JsonText, Key, Position } from "../model";
 import { asPosition } from "../values";
+import { rename } from "./actions";
 import { asOneEdit, eraseKeys, hasEnd, writeKey } from "./document-writes";
 import { moveWaypoints } from "./waypoints";
 
@@ -24,6 +25,13 @@ export function setGraphName(doc: Y.Doc, name: string): void {
   asOneEdit(doc, () => {
     writeKey(doc, "meta", "name", name);
     eraseKeys(doc, "meta", "x/graph_name");
+  });
+}
+
+/** Calls the action of a document of the library otherwise, and so the document. */
+export function renameDocument(doc: Y.Doc, key: Key, name: string): void {
+  asOneEdit(doc, () => {
+    if (rename(doc, key, name)) setGraphName(doc, name);
   });
 }
 

@@ -1,6 +1,7 @@
 /** Where two runs part and why that is likely: differences in words, never between overlapping ranges. Pure. */
 import type { ComparedField, ComparedStep, Comparison } from "../../api/review";
 import type { Visit } from "../../api/runs";
+import { plainValue } from "../../history/difference-words";
 import { boundsText } from "../../status/durations";
 import { visitDuration } from "../../status/progress";
 
@@ -134,28 +135,6 @@ export function sameAsSeen(found: Comparison): { name: string; text: string }[] 
     const text = x === y ? `${x} in both` : `${x} and ${y} overlap: no difference is claimed`;
     return [{ name: spaced(name), text }];
   });
-}
-
-/** The value inside a parameter's JSON text, or the text itself. */
-export function plainValue(value: unknown): string {
-  if (value === null || value === undefined) return "—";
-  if (typeof value !== "string") return JSON.stringify(value);
-  try {
-    const parsed: unknown = JSON.parse(value);
-    if (typeof parsed === "object" && parsed !== null && "pvf_value" in parsed) {
-      return JSON.stringify(parsed.pvf_value);
-    }
-    return typeof parsed === "string" ? parsed : value;
-  } catch {
-    return value;
-  }
-}
-
-export function fieldWords(field: string): string {
-  if (field.startsWith("in/")) return `input ${field.slice(3)}`;
-  if (field.startsWith("out/")) return `output ${field.slice(4)}`;
-  if (field.startsWith("remap/")) return `remap of ${field.slice(6)}`;
-  return field.replaceAll("_", " ");
 }
 
 function changedWords({ field, before, after }: ComparedField): string {

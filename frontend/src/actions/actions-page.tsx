@@ -1,0 +1,158 @@
+/** The page of actions: the list at the left, the chosen one beside it; on a phone one after the other. */
+import { Button, Skeleton } from "@mantine/core";
+import { IconAlertTriangle, IconArrowLeft, IconBolt } from "@tabler/icons-react";
+import { useMemo, useState } from "react";
+import { Link, useLocation, useSearch } from "wouter";
+import { errorText } from "../api/http";
+import { type LibraryAction, useLibrary } from "../api/library";
+import { DeletedGraphs } from "../library/deleted-graphs";
+import { type RobotsKnowledge, useRobotsKnowledge } from "../library/robot-actions";
+import { Empty } from "../ui/empty";
+import { useIsPhone } from "../ui/hooks/use-screen-size";
+import { ActionList } from "./action-list";
+import style from "./actions-page.module.css";
+import { addressOf, type ListedAction, listedActions } from "./listing";
+import { NewActionDialog } from "./new-action-dialog";
+import { type BarSlots, OpenAction } from "./open/open-action";
+import { UnlistedAction } from "./unlisted-action";
+import { useNewActions } from "./use-new-actions";
+
+interface Props {
+  /** The document that is open; null: none. */
+  id: string | null;
+  person: { readonly id: string; readonly name: string };
+  slots: BarSlots;
+  onImport: () => void;
+}
+
+const NONE: readonly LibraryAction[] = [];
+
+/** What the address names besides: an action without a document, and whether it is edited. */
+function useAddress() {
+  const search = useSearch();
+  return useMemo(() => {
+    const query = new URLSearchParams(search);
+    return { name: query.get("name"), editing: query.has("edit") };
+  }, [search]);
+}
+
+/** Nothing is chosen. */
+function Nothing({ isEmpty }: { isEmpty: boolean }) {
+  return (
+    <Empty icon={<IconBolt size={22} />} title={isEmpty ? "No action yet" : "What robots can do"}>
+      {isEmpty
+        ? "Make one, import the file of one, or draw a graph: what it uses is listed here."
+        : "Choose an action to see what it takes and gives, where it is used, and its C++ package."}
+    </Empty>
+  );
+}
+
+interface ChosenProps extends Props {
+  all: readonly ListedAction[];
+  isEmpty: boolean;
+  knowledge: RobotsKnowledge;
+  making: ReturnType<typeof useNewActions>;
+}
+
+function Chosen({ all, knowledge, making, isEmpty, ...props }: ChosenProps) {
+  const { id, person, slots } = props;
+  const { name, editing } = useAddress();
+  const [, go] = useLocation();
+  if (id !== null) {
+    const known = all.find(({ action }) => action?.document === id)?.action;
+    return (
+      <OpenAction
+        id={id}
+        person={person}
+        known={known ?? undefined}
+        knowledge={knowledge}
+        slots={slots}
+        editing={editing}
+        onEdit={(next) => go(`/actions/${id}${next ? "?edit" : ""}`, { replace: true })}
+        onDelete={making.remove}
+      />
+    );
+  }
+  const listed = name === null ? undefined : all.find((each) => each.name === name);
+  if (listed === undefined) return <Nothing isEmpty={isEmpty} />;
+  return (
+    <UnlistedAction
+      listed={listed}
+      knowledge={knowledge}
+      busy={making.busy}
+      onAdd={making.add}
+      onTake={making.take}
+    />
+  );
+}
+
+export function ActionsPage(props: Props) {
+  const library = useLibrary();
+  const knowledge = useRobotsKnowledge();
+  const data = library.data ?? NONE;
+  const all = useMemo(() => listedActions(data, knowledge), [data, knowledge]);
+  const making = useNewActions();
+  const [asked, setAsked] = useState<string | null>(null);
+  const { name } = useAddress();
+  const phone = useIsPhone();
+  const open = props.id !== null || name !== null;
+  const current =
+    props.id === null
+      ? name && addressOf({ name, action: null })
+      : `/actions/${encodeURIComponent(props.id)}`;
+  const close = () => {
+    setAsked(null);
+    making.forget();
+  };
+  return (
+    <main className={style.page} data-open={open || undefined}>
+      <aside className={style.left} aria-label="Library" hidden={phone && open}>
+        {library.isPending && <Skeleton height={200} m="sm" />}
+        {library.isError && (
+          <Empty icon={<IconAlertTriangle size={22} />} title="The library cannot be read">
+            {errorText(library.error)}
+          </Empty>
+        )}
+        {library.isSuccess && (
+          <ActionList
+            actions={all}
+            robots={knowledge.robots}
+            current={current}
+            onNew={setAsked}
+            onImport={props.onImport}
+            foot={<DeletedGraphs kind="action" />}
+          />
+        )}
+      </aside>
+      {(!phone || open) && (
+        <div className={style.chosen}>
+          {phone && (
+            <Button
+              component={Link}
+              to="/actions"
+              variant="subtle"
+              className={style.back ?? ""}
+              leftSection={<IconArrowLeft size={16} aria-hidden />}
+            >
+              All actions
+            </Button>
+          )}
+          <Chosen
+            {...props}
+            all={all}
+            isEmpty={library.isSuccess && all.length === 0}
+            knowledge={knowledge}
+            making={making}
+          />
+        </div>
+      )}
+      <NewActionDialog
+        name={asked}
+        busy={making.busy}
+        wrong={making.wrong}
+        onClose={close}
+        onMake={(wanted) => void making.make(wanted).then((made) => made && close())}
+      />
+    </main>
+  );
+}

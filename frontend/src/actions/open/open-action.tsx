@@ -1,0 +1,189 @@
+/** An action of the library, open: read or edited together with whoever else is here. */
+import { Button, Skeleton } from "@mantine/core";
+import { notifications } from "@mantine/notifications";
+import { IconMapOff } from "@tabler/icons-react";
+import { useQueryClient } from "@tanstack/react-query";
+import { type ReactNode, useEffect, useState } from "react";
+import { createPortal } from "react-dom";
+import { Link } from "wouter";
+import { errorText } from "../../api/http";
+import { type LibraryAction, refreshLibrary, takeFromGraph } from "../../api/library";
+import { type EditorContext, EditorReactContext } from "../../edit-actions/editor-context";
+import { useToldProblems } from "../../editor/problem-count";
+import { RoomNotices } from "../../editor/room-notices";
+import { SaveStatus } from "../../editor/save-status";
+import { useEditor } from "../../editor/use-editor";
+import type { Action } from "../../graph/model";
+import { fieldOfTold } from "../../inspector/fields/field-problems";
+import { graphLabels } from "../../inspector/labels";
+import { LibraryActionForm } from "../../inspector/library-action-form";
+import type { RobotsKnowledge } from "../../library/robot-actions";
+import { People } from "../../people/people";
+import { roomUrl } from "../../sync/room-connection";
+import { RoomProvider, useLinkPart, useThrottledLink } from "../../sync/use-room";
+import { Empty } from "../../ui/empty";
+import { ActionOverview } from "../details/action-overview";
+import { OnRobots } from "../details/on-robots";
+import { UsedIn } from "../details/used-in";
+import { OlderUses } from "../uses/older-uses";
+import { ActionHead } from "./action-head";
+import { NamesLine } from "./names-line";
+import style from "./open.module.css";
+import { SidePane } from "./side-pane";
+import { useUndoKeys } from "./use-undo-keys";
+
+/** Places in the bar of the page, which stays as it is when another action is opened. */
+export interface BarSlots {
+  readonly status: HTMLElement | null;
+  readonly people: HTMLElement | null;
+}
+
+interface Props {
+  id: string;
+  person: { readonly id: string; readonly name: string };
+  /** What the list says of it; undefined until that is read. */
+  known: LibraryAction | undefined;
+  knowledge: RobotsKnowledge;
+  slots: BarSlots;
+  editing: boolean;
+  onEdit: (editing: boolean) => void;
+  onDelete: (id: string, name: string) => void;
+}
+
+const noPanel = () => {};
+
+/** Values are those of uses, so that nothing is to be filled in here. */
+function useTold({ id, graph }: EditorContext, seq: number) {
+  const { told } = useToldProblems(id, seq, graph);
+  return told.filter((each) => each.kind !== "fill-in" && fieldOfTold(each) !== null);
+}
+
+/** The list says what was edited here as soon as it is stored. */
+function useFreshLibrary(seq: number, unsaved: number): void {
+  const client = useQueryClient();
+  const [opened] = useState(seq);
+  useEffect(() => {
+    if (seq > opened && unsaved === 0) void refreshLibrary(client);
+  }, [client, seq, unsaved, opened]);
+}
+
+function Places({ known, action, knowledge, context }: PlacesProps) {
+  const client = useQueryClient();
+  const take = async (graph: string, name: string) => {
+    try {
+      await takeFromGraph(context.id, graph);
+      notifications.show({ message: `The library has what ${name} had. The history leads back.` });
+    } catch (error) {
+      notifications.show({ color: "red", title: "Not taken over", message: errorText(error) });
+    } finally {
+      await refreshLibrary(client);
+    }
+  };
+  return (
+    <>
+      <UsedIn
+        usedIn={known?.used_in ?? []}
+        differs={known?.differs_in ?? []}
+        {...(context.mayEdit && {
+          onTake: (graph: string, name: string) => void take(graph, name),
+        })}
+      />
+      <OnRobots name={action.name} knowledge={knowledge} own={known ?? null} />
+    </>
+  );
+}
+
+interface PlacesProps extends Pick<Props, "known" | "knowledge"> {
+  action: Action;
+  context: EditorContext;
+}
+
+function Body(props: Props & { action: Action; context: EditorContext; seq: number }) {
+  const { action, context, seq, known, id, editing } = props;
+  const told = useTold(context, seq);
+  return (
+    <div className={style.inner}>
+      <ActionHead
+        name={action.name}
+        editing={editing && context.mayEdit}
+        onEdit={props.onEdit}
+        onDelete={() => props.onDelete(id, action.name)}
+      />
+      {known && <OlderUses id={id} name={action.name} count={known.differs_in.length} />}
+      {editing && context.mayEdit ? (
+        <div className={style.form}>
+          <LibraryActionForm
+            key={action.key}
+            action={action}
+            told={told}
+            names={<NamesLine id={id} seq={seq} name={action.name} />}
+          />
+        </div>
+      ) : (
+        <ActionOverview {...action} labels={graphLabels(context.graph)}>
+          <Places {...props} />
+        </ActionOverview>
+      )}
+    </div>
+  );
+}
+
+function Inside(props: Props) {
+  const { id, person, slots } = props;
+  const { context } = useEditor(id, noPanel);
+  const { seq, unsaved } = useThrottledLink();
+  const gone = useLinkPart(
+    (link) => link.state === "refused" && link.why === "no-such-graph" && link.seq === 0,
+  );
+  useUndoKeys(context);
+  useFreshLibrary(seq, unsaved);
+  const action = context.graph.actions.find(({ missing }) => !missing);
+  const inSlot = (slot: HTMLElement | null, part: ReactNode) => slot && createPortal(part, slot);
+  if (gone) return <Gone />;
+  return (
+    <EditorReactContext value={context}>
+      {inSlot(slots.status, <SaveStatus />)}
+      {inSlot(slots.people, <People me={person.id} />)}
+      <div className={style.opened}>
+        <section className={style.middle} aria-label={action?.name ?? "Action"}>
+          {seq === 0 && <Skeleton height={180} />}
+          {seq > 0 && action === undefined && <p role="status">It holds no action.</p>}
+          {action && <Body {...props} action={action} context={context} seq={seq} />}
+        </section>
+        <aside className={style.beside} aria-label="Package and history">
+          <SidePane id={id} seq={seq} mayEdit={context.mayEdit} />
+        </aside>
+      </div>
+      <RoomNotices />
+    </EditorReactContext>
+  );
+}
+
+function Gone() {
+  return (
+    <Empty
+      icon={<IconMapOff size={22} />}
+      title="There is no such action"
+      action={
+        <Button component={Link} to="/actions">
+          All actions
+        </Button>
+      }
+    >
+      It was deleted, or the address is of another server.
+    </Empty>
+  );
+}
+
+export function OpenAction(props: Props) {
+  const { id, person } = props;
+  return (
+    <RoomProvider
+      url={roomUrl(id)}
+      keep={{ graph: id, person }}
+      fallback={<Skeleton height={180} m="lg" />}
+    >
+      <Inside key={id} {...props} />
+    </RoomProvider>
+  );
+}

@@ -1,0 +1,74 @@
+/** An action that the library does not have: what graphs or robots know of it, and how to add it. */
+import { Button } from "@mantine/core";
+import { IconPlus } from "@tabler/icons-react";
+import { useMay } from "../api/use-person";
+import { type RobotAction, type RobotsKnowledge, robotTemplate } from "../library/robot-actions";
+import { ActionOverview } from "./details/action-overview";
+import { OnRobots } from "./details/on-robots";
+import { UsedIn } from "./details/used-in";
+import type { ListedAction } from "./listing";
+import style from "./open/open.module.css";
+
+interface Props {
+  listed: ListedAction;
+  knowledge: RobotsKnowledge;
+  busy: boolean;
+  /** Adds it as graphs have it. */
+  onAdd: (name: string) => void;
+  /** Adds it as a robot has it. */
+  onTake: (has: RobotAction) => void;
+}
+
+/** What is known of it, from graphs before robots. */
+function shownOf({ action, robots: [first] }: ListedAction) {
+  const template = first && robotTemplate(first.action);
+  return {
+    description: action?.description ?? "",
+    type: action?.type ?? "sync",
+    labels: [],
+    inputs: action?.inputs ?? template?.inputs ?? [],
+    outputs: action?.outputs ?? template?.outputs ?? [],
+  };
+}
+
+export function UnlistedAction({ listed, knowledge, busy, onAdd, onTake }: Props) {
+  const { name, action } = listed;
+  const mayEdit = useMay("edit");
+  const takeOver = (has: RobotAction) =>
+    mayEdit && (
+      <Button size="compact-sm" variant="subtle" disabled={busy} onClick={() => onTake(has)}>
+        Take over<span className="visually-hidden"> from {has.robot}</span>
+      </Button>
+    );
+  return (
+    <section className={style.middle} aria-label={name}>
+      <div className={style.inner}>
+        <div className={style.head}>
+          <h2 className={style.title}>
+            <bdi>{name}</bdi>
+          </h2>
+          {mayEdit && action !== null && (
+            <Button
+              variant="filled"
+              className={style.tool ?? ""}
+              loading={busy}
+              leftSection={<IconPlus size={16} aria-hidden />}
+              onClick={() => onAdd(name)}
+            >
+              Add to the library
+            </Button>
+          )}
+        </div>
+        <p className={style.names}>
+          {action === null
+            ? "The library does not have it, and no graph uses it."
+            : "Only graphs use it: each says for itself what it takes. In the library it is described once."}
+        </p>
+        <ActionOverview {...shownOf(listed)}>
+          {action && <UsedIn usedIn={action.used_in} differs={[]} />}
+          <OnRobots name={name} knowledge={knowledge} own={action} offer={takeOver} />
+        </ActionOverview>
+      </div>
+    </section>
+  );
+}

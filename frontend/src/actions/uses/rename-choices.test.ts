@@ -1,0 +1,55 @@
+import { expect, test } from "vitest";
+import { type ActionUse, NO_RENAMES } from "../../api/library";
+import { canUpdate, clashes, keyOfRename, renamesOf, suggestedRenames } from "./rename-choices";
+
+const use = (more: Partial<ActionUse>): ActionUse => ({
+  graph: "g",
+  name: "kitchen",
+  seq: 1,
+  count: 1,
+  changed: true,
+  difference: null,
+  suggested: NO_RENAMES,
+  conflicts: [],
+  ...more,
+});
+const uses = [
+  use({ suggested: { inputs: [["speed", "velocity"]], outputs: [["done", "ended"]] } }),
+  use({
+    suggested: {
+      inputs: [
+        ["speed", "velocity"],
+        ["rate", "velocity"],
+      ],
+      outputs: [],
+    },
+  }),
+];
+
+test("what several graphs suggest is asked once", () => {
+  expect(suggestedRenames(uses)).toEqual([
+    { side: "in", from: "speed", to: "velocity", graphs: 2 },
+    { side: "out", from: "done", to: "ended", graphs: 1 },
+    { side: "in", from: "rate", to: "velocity", graphs: 1 },
+  ]);
+});
+
+test("nothing is renamed that nobody has ticked, and two never become one", () => {
+  const all = suggestedRenames(uses);
+  expect(renamesOf(new Set(), all)).toEqual(NO_RENAMES);
+  const [speed, done, rate] = all;
+  if (!speed || !done || !rate) throw new Error("they are there");
+  const ticked = new Set([keyOfRename(speed), keyOfRename(done)]);
+  expect(renamesOf(ticked, all)).toEqual({
+    inputs: [["speed", "velocity"]],
+    outputs: [["done", "ended"]],
+  });
+  expect(clashes(rate, ticked, all)).toBe(true);
+  expect(clashes(done, ticked, all)).toBe(false);
+});
+
+test("a graph is updated that would change and that nothing stands against", () => {
+  expect(canUpdate(use({}))).toBe(true);
+  expect(canUpdate(use({ changed: false }))).toBe(false);
+  expect(canUpdate(use({ conflicts: ["two parameters would be one"] }))).toBe(false);
+});

@@ -1,0 +1,55 @@
+/** Which parameters may only be called otherwise now: suggested by graphs, ticked by people. Pure. */
+import type { ActionUse, Renames } from "../../api/library";
+import type { ParameterSide } from "../../graph/document-keys";
+
+/** One that somebody may tick. `graphs`: by how many it is suggested. */
+export interface SuggestedRename {
+  readonly side: ParameterSide;
+  readonly from: string;
+  readonly to: string;
+  readonly graphs: number;
+}
+
+export const keyOfRename = ({ side, from, to }: Omit<SuggestedRename, "graphs">): string =>
+  `${side} ${from} ${to}`;
+
+/** Those of all graphs, each once, in the order in which they come. */
+export function suggestedRenames(uses: readonly ActionUse[]): SuggestedRename[] {
+  const found = new Map<string, SuggestedRename>();
+  for (const { suggested } of uses) {
+    for (const side of ["in", "out"] as const) {
+      for (const [from, to] of side === "in" ? suggested.inputs : suggested.outputs) {
+        const key = keyOfRename({ side, from, to });
+        found.set(key, { side, from, to, graphs: (found.get(key)?.graphs ?? 0) + 1 });
+      }
+    }
+  }
+  return [...found.values()];
+}
+
+/** Whether ticking one more would call one thing twice, or two things one. */
+export function clashes(
+  one: SuggestedRename,
+  ticked: ReadonlySet<string>,
+  all: readonly SuggestedRename[],
+): boolean {
+  return all.some(
+    (other) =>
+      other !== one &&
+      ticked.has(keyOfRename(other)) &&
+      other.side === one.side &&
+      (other.from === one.from || other.to === one.to),
+  );
+}
+
+export function renamesOf(ticked: ReadonlySet<string>, all: readonly SuggestedRename[]): Renames {
+  const of = (side: ParameterSide) =>
+    all
+      .filter((each) => each.side === side && ticked.has(keyOfRename(each)))
+      .map(({ from, to }) => [from, to] as const);
+  return { inputs: of("in"), outputs: of("out") };
+}
+
+/** Whether an update can do anything for a graph. */
+export const canUpdate = ({ changed, conflicts }: ActionUse): boolean =>
+  changed && conflicts.length === 0;

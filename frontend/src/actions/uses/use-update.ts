@@ -1,0 +1,97 @@
+/** Updating graphs to the parameters of an action: what is chosen, what came of it, what stood against it. */
+import { useQueryClient } from "@tanstack/react-query";
+import { useState } from "react";
+import { refreshGraphs } from "../../api/graphs";
+import { errorText, Refusal } from "../../api/http";
+import {
+  type ActionUse,
+  type ActionUses,
+  NO_RENAMES,
+  refreshLibrary,
+  refreshUses,
+  type UpdatedUse,
+  updateUses,
+  useActionUses,
+} from "../../api/library";
+import { canUpdate, clashes, keyOfRename, renamesOf, suggestedRenames } from "./rename-choices";
+
+/** The graph that a refusal is about, by its id. */
+function graphOf(error: unknown): string | null {
+  if (!(error instanceof Refusal)) return null;
+  const where: Readonly<Record<string, unknown>> = { ...error.details.where };
+  return typeof where.graph === "string" ? where.graph : null;
+}
+
+function words(error: unknown, uses: readonly ActionUse[]): string {
+  const place = uses.find(({ graph }) => graph === graphOf(error))?.name;
+  const text = place === undefined ? errorText(error) : `${place}: ${errorText(error)}`;
+  const changed = error instanceof Refusal && error.details.status === 409;
+  return changed
+    ? `${text} Nothing was written. What would change is shown anew below.`
+    : `${text} Look below at what would still change.`;
+}
+
+const toggled = (set: ReadonlySet<string>, key: string): ReadonlySet<string> => {
+  const next = new Set(set);
+  if (!next.delete(key)) next.add(key);
+  return next;
+};
+
+/** What a person has ticked: of renames those that shall be, of graphs those that shall not. */
+function useTicks(id: string) {
+  const [ticked, setTicked] = useState<ReadonlySet<string>>(new Set());
+  const [left, setLeft] = useState<ReadonlySet<string>>(new Set());
+  // Suggestions are those without renames: one that was ticked is suggested no more.
+  const plain = useActionUses(id, NO_RENAMES);
+  const suggested = suggestedRenames(plain.data?.uses ?? []);
+  const renames = renamesOf(ticked, suggested);
+  return {
+    renames,
+    suggested: suggested.map((each) => ({
+      ...each,
+      key: keyOfRename(each),
+      ticked: ticked.has(keyOfRename(each)),
+      clashes: clashes(each, ticked, suggested),
+    })),
+    tick: (key: string) => setTicked((now) => toggled(now, key)),
+    isLeft: (graph: string) => left.has(graph),
+    leave: (graph: string) => setLeft((now) => toggled(now, graph)),
+  };
+}
+
+export function useUpdate(id: string) {
+  const client = useQueryClient();
+  const { renames, isLeft, ...ticks } = useTicks(id);
+  const found = useActionUses(id, renames);
+  const [busy, setBusy] = useState(false);
+  const [wrong, setWrong] = useState("");
+  const [done, setDone] = useState<readonly UpdatedUse[]>([]);
+  const uses = found.data?.uses ?? [];
+  const chosen = uses.filter((use) => canUpdate(use) && !isLeft(use.graph));
+  const update = async ({ seq }: ActionUses) => {
+    setBusy(true);
+    setWrong("");
+    try {
+      const graphs = chosen.map(({ graph, seq }) => ({ graph, seq }));
+      setDone(await updateUses(id, { seq, graphs, renames }));
+    } catch (error) {
+      setWrong(words(error, uses));
+    } finally {
+      await Promise.all([refreshUses(client, id), refreshLibrary(client), refreshGraphs(client)]);
+      setBusy(false);
+    }
+  };
+  return {
+    ...ticks,
+    found,
+    uses,
+    chosen,
+    isLeft,
+    busy,
+    wrong,
+    done,
+    /** What is shown is of other renames than are ticked, until the answer is there. */
+    renewing: found.isPlaceholderData || found.isFetching,
+    update: () => (found.data ? update(found.data) : Promise.resolve()),
+  };
+}

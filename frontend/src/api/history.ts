@@ -1,0 +1,38 @@
+/** What was done to a document, what that changed, and the way back to it. */
+import { type QueryClient, useQuery } from "@tanstack/react-query";
+import type { GraphDifference, GraphSummary } from "./graphs";
+import { fetchJson } from "./http";
+import type { EditorApi } from "./schema/editor";
+
+export type HistoryEntry = EditorApi["HistoryEntry"];
+
+const below = (id: string) => `/api/graphs/${encodeURIComponent(id)}`;
+
+/** Newest first. `seq`: the moment on screen, with which it is read again. */
+export function useHistory(id: string, seq: number) {
+  return useQuery({
+    queryKey: ["history", id, seq],
+    queryFn: ({ signal }) => fetchJson<HistoryEntry[]>(`${below(id)}/history`, { signal }),
+    placeholderData: (before) => before,
+  });
+}
+
+/** What differs from the change `from` to the change `to`; null as `from`: nothing is asked. */
+export function useDifference(id: string, from: number | null, to: number) {
+  return useQuery({
+    enabled: from !== null,
+    queryKey: ["history", id, "difference", from, to],
+    queryFn: ({ signal }) =>
+      fetchJson<GraphDifference>(`${below(id)}/diff?from=${from}&to=${to}`, { signal }),
+    staleTime: Number.POSITIVE_INFINITY,
+  });
+}
+
+/** Makes it what it was after an earlier change: an edit, which everybody sees. */
+export function restoreMoment(id: string, seq: number): Promise<GraphSummary> {
+  return fetchJson(`${below(id)}/restore`, { method: "POST", body: { seq } });
+}
+
+export function refreshHistory(client: QueryClient, id: string): Promise<void> {
+  return client.invalidateQueries({ queryKey: ["history", id] });
+}

@@ -1,0 +1,137 @@
+/** The library of actions, each a document of its own, as the editor answers it. */
+import { keepPreviousData, type QueryClient, useQuery } from "@tanstack/react-query";
+import {
+  type GraphDifference,
+  type GraphSummary,
+  type KnownActionAnswer,
+  type Preview,
+  queryKeys,
+} from "./graphs";
+import { fetchJson } from "./http";
+import { serverPath } from "./page-url";
+
+/** `document`: its own; null where only graphs use it. `differs_in`: of `used_in`, where parameters are others. */
+export interface LibraryAction extends KnownActionAnswer {
+  readonly document: string | null;
+  readonly seq: number | null;
+  readonly labels: readonly string[];
+  readonly differs_in: readonly string[];
+}
+
+/** Parameters that are called otherwise now: pairs of paths, the old one first. */
+export interface Renames {
+  readonly inputs: readonly (readonly [from: string, to: string])[];
+  readonly outputs: readonly (readonly [from: string, to: string])[];
+}
+
+export const NO_RENAMES: Renames = { inputs: [], outputs: [] };
+
+/** A graph that uses the action. `count`: how often. `conflicts`: why it cannot be updated. */
+export interface ActionUse {
+  readonly graph: string;
+  readonly name: string;
+  readonly seq: number;
+  readonly count: number;
+  readonly changed: boolean;
+  readonly difference: GraphDifference | null;
+  readonly suggested: Renames;
+  readonly conflicts: readonly string[];
+}
+
+/** `seq`: the change of the action's document that this was worked out from. */
+export interface ActionUses {
+  readonly seq: number;
+  readonly uses: readonly ActionUse[];
+}
+
+export interface UpdatedUse {
+  readonly graph: string;
+  readonly seq: number;
+  readonly changed: boolean;
+}
+
+const below = (id: string) => `/api/actions/${encodeURIComponent(id)}`;
+
+/** Every action of the library, and what else graphs use, by name. */
+export function useLibrary() {
+  return useQuery({
+    queryKey: queryKeys.actions,
+    queryFn: ({ signal }) => fetchJson<LibraryAction[]>("/api/actions", { signal }),
+    refetchInterval: 15_000,
+  });
+}
+
+export function refreshLibrary(client: QueryClient): Promise<void> {
+  return client.invalidateQueries({ queryKey: queryKeys.actions });
+}
+
+/** Actions that were deleted and can be brought back. */
+export function useDeletedActions(wanted: boolean) {
+  return useQuery({
+    enabled: wanted,
+    queryKey: [...queryKeys.actions, "deleted"],
+    queryFn: ({ signal }) => fetchJson<GraphSummary[]>("/api/actions?deleted=true", { signal }),
+  });
+}
+
+/** `fromGraphs`: with what graphs know of it, instead of empty. */
+export function createAction(name: string, fromGraphs = false): Promise<GraphSummary> {
+  const body = fromGraphs ? { name, from_graphs: true } : { name };
+  return fetchJson("/api/actions", { method: "POST", body });
+}
+
+export function previewAction(text: string): Promise<Preview> {
+  return fetchJson("/api/actions?preview=true", { method: "POST", body: text });
+}
+
+/** Takes in the file of one action as it is. */
+export function importAction(text: string): Promise<GraphSummary> {
+  return fetchJson("/api/actions", { method: "POST", body: text });
+}
+
+/** Where the browser gets the file of the action alone from. */
+export function actionDownload(id: string): string {
+  return serverPath(`${below(id)}/umrf`);
+}
+
+function renamesQuery({ inputs, outputs }: Renames): string {
+  const query = new URLSearchParams();
+  const pair = ([from, to]: readonly [string, string]) =>
+    `${encodeURIComponent(from)}:${encodeURIComponent(to)}`;
+  for (const each of inputs) query.append("inputs", pair(each));
+  for (const each of outputs) query.append("outputs", pair(each));
+  const text = query.toString();
+  return text === "" ? "" : `?${text}`;
+}
+
+/** What updating each graph to the parameters of the document would change. */
+export function useActionUses(id: string, renames: Renames) {
+  const query = renamesQuery(renames);
+  return useQuery({
+    queryKey: ["uses", id, query],
+    queryFn: ({ signal }) => fetchJson<ActionUses>(`${below(id)}/uses${query}`, { signal }),
+    placeholderData: keepPreviousData,
+    staleTime: 0,
+    gcTime: 0,
+    refetchOnWindowFocus: false,
+  });
+}
+
+export function refreshUses(client: QueryClient, id: string): Promise<void> {
+  return client.invalidateQueries({ queryKey: ["uses", id] });
+}
+
+interface Updating {
+  readonly seq: number;
+  readonly graphs: readonly { readonly graph: string; readonly seq: number }[];
+  readonly renames: Renames;
+}
+
+export function updateUses(id: string, body: Updating): Promise<UpdatedUse[]> {
+  return fetchJson(`${below(id)}/uses`, { method: "POST", body, timeoutMs: 60_000 });
+}
+
+/** The document takes over the parameters that a graph's use of it has. */
+export function takeFromGraph(id: string, graph: string): Promise<GraphSummary> {
+  return fetchJson(`${below(id)}/take`, { method: "POST", body: { graph } });
+}

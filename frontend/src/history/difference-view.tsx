@@ -1,0 +1,68 @@
+/** What differs between two moments: actions and arrows that came, went or changed, field by field. */
+import type { GraphDifference } from "../api/graphs";
+import style from "./difference-view.module.css";
+import { changedLines, type FieldChange } from "./difference-words";
+
+type Changes = Pick<GraphDifference, "actions" | "relations"> & { fields?: readonly FieldChange[] };
+
+function Fields({ fields }: { fields: readonly FieldChange[] }) {
+  const lines = fields.flatMap(changedLines);
+  return (
+    <ul className={style.fields}>
+      {lines.map((line) => (
+        <li key={line.name}>
+          <span>{line.name}</span>{" "}
+          {line.before !== null && (
+            <del>
+              <i aria-hidden>−</i> {line.before}
+            </del>
+          )}{" "}
+          {line.after !== null && (
+            <ins>
+              <i aria-hidden>+</i> {line.after}
+            </ins>
+          )}
+        </li>
+      ))}
+    </ul>
+  );
+}
+
+/** Places of cards mean nothing; who looks for what was moved looks at the canvas. */
+export const isMeant = ({ field }: FieldChange): boolean => field !== "position";
+
+/** Whether there is anything in it that means something. */
+export function meansSomething({ actions, relations, fields = [] }: Changes): boolean {
+  const action = actions.some((each) => each.change !== "changed" || each.fields.some(isMeant));
+  return action || relations.length > 0 || fields.length > 0;
+}
+
+export function DifferenceView({ found, label }: { found: Changes; label: string }) {
+  const actions = found.actions
+    .map((each) => ({ ...each, fields: each.fields.filter(isMeant) }))
+    .filter((each) => each.change !== "changed" || each.fields.length > 0);
+  return (
+    <ul className={style.changes} aria-label={label}>
+      {found.fields !== undefined && found.fields.length > 0 && (
+        <li>
+          <Fields fields={found.fields} />
+        </li>
+      )}
+      {actions.map((change) => (
+        <li key={change.aid} data-change={change.change}>
+          <b>{change.name}</b> <span className={style.change}>{change.change}</span>
+          <Fields fields={change.fields} />
+        </li>
+      ))}
+      {found.relations.map((change) => (
+        <li key={`${change.parent} ${change.child}`} data-change={change.change}>
+          <b>
+            {change.parent} → {change.child}
+          </b>{" "}
+          <span className={style.change}>{change.change}</span>
+          <Fields fields={change.fields} />
+        </li>
+      ))}
+    </ul>
+  );
+}

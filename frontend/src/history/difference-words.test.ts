@@ -1,0 +1,25 @@
+import { expect, test } from "vitest";
+import { changedLines, fieldWords } from "./difference-words";
+
+test("of a parameter only what is another is told", () => {
+  const before = '{"pvf_type":"number","pvf_value":1}';
+  const after = '{"pvf_type":"number","pvf_value":2,"pvf_required":false}';
+  expect(changedLines({ field: "in/pose/x", before, after })).toEqual([
+    { name: "input pose.x", before: "1", after: "2" },
+    { name: "input pose.x, required", before: null, after: "false" },
+  ]);
+});
+
+test("a parameter that came is told as a whole", () => {
+  const after = '{"pvf_type":"string","pvf_allowed_values":["a"],"pvf_required":false}';
+  expect(changedLines({ field: "out/side", before: null, after })).toEqual([
+    { name: "output side", before: null, after: 'string, optional, one of ["a"]' },
+  ]);
+});
+
+test("other fields are values", () => {
+  expect(changedLines({ field: "description", before: "a", after: "b" })).toEqual([
+    { name: "description", before: "a", after: "b" },
+  ]);
+  expect(fieldWords("remap/a")).toBe("remap of a");
+});

@@ -1,0 +1,84 @@
+/** What differs between two moments of a document, in words. Pure. */
+import { memberText } from "../graph/json-members";
+import { pathWords } from "../graph/value-text";
+
+/** A field that says something else. */
+export interface FieldChange {
+  readonly field: string;
+  readonly before?: unknown;
+  readonly after?: unknown;
+}
+
+/** One line of it: null where there is nothing on that side. */
+export interface ChangedLine {
+  readonly name: string;
+  readonly before: string | null;
+  readonly after: string | null;
+}
+
+/** The value inside a parameter's JSON text, or the text itself. */
+export function plainValue(value: unknown): string {
+  if (value === null || value === undefined) return "—";
+  if (typeof value !== "string") return JSON.stringify(value);
+  try {
+    const parsed: unknown = JSON.parse(value);
+    if (typeof parsed === "object" && parsed !== null && "pvf_value" in parsed) {
+      return JSON.stringify(parsed.pvf_value);
+    }
+    return typeof parsed === "string" ? parsed : value;
+  } catch {
+    return value;
+  }
+}
+
+export function fieldWords(field: string): string {
+  if (field.startsWith("in/")) return `input ${pathWords(field.slice(3))}`;
+  if (field.startsWith("out/")) return `output ${pathWords(field.slice(4))}`;
+  if (field.startsWith("remap/")) return `remap of ${field.slice(6)}`;
+  return field.replaceAll("_", " ");
+}
+
+const MEMBERS = {
+  pvf_type: "type",
+  pvf_value: "value",
+  pvf_allowed_values: "allowed",
+  pvf_required: "required",
+  pvf_updatable: "may be replaced",
+} as const;
+
+const isParameter = (value: unknown): value is string =>
+  typeof value === "string" && value.trimStart().startsWith("{");
+
+/** A whole parameter: its type, what else it is, and its value. */
+function parameterWords(text: string): string {
+  const type = memberText(text, "pvf_type");
+  const value = memberText(text, "pvf_value");
+  const allowed = memberText(text, "pvf_allowed_values");
+  return [
+    type === null ? "no type" : plainValue(type),
+    ...(memberText(text, "pvf_required") === "false" ? ["optional"] : []),
+    ...(allowed === null ? [] : [`one of ${allowed}`]),
+    ...(value === null ? [] : [`= ${value}`]),
+  ].join(", ");
+}
+
+/** Which members of a parameter differ; of one that came or went, what it is as a whole. */
+export function changedLines({ field, before, after }: FieldChange): ChangedLine[] {
+  const name = fieldWords(field);
+  const parameter = /^(in|out)\//.test(field);
+  if (!parameter || !(isParameter(before) || isParameter(after))) {
+    const side = (value: unknown) =>
+      value === null || value === undefined ? null : plainValue(value);
+    return [{ name, before: side(before), after: side(after) }];
+  }
+  if (!isParameter(before) || !isParameter(after)) {
+    const side = (value: unknown) => (isParameter(value) ? parameterWords(value) : null);
+    return [{ name, before: side(before), after: side(after) }];
+  }
+  const lines = Object.entries(MEMBERS).flatMap(([member, word]) => {
+    const [was, is] = [memberText(before, member), memberText(after, member)];
+    const spoken = member === "pvf_value" ? name : `${name}, ${word}`;
+    return was === is ? [] : [{ name: spoken, before: was, after: is }];
+  });
+  return lines.length > 0 ? lines : [{ name, before, after }];
+}

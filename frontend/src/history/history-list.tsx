@@ -1,0 +1,108 @@
+/** What was done to a document, newest first: who, when, what it changed, and the way back to it. */
+import { Button, Skeleton } from "@mantine/core";
+import { notifications } from "@mantine/notifications";
+import { IconRestore } from "@tabler/icons-react";
+import { useQueryClient } from "@tanstack/react-query";
+import { useState } from "react";
+import { authorName } from "../api/graphs";
+import {
+  type HistoryEntry,
+  refreshHistory,
+  restoreMoment,
+  useDifference,
+  useHistory,
+} from "../api/history";
+import { errorText } from "../api/http";
+import { clock, day, instant, useNow } from "../ui/times";
+import { DifferenceView, meansSomething } from "./difference-view";
+import style from "./history-list.module.css";
+import { doneWords, isWayBack, momentBefore } from "./history-words";
+
+interface Props {
+  id: string;
+  /** The moment on screen; what comes after it is read with it. */
+  seq: number;
+  mayEdit: boolean;
+}
+
+function Changed({ id, from, to }: { id: string; from: number; to: number }) {
+  const found = useDifference(id, from, to);
+  if (found.isPending) return <Skeleton height={24} />;
+  if (found.isError) return <p role="alert">{errorText(found.error)}</p>;
+  if (!meansSomething(found.data))
+    return <p className={style.quiet}>Nothing that means anything.</p>;
+  return <DifferenceView found={found.data} label="What it changed" />;
+}
+
+interface RowProps extends Props {
+  entry: HistoryEntry;
+  now: number;
+}
+
+function Row({ entry, id, seq, mayEdit, now }: RowProps) {
+  const client = useQueryClient();
+  const [open, setOpen] = useState(false);
+  const [busy, setBusy] = useState(false);
+  const at = instant(entry.until);
+  const before = momentBefore(entry);
+  const when = at === null ? "" : `${day(at, now)} ${clock(at)}`;
+  const goBack = async () => {
+    setBusy(true);
+    try {
+      await restoreMoment(id, entry.seq);
+    } catch (error) {
+      notifications.show({ color: "red", title: "Not restored", message: errorText(error) });
+    } finally {
+      await refreshHistory(client, id);
+      setBusy(false);
+    }
+  };
+  return (
+    <li className={style.entry}>
+      <p className={style.line}>
+        <span>
+          <bdi className={style.who}>{authorName(entry.author)}</bdi> {doneWords(entry)}
+        </span>
+        <time dateTime={entry.until}>{when}</time>
+      </p>
+      <div className={style.buttons}>
+        {before !== null && (
+          <Button
+            size="compact-sm"
+            variant="subtle"
+            aria-expanded={open}
+            onClick={() => setOpen(!open)}
+          >
+            What changed
+          </Button>
+        )}
+        {mayEdit && isWayBack(entry, seq) && (
+          <Button
+            size="compact-sm"
+            variant="subtle"
+            loading={busy}
+            leftSection={<IconRestore size={14} aria-hidden />}
+            onClick={() => void goBack()}
+          >
+            Make it so again<span className="visually-hidden"> as on {when}</span>
+          </Button>
+        )}
+      </div>
+      {open && before !== null && <Changed id={id} from={before} to={entry.seq} />}
+    </li>
+  );
+}
+
+export function HistoryList(props: Props) {
+  const now = useNow(60_000);
+  const history = useHistory(props.id, props.seq);
+  if (history.isPending) return <Skeleton height={120} />;
+  if (history.isError) return <p role="alert">{errorText(history.error)}</p>;
+  return (
+    <ol className={style.list} aria-label="History">
+      {history.data.map((entry) => (
+        <Row key={`${entry.kind} ${entry.seq} ${entry.at}`} entry={entry} now={now} {...props} />
+      ))}
+    </ol>
+  );
+}

@@ -1,0 +1,28 @@
+/** What was done to a document, in a few words. Pure. */
+import type { HistoryEntry } from "../api/history";
+
+const DONE: Readonly<Record<HistoryEntry["kind"], string>> = {
+  created: "made it",
+  imported: "imported it",
+  edited: "changed it",
+  restored: "went back",
+  published: "kept a version",
+  deleted: "deleted it",
+  recovered: "brought it back",
+};
+
+export function doneWords({ kind, version }: Pick<HistoryEntry, "kind" | "version">): string {
+  return kind === "published" && version?.label ? `kept version ${version.label}` : DONE[kind];
+}
+
+/** The moment before it, with which it is compared; null where there was nothing. */
+export function momentBefore({ kind, seq, from_seq }: HistoryEntry): number | null {
+  if (kind !== "edited" && kind !== "restored") return null;
+  const before = (from_seq ?? seq) - 1;
+  return before >= 1 ? before : null;
+}
+
+/** Those that lead to another moment than the one after which they come: only they can be gone back to. */
+export function isWayBack(entry: HistoryEntry, now: number): boolean {
+  return entry.seq >= 1 && entry.seq < now;
+}

@@ -1,0 +1,42 @@
+/** The form of an action of the library: what it has in every graph, and nothing of one use. */
+import type { ReactNode } from "react";
+import { useEditorContext } from "../edit-actions/editor-context";
+import { renameDocument } from "../graph/edit";
+import type { Action } from "../graph/model";
+import { DescriptionField, NameField, TypeField } from "./fields/action-fields";
+import { ProblemsContext, type Told } from "./fields/field-problems";
+import { ViewOnly } from "./fields/view-only";
+import style from "./inspector.module.css";
+import { LabelsField } from "./labels-field";
+import { ParameterList } from "./parameters/parameter-list";
+
+interface Props {
+  action: Action;
+  /** What follows from its name. */
+  names: ReactNode;
+  told: readonly Told[];
+}
+
+export function LibraryActionForm({ action, names, told }: Props) {
+  const { doc } = useEditorContext();
+  return (
+    <ViewOnly>
+      <ProblemsContext value={told}>
+        <div className={style.form}>
+          <NameField
+            action={action}
+            description={names}
+            onRename={(name) => renameDocument(doc, action.key, name)}
+          />
+          <DescriptionField action={action} />
+          <LabelsField />
+          <ParameterList action={action} side="in" />
+          <ParameterList action={action} side="out" />
+          <section className={style.section}>
+            <TypeField action={action} />
+          </section>
+        </div>
+      </ProblemsContext>
+    </ViewOnly>
+  );
+}
