@@ -5,7 +5,7 @@ import { useRouter } from "wouter";
 import style from "./actions-page.module.css";
 import { addressOf, type ListedAction } from "./listing";
 
-interface RowProps {
+interface ActionRowProps {
   listed: ListedAction;
   base: string;
   current: boolean;
@@ -17,7 +17,7 @@ function source({ action }: ListedAction): string {
   return action.document === null ? "only in graphs" : "";
 }
 
-const Row = memo(function Row({ listed, base, current }: RowProps) {
+const Row = memo(function Row({ listed, base, current }: ActionRowProps) {
   const { name, summary, action } = listed;
   const uses = action?.used_in.length ?? 0;
   const older = action?.differs_in.length ?? 0;

@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import type { LibraryAction } from "../api/library";
+import type { LibraryAction } from "../api/documents/library";
 import { knowledgeOf } from "../library/robot-actions";
 import { addressOf, foundActions, listedActions } from "./listing";
 

@@ -1,5 +1,5 @@
 /** Which actions the list shows: those of the library, of graphs and of robots. Pure. */
-import type { LibraryAction } from "../api/library";
+import type { LibraryAction } from "../api/documents/library";
 import { pathWords } from "../graph/value-text";
 import type { RobotAction, RobotsKnowledge } from "../library/robot-actions";
 

@@ -3,10 +3,12 @@ import { notifications } from "@mantine/notifications";
 import { useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
 import { useLocation } from "wouter";
-import { deleteGraph, type GraphSummary } from "../api/graphs";
+import { createAction } from "../api/documents/library";
+import { deleteGraph, type GraphSummary, refreshLibrary } from "../api/graphs";
 import { errorText, Refusal } from "../api/http";
-import { createAction, importAction, refreshLibrary } from "../api/library";
-import { type RobotAction, robotActionText } from "../library/robot-actions";
+import { useLive } from "../api/live/use-live";
+import type { RobotAction } from "../library/robot-actions";
+import { takeFromRobot } from "../library/take-from-robot";
 
 /** There is one of that name already. */
 function isTaken(error: unknown): boolean {
@@ -15,28 +17,32 @@ function isTaken(error: unknown): boolean {
 
 export function useNewActions() {
   const client = useQueryClient();
+  const { runner } = useLive();
   const [, go] = useLocation();
   const [busy, setBusy] = useState(false);
   const [wrong, setWrong] = useState("");
-  /** Opens what was made; answers whether anything was. */
-  const make = async (work: () => Promise<GraphSummary>, editing: boolean): Promise<boolean> => {
+  /** Opens what was made; answers why there is nothing, or nothing. */
+  const make = async (work: () => Promise<GraphSummary>, editing: boolean): Promise<string> => {
     setBusy(true);
-    setWrong("");
     try {
       const { id } = await work();
       await refreshLibrary(client);
       go(`/actions/${id}${editing ? "?edit" : ""}`);
-      return true;
+      return "";
     } catch (error) {
-      setWrong(isTaken(error) ? "The library has an action of this name." : errorText(error));
-      return false;
+      return isTaken(error) ? "The library has an action of this name." : errorText(error);
     } finally {
       setBusy(false);
     }
   };
   const told = async (work: () => Promise<GraphSummary>) => {
-    if (await make(work, false)) return;
-    notifications.show({ color: "red", title: "Not added", message: "Look at the list again." });
+    const message = await make(work, false);
+    if (message !== "") notifications.show({ color: "red", title: "Not added", message });
+  };
+  const ask = async (name: string): Promise<boolean> => {
+    const reason = await make(() => createAction(name), true);
+    setWrong(reason);
+    return reason === "";
   };
   const remove = async (id: string, name: string) => {
     try {
@@ -55,9 +61,9 @@ export function useNewActions() {
   return {
     busy,
     wrong,
-    make: (name: string) => make(() => createAction(name), true),
+    make: ask,
     add: (name: string) => void told(() => createAction(name, true)),
-    take: ({ action }: RobotAction) => void told(() => importAction(robotActionText(action))),
+    take: (has: RobotAction) => void told(() => takeFromRobot(runner, has)),
     remove: (id: string, name: string) => void remove(id, name),
     forget: () => setWrong(""),
   };

@@ -7,8 +7,6 @@ import type { EditorApi } from "./schema/editor";
 export type Config = EditorApi["Config"];
 /** `people`: who is in it now. */
 export type GraphSummary = EditorApi["GraphView"];
-/** An action that some graph uses. `used_in`: ids of graphs. */
-export type KnownActionAnswer = EditorApi["LibraryAction"];
 export type VersionAuthor = EditorApi["PersonRef"];
 export type Version = EditorApi["VersionView"];
 /** A place: a JSON pointer into a text, with line and column where that text is known. */
@@ -175,4 +173,8 @@ export async function refreshGraphs(client: QueryClient): Promise<void> {
     client.invalidateQueries({ queryKey: queryKeys.graphs, exact: true }),
     client.invalidateQueries({ queryKey: queryKeys.deleted }),
   ]);
+}
+
+export function refreshLibrary(client: QueryClient): Promise<void> {
+  return client.invalidateQueries({ queryKey: queryKeys.actions });
 }

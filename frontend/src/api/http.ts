@@ -42,7 +42,7 @@ export function isFinal(error: unknown): boolean {
 }
 
 export interface RequestOptions {
-  method?: "GET" | "POST" | "PATCH" | "DELETE";
+  method?: "GET" | "POST" | "PUT" | "PATCH" | "DELETE";
   /** An object is sent as JSON, a string as it is (also JSON). */
   body?: unknown;
   signal?: AbortSignal;

@@ -72,6 +72,11 @@ export function useIndexedByRobots(
   });
 }
 
+/** The file of an action that a robot has indexed. */
+export function indexedAction(runner: string, robot: string, action: string): Promise<string> {
+  return fetchText(`${path(runner, robot)}/known/${encodeURIComponent(action)}`);
+}
+
 export function useRobotLog(runner: string | undefined, robot: string, on: boolean) {
   return useQuery({
     queryKey: ["robots", "flight", robot],

@@ -1,9 +1,9 @@
 /** The screen of actions: the bar stays as it is while one action after the other is opened. */
 import { useState } from "react";
 import { ActionsPage } from "../actions/actions-page";
-import { useLibrary } from "../api/library";
+import { useLibrary } from "../api/documents/library";
 import { usePerson } from "../api/use-person";
-import { useNewGraphs } from "./new-graphs";
+import { useNewGraphs } from "./imports/new-graphs";
 import { PageBar, PageFrame } from "./page-frame";
 import { useTitle } from "./use-title";
 

@@ -18,8 +18,8 @@ import { OverlayBoundary } from "../ui/parts/part-boundary";
 import { DragPreview } from "../ui/pointer-drag";
 import { theme, variables } from "../ui/theme";
 import type { Crumb } from "../ui/top-bar";
-import { DropFiles } from "./drop-files";
-import { importReviews } from "./import-review";
+import { DropFiles } from "./imports/drop-files";
+import { importReviews } from "./imports/import-review";
 import {
   ActionsScreen,
   CompareScreen,
@@ -54,7 +54,7 @@ function LiveConnection({ children }: { children: ReactNode }) {
 
 const Messages = lazyPart(() => import("../ui/parts/messages").then((part) => part.Messages));
 const ImportReviewDialog = lazyPart(() =>
-  import("./import-review-dialog").then((part) => part.ImportReviewDialog),
+  import("./imports/import-review-dialog").then((part) => part.ImportReviewDialog),
 );
 
 /** Once something had to be looked at, the dialog stays: it goes out of sight by itself. */

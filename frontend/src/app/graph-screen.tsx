@@ -25,7 +25,7 @@ import { useStableCallback } from "../ui/hooks/use-stable-callback";
 import { lazyPart } from "../ui/parts/lazy-part";
 import { PartBoundary } from "../ui/parts/part-boundary";
 import { instant } from "../ui/times";
-import { useNewGraphs } from "./new-graphs";
+import { useNewGraphs } from "./imports/new-graphs";
 import { PageBar, PageFrame } from "./page-frame";
 import { useTitle } from "./use-title";
 

@@ -1,9 +1,9 @@
 /** The first screen: every graph. */
 import { NamePrompt } from "../account/name-prompt";
-import { Home } from "../library/home";
+import { Home } from "../library/home/home";
 import { lazyPart } from "../ui/parts/lazy-part";
 import { PartBoundary } from "../ui/parts/part-boundary";
-import { useNewGraphs } from "./new-graphs";
+import { useNewGraphs } from "./imports/new-graphs";
 import { PageBar, PageFrame } from "./page-frame";
 import { useTitle } from "./use-title";
 

@@ -1,6 +1,6 @@
 /** The screen of robots: what they hold can be taken as a graph. */
 import { RobotsPage } from "../robots/robots-page";
-import { useNewGraphs } from "./new-graphs";
+import { useNewGraphs } from "./imports/new-graphs";
 import { PageBar, PageFrame } from "./page-frame";
 import { useTitle } from "./use-title";
 

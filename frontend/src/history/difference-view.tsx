@@ -29,7 +29,7 @@ function Fields({ fields }: { fields: readonly FieldChange[] }) {
 }
 
 /** Places of cards mean nothing; who looks for what was moved looks at the canvas. */
-export const isMeant = ({ field }: FieldChange): boolean => field !== "position";
+const isMeant = ({ field }: FieldChange): boolean => field !== "position";
 
 /** Whether there is anything in it that means something. */
 export function meansSomething({ actions, relations, fields = [] }: Changes): boolean {

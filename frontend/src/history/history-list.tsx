@@ -4,14 +4,14 @@ import { notifications } from "@mantine/notifications";
 import { IconRestore } from "@tabler/icons-react";
 import { useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
-import { authorName } from "../api/graphs";
 import {
   type HistoryEntry,
   refreshHistory,
   restoreMoment,
   useDifference,
   useHistory,
-} from "../api/history";
+} from "../api/documents/history";
+import { authorName } from "../api/graphs";
 import { errorText } from "../api/http";
 import { clock, day, instant, useNow } from "../ui/times";
 import { DifferenceView, meansSomething } from "./difference-view";
@@ -34,12 +34,12 @@ function Changed({ id, from, to }: { id: string; from: number; to: number }) {
   return <DifferenceView found={found.data} label="What it changed" />;
 }
 
-interface RowProps extends Props {
+interface EntryProps extends Props {
   entry: HistoryEntry;
   now: number;
 }
 
-function Row({ entry, id, seq, mayEdit, now }: RowProps) {
+function Row({ entry, id, seq, mayEdit, now }: EntryProps) {
   const client = useQueryClient();
   const [open, setOpen] = useState(false);
   const [busy, setBusy] = useState(false);

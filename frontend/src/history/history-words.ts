@@ -1,11 +1,12 @@
 /** What was done to a document, in a few words. Pure. */
-import type { HistoryEntry } from "../api/history";
+import type { HistoryEntry } from "../api/documents/history";
 
 const DONE: Readonly<Record<HistoryEntry["kind"], string>> = {
   created: "made it",
   imported: "imported it",
   edited: "changed it",
   restored: "went back",
+  adapted: "took parameters over",
   published: "kept a version",
   deleted: "deleted it",
   recovered: "brought it back",
@@ -17,7 +18,7 @@ export function doneWords({ kind, version }: Pick<HistoryEntry, "kind" | "versio
 
 /** The moment before it, with which it is compared; null where there was nothing. */
 export function momentBefore({ kind, seq, from_seq }: HistoryEntry): number | null {
-  if (kind !== "edited" && kind !== "restored") return null;
+  if (kind !== "edited" && kind !== "restored" && kind !== "adapted") return null;
   const before = (from_seq ?? seq) - 1;
   return before >= 1 ? before : null;
 }

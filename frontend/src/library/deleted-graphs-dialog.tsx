@@ -4,9 +4,15 @@ import { notifications } from "@mantine/notifications";
 import { IconRestore } from "@tabler/icons-react";
 import { useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
-import { type GraphSummary, recoverGraph, refreshGraphs, useDeletedGraphs } from "../api/graphs";
+import { useDeletedActions } from "../api/documents/library";
+import {
+  type GraphSummary,
+  recoverGraph,
+  refreshGraphs,
+  refreshLibrary,
+  useDeletedGraphs,
+} from "../api/graphs";
 import { errorText } from "../api/http";
-import { refreshLibrary, useDeletedActions } from "../api/library";
 import { useMay } from "../api/use-person";
 import { ago, instant, useNow } from "../ui/times";
 import style from "./deleted-graphs-dialog.module.css";

@@ -1,7 +1,6 @@
 /** The actions that can be added: those of the library and what graphs use besides, each once. */
 import { useMemo } from "react";
-import type { KnownActionAnswer } from "../api/graphs";
-import { type LibraryAction, useLibrary } from "../api/library";
+import { type LibraryAction, useLibrary } from "../api/documents/library";
 import type { NewAction } from "../graph/edit";
 import { pathWords } from "../graph/value-text";
 
@@ -16,7 +15,7 @@ export interface KnownAction {
   readonly gives: readonly string[];
 }
 
-type Parameters = KnownActionAnswer["inputs"];
+type Parameters = LibraryAction["inputs"];
 
 const words = (list: Parameters): string[] =>
   list.map(

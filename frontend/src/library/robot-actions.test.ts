@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { knowledgeOf, robotActionText, robotDifferences, robotTemplate } from "./robot-actions";
+import { knowledgeOf, robotDifferences, robotTemplate } from "./robot-actions";
 
 const move = {
   name: "Move",
@@ -17,26 +17,11 @@ test("robots are grouped by what they have", () => {
   expect(known.byName.get("Move")?.map(({ robot }) => robot)).toEqual(["atlas"]);
 });
 
-test("what a robot has becomes the file of an action, with its groups", () => {
-  expect(JSON.parse(robotActionText(move))).toEqual({
-    name: "Move",
-    instance_id: 0,
-    type: "sync",
-    input_parameters: {
-      pose: { x: { pvf_type: "number" }, y: { pvf_type: "number" } },
-      fast: { pvf_type: "bool" },
-    },
-    output_parameters: { done: { pvf_type: "bool" } },
-  });
+test("what a robot has is drawn with, groups and all", () => {
   expect(robotTemplate(move).inputs?.[0]).toEqual({
     path: "pose/x",
     text: '{"pvf_type":"number"}',
   });
-});
-
-test("names that objects have already are names like others", () => {
-  const odd = { name: "A", inputs: { "__proto__::x": "number" }, outputs: {} };
-  expect(robotActionText(odd)).toContain('"__proto__":{"x":{"pvf_type":"number"}}');
 });
 
 test("what a robot has otherwise is told", () => {

@@ -1,4 +1,4 @@
-/** Actions that robots have indexed: beside those of the library, and as files to take them over. */
+/** Actions that robots have indexed: beside those of the library. */
 import { useMemo } from "react";
 import { useLive } from "../api/live/use-live";
 import { type IndexedByRobot, useIndexedByRobots } from "../api/robots";
@@ -21,10 +21,10 @@ export interface RobotsKnowledge {
   readonly byName: ReadonlyMap<string, readonly RobotAction[]>;
 }
 
-/** A robot as it is grouped: what it has, or null. */
-type Told = readonly { readonly robot: string; readonly indexed: IndexedByRobot | null }[];
+/** What each robot has told; null: nothing. */
+type ToldByRobots = readonly { readonly robot: string; readonly indexed: IndexedByRobot | null }[];
 
-export function knowledgeOf(told: Told): RobotsKnowledge {
+export function knowledgeOf(told: ToldByRobots): RobotsKnowledge {
   const byName = new Map<string, RobotAction[]>();
   for (const { robot, indexed } of told) {
     for (const action of indexed?.actions ?? []) {
@@ -58,37 +58,6 @@ const parameters = (types: Types) =>
 /** What a new use of it begins with. */
 export function robotTemplate({ name, inputs, outputs }: IndexedAction): NewAction {
   return { name, type: "sync", inputs: parameters(inputs), outputs: parameters(outputs) };
-}
-
-interface ParameterTree {
-  [name: string]: ParameterTree | { pvf_type: string };
-}
-
-function treeOf(types: Types): ParameterTree {
-  const root: ParameterTree = Object.create(null);
-  for (const [flat, type] of Object.entries(types)) {
-    const keys = flat.split("::");
-    const last = keys.pop() ?? flat;
-    let at = root;
-    for (const key of keys) {
-      const next: ParameterTree = (at[key] as ParameterTree | undefined) ?? Object.create(null);
-      at[key] = next;
-      at = next;
-    }
-    at[last] = { pvf_type: type };
-  }
-  return root;
-}
-
-/** It as the file of an action. */
-export function robotActionText({ name, inputs, outputs }: IndexedAction): string {
-  return JSON.stringify({
-    name,
-    instance_id: 0,
-    type: "sync",
-    input_parameters: treeOf(inputs),
-    output_parameters: treeOf(outputs),
-  });
 }
 
 /** A parameter, as far as robots tell them. */

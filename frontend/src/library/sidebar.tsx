@@ -1,4 +1,4 @@
-/** The list on the left: graphs to open, actions to place. */
+/** The list on the left: graphs to open, or actions to place. */
 import { ActionIcon, Kbd, TextInput } from "@mantine/core";
 import { IconFileImport, IconPlus, IconSearch } from "@tabler/icons-react";
 import { useState } from "react";
@@ -6,11 +6,17 @@ import { useGraphs } from "../api/graphs";
 import { useMay } from "../api/use-person";
 import type { NewAction } from "../graph/edit";
 import { Tooltip } from "../ui/floating/tooltip";
-import { ActionRow } from "./action-row";
+import { type ListTab, useListTab } from "../ui/hooks/use-list-tab";
+import { lazyPart } from "../ui/parts/lazy-part";
+import { PartBoundary } from "../ui/parts/part-boundary";
+import { Segments } from "../ui/segments";
 import { GraphRow, RowSkeletons } from "./graph-rows";
 import { matchesSearch } from "./graph-selection";
-import { signature, useKnownActions } from "./known-actions";
 import style from "./sidebar.module.css";
+
+const PlaceableActions = lazyPart(() =>
+  import("./placeable-actions").then((part) => part.PlaceableActions),
+);
 
 interface Props {
   current?: string;
@@ -20,37 +26,29 @@ interface Props {
   onPlace?: (template: NewAction) => void;
 }
 
-function ActionList({ search, onPlace }: { search: string; onPlace: (t: NewAction) => void }) {
-  const { actions, ready } = useKnownActions();
-  const shown = actions.filter(({ template }) =>
-    matchesSearch(search, template.name, template.description, signature(template)),
-  );
-  const fresh = search.trim();
-  const exact = shown.some(({ template }) => template.name === fresh);
-  if (!ready) return <RowSkeletons count={4} />;
+const TABS: readonly { value: ListTab; label: string }[] = [
+  { value: "graphs", label: "Graphs" },
+  { value: "actions", label: "Actions" },
+];
+
+function Tools({ onNew, onImport }: Pick<Props, "onNew" | "onImport">) {
   return (
     <>
-      {shown.map((known) => (
-        <ActionRow key={known.template.name} known={known} onPlace={onPlace} />
-      ))}
-      {fresh !== "" && !exact && (
-        <ActionRow
-          known={{ template: { name: fresh }, document: null, usedIn: [], takes: [], gives: [] }}
-          onPlace={onPlace}
-        />
-      )}
-      {shown.length === 0 && fresh === "" && (
-        <p className={style.hint}>
-          Actions appear here once a graph uses them. Type a name above to make a new one.
-        </p>
-      )}
+      <Tooltip label="Import a file">
+        <ActionIcon size="sm" aria-label="Import a file" onClick={onImport}>
+          <IconFileImport size={15} />
+        </ActionIcon>
+      </Tooltip>
+      <Tooltip label="New graph">
+        <ActionIcon size="sm" aria-label="New graph" onClick={onNew}>
+          <IconPlus size={15} />
+        </ActionIcon>
+      </Tooltip>
     </>
   );
 }
 
-export function Sidebar({ current, onNew, onImport, onPlace }: Props) {
-  const [search, setSearch] = useState("");
-  const mayEdit = useMay("edit");
+function GraphList({ search, current }: { search: string; current: string | undefined }) {
   const graphs = useGraphs();
   const shown = (graphs.data ?? []).filter((graph) =>
     matchesSearch(
@@ -62,51 +60,61 @@ export function Sidebar({ current, onNew, onImport, onPlace }: Props) {
     ),
   );
   return (
+    <>
+      {graphs.isPending && <RowSkeletons count={4} />}
+      <nav aria-label="Graphs">
+        {shown.map((graph) => (
+          <GraphRow key={graph.id} graph={graph} current={graph.id === current} />
+        ))}
+      </nav>
+      {graphs.isSuccess && shown.length === 0 && (
+        <p className={style.hint}>{search === "" ? "No graph yet." : "No graph is called so."}</p>
+      )}
+    </>
+  );
+}
+
+export function Sidebar({ current, onNew, onImport, onPlace }: Props) {
+  const [search, setSearch] = useState("");
+  const [wanted, setTab] = useListTab();
+  const mayEdit = useMay("edit");
+  const mayPlace = onPlace !== undefined && mayEdit;
+  const tab = mayPlace ? wanted : "graphs";
+  const words = mayPlace ? "Search graphs and actions" : "Search graphs";
+  return (
     <div className={style.sidebar}>
       <TextInput
-        aria-label="Search graphs and actions"
-        placeholder="Search graphs and actions"
+        aria-label={words}
+        placeholder={words}
         leftSection={<IconSearch size={15} aria-hidden />}
         rightSection={search === "" ? <Kbd>/</Kbd> : undefined}
         value={search}
         onChange={(event) => setSearch(event.currentTarget.value)}
         data-search
       />
-      <div className={style.scroll}>
-        <div className={style.heading} data-heading="Graphs">
+      <div className={style.heading}>
+        {mayPlace ? (
+          <Segments
+            className={style.tabs}
+            label="What is listed"
+            size="xs"
+            fullWidth
+            data={TABS}
+            value={tab}
+            onChange={setTab}
+          />
+        ) : (
           <h2>Graphs</h2>
-          {mayEdit && (
-            <>
-              <Tooltip label="Import a file">
-                <ActionIcon size="sm" aria-label="Import a file" onClick={onImport}>
-                  <IconFileImport size={15} />
-                </ActionIcon>
-              </Tooltip>
-              <Tooltip label="New graph">
-                <ActionIcon size="sm" aria-label="New graph" onClick={onNew}>
-                  <IconPlus size={15} />
-                </ActionIcon>
-              </Tooltip>
-            </>
-          )}
-        </div>
-        {graphs.isPending && <RowSkeletons count={4} />}
-        <nav aria-label="Graphs">
-          {shown.map((graph) => (
-            <GraphRow key={graph.id} graph={graph} current={graph.id === current} />
-          ))}
-        </nav>
-        {graphs.isSuccess && shown.length === 0 && (
-          <p className={style.hint}>{search === "" ? "No graph yet." : "No graph is called so."}</p>
         )}
-        {onPlace && mayEdit && (
-          <>
-            <div className={style.heading} data-heading="Actions">
-              <h2>Actions</h2>
-              <span className={style.how}>drag or tap to place</span>
-            </div>
-            <ActionList search={search} onPlace={onPlace} />
-          </>
+        {mayEdit && <Tools onNew={onNew} onImport={onImport} />}
+      </div>
+      <div className={style.scroll}>
+        {tab === "graphs" ? (
+          <GraphList search={search} current={current} />
+        ) : (
+          <PartBoundary waiting={<RowSkeletons count={4} />}>
+            {onPlace && <PlaceableActions search={search} onPlace={onPlace} />}
+          </PartBoundary>
         )}
       </div>
     </div>

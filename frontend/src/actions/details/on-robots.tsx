@@ -1,6 +1,6 @@
 /** Which robots have an action, and how what they have differs. */
 import type { ReactNode } from "react";
-import type { LibraryAction } from "../../api/library";
+import type { LibraryAction } from "../../api/documents/library";
 import {
   type RobotAction,
   type RobotsKnowledge,

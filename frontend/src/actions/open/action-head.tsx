@@ -1,7 +1,7 @@
 /** The head of an action of the library: its name, edit, undo, and what can be done with it. */
 import { ActionIcon, Button, Menu } from "@mantine/core";
 import { IconCheck, IconDots, IconDownload, IconPencil, IconTrash } from "@tabler/icons-react";
-import { actionDownload } from "../../api/library";
+import { actionDownload } from "../../api/documents/library";
 import { redo, undo } from "../../edit-actions/all";
 import type { EditAction } from "../../edit-actions/edit-action";
 import { isEnabled, labelOf } from "../../edit-actions/edit-action";

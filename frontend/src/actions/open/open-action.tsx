@@ -1,4 +1,5 @@
 /** An action of the library, open: read or edited together with whoever else is here. */
+
 import { Button, Skeleton } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconMapOff } from "@tabler/icons-react";
@@ -6,8 +7,9 @@ import { useQueryClient } from "@tanstack/react-query";
 import { type ReactNode, useEffect, useState } from "react";
 import { createPortal } from "react-dom";
 import { Link } from "wouter";
+import { type LibraryAction, takeFromGraph } from "../../api/documents/library";
+import { refreshLibrary } from "../../api/graphs";
 import { errorText } from "../../api/http";
-import { type LibraryAction, refreshLibrary, takeFromGraph } from "../../api/library";
 import { type EditorContext, EditorReactContext } from "../../edit-actions/editor-context";
 import { useToldProblems } from "../../editor/problem-count";
 import { RoomNotices } from "../../editor/room-notices";

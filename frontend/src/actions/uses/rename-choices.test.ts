@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
-import { type ActionUse, NO_RENAMES } from "../../api/library";
-import { canUpdate, clashes, keyOfRename, renamesOf, suggestedRenames } from "./rename-choices";
+import { type ActionUse, NO_RENAMES } from "../../api/documents/library";
+import { clashes, keyOfRename, renamesOf, suggestedRenames } from "./rename-choices";
 
 const use = (more: Partial<ActionUse>): ActionUse => ({
   graph: "g",
@@ -10,7 +10,6 @@ const use = (more: Partial<ActionUse>): ActionUse => ({
   changed: true,
   difference: null,
   suggested: NO_RENAMES,
-  conflicts: [],
   ...more,
 });
 const uses = [
@@ -46,10 +45,4 @@ test("nothing is renamed that nobody has ticked, and two never become one", () =
   });
   expect(clashes(rate, ticked, all)).toBe(true);
   expect(clashes(done, ticked, all)).toBe(false);
-});
-
-test("a graph is updated that would change and that nothing stands against", () => {
-  expect(canUpdate(use({}))).toBe(true);
-  expect(canUpdate(use({ changed: false }))).toBe(false);
-  expect(canUpdate(use({ conflicts: ["two parameters would be one"] }))).toBe(false);
 });

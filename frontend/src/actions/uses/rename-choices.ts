@@ -1,5 +1,5 @@
 /** Which parameters may only be called otherwise now: suggested by graphs, ticked by people. Pure. */
-import type { ActionUse, Renames } from "../../api/library";
+import type { ActionUse, Renames } from "../../api/documents/library";
 import type { ParameterSide } from "../../graph/document-keys";
 
 /** One that somebody may tick. `graphs`: by how many it is suggested. */
@@ -46,10 +46,6 @@ export function renamesOf(ticked: ReadonlySet<string>, all: readonly SuggestedRe
   const of = (side: ParameterSide) =>
     all
       .filter((each) => each.side === side && ticked.has(keyOfRename(each)))
-      .map(({ from, to }) => [from, to] as const);
+      .map(({ from, to }): [string, string] => [from, to]);
   return { inputs: of("in"), outputs: of("out") };
 }
-
-/** Whether an update can do anything for a graph. */
-export const canUpdate = ({ changed, conflicts }: ActionUse): boolean =>
-  changed && conflicts.length === 0;

@@ -3,11 +3,10 @@ import { Button, Checkbox, Loader, Modal, Skeleton } from "@mantine/core";
 import { IconCheck } from "@tabler/icons-react";
 import { useId } from "react";
 import { Link } from "wouter";
+import type { ActionUse, UpdatedUse } from "../../api/documents/library";
 import { errorText } from "../../api/http";
-import type { ActionUse, UpdatedUse } from "../../api/library";
 import { pathWords } from "../../graph/value-text";
 import { DifferenceView } from "../../history/difference-view";
-import { canUpdate } from "./rename-choices";
 import style from "./update-dialog.module.css";
 import { useUpdate } from "./use-update";
 
@@ -48,11 +47,11 @@ interface UseProps {
 
 function Use({ use, update, mayEdit }: UseProps) {
   const title = useId();
-  const { graph, name, count, conflicts, difference } = use;
+  const { graph, name, count, difference } = use;
   return (
     <li className={style.use} aria-labelledby={title}>
       <div className={style.head}>
-        {mayEdit && canUpdate(use) && (
+        {mayEdit && (
           <Checkbox
             aria-label={`Update ${name || "Untitled"}`}
             checked={!update.isLeft(graph)}
@@ -65,11 +64,6 @@ function Use({ use, update, mayEdit }: UseProps) {
         </h3>
         <span className={style.quiet}>{count === 1 ? "used once" : `used ${count} times`}</span>
       </div>
-      {conflicts.map((conflict) => (
-        <p key={conflict} className={style.conflict}>
-          Cannot be updated: {conflict}
-        </p>
-      ))}
       {difference && <DifferenceView found={difference} label={`What changes in ${name}`} />}
     </li>
   );
@@ -106,7 +100,7 @@ function Body({ id, mayEdit, onClose }: Props) {
   const { found, uses, chosen } = update;
   if (found.isPending) return <Skeleton height={160} />;
   if (found.isError) return <p role="alert">{errorText(found.error)}</p>;
-  const older = uses.filter((use) => use.changed || use.conflicts.length > 0);
+  const older = uses.filter((use) => use.changed);
   const count = chosen.length === 1 ? "1 graph" : `${chosen.length} graphs`;
   return (
     <div aria-busy={update.renewing}>

@@ -1,29 +1,22 @@
 /** Updating graphs to the parameters of an action: what is chosen, what came of it, what stood against it. */
 import { useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
-import { refreshGraphs } from "../../api/graphs";
-import { errorText, Refusal } from "../../api/http";
 import {
   type ActionUse,
   type ActionUses,
   NO_RENAMES,
-  refreshLibrary,
   refreshUses,
   type UpdatedUse,
   updateUses,
   useActionUses,
-} from "../../api/library";
-import { canUpdate, clashes, keyOfRename, renamesOf, suggestedRenames } from "./rename-choices";
-
-/** The graph that a refusal is about, by its id. */
-function graphOf(error: unknown): string | null {
-  if (!(error instanceof Refusal)) return null;
-  const where: Readonly<Record<string, unknown>> = { ...error.details.where };
-  return typeof where.graph === "string" ? where.graph : null;
-}
+} from "../../api/documents/library";
+import { refusedAt } from "../../api/documents/refused-at";
+import { refreshGraphs, refreshLibrary } from "../../api/graphs";
+import { errorText, Refusal } from "../../api/http";
+import { clashes, keyOfRename, renamesOf, suggestedRenames } from "./rename-choices";
 
 function words(error: unknown, uses: readonly ActionUse[]): string {
-  const place = uses.find(({ graph }) => graph === graphOf(error))?.name;
+  const place = uses.find(({ graph }) => graph === refusedAt(error, "graph"))?.name;
   const text = place === undefined ? errorText(error) : `${place}: ${errorText(error)}`;
   const changed = error instanceof Refusal && error.details.status === 409;
   return changed
@@ -67,7 +60,7 @@ export function useUpdate(id: string) {
   const [wrong, setWrong] = useState("");
   const [done, setDone] = useState<readonly UpdatedUse[]>([]);
   const uses = found.data?.uses ?? [];
-  const chosen = uses.filter((use) => canUpdate(use) && !isLeft(use.graph));
+  const chosen = uses.filter((use) => use.changed && !isLeft(use.graph));
   const update = async ({ seq }: ActionUses) => {
     setBusy(true);
     setWrong("");

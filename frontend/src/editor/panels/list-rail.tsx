@@ -7,19 +7,34 @@ import {
   IconListTree,
   IconSitemap,
 } from "@tabler/icons-react";
-import { type MouseEvent, type ReactNode, useEffect, useRef, useState } from "react";
+import { type MouseEvent, type ReactNode, useEffect, useRef } from "react";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import { countsOf, countWords } from "../../graph/problems/problem-kinds";
 import type { ToldProblem } from "../../graph/problems/told-problems";
 import { Tooltip } from "../../ui/floating/tooltip";
 import { whenThere } from "../../ui/focus-field";
+import { type ListTab, useListTab } from "../../ui/hooks/use-list-tab";
 import style from "./list-rail.module.css";
 import { type EditorSidePanel, type Panels, ROW } from "./use-panels";
 
 const PARTS = [
-  { name: "Graphs", side: "library", icon: IconSitemap, changes: false, field: "[data-search]" },
-  { name: "Actions", side: "library", icon: IconBolt, changes: true, field: "[data-search]" },
-  { name: "Outline", side: "outline", icon: IconListTree, changes: false, field: ROW },
+  {
+    name: "Graphs",
+    side: "library",
+    tab: "graphs",
+    icon: IconSitemap,
+    changes: false,
+    field: "[data-search]",
+  },
+  {
+    name: "Actions",
+    side: "library",
+    tab: "actions",
+    icon: IconBolt,
+    changes: true,
+    field: "[data-search]",
+  },
+  { name: "Outline", side: "outline", tab: null, icon: IconListTree, changes: false, field: ROW },
 ] as const;
 
 type Part = (typeof PARTS)[number];
@@ -112,8 +127,8 @@ export function ListRail({ panels, told }: Props) {
   const { left, setLeft, side, setSide, fold } = panels;
   const { mayEdit } = useEditorContext();
   const rail = useRef<HTMLElement>(null);
-  const [chosen, setChosen] = useState<Part["name"]>("Graphs");
-  const shown = sideName(side, chosen);
+  const [tab, setTab] = useListTab();
+  const shown = sideName(side, mayEdit ? tab : "graphs");
   usePutAway(
     left,
     () => setLeft(false),
@@ -124,11 +139,9 @@ export function ListRail({ panels, told }: Props) {
       setLeft(false);
       return;
     }
-    setChosen(part.name);
+    if (part.tab !== null) setTab(part.tab);
     setSide(part.side);
     setLeft(true);
-    const heading = `[data-heading="${part.name}"]`;
-    if (part.side === "library") whenThere(heading, (found) => found.scrollIntoView());
     if (byKey) whenThere(part.field, (field) => field.focus({ preventScroll: true }));
   };
   return (
@@ -161,8 +174,8 @@ export function ListRail({ panels, told }: Props) {
   );
 }
 
-/** What is open, when a shortcut has opened another side than was pressed. */
-function sideName(side: EditorSidePanel, chosen: Part["name"]): Part["name"] {
+/** What is open: of the lists the one whose tab is chosen, there or here. */
+function sideName(side: EditorSidePanel, tab: ListTab): Part["name"] {
   if (side === "outline") return "Outline";
-  return chosen === "Outline" ? "Graphs" : chosen;
+  return tab === "actions" ? "Actions" : "Graphs";
 }

@@ -1,7 +1,7 @@
 /** Asks for another name of a graph. */
 import { Button, Group, Modal, TextInput } from "@mantine/core";
 import { useState } from "react";
-import type { GraphSummary } from "../api/graphs";
+import type { GraphSummary } from "../../api/graphs";
 
 interface Props {
   graph: GraphSummary;

@@ -1,12 +1,12 @@
 /** A graph in miniature: cards as blocks, arrows as lines in the colours of their outcomes. */
 import { useQuery } from "@tanstack/react-query";
 import { useMemo } from "react";
-import { graphText } from "../api/graphs";
-import { fromUmrf } from "../canvas/from-umrf";
-import { arrange } from "../canvas/geometry/arrange";
-import { outcomeColor } from "../canvas/outcome";
-import { ENTRY, EXIT, type Graph, spokenOutcomes } from "../graph/model";
-import { colorOfName } from "../ui/name-colors";
+import { graphText } from "../../api/graphs";
+import { fromUmrf } from "../../canvas/from-umrf";
+import { arrange } from "../../canvas/geometry/arrange";
+import { outcomeColor } from "../../canvas/outcome";
+import { ENTRY, EXIT, type Graph, spokenOutcomes } from "../../graph/model";
+import { colorOfName } from "../../ui/name-colors";
 
 const MARGIN = 26;
 const CARD = { width: 150, height: 84 } as const;

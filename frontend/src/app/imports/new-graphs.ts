@@ -1,4 +1,4 @@
-/** New graphs: from nothing, and from files. */
+/** New graphs and actions: from nothing, and from files. */
 import { notifications } from "@mantine/notifications";
 import { useQueryClient } from "@tanstack/react-query";
 import { useCallback } from "react";
@@ -6,24 +6,14 @@ import { useLocation } from "wouter";
 import {
   createGraph,
   type GraphSummary,
-  importGraph,
-  previewGraph,
   queryKeys,
   refreshGraphs,
-} from "../api/graphs";
-import { errorPlace, errorText } from "../api/http";
-import { importReviews, isPlain } from "./import-review";
-
-const MOST_BYTES = 10 * 1024 * 1024;
+  refreshLibrary,
+} from "../../api/graphs";
+import { errorText } from "../../api/http";
 
 function complain(title: string, error: unknown): void {
-  const where = errorPlace(error);
-  notifications.show({
-    color: "red",
-    title,
-    message: where === "" ? errorText(error) : `${errorText(error)} (${where})`,
-    autoClose: 15_000,
-  });
+  notifications.show({ color: "red", title, message: errorText(error), autoClose: 15_000 });
 }
 
 /** Asks for files as a file input does; nothing of it stays in the page. */
@@ -65,21 +55,22 @@ export function useNewGraphs(): NewGraphs {
   }, [client, go]);
   const take = useCallback(
     async (files: readonly File[]) => {
-      let last: GraphSummary | null = null;
-      for (const file of files) {
-        try {
-          if (file.size > MOST_BYTES) throw new Error("The file is larger than 10 MB.");
-          const text = await file.text();
-          const preview = await previewGraph(text);
-          if (!isPlain(preview) && !(await importReviews.ask(file.name, preview))) continue;
-          last = await importGraph(text);
-        } catch (error) {
-          complain(`${file.name} was not imported`, error);
-        }
+      if (files.length === 0) return;
+      const after = () => void Promise.all([refreshGraphs(client), refreshLibrary(client)]);
+      try {
+        const [{ takeFiles }, { placeAfter, progressOf, tellTaken }] = await Promise.all([
+          import("./take-files"),
+          import("./tell-taken"),
+        ]);
+        const { tell, end } = progressOf(files.length);
+        const found = await takeFiles(files, tell).finally(end);
+        after();
+        tellTaken(found, after);
+        const place = placeAfter(found);
+        if (place !== null) go(place);
+      } catch (error) {
+        complain("Nothing was imported", error);
       }
-      if (last === null) return;
-      void refreshGraphs(client);
-      go(`/graphs/${last.id}`);
     },
     [client, go],
   );

@@ -1,6 +1,7 @@
 import { expect, test } from "vitest";
-import type { Preview } from "../api/graphs";
-import { dialectWords, ImportReviews, isPlain } from "./import-review";
+import type { Preview } from "../../api/graphs";
+import { dialectWords, isPlain } from "./dialects";
+import { ImportReviews } from "./import-review";
 
 const preview = (part: Partial<Preview> = {}): Preview => ({
   dialect: "D1",

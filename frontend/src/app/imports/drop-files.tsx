@@ -1,12 +1,22 @@
 /** Takes files that are dropped anywhere on the page. */
 import { IconFileImport } from "@tabler/icons-react";
 import { type ReactNode, useEffect, useRef, useState } from "react";
-import { useMay } from "../api/use-person";
+import { useMay } from "../../api/use-person";
 import style from "./drop-files.module.css";
+import type { Dropped } from "./dropped-files";
 import { useNewGraphs } from "./new-graphs";
 
 function hasFiles(event: DragEvent): boolean {
   return [...(event.dataTransfer?.types ?? [])].includes("Files");
+}
+
+/** Read while the drop is heard: what was dropped is forgotten right after it. */
+function whatWasDropped(dropped: DataTransfer | null): Dropped {
+  const items = [...(dropped?.items ?? [])];
+  return {
+    files: [...(dropped?.files ?? [])],
+    entries: items.map((item) => item.webkitGetAsEntry?.() ?? null),
+  };
 }
 
 export function DropFiles({ children }: { children: ReactNode }) {
@@ -34,7 +44,8 @@ export function DropFiles({ children }: { children: ReactNode }) {
       event.preventDefault();
       depth.current = 0;
       setOver(false);
-      void take([...(event.dataTransfer?.files ?? [])]);
+      const dropped = whatWasDropped(event.dataTransfer);
+      void import("./dropped-files").then((part) => part.droppedFiles(dropped)).then(take);
     };
     const pairs = [
       ["dragenter", enter],
@@ -54,7 +65,7 @@ export function DropFiles({ children }: { children: ReactNode }) {
         <div className={style.over} aria-hidden>
           <div className={style.card}>
             <IconFileImport size={28} />
-            Drop to import as a graph
+            Drop to import graphs and actions
           </div>
         </div>
       )}

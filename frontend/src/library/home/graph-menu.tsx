@@ -11,12 +11,12 @@ import {
   recoverGraph,
   refreshGraphs,
   renameGraph,
-} from "../api/graphs";
-import { errorText } from "../api/http";
-import { serverPath } from "../api/page-url";
-import { useMay } from "../api/use-person";
-import { lazyPart } from "../ui/parts/lazy-part";
-import { OverlayBoundary } from "../ui/parts/part-boundary";
+} from "../../api/graphs";
+import { errorText } from "../../api/http";
+import { serverPath } from "../../api/page-url";
+import { useMay } from "../../api/use-person";
+import { lazyPart } from "../../ui/parts/lazy-part";
+import { OverlayBoundary } from "../../ui/parts/part-boundary";
 import style from "./home.module.css";
 
 /** "x copy", "x copy 2" …: the first that no graph is called. */

@@ -1,54 +1,23 @@
 /** The library of actions, each a document of its own, as the editor answers it. */
 import { keepPreviousData, type QueryClient, useQuery } from "@tanstack/react-query";
-import {
-  type GraphDifference,
-  type GraphSummary,
-  type KnownActionAnswer,
-  type Preview,
-  queryKeys,
-} from "./graphs";
-import { fetchJson } from "./http";
-import { serverPath } from "./page-url";
+import { type GraphSummary, type Preview, queryKeys } from "../graphs";
+import { fetchJson } from "../http";
+import { serverPath } from "../page-url";
+import type { EditorApi } from "../schema/editor";
 
 /** `document`: its own; null where only graphs use it. `differs_in`: of `used_in`, where parameters are others. */
-export interface LibraryAction extends KnownActionAnswer {
-  readonly document: string | null;
-  readonly seq: number | null;
-  readonly labels: readonly string[];
-  readonly differs_in: readonly string[];
-}
+export type LibraryAction = EditorApi["LibraryAction"];
 
 /** Parameters that are called otherwise now: pairs of paths, the old one first. */
-export interface Renames {
-  readonly inputs: readonly (readonly [from: string, to: string])[];
-  readonly outputs: readonly (readonly [from: string, to: string])[];
-}
+export type Renames = EditorApi["Renames"];
 
 export const NO_RENAMES: Renames = { inputs: [], outputs: [] };
 
-/** A graph that uses the action. `count`: how often. `conflicts`: why it cannot be updated. */
-export interface ActionUse {
-  readonly graph: string;
-  readonly name: string;
-  readonly seq: number;
-  readonly count: number;
-  readonly changed: boolean;
-  readonly difference: GraphDifference | null;
-  readonly suggested: Renames;
-  readonly conflicts: readonly string[];
-}
-
+/** A graph that uses the action. `count`: how often; `changed`: whether an update would change it. */
+export type ActionUse = EditorApi["ActionUse"];
 /** `seq`: the change of the action's document that this was worked out from. */
-export interface ActionUses {
-  readonly seq: number;
-  readonly uses: readonly ActionUse[];
-}
-
-export interface UpdatedUse {
-  readonly graph: string;
-  readonly seq: number;
-  readonly changed: boolean;
-}
+export type ActionUses = EditorApi["ActionUses"];
+export type UpdatedUse = EditorApi["UpdatedGraph"];
 
 const below = (id: string) => `/api/actions/${encodeURIComponent(id)}`;
 
@@ -61,16 +30,12 @@ export function useLibrary() {
   });
 }
 
-export function refreshLibrary(client: QueryClient): Promise<void> {
-  return client.invalidateQueries({ queryKey: queryKeys.actions });
-}
-
 /** Actions that were deleted and can be brought back. */
 export function useDeletedActions(wanted: boolean) {
   return useQuery({
     enabled: wanted,
     queryKey: [...queryKeys.actions, "deleted"],
-    queryFn: ({ signal }) => fetchJson<GraphSummary[]>("/api/actions?deleted=true", { signal }),
+    queryFn: ({ signal }) => fetchJson<GraphSummary[]>("/api/actions/deleted", { signal }),
   });
 }
 
@@ -87,6 +52,11 @@ export function previewAction(text: string): Promise<Preview> {
 /** Takes in the file of one action as it is. */
 export function importAction(text: string): Promise<GraphSummary> {
   return fetchJson("/api/actions", { method: "POST", body: text });
+}
+
+/** Makes an action that the library has what its file says. */
+export function replaceAction(id: string, text: string): Promise<GraphSummary> {
+  return fetchJson(`${below(id)}/umrf`, { method: "PUT", body: text });
 }
 
 /** Where the browser gets the file of the action alone from. */

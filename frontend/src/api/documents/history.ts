@@ -1,8 +1,8 @@
 /** What was done to a document, what that changed, and the way back to it. */
 import { type QueryClient, useQuery } from "@tanstack/react-query";
-import type { GraphDifference, GraphSummary } from "./graphs";
-import { fetchJson } from "./http";
-import type { EditorApi } from "./schema/editor";
+import type { GraphDifference, GraphSummary } from "../graphs";
+import { fetchJson } from "../http";
+import type { EditorApi } from "../schema/editor";
 
 export type HistoryEntry = EditorApi["HistoryEntry"];
 

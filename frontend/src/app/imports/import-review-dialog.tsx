@@ -1,10 +1,11 @@
 /** What was translated in a file of an old dialect, before it is kept. */
 import { Button, Group, Modal, Text } from "@mantine/core";
 import { useSyncExternalStore } from "react";
-import type { ProblemPlace } from "../api/graphs";
-import { countsOf, countWords } from "../graph/problems/problem-kinds";
-import { toldProblems } from "../graph/problems/told-problems";
-import { dialectWords, type ImportUnderReview, importReviews } from "./import-review";
+import type { ProblemPlace } from "../../api/graphs";
+import { countsOf, countWords } from "../../graph/problems/problem-kinds";
+import { toldProblems } from "../../graph/problems/told-problems";
+import { dialectWords } from "./dialects";
+import { type ImportUnderReview, importReviews } from "./import-review";
 import style from "./import-review-dialog.module.css";
 
 const MOST_PROBLEMS = 8;

@@ -2,11 +2,11 @@
 import { Button, Skeleton } from "@mantine/core";
 import { IconAlertTriangle, IconFileImport, IconPlus } from "@tabler/icons-react";
 import type { ReactNode } from "react";
-import { useGraphs } from "../api/graphs";
-import { errorText } from "../api/http";
-import { useMay } from "../api/use-person";
-import { Empty } from "../ui/empty";
-import { DeletedGraphs } from "./deleted-graphs";
+import { useGraphs } from "../../api/graphs";
+import { errorText } from "../../api/http";
+import { useMay } from "../../api/use-person";
+import { Empty } from "../../ui/empty";
+import { DeletedGraphs } from "../deleted-graphs";
 import { GraphCards } from "./graph-cards";
 import style from "./home.module.css";
 

@@ -1,0 +1,114 @@
+/** Actions to be placed on the canvas: of the library, of graphs, and what robots have besides. */
+
+import { Button } from "@mantine/core";
+import { notifications } from "@mantine/notifications";
+import { useQueryClient } from "@tanstack/react-query";
+import { useState } from "react";
+import { Link } from "wouter";
+import { refreshLibrary } from "../api/graphs";
+import { errorText } from "../api/http";
+import { useLive } from "../api/live/use-live";
+import type { NewAction } from "../graph/edit";
+import { ActionRow } from "./action-row";
+import { RowSkeletons } from "./graph-rows";
+import { matchesSearch } from "./graph-selection";
+import { type KnownAction, signature, useKnownActions } from "./known-actions";
+import { type RobotAction, robotTemplate, useRobotsKnowledge } from "./robot-actions";
+import style from "./sidebar.module.css";
+import { takeFromRobot } from "./take-from-robot";
+
+type Place = (template: NewAction) => void;
+
+const bare = (template: NewAction): KnownAction => ({
+  template,
+  document: null,
+  usedIn: [],
+  takes: [],
+  gives: [],
+});
+
+const fits = (search: string, template: NewAction): boolean =>
+  matchesSearch(search, template.name, template.description, signature(template));
+
+function RobotRow({ has, onPlace }: { has: RobotAction; onPlace: Place }) {
+  const client = useQueryClient();
+  const { runner } = useLive();
+  const [busy, setBusy] = useState(false);
+  const take = async () => {
+    setBusy(true);
+    try {
+      await takeFromRobot(runner, has);
+    } catch (error) {
+      notifications.show({ color: "red", title: "Not taken over", message: errorText(error) });
+    } finally {
+      await refreshLibrary(client);
+      setBusy(false);
+    }
+  };
+  return (
+    <div className={style.onRobot}>
+      <ActionRow known={bare(robotTemplate(has.action))} onPlace={onPlace} />
+      <Button size="compact-xs" variant="subtle" loading={busy} onClick={() => void take()}>
+        Take over
+        <span className="visually-hidden">
+          {" "}
+          {has.action.name} from {has.robot}
+        </span>
+      </Button>
+    </div>
+  );
+}
+
+/** What robots have and neither the library nor a graph knows. */
+function OnRobots({ search, known, onPlace }: RobotsProps) {
+  const { byName } = useRobotsKnowledge();
+  const found = [...byName.values()].flatMap(([has]) =>
+    has && !known.has(has.action.name) && fits(search, robotTemplate(has.action)) ? [has] : [],
+  );
+  if (found.length === 0) return null;
+  return (
+    <>
+      <div className={style.heading}>
+        <h2>Only on robots</h2>
+      </div>
+      {found.map((has) => (
+        <RobotRow key={has.action.name} has={has} onPlace={onPlace} />
+      ))}
+    </>
+  );
+}
+
+interface RobotsProps {
+  search: string;
+  known: ReadonlySet<string>;
+  onPlace: Place;
+}
+
+export function PlaceableActions({ search, onPlace }: { search: string; onPlace: Place }) {
+  const { actions, ready } = useKnownActions();
+  const shown = actions.filter(({ template }) => fits(search, template));
+  const fresh = search.trim();
+  const exact = shown.some(({ template }) => template.name === fresh);
+  if (!ready) return <RowSkeletons count={4} />;
+  return (
+    <>
+      <p className={style.how}>
+        Drag or tap to place. <Link to="/actions">The library</Link>
+      </p>
+      {shown.map((known) => (
+        <ActionRow key={known.template.name} known={known} onPlace={onPlace} />
+      ))}
+      {fresh !== "" && !exact && <ActionRow known={bare({ name: fresh })} onPlace={onPlace} />}
+      {shown.length === 0 && fresh === "" && (
+        <p className={style.hint}>
+          Actions appear here once a graph uses them. Type a name above to make a new one.
+        </p>
+      )}
+      <OnRobots
+        search={search}
+        known={new Set(actions.map(({ template }) => template.name))}
+        onPlace={onPlace}
+      />
+    </>
+  );
+}
