@@ -1,16 +1,16 @@
 /** What differs between two moments: actions and arrows that came, went or changed, field by field. */
 import type { GraphDifference } from "../api/graphs";
 import style from "./difference-view.module.css";
-import { changedLines, type FieldChange } from "./difference-words";
+import { type FieldChange, linesOf } from "./difference-words";
 
 type Changes = Pick<GraphDifference, "actions" | "relations"> & { fields?: readonly FieldChange[] };
 
 function Fields({ fields }: { fields: readonly FieldChange[] }) {
-  const lines = fields.flatMap(changedLines);
+  const lines = linesOf(fields);
   return (
     <ul className={style.fields}>
       {lines.map((line) => (
-        <li key={line.name}>
+        <li key={`${line.name} ${line.before === null}`}>
           <span>{line.name}</span>{" "}
           {line.before !== null && (
             <del>

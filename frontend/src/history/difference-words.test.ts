@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { changedLines, fieldWords } from "./difference-words";
+import { changedLines, fieldWords, linesOf } from "./difference-words";
 
 test("of a parameter only what is another is told", () => {
   const before = '{"pvf_type":"number","pvf_value":1}';
@@ -22,4 +22,27 @@ test("other fields are values", () => {
     { name: "description", before: "a", after: "b" },
   ]);
   expect(fieldWords("remap/a")).toBe("remap of a");
+});
+
+test("the numbers of a pose that came are one line", () => {
+  const after = '{"pvf_type":"number"}';
+  const came = ["grip/position/x", "grip/position/y", "speed"].map((path) => ({
+    field: `in/${path}`,
+    before: null,
+    after,
+  }));
+  const changed = { field: "in/grip/w", before: after, after: '{"pvf_type":"string"}' };
+  expect(linesOf([...came, changed])).toEqual([
+    { name: "input grip.(position.x, position.y)", before: null, after: "number" },
+    { name: "input speed", before: null, after: "number" },
+    { name: "input grip.w, type", before: '"number"', after: '"string"' },
+  ]);
+});
+
+test("what the JSON says besides is told by its name", () => {
+  const before = '{"pvf_type":"number","pvf_value":1}';
+  const after = '{"pvf_type":"number","pvf_unit":"m","pvf_value":1}';
+  expect(changedLines({ field: "in/x", before, after })).toEqual([
+    { name: "input x, unit", before: null, after: '"m"' },
+  ]);
 });

@@ -1,5 +1,5 @@
 /** What differs between two moments of a document, in words. Pure. */
-import { memberText } from "../graph/json-members";
+import { memberNames, memberText } from "../graph/json-members";
 import { pathWords } from "../graph/value-text";
 
 /** A field that says something else. */
@@ -38,13 +38,15 @@ export function fieldWords(field: string): string {
   return field.replaceAll("_", " ");
 }
 
-const MEMBERS = {
+const MEMBERS: Readonly<Record<string, string>> = {
   pvf_type: "type",
-  pvf_value: "value",
   pvf_allowed_values: "allowed",
   pvf_required: "required",
   pvf_updatable: "may be replaced",
-} as const;
+};
+
+const memberWord = (member: string): string =>
+  MEMBERS[member] ?? member.replace(/^pvf_/, "").replaceAll("_", " ");
 
 const isParameter = (value: unknown): value is string =>
   typeof value === "string" && value.trimStart().startsWith("{");
@@ -75,10 +77,39 @@ export function changedLines({ field, before, after }: FieldChange): ChangedLine
     const side = (value: unknown) => (isParameter(value) ? parameterWords(value) : null);
     return [{ name, before: side(before), after: side(after) }];
   }
-  const lines = Object.entries(MEMBERS).flatMap(([member, word]) => {
+  const members = [...new Set([...memberNames(before), ...memberNames(after)])];
+  const lines = members.flatMap((member) => {
     const [was, is] = [memberText(before, member), memberText(after, member)];
-    const spoken = member === "pvf_value" ? name : `${name}, ${word}`;
+    const spoken = member === "pvf_value" ? name : `${name}, ${memberWord(member)}`;
     return was === is ? [] : [{ name: spoken, before: was, after: is }];
   });
   return lines.length > 0 ? lines : [{ name, before, after }];
 }
+
+/** Lines of parameters of one group that came or went alike are one: a pose has seven. */
+export function linesOf(fields: readonly FieldChange[]): ChangedLine[] {
+  const lines = fields.flatMap(changedLines);
+  const told = new Map<string, { line: ChangedLine; names: string[] }>();
+  for (const line of lines) {
+    const isWhole = line.before === null || line.after === null;
+    const [, group, rest = ""] = /^((?:in|out)put [^.,]+)\.([^,]+)$/.exec(line.name) ?? [];
+    const key =
+      isWhole && group !== undefined
+        ? `${group} ${line.before} ${line.after}`
+        : `${told.size} ${line.name}`;
+    const known = told.get(key);
+    if (known) known.names.push(rest);
+    else
+      told.set(key, {
+        line: { ...line, name: group && isWhole ? group : line.name },
+        names: [rest],
+      });
+  }
+  return [...told.values()].map(({ line, names }) => ({
+    ...line,
+    name: names[0] === "" || line.name.includes(".") ? line.name : `${line.name}.${braced(names)}`,
+  }));
+}
+
+const braced = (names: readonly string[]): string =>
+  names.length === 1 ? (names[0] ?? "") : `(${names.join(", ")})`;

@@ -5,6 +5,7 @@ import { renameDocument } from "../graph/edit";
 import type { Action } from "../graph/model";
 import { DescriptionField, NameField, TypeField } from "./fields/action-fields";
 import { ProblemsContext, type Told } from "./fields/field-problems";
+import { InLibraryContext } from "./fields/in-library";
 import { ViewOnly } from "./fields/view-only";
 import style from "./inspector.module.css";
 import { LabelsField } from "./labels-field";
@@ -30,8 +31,10 @@ export function LibraryActionForm({ action, names, told }: Props) {
           />
           <DescriptionField action={action} />
           <LabelsField />
-          <ParameterList action={action} side="in" />
-          <ParameterList action={action} side="out" />
+          <InLibraryContext value={true}>
+            <ParameterList action={action} side="in" />
+            <ParameterList action={action} side="out" />
+          </InLibraryContext>
           <section className={style.section}>
             <TypeField action={action} />
           </section>

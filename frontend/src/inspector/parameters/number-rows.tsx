@@ -13,6 +13,7 @@ import { complaint, shown, typed, withValue } from "../../graph/parameters/value
 import { pathWords } from "../../graph/value-text";
 import { DraftInput } from "../../ui/draft-input";
 import { Tooltip } from "../../ui/floating/tooltip";
+import { useInLibrary } from "../fields/in-library";
 import { SharedField } from "../fields/shared-field";
 import style from "../inspector.module.css";
 import flowStyle from "./data-flow.module.css";
@@ -35,7 +36,8 @@ export function NumberField({
 }: Omit<Props, "block"> & { letter: string; parameter: Parameter }) {
   const { doc } = useEditorContext();
   const field = readValue(parameter);
-  const unwritten = side === "in" && field.required && field.value === null;
+  const inLibrary = useInLibrary();
+  const unwritten = side === "in" && field.required && field.value === null && !inLibrary;
   return (
     <SharedField of={action.key} field={`${side}/${parameter.path}`}>
       <div data-unwritten={unwritten || undefined}>
@@ -93,6 +95,7 @@ function givenTo(givers: readonly (readonly InputGiver[])[]): InputGiver[] {
 
 export function NumberRows({ action, side, block }: Props) {
   const { graph } = useEditorContext();
+  const inLibrary = useInLibrary();
   const [open, setOpen] = useState(false);
   const flow = use(DataFlowContext);
   const members = block.rows.flatMap((row) => row.members.map(({ parameter }) => parameter));
@@ -113,7 +116,7 @@ export function NumberRows({ action, side, block }: Props) {
           <span className={style.path}>{name}</span>
           <span className={style.type}>{block.word}</span>
           <span className={style.fieldEnd}>
-            {side === "in" && (
+            {side === "in" && !inLibrary && (
               <OutputPicker
                 owner={action.key}
                 paths={paths}

@@ -11,6 +11,7 @@ import { outputChoices } from "../../graph/parameters/output-choices";
 import type { ParameterValue } from "../../graph/parameters/values";
 import { pathWords } from "../../graph/value-text";
 import { Tooltip } from "../../ui/floating/tooltip";
+import { useInLibrary } from "../fields/in-library";
 import style from "../inspector.module.css";
 import flowStyle from "./data-flow.module.css";
 import { GiverChips } from "./given-value";
@@ -120,6 +121,7 @@ export function ParameterValueField({
   const field = readValue(parameter);
   const givers = side === "in" ? takenGivers(flow.get(action.key)?.get(parameter.path)) : [];
   const given = givers.length > 0;
+  const inLibrary = useInLibrary();
   const input = (
     <ParameterInput
       label={given ? "" : label}
@@ -128,7 +130,7 @@ export function ParameterValueField({
       parameter={parameter}
       write={(change) => setParameter(doc, action.key, side, parameter.path, change)}
       end={
-        side === "in" && !given && !field.locked ? (
+        side === "in" && !given && !field.locked && !inLibrary ? (
           <Picker action={action} parameter={parameter} givers={givers} renamed={false} />
         ) : null
       }
@@ -154,7 +156,8 @@ export function ParameterField({ action, side, parameter, name }: Props) {
   const field = readValue(parameter);
   const lights = useDataLights(flow, action.key, side, [parameter.path]);
   const list = side === "in" ? action.inputs : action.outputs;
-  const unwritten = side === "in" && field.required && field.value === null;
+  const inLibrary = useInLibrary();
+  const unwritten = side === "in" && field.required && field.value === null && !inLibrary;
   return (
     <div className={style.parameter} data-unwritten={unwritten || undefined} {...lights}>
       <ParameterValueField

@@ -13,6 +13,7 @@ import {
 import { DraftInput } from "../../ui/draft-input";
 import { Tooltip } from "../../ui/floating/tooltip";
 import { Segments } from "../../ui/segments";
+import { useInLibrary } from "../fields/in-library";
 import style from "../inspector.module.css";
 
 const HINTS: Partial<Record<string, string>> = {
@@ -81,8 +82,9 @@ function TakeAway({ name, write }: Pick<ValueProps, "name" | "write">) {
 
 function TypedValue(props: ValueProps & { native: NonNullable<ParameterValue["native"]> }) {
   const { label, name, field, end, write, native } = props;
+  const inLibrary = useInLibrary();
   const clearable = native === "string" && field.value !== null;
-  const empty = field.required && !field.locked ? "fill in" : "no value";
+  const empty = field.required && !field.locked && !inLibrary ? "fill in" : "no value";
   return (
     <DraftInput
       label={label}
@@ -113,13 +115,14 @@ function TypedValue(props: ValueProps & { native: NonNullable<ParameterValue["na
 /** One of the allowed values; another that stands there is shown, too. */
 function AllowedValue({ label, name, field, end, write }: ValueProps) {
   const { allowed, value } = field;
+  const inLibrary = useInLibrary();
   const strange = value === null || allowed.includes(value) ? [] : [value];
   return (
     <div className={style.allowed}>
       <Select
         label={label}
         aria-label={name}
-        placeholder="fill in"
+        placeholder={inLibrary ? "no value" : "fill in"}
         clearable
         flex={1}
         data={[
