@@ -141,9 +141,9 @@ test("arrows: healed, filled, led elsewhere, drawn by two taps", async ({ browse
     const [a, b] = [await boxOf(before), await boxOf(behind)];
     return { x: a.x + a.width + (b.x - a.x - a.width) * 0.75, y: b.y + b.height / 2 };
   };
-  const row = page
-    .getByRole("complementary", { name: "Library" })
-    .getByRole("button", { name: /^CheckBattery/ });
+  const library = page.getByRole("complementary", { name: "Library" });
+  await library.getByText("Actions", { exact: true }).click();
+  const row = library.getByRole("button", { name: /^CheckBattery/ });
   await row.hover();
   await page.mouse.down();
   const at = await gap();

@@ -180,7 +180,11 @@ test("each has a colour that nobody else has, everywhere the same, and leaves wi
     colors[1] ?? "",
   );
   await ada.page.screenshot({ path: test.info().outputPath("colours.png") });
-  await ada.page.getByText("Library", { exact: true }).click();
+  await ada.page
+    .getByRole("complementary", { name: "Library" })
+    .getByText("Graphs")
+    .first()
+    .click();
   await mari.page.mouse.move(700, 4);
   await expect(pointer("名前")).toHaveCount(0);
 });

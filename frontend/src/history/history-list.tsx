@@ -29,8 +29,7 @@ function Changed({ id, from, to }: { id: string; from: number; to: number }) {
   const found = useDifference(id, from, to);
   if (found.isPending) return <Skeleton height={24} />;
   if (found.isError) return <p role="alert">{errorText(found.error)}</p>;
-  if (!meansSomething(found.data))
-    return <p className={style.quiet}>Nothing that means anything.</p>;
+  if (!meansSomething(found.data)) return <p className={style.quiet}>Only where things stand.</p>;
   return <DifferenceView found={found.data} label="What it changed" />;
 }
 

@@ -12,7 +12,10 @@ const DONE: Readonly<Record<HistoryEntry["kind"], string>> = {
   recovered: "brought it back",
 };
 
-export function doneWords({ kind, version }: Pick<HistoryEntry, "kind" | "version">): string {
+type Done = Pick<HistoryEntry, "kind" | "version" | "adapted">;
+
+export function doneWords({ kind, version, adapted }: Done): string {
+  if (adapted) return `took parameters of ${adapted.action} over`;
   return kind === "published" && version?.label ? `kept version ${version.label}` : DONE[kind];
 }
 

@@ -4,7 +4,6 @@ import { Button } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
-import { Link } from "wouter";
 import { refreshLibrary } from "../api/graphs";
 import { errorText } from "../api/http";
 import { useLive } from "../api/live/use-live";
@@ -92,9 +91,7 @@ export function PlaceableActions({ search, onPlace }: { search: string; onPlace:
   if (!ready) return <RowSkeletons count={4} />;
   return (
     <>
-      <p className={style.how}>
-        Drag or tap to place. <Link to="/actions">The library</Link>
-      </p>
+      <p className={style.how}>Drag or tap to place.</p>
       {shown.map((known) => (
         <ActionRow key={known.template.name} known={known} onPlace={onPlace} />
       ))}

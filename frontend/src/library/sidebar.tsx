@@ -2,14 +2,14 @@
 import { ActionIcon, Kbd, TextInput } from "@mantine/core";
 import { IconFileImport, IconPlus, IconSearch } from "@tabler/icons-react";
 import { useState } from "react";
+import { Link } from "wouter";
 import { useGraphs } from "../api/graphs";
 import { useMay } from "../api/use-person";
 import type { NewAction } from "../graph/edit";
 import { Tooltip } from "../ui/floating/tooltip";
-import { type ListTab, useListTab } from "../ui/hooks/use-list-tab";
+import { useListTab } from "../ui/hooks/use-list-tab";
 import { lazyPart } from "../ui/parts/lazy-part";
 import { PartBoundary } from "../ui/parts/part-boundary";
-import { Segments } from "../ui/segments";
 import { GraphRow, RowSkeletons } from "./graph-rows";
 import { matchesSearch } from "./graph-selection";
 import style from "./sidebar.module.css";
@@ -25,11 +25,6 @@ interface Props {
   /** Puts an action on the canvas; absent where there is none. */
   onPlace?: (template: NewAction) => void;
 }
-
-const TABS: readonly { value: ListTab; label: string }[] = [
-  { value: "graphs", label: "Graphs" },
-  { value: "actions", label: "Actions" },
-];
 
 function Tools({ onNew, onImport }: Pick<Props, "onNew" | "onImport">) {
   return (
@@ -76,7 +71,7 @@ function GraphList({ search, current }: { search: string; current: string | unde
 
 export function Sidebar({ current, onNew, onImport, onPlace }: Props) {
   const [search, setSearch] = useState("");
-  const [wanted, setTab] = useListTab();
+  const [wanted] = useListTab();
   const mayEdit = useMay("edit");
   const mayPlace = onPlace !== undefined && mayEdit;
   const tab = mayPlace ? wanted : "graphs";
@@ -93,20 +88,9 @@ export function Sidebar({ current, onNew, onImport, onPlace }: Props) {
         data-search
       />
       <div className={style.heading}>
-        {mayPlace ? (
-          <Segments
-            className={style.tabs}
-            label="What is listed"
-            size="xs"
-            fullWidth
-            data={TABS}
-            value={tab}
-            onChange={setTab}
-          />
-        ) : (
-          <h2>Graphs</h2>
-        )}
-        {mayEdit && <Tools onNew={onNew} onImport={onImport} />}
+        <h2>{tab === "graphs" ? "Graphs" : "Actions"}</h2>
+        {tab === "actions" && <Link to="/actions">The library</Link>}
+        {mayEdit && tab === "graphs" && <Tools onNew={onNew} onImport={onImport} />}
       </div>
       <div className={style.scroll}>
         {tab === "graphs" ? (

@@ -11,17 +11,19 @@ import { useEditorContext } from "../../edit-actions/editor-context";
 import type { ToldProblem } from "../../graph/problems/told-problems";
 import { Tooltip } from "../../ui/floating/tooltip";
 import { whenThere } from "../../ui/focus-field";
+import { type ListTab, useListTab } from "../../ui/hooks/use-list-tab";
 import { lazyPart } from "../../ui/parts/lazy-part";
 import { PartBoundary } from "../../ui/parts/part-boundary";
 import { Segments } from "../../ui/segments";
 import { DryRunButton } from "../menus/dry-run-button";
 import style from "./layouts.module.css";
-import type { EditorSidePanel, Pane, Panels } from "./use-panels";
+import type { Pane, Panels } from "./use-panels";
 
 const ListRail = lazyPart(() => import("./list-rail").then((part) => part.ListRail));
 
-const SIDES: readonly { value: EditorSidePanel; label: string }[] = [
-  { value: "library", label: "Library" },
+const SIDES: readonly { value: ListTab | "outline"; label: string }[] = [
+  { value: "graphs", label: "Graphs" },
+  { value: "actions", label: "Actions" },
   { value: "outline", label: "Outline" },
 ];
 
@@ -146,9 +148,29 @@ interface DeskParts extends Parts {
   list: () => ReactNode;
 }
 
+/** Which of the lists is shown; actions are for who may place them. */
+function SideTabs({ panels: { side, setSide } }: { panels: Panels }) {
+  const { mayEdit } = useEditorContext();
+  const [tab, setTab] = useListTab();
+  const list = mayEdit ? tab : "graphs";
+  return (
+    <Segments
+      label="What is listed"
+      fullWidth
+      size="xs"
+      data={SIDES.filter(({ value }) => mayEdit || value !== "actions")}
+      value={side === "outline" ? side : list}
+      onChange={(next) => {
+        if (next !== "outline") setTab(next);
+        setSide(next === "outline" ? next : "library");
+      }}
+    />
+  );
+}
+
 /** The lists: beside the canvas, or over it where there is no room or a rail in their place. */
 function ListSide({ wide, panels, told, outline, list }: DeskParts) {
-  const { left, side, setSide, folded, fold } = panels;
+  const { left, side, folded, fold } = panels;
   const carrying = useSyncExternalStore(actionDrag.subscribe, actionDrag.now) !== null;
   const beside = wide && !folded;
   const open = beside || (left && !carrying);
@@ -170,7 +192,7 @@ function ListSide({ wide, panels, told, outline, list }: DeskParts) {
         aria-label="Library"
       >
         <div className={style.sides}>
-          <Segments fullWidth size="xs" data={SIDES} value={side} onChange={setSide} />
+          <SideTabs panels={panels} />
           {beside && <FoldButton fold={fold} />}
         </div>
         <div className={style.side}>{side === "outline" ? outline : list()}</div>

@@ -1,0 +1,337 @@
+/** The library of actions: made, used, changed with the graphs that use it, imported; by keys and on a phone. */
+
+import { expect, type Locator, type Page, test } from "@playwright/test";
+import { card, saved } from "./canvas";
+import { Product } from "./product";
+
+const product = new Product();
+
+test.beforeAll(() => product.start());
+test.afterAll(() => product.dispose());
+
+const leaf = (kind: string, more: object = {}) => ({ pvf_type: kind, ...more });
+
+function post(path: string, body: object): Promise<{ id: string }> {
+  const headers = { "content-type": "application/json" };
+  return product.ask(path, { method: "POST", body: JSON.stringify(body), headers });
+}
+
+const action = (name: string, input_parameters: object) => ({
+  ...{ name, instance_id: 0, type: "sync", input_parameters },
+});
+
+/** The id of a graph of one action. */
+async function using(graph_name: string, one: ReturnType<typeof action>): Promise<string> {
+  const end = { name: one.name, instance_id: 0 };
+  const graph = { graph_name, graph_entry: [end], graph_exit: [end], actions: [one] };
+  return (await post("/api/graphs", graph)).id;
+}
+
+const list = (page: Page): Locator => page.getByRole("navigation", { name: "Actions" });
+
+/** Chooses files as a person does. */
+async function choose(page: Page, files: { name: string; body: object }[]): Promise<void> {
+  const chooser = page.waitForEvent("filechooser");
+  await page.getByRole("button", { name: "Import", exact: true }).click();
+  const mimeType = "application/json";
+  await (await chooser).setFiles(
+    files.map(({ name, body }) => ({ name, mimeType, buffer: Buffer.from(JSON.stringify(body)) })),
+  );
+}
+
+async function addParameter(page: Page, name: string, type: string): Promise<void> {
+  await page.getByRole("button", { name: "Add", exact: true }).first().click();
+  await page.getByRole("combobox", { name: "Name of the parameter" }).fill(name);
+  await page.keyboard.press("Escape");
+  await page.getByRole("combobox", { name: "Type of the parameter" }).click();
+  await page.getByRole("option", { name: type, exact: true }).click();
+  await page.locator("form").getByRole("button", { name: "Add", exact: true }).click();
+}
+
+async function renameParameter(page: Page, from: string, to: string): Promise<void> {
+  await page.getByRole("button", { name: `What the parameter ${from} is` }).click();
+  const settings = page.getByRole("region", { name: `What the parameter ${from} is` });
+  await settings.getByRole("textbox", { name: "Name" }).fill(to);
+  await page.keyboard.press("Enter");
+}
+
+test("an action with a pose is made from nothing and used in a graph", async ({ browser }) => {
+  const { page, context, failures } = await product.person(browser, "Ada");
+  await page.getByRole("link", { name: "Actions", exact: true }).click();
+  await page.getByRole("button", { name: "New action" }).click();
+  await page.getByRole("textbox", { name: "Name" }).fill("GripPallet");
+  await page.keyboard.press("Enter");
+  await saved(page);
+  await expect(page.getByText("libgrip_pallet.so")).toBeVisible();
+  await addParameter(page, "grip", "pose");
+  await addParameter(page, "force", "number");
+  await page.getByRole("textbox", { name: "Description" }).fill("Takes a pallet by its side");
+  await page.getByRole("button", { name: "Done" }).click();
+  const takes = page.getByRole("table", { name: "Takes" });
+  await expect(takes.getByRole("row", { name: /grip pose/ })).toBeVisible();
+  await expect(takes.getByRole("row", { name: /force number/ })).toBeVisible();
+  await saved(page);
+  await page.getByRole("button", { name: /input_parameters\.hpp$/ }).click();
+  await expect(page.locator("pre")).toContainText("force");
+
+  await page.goto(`${product.url}/graphs/${await using("lifting", action("Wait", {}))}`);
+  await saved(page);
+  const library = page.getByRole("complementary", { name: "Library" });
+  await library.getByText("Actions", { exact: true }).click();
+  await library.getByRole("button", { name: /^GripPallet/ }).click();
+  await expect(card(page, "GripPallet")).toBeVisible();
+  await saved(page);
+  await page.goto(`${product.url}/actions`);
+  await list(page)
+    .getByRole("link", { name: /GripPallet/ })
+    .click();
+  await expect(page.getByRole("list", { name: "Graphs that use it" })).toContainText("lifting");
+  expect(failures).toEqual([]);
+  await context.close();
+});
+
+test("a parameter is called otherwise, and graphs follow after a look", async ({ browser }) => {
+  const speed = (value: number) => ({ speed: leaf("number", { pvf_value: value }) });
+  const night = await using("night_round", action("DriveSlowly", speed(3)));
+  await using("day_round", action("DriveSlowly", speed(5)));
+  const { page, context, failures } = await product.person(browser, "Ada");
+  await page.goto(`${product.url}/actions?name=DriveSlowly`);
+  await page.getByRole("button", { name: "Add to the library" }).click();
+  await saved(page);
+  await page.getByRole("button", { name: "Edit" }).click();
+  await renameParameter(page, "speed", "velocity");
+  const older = page.getByRole("region", { name: "Older parameters" });
+  await expect(older).toContainText("2 graphs still use the older parameters.");
+  await older.getByRole("button", { name: "Look and update" }).click();
+  const dialog = page.getByRole("dialog", { name: "Graphs that use DriveSlowly" });
+  // Until somebody says that it is the same, the value would be lost.
+  await expect(dialog.getByRole("list", { name: "What changes in night_round" })).toContainText(
+    "number, = 3",
+  );
+  const renamed = dialog.getByRole("checkbox", { name: "speed is now velocity" });
+  await expect(renamed).not.toBeChecked();
+  await renamed.check();
+  await expect(
+    dialog.getByRole("list", { name: "What changes in night_round" }).locator("ins"),
+  ).toContainText("number, = 3");
+
+  // Somebody changes one of them meanwhile: nothing is written, and the place is told.
+  await expect(dialog.getByRole("button", { name: "Update 2 graphs" })).toBeEnabled();
+  const patch = { method: "PATCH", body: JSON.stringify({ description: "at night" }) };
+  const headers = { "content-type": "application/json" };
+  await product.ask(`/api/graphs/${night}`, { ...patch, headers });
+  await dialog.getByRole("button", { name: "Update 2 graphs" }).click();
+  await expect(dialog.getByRole("alert")).toContainText("night_round");
+  await dialog.getByRole("button", { name: "Update 2 graphs" }).click();
+  await expect(dialog.getByRole("status").first()).toContainText("2 graphs are updated");
+  await dialog.getByRole("link", { name: "History of night_round" }).click();
+  const history = page.getByRole("dialog", { name: "What was done to this graph" });
+  await expect(history.getByRole("list", { name: "History" })).toContainText("took parameters");
+  const taken = history.getByRole("listitem").filter({ hasText: "took parameters" });
+  await taken.getByRole("button", { name: "What changed" }).click();
+  await expect(history.getByRole("list", { name: "What it changed" })).toContainText("velocity");
+  const now = await product.ask<object>(`/api/graphs/${night}/umrf`);
+  expect(JSON.stringify(now)).toMatch(/"velocity":\{[^}]*"pvf_value":3/);
+  expect(failures).toEqual([]);
+  await context.close();
+});
+
+test("what a robot has is told apart from the library, and taken over", async ({ browser }) => {
+  const robot = { method: "POST", body: JSON.stringify({ name: "atlas" }) };
+  const headers = { "content-type": "application/json" };
+  await product.ask("/api/robots", { ...robot, headers }, product.runnerUrl);
+  await post("/api/actions", action("LiftBox", { height: leaf("number") }));
+  const { page, context, failures } = await product.person(browser, "Ada");
+  const allowed = { "access-control-allow-origin": product.url };
+  const credentials = { "access-control-allow-credentials": "true" };
+  const has = (name: string, inputs: object) => ({ name, inputs, outputs: {} });
+  const actions = [has("LiftBox", { height: "string" }), has("OnlyThere", { "at::x": "number" })];
+  await page.route("**/api/robots/atlas/known", (route) =>
+    route.fulfill({
+      headers: { ...allowed, ...credentials },
+      json: { actions, graphs: [], unread: 0 },
+    }),
+  );
+  await page.route("**/api/robots/atlas/known/OnlyThere", (route) =>
+    route.fulfill({
+      headers: { ...allowed, ...credentials },
+      json: action("OnlyThere", { at: { x: leaf("number") } }),
+    }),
+  );
+  await page.goto(`${product.url}/actions`);
+  await page.getByRole("button", { name: "On atlas" }).click();
+  await expect(list(page).getByRole("link")).toHaveCount(2);
+  await list(page)
+    .getByRole("link", { name: /LiftBox/ })
+    .click();
+  await expect(page.getByRole("list", { name: "Robots" })).toContainText("height is string");
+  await list(page)
+    .getByRole("link", { name: /OnlyThere/ })
+    .click();
+  await expect(page.getByRole("list", { name: "Robots" })).toContainText("has it");
+
+  // The same from beside a canvas.
+  await page.goto(`${product.url}/graphs/${await using("boxes", action("Wait", {}))}`);
+  const library = page.getByRole("complementary", { name: "Library" });
+  await library.getByText("Actions", { exact: true }).click();
+  await library.getByRole("button", { name: "Take over OnlyThere from atlas" }).click();
+  await expect(library.getByText("Only on robots")).toHaveCount(0);
+  await expect(library.getByRole("button", { name: /^OnlyThere/ })).toBeVisible();
+  const known = await product.ask<{ name: string; document: string | null }[]>("/api/actions");
+  expect(known.find(({ name }) => name === "OnlyThere")?.document).toBeTruthy();
+  expect(failures).toEqual([]);
+  await context.close();
+});
+
+test("edits of an action are undone, and its history leads back", async ({ browser }) => {
+  const { id } = await post("/api/actions", { name: "LookAround" });
+  const { page, context, failures } = await product.person(browser, "Ada");
+  await page.goto(`${product.url}/actions/${id}?edit`);
+  await saved(page);
+  const name = page.getByRole("textbox", { name: "Name", exact: true });
+  await name.fill("class");
+  await name.press("Enter");
+  await expect(page.getByText(/No C\+\+ package: .*a word of C\+\+/)).toBeVisible();
+  await page.getByRole("button", { name: "Undo" }).click();
+  await expect(page.getByText("liblook_around.so")).toBeVisible();
+  await addParameter(page, "angle", "number");
+  await saved(page);
+  await page.getByRole("tab", { name: "History" }).click();
+  await page
+    .getByRole("button", { name: /^Make it so again/ })
+    .last()
+    .click();
+  await expect(page.getByText("Takes none.")).toBeVisible();
+  await expect(page.getByRole("list", { name: "History" })).toContainText("went back");
+  expect(failures).toEqual([]);
+  await context.close();
+});
+
+test("files of actions are imported into the library, many at once", async ({ browser }) => {
+  const { page, context, failures } = await product.person(browser, "Ada");
+  await page.goto(`${product.url}/actions`);
+  await choose(page, [
+    { name: "open.umrf.json", body: action("OpenHatch", { x: leaf("number") }) },
+  ]);
+  await expect(page.getByRole("heading", { name: "OpenHatch", level: 1 })).toBeVisible();
+  await expect(page.getByRole("table", { name: "Takes" })).toContainText("number");
+  await choose(page, [
+    { name: "a.umrf.json", body: action("OpenHatch", { x: leaf("string") }) },
+    { name: "b.umrf.json", body: action("ShutHatch", {}) },
+    { name: "c.umrf.json", body: action("WatchHatch", {}) },
+    { name: "d.json", body: { nothing: true } },
+  ]);
+  await expect(list(page).getByRole("link", { name: /WatchHatch/ })).toBeVisible();
+  await expect(page.getByText("d.json:")).toBeVisible();
+  await page.getByRole("button", { name: "Make them what the files say" }).click();
+  await list(page)
+    .getByRole("link", { name: /OpenHatch/ })
+    .click();
+  await expect(page.getByRole("table", { name: "Takes" })).toContainText("string");
+  expect(failures).toEqual([]);
+  await context.close();
+});
+
+test("an action is made, found and deleted by keys alone", async ({ browser }) => {
+  const { page, context, failures } = await product.person(browser, "Ada");
+  await page.goto(`${product.url}/actions`);
+  await expect(list(page)).toBeVisible();
+  await page.keyboard.press("/");
+  await page.keyboard.type("ByKeys");
+  const fresh = page.getByRole("button", { name: "New action “ByKeys”" });
+  await expect(fresh).toBeVisible();
+  await page.keyboard.press("ArrowDown");
+  await expect(fresh).toBeFocused();
+  await page.keyboard.press("Enter");
+  await expect(page.getByRole("textbox", { name: "Name" })).toHaveValue("ByKeys");
+  await page.keyboard.press("Enter");
+  await expect(page.getByText("libby_keys.so")).toBeVisible();
+  const describe = page.getByRole("textbox", { name: "Description" });
+  for (
+    let i = 0;
+    i < 40 && !(await describe.evaluate((it) => it === document.activeElement));
+    i += 1
+  )
+    await page.keyboard.press("Tab");
+  await page.keyboard.type("made by keys");
+  await page.keyboard.press("Tab");
+  await saved(page);
+  await page.keyboard.press("Escape");
+  await page.getByRole("button", { name: "More about ByKeys" }).focus();
+  await page.keyboard.press("Enter");
+  await page.getByRole("menuitem", { name: "Delete from the library" }).focus();
+  await page.keyboard.press("Enter");
+  await expect(page).toHaveURL(/\/actions$/);
+  await page.getByRole("button", { name: "Deleted actions" }).focus();
+  await page.keyboard.press("Enter");
+  await page.getByRole("button", { name: "Bring back ByKeys" }).focus();
+  await page.keyboard.press("Enter");
+  await expect(page.getByText("Nothing is deleted.")).toBeVisible();
+  expect(failures).toEqual([]);
+  await context.close();
+});
+
+test("on a phone the list and the action follow each other, and nothing is too wide", async ({
+  browser,
+}) => {
+  const { id } = await post("/api/actions", action("PhoneAction", { far: leaf("number") }));
+  const phone = { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true };
+  const { page, context, failures } = await product.person(browser, "Ada", phone);
+  await page.getByRole("link", { name: "Actions", exact: true }).tap();
+  await list(page)
+    .getByRole("link", { name: /PhoneAction/ })
+    .tap();
+  await expect(page).toHaveURL(new RegExp(`/actions/${id}$`));
+  await expect(page.getByRole("heading", { name: "PhoneAction", level: 2 })).toBeVisible();
+  const width = () => page.evaluate(() => document.documentElement.scrollWidth);
+  expect(await width()).toBeLessThanOrEqual(390);
+  await page.getByRole("button", { name: "Edit" }).tap();
+  await expect(page.getByRole("textbox", { name: "Description" })).toBeVisible();
+  expect(await width()).toBeLessThanOrEqual(390);
+  for (const name of ["Done", "More about PhoneAction"]) {
+    const box = await page.getByRole("button", { name }).boundingBox();
+    expect(box?.height).toBeGreaterThanOrEqual(44);
+  }
+  await page.getByRole("link", { name: "All actions" }).tap();
+  await expect(list(page).getByRole("link", { name: /PhoneAction/ })).toBeVisible();
+  expect(failures).toEqual([]);
+  await context.close();
+});
+
+test("a thousand actions are searched without waiting", async ({ browser }) => {
+  const { page, context, failures } = await product.person(browser, "Ada");
+  await page.route("**/api/actions", async (route) => {
+    const one = { description: "moves something from here to there", type: "sync", labels: [] };
+    const known = { used_in: [], differs_in: [], first_seen: "2026-01-01T00:00:00Z", seq: 1 };
+    const parameter = { pvf_type: "number", required: true, text: '{"pvf_type":"number"}' };
+    const inputs = ["speed", "place"].map((path) => ({ path, ...parameter }));
+    const json = Array.from({ length: 1000 }, (_, i) => {
+      const name = `Action${String(i).padStart(4, "0")}`;
+      return { ...one, ...known, name, inputs, outputs: [], document: `d${i}` };
+    });
+    await route.fulfill({ json });
+  });
+  await page.goto(`${product.url}/actions`);
+  const rows = list(page).getByRole("link");
+  await expect(rows).toHaveCount(1000);
+  // From the key to the first frame with what was found.
+  const took = await page
+    .getByRole("textbox", { name: "Search actions" })
+    .evaluate(async (field) => {
+      const times: number[] = [];
+      const setter = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value")?.set;
+      for (const text of ["a", "action09", "action0999", "action0", ""]) {
+        const start = performance.now();
+        setter?.call(field, text);
+        field.dispatchEvent(new Event("input", { bubbles: true }));
+        const count = () => document.querySelectorAll("a[data-row]").length;
+        const wanted = { a: 1000, action09: 100, action0999: 1, action0: 1000, "": 1000 }[text];
+        while (count() !== wanted) await new Promise(requestAnimationFrame);
+        times.push(performance.now() - start);
+      }
+      return times.sort((a, b) => a - b);
+    });
+  expect(took[Math.floor(took.length / 2)]).toBeLessThan(50);
+  expect(failures).toEqual([]);
+  await context.close();
+});
