@@ -1,6 +1,12 @@
 import { expect, test } from "vitest";
 import { type ActionUse, NO_RENAMES } from "../../api/documents/library";
-import { clashes, keyOfRename, renamesOf, suggestedRenames } from "./rename-choices";
+import {
+  clashes,
+  keyOfRename,
+  possibleRenames,
+  renamesOf,
+  suggestedRenames,
+} from "./rename-choices";
 
 const use = (more: Partial<ActionUse>): ActionUse => ({
   graph: "g",
@@ -45,4 +51,22 @@ test("nothing is renamed that nobody has ticked, and two never become one", () =
   });
   expect(clashes(rate, ticked, all)).toBe(true);
   expect(clashes(done, ticked, all)).toBe(false);
+});
+
+test("what nobody suggests can be said by hand, where types allow it", () => {
+  const [number, text] = ['{"pvf_type":"number"}', '{"pvf_type":"string"}'];
+  const fields = [
+    { field: "in/speed", before: number, after: null },
+    { field: "in/velocity", before: null, after: number },
+    { field: "in/rate", before: null, after: number },
+    { field: "in/note", before: null, after: text },
+    { field: "out/done", before: null, after: number },
+  ];
+  const changed = { change: "changed", aid: "a", name: "Drive_0", fields } as const;
+  const difference = { before: 1, after: 1, fields: [], relations: [] };
+  const one = use({ difference: { ...difference, actions: [{ ...changed, fields }] } });
+  const known = [{ side: "in", from: "speed", to: "rate", graphs: 1 } as const];
+  expect(possibleRenames([one, one], known)).toEqual([
+    { side: "in", from: "speed", to: "velocity", graphs: 2 },
+  ]);
 });

@@ -5,10 +5,10 @@ import { useId } from "react";
 import { Link } from "wouter";
 import type { ActionUse, UpdatedUse } from "../../api/documents/library";
 import { errorText } from "../../api/http";
-import { pathWords } from "../../graph/value-text";
 import { DifferenceView } from "../../history/difference-view";
+import { RenameChoices } from "./rename-fields";
 import style from "./update-dialog.module.css";
-import { useUpdate } from "./use-update";
+import { type Update, useUpdate } from "./use-update";
 
 interface Props {
   id: string;
@@ -16,27 +16,6 @@ interface Props {
   mayEdit: boolean;
   opened: boolean;
   onClose: () => void;
-}
-
-type Update = ReturnType<typeof useUpdate>;
-
-/** What may only be called otherwise: asked, and never taken for granted. */
-function Renames({ update, mayEdit }: { update: Update; mayEdit: boolean }) {
-  if (update.suggested.length === 0) return null;
-  return (
-    <fieldset className={style.renames}>
-      <legend>Only called otherwise? What is ticked keeps its value under the new name.</legend>
-      {update.suggested.map(({ key, side, from, to, ticked, clashes }) => (
-        <Checkbox
-          key={key}
-          label={`${side === "in" ? "" : "output "}${pathWords(from)} is now ${pathWords(to)}`}
-          checked={ticked}
-          disabled={!mayEdit || update.busy || (clashes && !ticked)}
-          onChange={() => update.tick(key)}
-        />
-      ))}
-    </fieldset>
-  );
 }
 
 interface UseProps {
@@ -110,7 +89,7 @@ function Body({ id, mayEdit, onClose }: Props) {
         </p>
       )}
       <Done done={update.done} update={update} />
-      <Renames update={update} mayEdit={mayEdit} />
+      {mayEdit && <RenameChoices update={update} />}
       {older.length === 0 ? (
         <p>Every graph uses the parameters as they are.</p>
       ) : (

@@ -13,7 +13,14 @@ import {
 import { refusedAt } from "../../api/documents/refused-at";
 import { refreshGraphs, refreshLibrary } from "../../api/graphs";
 import { errorText, Refusal } from "../../api/http";
-import { clashes, keyOfRename, renamesOf, suggestedRenames } from "./rename-choices";
+import {
+  clashes,
+  keyOfRename,
+  possibleRenames,
+  renamesOf,
+  type SuggestedRename,
+  suggestedRenames,
+} from "./rename-choices";
 
 function words(error: unknown, uses: readonly ActionUse[]): string {
   const place = uses.find(({ graph }) => graph === refusedAt(error, "graph"))?.name;
@@ -36,17 +43,27 @@ function useTicks(id: string) {
   const [left, setLeft] = useState<ReadonlySet<string>>(new Set());
   // Suggestions are those without renames: one that was ticked is suggested no more.
   const plain = useActionUses(id, NO_RENAMES);
-  const suggested = suggestedRenames(plain.data?.uses ?? []);
-  const renames = renamesOf(ticked, suggested);
+  const uses = plain.data?.uses ?? [];
+  const suggested = suggestedRenames(uses);
+  const possible = possibleRenames(uses, suggested);
+  const all = [...suggested, ...possible];
+  const renames = renamesOf(ticked, all);
+  const shown = (each: SuggestedRename) => ({
+    ...each,
+    key: keyOfRename(each),
+    ticked: ticked.has(keyOfRename(each)),
+    clashes: clashes(each, ticked, all),
+  });
   return {
     renames,
-    suggested: suggested.map((each) => ({
-      ...each,
-      key: keyOfRename(each),
-      ticked: ticked.has(keyOfRename(each)),
-      clashes: clashes(each, ticked, suggested),
-    })),
+    suggested: suggested.map(shown),
+    possible: possible.map(shown),
     tick: (key: string) => setTicked((now) => toggled(now, key)),
+    /** Of several that exclude each other one, or none. */
+    choose: (others: readonly string[], key: string) =>
+      setTicked(
+        (now) => new Set([...now].filter((each) => !others.includes(each)).concat(key || [])),
+      ),
     isLeft: (graph: string) => left.has(graph),
     leave: (graph: string) => setLeft((now) => toggled(now, graph)),
   };
@@ -88,3 +105,5 @@ export function useUpdate(id: string) {
     update: () => (found.data ? update(found.data) : Promise.resolve()),
   };
 }
+
+export type Update = ReturnType<typeof useUpdate>;
