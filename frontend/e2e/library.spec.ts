@@ -186,7 +186,9 @@ test("what a robot has is told apart from the library, and taken over", async ({
 test("edits of an action are undone, and its history leads back", async ({ browser }) => {
   const { id } = await post("/api/actions", { name: "LookAround" });
   const { page, context, failures } = await product.person(browser, "Ada");
-  await page.goto(`${product.url}/actions/${id}?edit`);
+  await page.goto(`${product.url}/graphs/${id}`);
+  await expect(page).toHaveURL(`${product.url}/actions/${id}`);
+  await page.getByRole("button", { name: "Edit" }).click();
   await saved(page);
   const name = page.getByRole("textbox", { name: "Name", exact: true });
   await name.fill("class");

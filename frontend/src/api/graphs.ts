@@ -1,7 +1,7 @@
 /** Graphs, versions and problems as the editor answers them. */
 import { type QueryClient, useQuery, useQueryClient } from "@tanstack/react-query";
 import { useEffect } from "react";
-import { fetchJson, fetchMoment, fetchText } from "./http";
+import { fetchJson, fetchText } from "./http";
 import type { EditorApi } from "./schema/editor";
 
 export type Config = EditorApi["Config"];
@@ -94,10 +94,6 @@ export function createGraph(name: string): Promise<GraphSummary> {
  * translated, and what has no place; `remarks` are the same with their places. */
 export type Preview = EditorApi["Preview"];
 
-export function previewGraph(text: string): Promise<Preview> {
-  return fetchJson("/api/graphs?preview=true", { method: "POST", body: text });
-}
-
 /** Imports a file's text as it is. */
 export function importGraph(text: string): Promise<GraphSummary> {
   return fetchJson("/api/graphs", { method: "POST", body: text });
@@ -130,22 +126,6 @@ export function recoverGraph(id: string): Promise<unknown> {
 
 export function graphText(id: string): Promise<string> {
   return fetchText(`/api/graphs/${encodeURIComponent(id)}/umrf`);
-}
-
-/** The text of a graph as it is, and the moment that it is of. */
-export function graphMoment(id: string): Promise<{ text: string; seq: number }> {
-  return fetchMoment(`/api/graphs/${encodeURIComponent(id)}/umrf`);
-}
-
-/** One key of the document; a value that is not there is `undefined`. */
-export type KeyChange = EditorApi["KeyChange"];
-/** What an edited text would change, and the errors that would come with it. */
-export type TextChanges = EditorApi["TextEdit"];
-
-/** What the text, edited from that of the moment `seq`, would change. Nothing is stored. */
-export function textChangesOf(id: string, seq: number, text: string): Promise<TextChanges> {
-  const route = `/api/graphs/${encodeURIComponent(id)}/rewriting?seq=${seq}`;
-  return fetchJson(route, { method: "POST", body: text });
 }
 
 /** The version of what the page shows at `seq`, as text, because its numbers must stay as written. */

@@ -125,47 +125,23 @@ async function send(url: string, ask: RequestOptions): Promise<Response> {
   }
 }
 
-/** What a route answers, as JSON. Throws `Refusal` or `Unreachable`. */
-export async function fetchJson<T>(url: string, request: RequestOptions = {}): Promise<T> {
+/** What a route answers when it does not refuse. Throws `Refusal` or `Unreachable`. */
+export async function fetchAnswer(url: string, request: RequestOptions = {}): Promise<Response> {
   const response = await send(url, request);
   if (!response.ok) throw new Refusal(await problemOf(response));
+  return response;
+}
+
+/** What a route answers, as JSON. Throws `Refusal` or `Unreachable`. */
+export async function fetchJson<T>(url: string, request: RequestOptions = {}): Promise<T> {
+  const response = await fetchAnswer(url, request);
   if (response.status === 204) return undefined as T;
   return (await response.json()) as T;
 }
 
 /** What a route answers, as the text it sent, so that `5` and `5.0` stay what they are. */
 export async function fetchText(url: string, request: RequestOptions = {}): Promise<string> {
-  const response = await send(url, request);
-  if (!response.ok) throw new Refusal(await problemOf(response));
-  return response.text();
-}
-
-/** The first `most` lines of what a route answers, and whether there are more. */
-export async function fetchLines(
-  url: string,
-  most: number,
-  request: RequestOptions = {},
-): Promise<{ lines: string[]; more: boolean }> {
-  const response = await send(url, request);
-  if (!response.ok) throw new Refusal(await problemOf(response));
-  const reader = response.body?.pipeThrough(new TextDecoderStream()).getReader();
-  let text = "";
-  for (;;) {
-    const part = await reader?.read();
-    if (part === undefined || part.done) break;
-    text += part.value;
-    if (text.split("\n").length > most + 1) break;
-  }
-  await reader?.cancel();
-  const lines = text.split("\n").filter((line) => line !== "");
-  return { lines: lines.slice(0, most), more: lines.length > most };
-}
-
-/** The text that a route answers, and which moment of the graph it is of. */
-export async function fetchMoment(url: string): Promise<{ text: string; seq: number }> {
-  const response = await send(url, {});
-  if (!response.ok) throw new Refusal(await problemOf(response));
-  return { text: await response.text(), seq: Number(response.headers.get("x-seq")) };
+  return (await fetchAnswer(url, request)).text();
 }
 
 /** One sentence for people, whatever went wrong. */

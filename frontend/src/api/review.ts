@@ -1,6 +1,6 @@
 /** What the runner tells of past runs: replays, marks, comparisons, statistics, files. */
 import { useQuery } from "@tanstack/react-query";
-import { fetchJson, fetchLines } from "./http";
+import { fetchAnswer, fetchJson, type RequestOptions } from "./http";
 import { getRun, type Run } from "./runs";
 import type { RunnerApi } from "./schema/runner";
 
@@ -225,6 +225,26 @@ export function expectRun(runner: string, run: string, name: string): Promise<un
 /** Where a run can be fetched as a file. */
 export function exportUrl(runner: string, run: string, format: "jsonl" | "csv" | "mcap"): string {
   return `${runner}${path(run)}/export?format=${format}`;
+}
+
+/** The first `most` lines of what a route answers, and whether there are more. */
+async function fetchLines(
+  url: string,
+  most: number,
+  request: RequestOptions = {},
+): Promise<{ lines: string[]; more: boolean }> {
+  const response = await fetchAnswer(url, request);
+  const reader = response.body?.pipeThrough(new TextDecoderStream()).getReader();
+  let text = "";
+  for (;;) {
+    const part = await reader?.read();
+    if (part === undefined || part.done) break;
+    text += part.value;
+    if (text.split("\n").length > most + 1) break;
+  }
+  await reader?.cancel();
+  const lines = text.split("\n").filter((line) => line !== "");
+  return { lines: lines.slice(0, most), more: lines.length > most };
 }
 
 /** The first stored events of a run, each as one line of JSON. */

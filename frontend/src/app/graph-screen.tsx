@@ -2,7 +2,7 @@
 import { Button } from "@mantine/core";
 import { IconMapOff } from "@tabler/icons-react";
 import { memo, type ReactNode, useEffect, useMemo, useRef, useState } from "react";
-import { Link, useSearch } from "wouter";
+import { Link, Redirect, useSearch } from "wouter";
 import { useVersions, versionName } from "../api/graphs";
 import { newestRun, openRuns, useLive } from "../api/live/use-live";
 import { type Run, useLastRun } from "../api/runs";
@@ -218,8 +218,14 @@ function Gone() {
   );
 }
 
+/** Links and copies on the device know an id, and not whether it is a graph's or an action's. */
+function useIsAction(id: string): boolean {
+  return useKnownActions().actions.some(({ document }) => document === id);
+}
+
 export function GraphScreen({ id }: { id: string }): ReactNode {
   const { person } = usePerson();
+  if (useIsAction(id)) return <Redirect to={`/actions/${id}`} replace />;
   return (
     <PageFrame>
       <RoomProvider

@@ -30,7 +30,7 @@ export function ActionOverview({ description, type, labels, inputs, outputs, chi
           <li key={label}>{label}</li>
         ))}
       </ul>
-      <ParameterTable title="Takes" none="No parameters." parameters={inputs} />
+      <ParameterTable title="Takes" none="No parameters." free="anything" parameters={inputs} />
       <ParameterTable title="Gives" none="Nothing but its outcome." parameters={outputs} />
       <div className={style.pair}>{children}</div>
     </>

@@ -3,7 +3,7 @@ import type { Parameter } from "../../graph/model";
 import style from "./details.module.css";
 import { type ParameterFacts, parameterFacts } from "./parameter-facts";
 
-function Row({ facts }: { facts: ParameterFacts }) {
+function Row({ facts, free }: { facts: ParameterFacts; free: string }) {
   const { name, type, required, allowed, value, more } = facts;
   return (
     <tr>
@@ -13,7 +13,7 @@ function Row({ facts }: { facts: ParameterFacts }) {
       </td>
       <td className={style.said}>
         {[allowed, ...more].filter(Boolean).join(" · ") || (
-          <span className={style.quiet}>anything</span>
+          <span className={style.quiet}>{free}</span>
         )}
       </td>
       <td className={style.value}>
@@ -29,9 +29,11 @@ interface Props {
   /** What is said when there are none. */
   none: string;
   parameters: readonly Parameter[];
+  /** What is said where nothing is asked of a value. */
+  free?: string;
 }
 
-export function ParameterTable({ title, none, parameters }: Props) {
+export function ParameterTable({ title, none, parameters, free = "" }: Props) {
   const rows = parameterFacts(parameters);
   return (
     <section>
@@ -52,7 +54,7 @@ export function ParameterTable({ title, none, parameters }: Props) {
           </thead>
           <tbody>
             {rows.map((facts) => (
-              <Row key={facts.path} facts={facts} />
+              <Row key={facts.path} facts={facts} free={free} />
             ))}
           </tbody>
         </table>

@@ -15,7 +15,9 @@ function Others({ update }: { update: Update }) {
   if (names.length === 0) return null;
   return (
     <details className={style.others}>
-      <summary>Something else is only called otherwise</summary>
+      <summary>
+        {update.suggested.length > 0 ? "Something else is" : "Say what is"} only called otherwise
+      </summary>
       {names.map((name) => {
         const choices = update.possible.filter((each) => nameOf(each) === name);
         return (

@@ -1,7 +1,8 @@
 /** Takes files in: graphs as graphs, actions into the library, each looked at first where it was translated. */
 import { importAction, previewAction, replaceAction } from "../../api/documents/library";
 import { refusedAt } from "../../api/documents/refused-at";
-import { type GraphSummary, importGraph, type Preview, previewGraph } from "../../api/graphs";
+import { previewGraph } from "../../api/documents/texts";
+import { type GraphSummary, importGraph, type Preview } from "../../api/graphs";
 import { errorPlace, errorText } from "../../api/http";
 import { isPlain, isPlainAction } from "./dialects";
 import { importReviews } from "./import-review";

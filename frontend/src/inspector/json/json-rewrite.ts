@@ -1,6 +1,6 @@
 /** Edited JSON as an edit of the document, and what others changed meanwhile. Pure but for the edit. */
 import type * as Y from "yjs";
-import type { KeyChange } from "../../api/graphs";
+import type { KeyChange } from "../../api/documents/texts";
 import { bundleOfKey, endsOf, ROOTS, type Root, rootOf, splitKey } from "../../graph/document-keys";
 import { asOneEdit } from "../../graph/edit/document-writes";
 import { isEqual } from "../../graph/equal";

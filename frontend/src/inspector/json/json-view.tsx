@@ -2,7 +2,7 @@
 import { ActionIcon, Button, CopyButton, Kbd, Skeleton } from "@mantine/core";
 import { IconAlertTriangle, IconCheck, IconCopy } from "@tabler/icons-react";
 import { type ReactNode, useMemo, useState } from "react";
-import type { KeyChange } from "../../api/graphs";
+import type { KeyChange } from "../../api/documents/texts";
 import { errorText } from "../../api/http";
 import { printedKeys } from "../../edit-actions/edit-action";
 import {

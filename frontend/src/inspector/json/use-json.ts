@@ -1,7 +1,7 @@
 /** The JSON of a graph while it is read and while it is edited: newest text, draft, verdict. */
 import { useQuery } from "@tanstack/react-query";
 import { useEffect, useRef, useState, useSyncExternalStore } from "react";
-import { graphMoment, type TextChanges, textChangesOf } from "../../api/graphs";
+import { graphMoment, type TextChanges, textChangesOf } from "../../api/documents/texts";
 import { errorText, Refusal } from "../../api/http";
 import type { JsonError } from "./json-editor";
 import { lineOf } from "./json-positions";

@@ -1,5 +1,6 @@
 /** A run once more in the simulator: the graph that it ran or the newest one, doing what it did then. */
-import { graphMoment, publish, type Version } from "../../api/graphs";
+import { graphMoment } from "../../api/documents/texts";
+import { publish, type Version } from "../../api/graphs";
 import { fetchText } from "../../api/http";
 import { type InjectedFault, recordedScriptFor, recordedScriptOf, umrfUrl } from "../../api/review";
 import { type Run, startRun } from "../../api/runs";

@@ -11,7 +11,8 @@ import {
 } from "@tabler/icons-react";
 import { useState } from "react";
 import { useLocation } from "wouter";
-import { graphMoment, useVersions, versionName } from "../../api/graphs";
+import { graphMoment } from "../../api/documents/texts";
+import { useVersions, versionName } from "../../api/graphs";
 import { errorText } from "../../api/http";
 import { expectRun } from "../../api/review";
 import type { Run } from "../../api/runs";
