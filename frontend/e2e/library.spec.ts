@@ -209,6 +209,25 @@ test("edits of an action are undone, and its history leads back", async ({ brows
   await context.close();
 });
 
+test("two people edit an action at once, and see each other", async ({ browser }) => {
+  const { id } = await post("/api/actions", action("Together", { depth: leaf("number") }));
+  const ada = await product.person(browser, "Ada");
+  const ben = await product.person(browser, "Ben");
+  for (const { page } of [ada, ben]) await page.goto(`${product.url}/actions/${id}?edit`);
+  await expect(ada.page.getByText("Also here: Ben")).toBeAttached();
+  const text = (page: Page) => page.getByRole("textbox", { name: "Description" });
+  await text(ada.page).fill("goes down");
+  await expect(ben.page.getByText("Ada is writing").first()).toBeAttached();
+  await expect(text(ben.page)).toHaveValue("goes down");
+  await renameParameter(ben.page, "depth", "below");
+  await expect(ada.page.getByRole("button", { name: "What the parameter below is" })).toBeVisible();
+  await saved(ben.page);
+  for (const { failures, context } of [ada, ben]) {
+    expect(failures).toEqual([]);
+    await context.close();
+  }
+});
+
 test("files of actions are imported into the library, many at once", async ({ browser }) => {
   const { page, context, failures } = await product.person(browser, "Ada");
   await page.goto(`${product.url}/actions`);

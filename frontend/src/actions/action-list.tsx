@@ -80,7 +80,8 @@ export function ActionList({ actions, robots, current, onNew, onImport, foot }: 
   // Typing is never held up by the list.
   const wanted = useDeferredValue(search);
   const shown = useMemo(() => foundActions(actions, filter, wanted), [actions, filter, wanted]);
-  const fresh = search.trim();
+  // What the list offers is of one search.
+  const fresh = wanted.trim();
   const exact = actions.some(({ name }) => name === fresh);
   const list = useRef<HTMLDivElement>(null);
   useSearchKey();
@@ -117,7 +118,7 @@ export function ActionList({ actions, robots, current, onNew, onImport, foot }: 
         )}
         {foot}
       </nav>
-      {mayEdit && <Tools onNew={() => onNew(fresh)} onImport={onImport} />}
+      {mayEdit && <Tools onNew={() => onNew(search.trim())} onImport={onImport} />}
     </div>
   );
 }
