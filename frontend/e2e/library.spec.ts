@@ -124,6 +124,7 @@ test("a parameter is called otherwise, and graphs follow after a look", async ({
   await expect(dialog.getByRole("alert")).toContainText("night_round");
   await dialog.getByRole("button", { name: "Update 2 graphs" }).click();
   await expect(dialog.getByRole("status").first()).toContainText("2 graphs are updated");
+  await expect(older).toBeHidden();
   await dialog.getByRole("link", { name: "History of night_round" }).click();
   const history = page.getByRole("dialog", { name: "What was done to this graph" });
   await expect(history.getByRole("list", { name: "History" })).toContainText("took parameters");
@@ -304,6 +305,7 @@ test("on a phone the list and the action follow each other, and nothing is too w
     .tap();
   await expect(page).toHaveURL(new RegExp(`/actions/${id}$`));
   await expect(page.getByRole("heading", { name: "PhoneAction", level: 2 })).toBeVisible();
+  await expect(page.getByText("older parameters")).not.toBeVisible();
   const width = () => page.evaluate(() => document.documentElement.scrollWidth);
   expect(await width()).toBeLessThanOrEqual(390);
   await page.getByRole("button", { name: "Edit" }).tap();

@@ -90,7 +90,14 @@ for (const [name, options] of Object.entries(SCREENS)) {
     ] as const;
     const { page, context } = await product.person(browser, "Ada", options);
     await taken(page, `${name}-graphs`);
-    for (const path of ["runs", "runs/statistics", "runs/compare", "robots", "nowhere"]) {
+    for (const path of [
+      "runs",
+      "runs/statistics",
+      "runs/compare",
+      "robots",
+      "actions",
+      "nowhere",
+    ]) {
       await page.goto(`${product.url}/${path}`);
       await taken(page, `${name}-${path.replace("/", "-")}`);
     }
