@@ -184,6 +184,30 @@ test("what a robot has is told apart from the library, and taken over", async ({
   await context.close();
 });
 
+test("errors of the last build are shown at the action, until it builds", async ({ browser }) => {
+  const { id } = await post("/api/actions", action("WeldSeam", {}));
+  const told = (ended_well: boolean, errors: object[]) =>
+    product.ask(`/api/actions/${id}/build`, {
+      method: "PUT",
+      headers: { "content-type": "application/json" },
+      body: JSON.stringify({
+        ...{ package: "weld_seam", ended_well, at: "2026-11-23T10:00:00Z", errors },
+      }),
+    });
+  const message = "‘torch’ was not declared <b>in this scope</b>";
+  await told(false, [{ file: "src/weld_seam.cpp", line: 25, column: 5, message }]);
+  const { page, context, failures } = await product.person(browser, "Ada");
+  await page.goto(`${product.url}/actions/${id}`);
+  const build = page.getByRole("region", { name: "Last build" });
+  await expect(build).toContainText("1 error");
+  await expect(build.getByRole("listitem")).toHaveText(`src/weld_seam.cpp:25:5 ${message}`);
+  await told(true, []);
+  await expect(build).toContainText("built", { timeout: 20_000 });
+  await expect(build.getByRole("listitem")).toHaveCount(0);
+  expect(failures).toEqual([]);
+  await context.close();
+});
+
 test("edits of an action are undone, and its history leads back", async ({ browser }) => {
   const { id } = await post("/api/actions", { name: "LookAround" });
   const { page, context, failures } = await product.person(browser, "Ada");

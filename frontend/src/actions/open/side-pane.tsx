@@ -3,6 +3,7 @@ import { Tabs } from "@mantine/core";
 import { useState } from "react";
 import { HistoryList } from "../../history/history-list";
 import { PackagePane } from "../../packages/package-pane";
+import { LastBuild } from "./last-build";
 import style from "./open.module.css";
 
 interface Props {
@@ -21,6 +22,7 @@ export function SidePane({ id, seq, mayEdit }: Props) {
         <Tabs.Tab value="history">History</Tabs.Tab>
       </Tabs.List>
       <Tabs.Panel value="package" className={style.panel ?? ""}>
+        <LastBuild id={id} />
         <PackagePane graph={id} seq={seq} />
       </Tabs.Panel>
       <Tabs.Panel value="history" className={style.panel ?? ""}>

@@ -30,6 +30,17 @@ export function useLibrary() {
   });
 }
 
+/** How the package's last build went, as somebody has told it; null before that. */
+export type ActionBuild = EditorApi["ActionBuilt"];
+
+export function useLastBuild(id: string) {
+  return useQuery({
+    queryKey: ["build", id],
+    queryFn: ({ signal }) => fetchJson<EditorApi["LastBuild"]>(`${below(id)}/build`, { signal }),
+    refetchInterval: 15_000,
+  });
+}
+
 /** Actions that were deleted and can be brought back. */
 export function useDeletedActions(wanted: boolean) {
   return useQuery({

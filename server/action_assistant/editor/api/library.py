@@ -205,16 +205,16 @@ def _builds(app_state: EditorState) -> list[ControllerRouterHandler]:
 
     @put(
         "/api/actions/{action_id:str}/build",
-        status_code=204,
         summary="Tell how the last build of an action's package went",
         operation_id="putBuild",
         guards=[Needs("edit")],
     )
-    async def put_build(action_id: str, data: BuildReport, request: Asking) -> None:
+    async def put_build(action_id: str, data: BuildReport, request: Asking) -> LastBuild:
         services, person = app_state.services, person_of(request)
         await services.people.seen(person)
         build = h.ActionBuilt(data.package, data.ended_well, data.at, data.errors)
         await services.library_edits.built(action_id, build, person.id)
+        return LastBuild(build)
 
     return [get_build, put_build]
 
