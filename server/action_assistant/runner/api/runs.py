@@ -238,10 +238,12 @@ def _reads(services: RunnerServices) -> list[ControllerRouterHandler]:
     async def events(run: str, request: _Asking) -> Stream | Response[None]:
         after = _last_event_id(request)
         opened = services.control.open.get(run)
+        # Asked first: what has ended and is stored by now is in what is read afterwards.
+        is_over = opened is None or (opened.run.end is not None and opened.recorder.idle)
         newest = await services.asked.newest(run)
         if not newest:
             raise NotFound("There is no such run.")
-        if newest <= after and (opened is None or opened.run.end is not None):
+        if newest <= after and is_over:
             return Response(None, status_code=204)  # tells an EventSource not to come again
         return Stream(
             _tail(services, run, after),
