@@ -1,7 +1,7 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
 import type { Visit } from "../../api/runs";
-import { growingSpan, shareOf, ticksOf, wholeSpan } from "./axis";
+import { growingSpan, renewalOf, shareOf, ticksOf, wholeSpan } from "./axis";
 import { barOf } from "./bars";
 
 test("an axis of what goes on grows in steps and always holds all of it", () => {
@@ -64,4 +64,17 @@ test("what goes on ends where it was last heard of, and without an end it has no
     sure: { left: 0.2, width: 0.3 },
   });
   expect(barOf(open, axis, 5000, true)).toMatchObject({ open: false, tone: "unknown" });
+});
+
+test("what grows is drawn in steps that stay small on any axis, and once a second at least", () => {
+  fc.assert(
+    fc.property(fc.integer({ min: 0, max: 7_200_000 }), (elapsed) => {
+      const axis = { start: 0, span: growingSpan(elapsed) };
+      expect([250, 500, 1000]).toContain(renewalOf(axis));
+      expect(renewalOf(axis) / axis.span).toBeLessThanOrEqual(1 / 40);
+    }),
+  );
+  expect([10_000, 60_000, 120_000].map((span) => renewalOf({ start: 0, span }))).toEqual([
+    250, 500, 1000,
+  ]);
 });

@@ -29,6 +29,15 @@ export function shareOf(axis: TimeAxis, at: number): number {
   return Math.min(1, Math.max(0, (at - axis.start) / axis.span));
 }
 
+/** How many times what grows is drawn while it passes a whole axis: steps of some px. */
+const DRAWINGS = 120;
+const RENEWALS = [1000, 500]; // ms
+
+/** ms between two drawings of what moves along an axis; each has the page order all its layers. */
+export function renewalOf({ span }: TimeAxis): number {
+  return RENEWALS.find((each) => each * DRAWINGS <= span) ?? 250;
+}
+
 const TICKS = [1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600]; // s
 const MOST_TICKS = 8;
 

@@ -6,7 +6,7 @@ import { stopwatch, useNow } from "../../ui/times";
 import { durationText } from "../durations";
 import type { Progress, Tone } from "../progress";
 import { StateLabel, toneColor } from "../state-label";
-import { shareOf, type TimeAxis } from "./axis";
+import { renewalOf, shareOf, type TimeAxis } from "./axis";
 import { type Bar, barOf } from "./bars";
 import type { Lane } from "./lanes";
 import style from "./timeline.module.css";
@@ -24,13 +24,11 @@ interface Props {
   onPick: ((aid: string) => void) | undefined;
 }
 
-const GROWS = 250; // ms between two drawings of what goes on
-
 const percent = (share: number) => `${share * 100}%`;
 
 /** What reaches from a moment to now: moved, not drawn again, while time goes on. */
 function Growing({ axis, from, ...look }: GrowingProps) {
-  const now = useNow(GROWS);
+  const now = useNow(renewalOf(axis));
   const left = shareOf(axis, from);
   const room = Math.max(1e-6, 1 - left);
   const part = Math.max(0.004, shareOf(axis, now) - left) / room;

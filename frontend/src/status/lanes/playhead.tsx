@@ -1,6 +1,6 @@
 /** Where one is in time: at the live edge, or where a replay stands. */
 import { stopwatch, useNow } from "../../ui/times";
-import { shareOf, type TimeAxis } from "./axis";
+import { renewalOf, shareOf, type TimeAxis } from "./axis";
 import style from "./timeline.module.css";
 
 function Head({ share, label, live }: { share: number; label: string; live: boolean }) {
@@ -15,7 +15,7 @@ function Head({ share, label, live }: { share: number; label: string; live: bool
 
 /** Moves with time. `silentSince`: what it shows is not known from there on. */
 function LiveHead({ axis, silentSince }: { axis: TimeAxis; silentSince: number | null }) {
-  const now = useNow(250);
+  const now = useNow(renewalOf(axis));
   const words = silentSince === null ? "live" : "not known";
   return (
     <Head
