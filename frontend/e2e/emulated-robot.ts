@@ -86,6 +86,14 @@ abstract class Engine extends Speaker {
 /** A stand-in whose actions do as `behaviours` say, by their names: always, or call by call. `quirks`:
  * `NAME=VALUE`. */
 export class StandIn extends Engine {
+  private readonly actions: string;
+
+  /** `actions`: a folder with the files of those that it has; without one it has all. */
+  constructor(name: string, actions = "") {
+    super(name);
+    this.actions = actions;
+  }
+
   start(folder: string, behaviours: Record<string, object | object[]>, ...quirks: string[]): void {
     const script = join(folder, `${this.name}.json`);
     const each = Object.entries(behaviours).map(([name, behaviour]) => [name, [behaviour].flat()]);
@@ -94,6 +102,7 @@ export class StandIn extends Engine {
       ...["-m", "action_assistant", "simulate-robot", this.name],
       ...["--domain", String(DOMAIN), "--namespace", this.name, "--script", script],
       ...quirks.flatMap((quirk) => ["--quirk", quirk]),
+      ...(this.actions === "" ? [] : ["--actions", this.actions]),
     ]);
   }
 }
