@@ -34,8 +34,9 @@ export default defineConfig({
   testDir: "e2e",
   outputDir: "test-results",
   fullyParallel: false,
-  // Each file starts its own product; most of its time it waits, so that three take turns on two cores.
-  workers: 3,
+  // Each file starts its own product; two at a time use what one leaves idle while it waits. With three,
+  // single tests took up to three times as long.
+  workers: 2,
   // Two browsers and all that they drive share two cores there, which starves one of them now and then.
   // What passed only when it was tried again is told at the end: it is a fault to be found.
   retries: process.env.CI ? 1 : 0,
