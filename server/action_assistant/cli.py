@@ -5,6 +5,7 @@ Exit codes: 0 fine, 1 the answer is no, 2 wrong use or cannot start.
 
 import argparse
 import importlib
+import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, NamedTuple
@@ -82,6 +83,9 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
     ),
 }
 
+#: As `secrets.token_urlsafe(9)` may write it.
+_DASHED_ID: Final = re.compile(r"-[A-Za-z0-9_][A-Za-z0-9_-]{10}")
+
 
 class _CommandParser(argparse.ArgumentParser):
     """The parser of one command, complete once it is used."""
@@ -134,12 +138,21 @@ def _complete(name: str, parser: argparse.ArgumentParser) -> None:
     module.COMMANDS[name](parser)
 
 
+def _with_ids_last(arguments: Sequence[str]) -> list[str]:
+    """Ids of runs that an earlier version started may begin with a dash. No
+    option of ours looks like it, and a Stop must not be refused as one that nobody knows."""
+    ids = [each for each in arguments if _DASHED_ID.fullmatch(each)]
+    if not ids or "--" in arguments:
+        return [*arguments]
+    return [*(each for each in arguments if each not in ids), "--", *ids]
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; the exit code."""
     make_streams_printable()
     if arguments is None:
         hide_password()
-    options = parser().parse_args(arguments)
+    options = parser().parse_args(_with_ids_last(sys.argv[1:] if arguments is None else arguments))
     try:
         check_environment()
         code: int = options.handler(options)

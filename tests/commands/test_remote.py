@@ -149,6 +149,14 @@ def test_a_run_is_stopped_and_that_is_proven(product: Product, files: dict[str, 
         assert runner.get(f"/api/runs/{run}").json()["state"] == "stopped"
 
 
+def test_an_id_that_begins_with_a_dash_is_no_option(product: Product) -> None:
+    """Earlier versions made such ids, one in 64."""
+    for words in (["stop", "-8kdhW2_-qNv"], ["stop", "-8kdhW2_-qNv", "--wait", "1"]):
+        answer = product.cli(*words)
+        assert answer.returncode == 1, answer.stderr
+        assert "There is no such run." in answer.stderr
+
+
 def test_the_answer_no_is_exit_code_1_and_one_sentence(
     product: Product, files: dict[str, str], tmp_path: Path
 ) -> None:

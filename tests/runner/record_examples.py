@@ -5,7 +5,6 @@
 
 import asyncio
 import itertools
-import secrets
 import sys
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager
@@ -22,6 +21,7 @@ from action_assistant.runner.emulator.messages import EngineTraits, Start, index
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.runs.events import Author, Override
 from action_assistant.runner.runs.recorder import stream_of
+from action_assistant.runner.start import start_checks
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import (
     ENTRY,
@@ -211,11 +211,11 @@ async def played(story: Story, begins: int) -> bytes:
 @contextmanager
 def _named(name: str) -> Iterator[None]:
     """Ids are drawn by chance; those of examples are always the same."""
-    drawn, secrets.token_urlsafe = secrets.token_urlsafe, lambda _=None: f"example-{name}"
+    drawn, start_checks.random_id = start_checks.random_id, lambda: f"example-{name}"
     try:
         yield
     finally:
-        secrets.token_urlsafe = drawn
+        start_checks.random_id = drawn
 
 
 def recorded() -> dict[str, bytes]:

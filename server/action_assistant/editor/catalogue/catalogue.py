@@ -9,13 +9,13 @@ from sqlalchemy import Row, Select, select
 from action_assistant.editor.catalogue import server_edits
 from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.documents.contents import Counts, GraphInfo, info_of
-from action_assistant.editor.documents.document import new_aid
 from action_assistant.editor.interchange import changes, importing
 from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import BadInput, NotFound
 from action_assistant.journal.events import Addition, Draft
 from action_assistant.journal.journal import Journal
+from action_assistant.random_ids import random_id
 from action_assistant.schema import editor_tables
 from action_assistant.umrf.check import check
 from action_assistant.umrf.model import Action, Graph
@@ -172,7 +172,7 @@ class Catalogue:
     async def _add(
         self, update: bytes, of: GraphInfo, about: list[Draft], author: str
     ) -> GraphView:
-        made = new_aid()
+        made = random_id()
         document = Draft(h.UPDATED, author, update)
         await self._journal.append_all(
             [

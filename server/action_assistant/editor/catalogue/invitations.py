@@ -18,7 +18,6 @@ from msgspec.structs import replace
 from sqlalchemy import select
 
 from action_assistant.editor.catalogue.people import People
-from action_assistant.editor.documents.document import new_aid
 from action_assistant.editor.log import graph_events as h
 from action_assistant.errors import (
     BadInput,
@@ -29,6 +28,7 @@ from action_assistant.errors import (
     Withdrawn,
 )
 from action_assistant.journal.journal import Journal
+from action_assistant.random_ids import random_id
 from action_assistant.schema import editor_tables
 from action_assistant.web.auth.keys import Keys, PersonRef
 from action_assistant.web.auth.revocations import Revocations
@@ -116,7 +116,7 @@ class Invitations:
             raise BadInput(f"A label has up to {LABEL_LIMIT} characters.", where={"path": "/label"})
         if sum(each.revoked_at is None for each in self._made.values()) >= _MOST:
             raise Conflict(f"There are {_MOST} links already; revoke some.")
-        made = new_aid()
+        made = random_id()
         await self._append(h.INVITED, author, h.MadeInvitation(made, role, label))
         await self._read(made)
         return self.get(made)

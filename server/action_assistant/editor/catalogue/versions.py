@@ -8,10 +8,10 @@ from sqlalchemy import Row, select
 
 from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.documents import contents
-from action_assistant.editor.documents.document import new_aid
 from action_assistant.editor.log import graph_events as h
 from action_assistant.errors import BadInput, NotFound
 from action_assistant.journal.journal import Journal
+from action_assistant.random_ids import random_id
 from action_assistant.schema import editor_tables
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.json.embedded import UmrfGraph
@@ -55,7 +55,7 @@ class Versions:
         if not label:
             for row in await self._rows(graph, sight.seq):
                 return await self.get(row.id), False
-        made = new_aid()
+        made = random_id()
         stamp = codec.Stamp(graph=graph, version=made, run=None)
         digest, text = await self._graph_reader.ask(contents.released, sight, stamp)
         published = h.VersionPublished(

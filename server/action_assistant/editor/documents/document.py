@@ -5,8 +5,6 @@ two people fill in different things of one action without replacing each other's
 an undone delete bring back what a colleague changed meanwhile.
 """
 
-import secrets
-import string
 from collections.abc import Iterable, Mapping
 from typing import Final, TypeAlias, cast
 
@@ -16,6 +14,7 @@ from pycrdt import Doc, Map
 
 from action_assistant.editor.documents.reading import read_maps
 from action_assistant.editor.documents.values import ROOTS, Root, by_text, is_aid, relation_id
+from action_assistant.random_ids import random_id
 from action_assistant.umrf.model import (
     ENTRY,
     EXIT,
@@ -37,12 +36,11 @@ Maps: TypeAlias = dict[str, dict[str, object]]
 
 SCHEMA: Final = 1.0
 _PLAIN: Final = (str, float, int, bool, list, dict, bytes, bytearray, type(None))
-_LETTERS: Final = string.ascii_letters + string.digits
 
 
 def new_aid() -> Key:
-    """A random key for an action: 12 characters, 71 bits."""
-    return "".join(secrets.choice(_LETTERS) for _ in range(12))
+    """A random key for an action."""
+    return random_id()
 
 
 def read(doc: Doc) -> Graph:  # type: ignore[type-arg]

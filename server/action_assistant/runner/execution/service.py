@@ -4,7 +4,6 @@ All of it lives on one event loop. Runs that are not over are in memory; the jou
 """
 
 import logging
-import secrets
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
 from typing import Any, Final
@@ -14,6 +13,7 @@ from anyio.abc import TaskGroup
 from sqlalchemy import Row
 
 from action_assistant.errors import BadInput, Conflict, NotFound, Refused
+from action_assistant.random_ids import random_id
 from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.execution import interventions
 from action_assistant.runner.execution.run_loop import OpenRun
@@ -184,7 +184,7 @@ class ExecutionService:
         author: Author,
         stops: int,
     ) -> Grouped:
-        group = secrets.token_urlsafe(9)
+        group = random_id()
         runs: list[Run] = []
         failed: dict[str, str] = {}
         for each, clear in zip(starts, cleared, strict=True):

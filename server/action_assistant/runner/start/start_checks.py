@@ -1,6 +1,5 @@
 """The checks before a start is stored and sent, for each engine that it shall go to."""
 
-import secrets
 from collections.abc import Callable, Collection, Sequence
 from functools import partial
 from typing import Annotated, Final
@@ -9,6 +8,7 @@ import anyio
 import msgspec
 
 from action_assistant.errors import BadInput, Conflict, Refused, Unavailable
+from action_assistant.random_ids import random_id
 from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.links.behaviours.folder import BehaviourFolder
 from action_assistant.runner.links.port import SIMULATOR, Answer, Link, NoAnswer
@@ -132,7 +132,7 @@ class StartChecks:
             raise BadInput("Only the simulator plays a robot.", where={"path": "/like"})
         if asked.behaviours:
             raise BadInput("Only the simulator runs behaviours.", where={"path": "/behaviours"})
-        ready = await self._run_in_worker(prepared, asked, robot.facts, secrets.token_urlsafe(9))
+        ready = await self._run_in_worker(prepared, asked, robot.facts, random_id())
         free = preflight.of_taken(asked.engine, self._taken(asked.engine))
         preflight.check_items([free], ())
         if self._robots.foreign_stops.going(asked.engine):
@@ -160,7 +160,7 @@ class StartChecks:
 
     async def _cleared_simulation(self, asked: StartRequest) -> Cleared:
         facts = self._simulated(asked)
-        ready = await self._run_in_worker(prepared, asked, facts, secrets.token_urlsafe(9))
+        ready = await self._run_in_worker(prepared, asked, facts, random_id())
         behaviours = await self._folder(ready) if asked.behaviours else None
         link = self._simulator(facts, ready.script, self._clock_us, behaviours)
         return Cleared(

@@ -19,6 +19,7 @@ from typing import Final
 import msgspec
 
 from action_assistant.errors import CannotStart
+from action_assistant.random_ids import random_id
 from action_assistant.web.auth.roles import OWNER, Role
 
 TOKEN_FILE: Final = "token"
@@ -128,9 +129,9 @@ class Keys:
     ) -> Session:
         """A session from now on; with `person_id` for somebody who is known already, with
         `session_id` for a browser whose session goes on, so that one end ends all cookies of it."""
-        person = Person(person_id or secrets.token_urlsafe(9), name, role)
+        person = Person(person_id or random_id(), name, role)
         expires = time.time() + SESSION_SECONDS
-        return Session(session_id or secrets.token_urlsafe(12), person, expires, invitation)
+        return Session(session_id or random_id(), person, expires, invitation)
 
     def secret_of(self, invitation: str) -> str:
         """The secret of a link (256 bit): only who knows the token can tell it from the id."""
