@@ -6,6 +6,7 @@ const DONE: Readonly<Record<HistoryEntry["kind"], string>> = {
   imported: "imported it",
   edited: "changed it",
   restored: "went back",
+  reverted: "took changes back",
   adapted: "took parameters over",
   published: "kept a version",
   deleted: "deleted it",

@@ -15,6 +15,7 @@ from action_assistant.editor.api import (
     drawing,
     editor,
     graphs,
+    history,
     invitations,
     library,
     packages,
@@ -59,7 +60,7 @@ async def open_services(
             people = await People.known(journal)
             services = EditorServices(settings, journal, people, epoch, revoked, workers)
             try:
-                async with services.invitations.opened():
+                async with services.invitations.opened(), services.change_index.kept_up():
                     if new:
                         await _greet(services, paths.examples())
                     yield services
@@ -134,6 +135,7 @@ def _routes(
         *invitations.routes(app_state, addresses, browsers),
         *editor.routes(app_state, addresses),
         *graphs.routes(app_state),
+        *history.routes(app_state),
         *versions.routes(app_state),
         *drawing.routes(app_state),
         *packages.routes(app_state),

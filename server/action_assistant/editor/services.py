@@ -2,12 +2,15 @@
 
 from action_assistant.editor.catalogue.catalogue import Catalogue
 from action_assistant.editor.catalogue.graph_reader import GraphReader
-from action_assistant.editor.catalogue.history import GraphHistory
 from action_assistant.editor.catalogue.invitations import Invitations
 from action_assistant.editor.catalogue.library import Library
 from action_assistant.editor.catalogue.library_edits import LibraryEdits
 from action_assistant.editor.catalogue.people import People
 from action_assistant.editor.catalogue.versions import Versions
+from action_assistant.editor.history.blame import Blame
+from action_assistant.editor.history.change_index import ChangeIndex
+from action_assistant.editor.history.going_back import GoingBack
+from action_assistant.editor.history.graph_history import GraphHistory
 from action_assistant.editor.rooms.colours import PersonColours
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.editor.rooms.rate_limits import ByteRateLimits
@@ -48,7 +51,14 @@ class EditorServices:
             journal, self.rooms, self.graph_reader, self.catalogue, self.library, workers.files
         )
         self.invitations = Invitations(journal, people, Keys.of(settings.data), revoked)
-        self.history = GraphHistory(journal, people, self.versions)
+        self.change_index = ChangeIndex(journal, workers.graphs)
+        self.history = GraphHistory(
+            journal, people, self.versions, self.change_index, workers.graphs
+        )
+        self.going_back = GoingBack(
+            journal, self.rooms, self.graph_reader, self.change_index, workers.graphs
+        )
+        self.blame = Blame(self.change_index, people)
 
 
 class EditorState:

@@ -20,6 +20,8 @@ _PRELOADED: Final = (
     "action_assistant.editor.crdt.trial",
     "action_assistant.editor.interchange.action_uses",
     "action_assistant.editor.interchange.action_packages",
+    "action_assistant.editor.history.told_changes",
+    "action_assistant.editor.history.reverting",
 )
 _NICE: Final = 5
 

@@ -104,6 +104,11 @@ class Journal(JournalReader):
 
         await self._write(keep)
 
+    async def derive(self, work: Callable[[Connection], T]) -> T:
+        """Write to tables that follow from events, some time after these were stored; all or nothing.
+        Raises Unavailable."""
+        return await self._write(lambda transaction: work(transaction.connection))
+
     async def take_out(self, removed: StreamRemoved, also: Callable[[int], Addition]) -> int:
         """Say in the log that a stream is kept elsewhere from now on; the number of that, by which
         its events may be deleted. `also` tells more of it, in the same transaction. Raises Conflict

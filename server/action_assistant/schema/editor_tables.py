@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from sqlalchemy import BigInteger, Column, Index, MetaData, Table, Text
+from sqlalchemy import BigInteger, Column, Index, LargeBinary, MetaData, Table, Text
 
 from action_assistant.schema.log_tables import NAMES, log_tables
 
@@ -66,4 +66,30 @@ guest: Final = Table(
     Column("person", Text, primary_key=True),
     Column("name", Text, nullable=False),
     Column("at", BigInteger, nullable=False),
+)
+#: Which keys each event of a document's log changed. `owner`: what a key speaks of. Values are MessagePack,
+#: none where there is no such key. Derived some time after the events were stored, and again from them
+#: whenever it is not there.
+key_change: Final = Table(
+    "key_change",
+    EDITOR,
+    Column("graph", Text, primary_key=True),
+    Column("seq", BigInteger, primary_key=True, autoincrement=False),
+    Column("root", Text, primary_key=True),
+    Column("key", Text, primary_key=True),
+    Column("owner", Text, nullable=False),
+    Column("author", Text, nullable=False),
+    Column("at", BigInteger, nullable=False),
+    Column("before", LargeBinary),
+    Column("after", LargeBinary),
+    Index(None, "graph", "owner", "seq"),
+    Index(None, "graph", "root", "key", "seq"),
+)
+#: Up to which event the changes of a graph are derived, and its document then, to go on from.
+key_change_head: Final = Table(
+    "key_change_head",
+    EDITOR,
+    Column("graph", Text, primary_key=True),
+    Column("seq", BigInteger, nullable=False),
+    Column("document", LargeBinary, nullable=False),
 )

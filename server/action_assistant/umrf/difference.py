@@ -5,7 +5,8 @@ from typing import Any, Literal, TypeAlias
 
 import msgspec
 
-from action_assistant.umrf.model import ENTRY, EXIT, Action, Graph, Relation
+from action_assistant.umrf.json.text import parse_small
+from action_assistant.umrf.model import ENTRY, EXIT, Action, Graph, JsonText, Key, Relation
 
 Change: TypeAlias = Literal["added", "removed", "changed"]
 
@@ -28,12 +29,22 @@ class ActionChange(msgspec.Struct, frozen=True):
 
 
 class RelationChange(msgspec.Struct, frozen=True):
-    """An arrow that came, went or changed, between actions by full name, or `entry` and `exit`."""
+    """An arrow that came, went or changed, between actions by full name, or `entry` and `exit`. `ends`:
+    the same by their keys."""
 
     change: Change
     parent: str
     child: str
     fields: tuple[Field, ...] = ()
+    ends: tuple[Key, Key] = ("", "")
+
+
+class NoteChange(msgspec.Struct, frozen=True):
+    """A note or frame that came, went or changed. `text` is what it says, the newer one."""
+
+    change: Change
+    id: str
+    text: str
 
 
 class Difference(msgspec.Struct, frozen=True):
@@ -44,6 +55,7 @@ class Difference(msgspec.Struct, frozen=True):
     fields: tuple[Field, ...]
     actions: tuple[ActionChange, ...]
     relations: tuple[RelationChange, ...]
+    notes: tuple[NoteChange, ...] = ()
 
 
 def difference(before: tuple[int, Graph], after: tuple[int, Graph]) -> Difference:
@@ -55,13 +67,14 @@ def difference(before: tuple[int, Graph], after: tuple[int, Graph]) -> Differenc
         tuple(_fields(_graph_says(old), _graph_says(new))),
         tuple(_actions(old, new)),
         tuple(_relations(old, new)),
+        tuple(_notes(old, new)),
     )
 
 
 def _actions(old: Graph, new: Graph) -> Iterable[ActionChange]:
     was = {action.key: action for action in old.actions}
     now = {action.key: action for action in new.actions}
-    for key in was.keys() | now.keys():
+    for key in dict.fromkeys([*now, *was]):
         a, b = was.get(key), now.get(key)
         fields = tuple(_fields(_action_says(a), _action_says(b))) if a and b else ()
         shown = b or a
@@ -78,8 +91,27 @@ def _relations(old: Graph, new: Graph) -> Iterable[RelationChange]:
         if fields or not (a and b):
             parent, child, _ = ends
             yield RelationChange(
-                _change(a, b), names.get(parent, parent), names.get(child, child), fields
+                _change(a, b),
+                names.get(parent, parent),
+                names.get(child, child),
+                fields,
+                (parent, child),
             )
+
+
+def _notes(old: Graph, new: Graph) -> Iterable[NoteChange]:
+    was, now = dict(old.notes), dict(new.notes)
+    for note in sorted(was.keys() | now.keys()):
+        a, b = was.get(note), now.get(note)
+        if a != b:
+            yield NoteChange(_change(a, b), note, _said(b or a or ""))
+
+
+def _said(note: JsonText) -> str:
+    """What a note or frame says; anything else may stand in its place."""
+    found = parse_small(note)
+    said = found.get("text") if isinstance(found, dict) else None
+    return said if isinstance(said, str) else ""
 
 
 def _change(a: object, b: object) -> Change:

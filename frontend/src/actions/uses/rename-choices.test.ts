@@ -63,7 +63,7 @@ test("what nobody suggests can be said by hand, where types allow it", () => {
     { field: "out/done", before: null, after: number },
   ];
   const changed = { change: "changed", aid: "a", name: "Drive_0", fields } as const;
-  const difference = { before: 1, after: 1, fields: [], relations: [] };
+  const difference = { before: 1, after: 1, fields: [], relations: [], notes: [] };
   const one = use({ difference: { ...difference, actions: [{ ...changed, fields }] } });
   const known = [{ side: "in", from: "speed", to: "rate", graphs: 1 } as const];
   expect(possibleRenames([one, one], known)).toEqual([

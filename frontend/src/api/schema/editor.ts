@@ -106,6 +106,25 @@ export interface EditorApi {
         errors: EditorApi["BuildFault"][];
     };
     /**
+     * Changes
+     * @description What somebody changed, as a difference, with at most 30 things of a kind and how many more there are.
+     *     `comments`: threads in which something was said.
+     */
+    Changes: {
+        /** @default [] */
+        fields?: EditorApi["Field"][];
+        /** @default [] */
+        actions?: EditorApi["ActionChange"][];
+        /** @default [] */
+        relations?: EditorApi["RelationChange"][];
+        /** @default [] */
+        notes?: EditorApi["NoteChange"][];
+        /** @default 0 */
+        more?: number;
+        /** @default 0 */
+        comments?: number;
+    };
+    /**
      * Command
      * @description What a person does to the graph, and when.
      */
@@ -151,6 +170,7 @@ export interface EditorApi {
         fields: EditorApi["Field"][];
         actions: EditorApi["ActionChange"][];
         relations: EditorApi["RelationChange"][];
+        notes: EditorApi["NoteChange"][];
     };
     /**
      * Dispatch
@@ -165,6 +185,19 @@ export interface EditorApi {
         response: string;
     };
     /**
+     * DocumentStep
+     * @description The change `seq` gave a key of a root map another value (docs/contracts.md 1). null is no value.
+     */
+    DocumentStep: {
+        seq: number;
+        author: string;
+        /** @enum {string} */
+        root: "actions" | "comments" | "meta" | "positions" | "relations";
+        key: string;
+        before: unknown;
+        after: unknown;
+    };
+    /**
      * EdgeEval
      * @description One relation was asked: `parent => child`, and what came of it: `result -> response`.
      */
@@ -175,6 +208,15 @@ export interface EditorApi {
         graph: string;
         edge: string;
         eval: string;
+    };
+    /**
+     * EditsOfOne
+     * @description What one person, by id, changed from the change `from_seq` to `seq`.
+     */
+    EditsOfOne: {
+        author: string;
+        from_seq: number;
+        seq: number;
     };
     /**
      * Example
@@ -195,6 +237,41 @@ export interface EditorApi {
         field: string;
         before: unknown;
         after: unknown;
+    };
+    /**
+     * FieldBlame
+     * @description Of which field, as the document's keys name it (docs/contracts.md 1): `in/speed`, `on_true`, "" for
+     *     the name of an action; and `position`.
+     */
+    FieldBlame: {
+        value: unknown;
+        before: unknown;
+        author: EditorApi["PersonRef"];
+        /** Format: date-time */
+        at: string;
+        seq: number;
+        field: string;
+    };
+    /**
+     * FieldValue
+     * @description The value that somebody gave a field by the change `seq`, and the one before. null is no value.
+     */
+    FieldValue: {
+        value: unknown;
+        before: unknown;
+        author: EditorApi["PersonRef"];
+        /** Format: date-time */
+        at: string;
+        seq: number;
+    };
+    /**
+     * GoneBack
+     * @description How far the log of the graph goes now, and of what not all was taken back, since others have changed
+     *     it or built on it: actions, notes and arrows by their keys.
+     */
+    GoneBack: {
+        seq: number;
+        left: string[];
     };
     /**
      * GraphMoment
@@ -296,12 +373,14 @@ export interface EditorApi {
      * @description Something that was done to a graph, between `at` and `until`.
      *
      *     `seq` is the change of the document that `…/umrf?at=` and `…/restore` take to see the graph as it
-     *     was after that edit; edits begin at `from_seq`. `restored` is the change that was gone back to,
-     *     `adapted` that of which parameters were taken over.
+     *     was after that edit; edits begin at `from_seq`, and others may have edited between the two.
+     *     `restored` is the change that was gone back to, `adapted` that of which parameters were taken over,
+     *     `reverted` what was taken back. `changes` is what this person changed; null where that is too much
+     *     to tell here, or nothing.
      */
     HistoryEntry: {
         /** @enum {string} */
-        kind: "adapted" | "created" | "deleted" | "edited" | "imported" | "published" | "recovered" | "restored";
+        kind: "adapted" | "created" | "deleted" | "edited" | "imported" | "published" | "recovered" | "restored" | "reverted";
         author: EditorApi["PersonRef"];
         /** Format: date-time */
         at: string;
@@ -311,7 +390,9 @@ export interface EditorApi {
         from_seq?: number;
         restored?: number;
         adapted?: EditorApi["TakenFrom"];
+        reverted?: EditorApi["Reverted"];
         version?: EditorApi["VersionView"];
+        changes?: EditorApi["Changes"];
     };
     /**
      * ImportReport
@@ -512,6 +593,16 @@ export interface EditorApi {
         also?: EditorApi["Where"][];
     };
     /**
+     * NoteChange
+     * @description A note or frame that came, went or changed. `text` is what it says, the newer one.
+     */
+    NoteChange: {
+        /** @enum {string} */
+        change: "added" | "changed" | "removed";
+        id: string;
+        text: string;
+    };
+    /**
      * OpenSession
      * @description A browser that is signed in. `invitation` is the id of the link that it came by; without one it
      *     came by the token.
@@ -578,6 +669,17 @@ export interface EditorApi {
         id: string;
         name: string;
         color: string;
+    };
+    /**
+     * PastDocument
+     * @description The root maps of a document as they were after its change `seq` (docs/contracts.md 1).
+     */
+    PastDocument: {
+        meta: Record<string, unknown>;
+        actions: Record<string, unknown>;
+        relations: Record<string, unknown>;
+        positions: Record<string, unknown>;
+        comments: Record<string, unknown>;
     };
     /**
      * Person
@@ -707,7 +809,8 @@ export interface EditorApi {
     };
     /**
      * RelationChange
-     * @description An arrow that came, went or changed, between actions by full name, or `entry` and `exit`.
+     * @description An arrow that came, went or changed, between actions by full name, or `entry` and `exit`. `ends`:
+     *     the same by their keys.
      */
     RelationChange: {
         /** @enum {string} */
@@ -715,6 +818,10 @@ export interface EditorApi {
         parent: string;
         child: string;
         fields: EditorApi["Field"][];
+        ends: [
+            string,
+            string
+        ];
     };
     /**
      * Renames
@@ -732,9 +839,21 @@ export interface EditorApi {
     };
     /**
      * Restoring
-     * @description The change after which the graph was as it shall be again.
+     * @description The change after which the graph was as it shall be again; with `of` only that action, arrow or
+     *     note, by its key.
      */
     Restoring: {
+        seq: number;
+        /** @default null */
+        of?: string | null;
+    };
+    /**
+     * Reverted
+     * @description Whose changes were taken back, from which to which.
+     */
+    Reverted: {
+        author: EditorApi["PersonRef"];
+        from_seq: number;
         seq: number;
     };
     /**

@@ -235,6 +235,7 @@ export interface RunnerApi {
         fields: RunnerApi["Field"][];
         actions: RunnerApi["ActionChange"][];
         relations: RunnerApi["RelationChange"][];
+        notes: RunnerApi["NoteChange"][];
     };
     /**
      * Doubt
@@ -518,6 +519,16 @@ export interface RunnerApi {
         outcomes: string[];
     };
     /**
+     * NoteChange
+     * @description A note or frame that came, went or changed. `text` is what it says, the newer one.
+     */
+    NoteChange: {
+        /** @enum {string} */
+        change: "added" | "changed" | "removed";
+        id: string;
+        text: string;
+    };
+    /**
      * Overridden
      * @description A problem that stood in the way of a start, as the look before it told it. `aid` and `path`
      *     are its place in the graph that was sent.
@@ -679,7 +690,8 @@ export interface RunnerApi {
     };
     /**
      * RelationChange
-     * @description An arrow that came, went or changed, between actions by full name, or `entry` and `exit`.
+     * @description An arrow that came, went or changed, between actions by full name, or `entry` and `exit`. `ends`:
+     *     the same by their keys.
      */
     RelationChange: {
         /** @enum {string} */
@@ -687,6 +699,10 @@ export interface RunnerApi {
         parent: string;
         child: string;
         fields: RunnerApi["Field"][];
+        ends: [
+            string,
+            string
+        ];
     };
     /**
      * ReplayFrame

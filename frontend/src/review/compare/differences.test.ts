@@ -31,7 +31,7 @@ const comparison = (steps: ComparedStep[], part: Partial<Comparison> = {}): Comp
     b: { number: 43, engine: "atlas" },
     same_graph: true,
     same_engine: true,
-    graph: { before: 0, after: 0, fields: [], actions: [], relations: [] },
+    graph: { before: 0, after: 0, fields: [], actions: [], relations: [], notes: [] },
     parameters: [],
     steps,
     left_out: 0,
@@ -91,6 +91,7 @@ test("the likely cause is the nearest thing that differed, and none where nothin
     after: 0,
     fields: [],
     relations: [],
+    notes: [],
     actions: [
       {
         change: "changed" as const,

@@ -1,4 +1,4 @@
-"""Routes of graphs: the catalogue, what a graph is or was, what is wrong with it, its past."""
+"""Routes of graphs: the catalogue, what a graph is or was, what is wrong with it."""
 
 from typing import Annotated, Any
 
@@ -7,17 +7,13 @@ from litestar import Request, Response, delete, get, patch, post
 from litestar.params import Parameter
 from litestar.types import ControllerRouterHandler
 
-from action_assistant.editor.catalogue import server_edits
 from action_assistant.editor.catalogue.catalogue import GraphView
-from action_assistant.editor.catalogue.history import HistoryEntry
 from action_assistant.editor.documents import contents
 from action_assistant.editor.interchange import importing
 from action_assistant.editor.interchange.edited_text import TextEdit, edited_text
 from action_assistant.editor.interchange.importing import ImportReport, Preview
-from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.services import EditorState
 from action_assistant.editor.workers import encoded
-from action_assistant.umrf.difference import Difference
 from action_assistant.umrf.json.embedded import JsonObject, UmrfGraph
 from action_assistant.umrf.model import Problem
 from action_assistant.web.auth.access import Needs, person_of
@@ -48,15 +44,9 @@ class Problems(msgspec.Struct, frozen=True):
     problems: tuple[Problem, ...]
 
 
-class Restoring(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The change after which the graph was as it shall be again."""
-
-    seq: int
-
-
 def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
-    """Everything under `/api/graphs` except versions and rooms."""
-    return [*_catalogue(app_state), *_contents(app_state), *_past(app_state)]
+    """Everything under `/api/graphs` except versions, rooms and the past."""
+    return [*_catalogue(app_state), *_contents(app_state)]
 
 
 def _catalogue(app_state: EditorState) -> list[ControllerRouterHandler]:
@@ -176,62 +166,3 @@ def _contents(app_state: EditorState) -> list[ControllerRouterHandler]:
         return answer
 
     return [get_umrf, get_problems, get_rewriting]
-
-
-def _past(app_state: EditorState) -> list[ControllerRouterHandler]:
-    @get(
-        "/api/graphs/{graph_id:str}/history",
-        summary="What was done to a graph, newest first",
-        operation_id="getHistory",
-    )
-    async def get_history(
-        graph_id: str,
-        limit: Annotated[int, Parameter(ge=1, le=1000)] = 100,
-        before: Seq | None = None,
-    ) -> list[HistoryEntry]:
-        services = app_state.services
-        await services.catalogue.require(graph_id)
-        return await services.history.of(graph_id, limit=limit, before=before)
-
-    @get(
-        "/api/graphs/{graph_id:str}/diff",
-        summary="What differs between two changes of a graph; `to` is now when left out",
-        operation_id="getDifference",
-    )
-    async def get_difference(
-        graph_id: str,
-        before: Annotated[int, Parameter(query="from", ge=1)],
-        after: Annotated[int | None, Parameter(query="to", ge=1)] = None,
-    ) -> Difference:
-        services = app_state.services
-        await services.catalogue.require(graph_id)
-        then = await services.graph_reader.at(graph_id, before)
-        later = await services.graph_reader.moment(graph_id, after)
-        found: Difference = encoded(
-            await services.graph_reader.ask(contents.differing, then, later)
-        )
-        return found
-
-    @post(
-        "/api/graphs/{graph_id:str}/restore",
-        status_code=200,
-        summary="Make a graph what it was after an earlier change, as an edit that can be undone",
-        operation_id="restoreGraph",
-        guards=[Needs("edit")],
-    )
-    async def restore_graph(graph_id: str, data: Restoring, request: Asking) -> GraphView:
-        services, person = app_state.services, person_of(request)
-        await services.catalogue.require(graph_id)
-        await services.people.seen(person)
-        then = await services.graph_reader.at(graph_id, data.seq)
-        async with services.rooms.enter(h.graph_stream(graph_id)) as room:
-            before = room.seq
-            seq = await server_edits.restore(
-                room, person.id, then.state, run_in_worker=services.workers.graphs
-            )
-        if seq > before:
-            restored = h.draft(h.RESTORED, person.id, h.GraphRestored(data.seq, seq))
-            await services.journal.append(h.about_stream(graph_id), [restored])
-        return await services.catalogue.get(graph_id)
-
-    return [get_history, get_difference, restore_graph]

@@ -106,6 +106,18 @@ class Replica:
                 self._apply(*(event.body for event in group))
                 self._known = clocks(self.doc.get_state())
 
+    def replay_each(self, events: Sequence[Event]) -> Iterator[Event]:
+        """As `replay` without learning, one by one: each event after it was applied, for who watches
+        the document. Raises Malformed, Panicked."""
+        for event in events:
+            if event.kind == UPDATED and not self._waiting:
+                self._apply(event.body)
+            elif event.kind in {UPDATED, DEFERRED}:
+                self._known = clocks(self.doc.get_state())
+                self._replay_one_by_one([event])
+            yield event
+        self._known = clocks(self.doc.get_state())
+
     def begin(self, kept: "ReplicaState") -> None:
         """Take up where a snapshot was made. Raises Malformed, Panicked."""
         begun = time.thread_time()

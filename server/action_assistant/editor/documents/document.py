@@ -29,13 +29,25 @@ from action_assistant.umrf.model import (
     Remap,
 )
 
-__all__ = ["Maps", "change", "fill", "flatten", "maps_of", "new_aid", "read", "read_maps"]
+__all__ = [
+    "PLAIN",
+    "Maps",
+    "change",
+    "fill",
+    "flatten",
+    "is_same",
+    "maps_of",
+    "new_aid",
+    "read",
+    "read_maps",
+]
 
 #: root → flat key → plain value
 Maps: TypeAlias = dict[str, dict[str, object]]
 
 SCHEMA: Final = 1.0
-_PLAIN: Final = (str, float, int, bool, list, dict, bytes, bytearray, type(None))
+#: What a key may hold; nested shared types, which no client of ours writes, are none.
+PLAIN: Final = (str, float, int, bool, list, dict, bytes, bytearray, type(None))
 
 
 def new_aid() -> Key:
@@ -52,7 +64,7 @@ def maps_of(doc: Doc) -> Maps:  # type: ignore[type-arg]
     """What is in the document, as plain values. Nested shared types, which no client of ours
     writes, are left out."""
     return {
-        root: {key: value for key, value in _root(doc, root).items() if isinstance(value, _PLAIN)}
+        root: {key: value for key, value in _root(doc, root).items() if isinstance(value, PLAIN)}
         for root in ROOTS
     }
 
@@ -73,7 +85,7 @@ def change(doc: Doc, target: Mapping[str, Mapping[str, object]]) -> None:  # typ
             for key in now[root].keys() - wanted.keys():
                 del shared[key]
             for key, value in wanted.items():
-                if key not in now[root] or not _equal(now[root][key], value):
+                if key not in now[root] or not is_same(now[root][key], value):
                     shared[key] = _plain(value)
 
 
@@ -203,7 +215,8 @@ def _root(doc: Doc, root: Root) -> Map:  # type: ignore[type-arg]
     return shared
 
 
-def _equal(a: object, b: object) -> bool:
+def is_same(a: object, b: object) -> bool:
+    """Whether two plain values are one: `True` is not 1."""
     return a == b and isinstance(a, bool) == isinstance(b, bool)
 
 

@@ -22,6 +22,7 @@ CREATED: Final = "graph.created.v1"
 IMPORTED: Final = "graph.imported.v1"  # the body is the file as it came
 DESCRIBED: Final = "graph.described.v1"
 RESTORED: Final = "graph.restored.v1"
+REVERTED: Final = "graph.reverted.v1"
 ADAPTED: Final = "graph.adapted.v1"
 BUILT: Final = "action.built.v1"
 DELETED: Final = "graph.deleted.v1"
@@ -66,6 +67,16 @@ class GraphRestored(msgspec.Struct, frozen=True):
     """The graph was made again what it had been at `restored`; the edit has the number `seq`."""
 
     restored: int
+    seq: int
+
+
+class GraphReverted(msgspec.Struct, frozen=True):
+    """The edit `seq` took back what `author` had changed between `from_seq` and `upto`, where nobody had
+    changed it since."""
+
+    author: str
+    from_seq: int
+    upto: int
     seq: int
 
 

@@ -1,0 +1,185 @@
+"""Routes of a graph's past: what was done, by whom, what it was, what differs, and the ways back."""
+
+from typing import Annotated, Any, Final
+
+import msgspec
+from litestar import Request, Response, get, post
+from litestar.params import Parameter
+from litestar.types import ControllerRouterHandler
+
+from action_assistant.editor.catalogue.catalogue import GraphView
+from action_assistant.editor.documents import contents
+from action_assistant.editor.history import told_changes
+from action_assistant.editor.history.blame import DocumentStep, FieldBlame, FieldValue
+from action_assistant.editor.history.going_back import EditsOfOne, GoneBack
+from action_assistant.editor.history.graph_history import HistoryEntry
+from action_assistant.editor.log.graph_events import graph_stream
+from action_assistant.editor.services import EditorState
+from action_assistant.editor.workers import encoded
+from action_assistant.errors import Conflict
+from action_assistant.umrf.difference import Difference
+from action_assistant.web.auth.access import Needs, person_of
+from action_assistant.web.server.openapi import answer
+
+Asking = Request[Any, Any, Any]
+Seq = Annotated[int, Parameter(ge=1)]
+
+_STEPS: Final = 5_000  # changes of keys in one answer
+
+
+class Restoring(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The change after which the graph was as it shall be again; with `of` only that action, arrow or
+    note, by its key."""
+
+    seq: int
+    of: str | None = None
+
+
+class PastDocument(msgspec.Struct, frozen=True):
+    """The root maps of a document as they were after its change `seq` (docs/contracts.md 1)."""
+
+    meta: dict[str, Any]
+    actions: dict[str, Any]
+    relations: dict[str, Any]
+    positions: dict[str, Any]
+    comments: dict[str, Any]
+
+
+def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
+    """Everything that looks or goes back."""
+    return [*_looking(app_state), *_blaming(app_state), *_going(app_state)]
+
+
+def _looking(app_state: EditorState) -> list[ControllerRouterHandler]:
+    @get(
+        "/api/graphs/{graph_id:str}/history",
+        summary="What was done to a graph, newest first",
+        operation_id="getHistory",
+    )
+    async def get_history(
+        graph_id: str,
+        limit: Annotated[int, Parameter(ge=1, le=1000)] = 100,
+        before: Seq | None = None,
+    ) -> list[HistoryEntry]:
+        services = app_state.services
+        await services.catalogue.require(graph_id)
+        return await services.history.of(graph_id, limit=limit, before=before)
+
+    @get(
+        "/api/graphs/{graph_id:str}/document",
+        summary="The document of a graph as it was after its change `at`",
+        operation_id="getDocument",
+        responses={200: answer(PastDocument)},
+    )
+    async def get_document(graph_id: str, at: Seq) -> Response[bytes]:
+        services = app_state.services
+        await services.catalogue.require(graph_id)
+        upto = await services.change_index.upto(graph_id, at)
+        if upto < at:
+            raise Conflict(
+                f"This graph has the changes 1 to {upto}; there is no {at}.",
+                where={"path": "/at"},
+            )
+        found = await services.change_index.at(graph_id, at)
+        text = await services.workers.graphs(told_changes.document, found)
+        return Response(text, media_type="application/json")
+
+    @get(
+        "/api/graphs/{graph_id:str}/changes",
+        summary="The newest changes of keys after the change `after` up to `upto`, in order of time: "
+        "the steps between two documents",
+        operation_id="getChanges",
+    )
+    async def get_changes(
+        graph_id: str,
+        after: Annotated[int, Parameter(ge=0)],
+        upto: Seq,
+        limit: Annotated[int, Parameter(ge=1, le=_STEPS)] = _STEPS,
+    ) -> list[DocumentStep]:
+        services = app_state.services
+        await services.catalogue.require(graph_id)
+        newest = await services.journal.newest(graph_stream(graph_id))
+        return await services.blame.changes(graph_id, after, min(upto, newest), limit)
+
+    @get(
+        "/api/graphs/{graph_id:str}/diff",
+        summary="What differs between two changes of a graph; `to` is now when left out",
+        operation_id="getDifference",
+    )
+    async def get_difference(
+        graph_id: str,
+        before: Annotated[int, Parameter(query="from", ge=1)],
+        after: Annotated[int | None, Parameter(query="to", ge=1)] = None,
+    ) -> Difference:
+        services = app_state.services
+        await services.catalogue.require(graph_id)
+        then = await services.graph_reader.at(graph_id, before)
+        later = await services.graph_reader.moment(graph_id, after)
+        found: Difference = encoded(
+            await services.graph_reader.ask(contents.differing, then, later)
+        )
+        return found
+
+    return [get_history, get_document, get_changes, get_difference]
+
+
+def _blaming(app_state: EditorState) -> list[ControllerRouterHandler]:
+    @get(
+        "/api/graphs/{graph_id:str}/blame",
+        summary="Who gave each field of an action, arrow or note the value that it has, and when",
+        operation_id="getBlame",
+    )
+    async def get_blame(graph_id: str, of: str, at: Seq | None = None) -> list[FieldBlame]:
+        services = app_state.services
+        await services.catalogue.require(graph_id)
+        return await services.blame.of(graph_id, of, at)
+
+    @get(
+        "/api/graphs/{graph_id:str}/blame/values",
+        summary="All values that a field of an action, arrow or note has had, newest first",
+        operation_id="getValues",
+    )
+    async def get_values(
+        graph_id: str, of: str, field: str, at: Seq | None = None
+    ) -> list[FieldValue]:
+        services = app_state.services
+        await services.catalogue.require(graph_id)
+        return await services.blame.of_field(graph_id, of, field, at)
+
+    return [get_blame, get_values]
+
+
+def _going(app_state: EditorState) -> list[ControllerRouterHandler]:
+    @post(
+        "/api/graphs/{graph_id:str}/restore",
+        status_code=200,
+        summary="Make a graph, or one action of it, what it was after an earlier change, as an edit "
+        "that can be undone",
+        operation_id="restoreGraph",
+        guards=[Needs("edit")],
+    )
+    async def restore_graph(graph_id: str, data: Restoring, request: Asking) -> GraphView:
+        services, person = app_state.services, person_of(request)
+        await services.catalogue.require(graph_id)
+        await services.people.seen(person)
+        if data.of is None:
+            await services.going_back.restore(graph_id, person.id, data.seq)
+        else:
+            await services.going_back.restore_one(graph_id, person.id, data.seq, data.of)
+        return await services.catalogue.get(graph_id)
+
+    @post(
+        "/api/graphs/{graph_id:str}/revert",
+        status_code=200,
+        summary="Take back what one person changed, where nobody has changed it since, as an edit "
+        "that can be undone",
+        operation_id="revertGraph",
+        guards=[Needs("edit")],
+    )
+    async def revert_graph(graph_id: str, data: EditsOfOne, request: Asking) -> GoneBack:
+        services, person = app_state.services, person_of(request)
+        await services.catalogue.require(graph_id)
+        await services.people.seen(person)
+        return await services.going_back.revert(graph_id, person.id, data)
+
+    return [restore_graph, revert_graph]

@@ -1,0 +1,139 @@
+"""Who gave each field of an action, an arrow or the graph the value that it has, and when."""
+
+from collections.abc import Iterable, Sequence
+from datetime import datetime
+from typing import Any, Final
+
+import msgspec
+
+from action_assistant.editor.catalogue.people import People
+from action_assistant.editor.documents.values import Root
+from action_assistant.editor.history.change_index import ChangeIndex
+from action_assistant.editor.history.key_changes import LoggedChange, unpacked
+from action_assistant.editor.log.document_events import when
+from action_assistant.errors import NotFound
+from action_assistant.web.auth.keys import PersonRef
+
+_ONE_GO: Final = (
+    5 * 60 * 1_000_000
+)  # microseconds between two changes of a field by one person, as one
+_MOST: Final = 1000  # values of one field
+
+
+class FieldValue(msgspec.Struct, frozen=True):
+    """The value that somebody gave a field by the change `seq`, and the one before. None is no value."""
+
+    value: Any
+    before: Any
+    author: PersonRef
+    at: datetime
+    seq: int
+
+
+class FieldBlame(FieldValue, frozen=True, kw_only=True):
+    """Of which field, as the document's keys name it (docs/contracts.md 1): `in/speed`, `on_true`, "" for
+    the name of an action; and `position`."""
+
+    field: str
+
+
+class DocumentStep(msgspec.Struct, frozen=True):
+    """The change `seq` gave a key of a root map another value (docs/contracts.md 1). None is no value."""
+
+    seq: int
+    author: str
+    root: Root
+    key: str
+    before: Any
+    after: Any
+
+
+class Blame:
+    """Asks the index who did what."""
+
+    def __init__(self, index: ChangeIndex, people: People) -> None:
+        self._index = index
+        self._people = people
+
+    async def of(self, graph: str, owner: str, seq: int | None) -> list[FieldBlame]:
+        """Every field of an action, arrow or note that has a value after the change `seq`, by field.
+
+        Raises NotFound, Unavailable.
+        """
+        upto = await self._index.upto(graph, seq)
+        found = await self._index.at(graph, upto if seq is None else seq, of={owner})
+        if not found:
+            raise NotFound(f"There is nothing {owner!r} in this graph at that moment.")
+        told = [self._told(change) for change in found]
+        return sorted(told, key=lambda each: each.field)
+
+    async def of_field(
+        self, graph: str, owner: str, field: str, seq: int | None
+    ) -> list[FieldValue]:
+        """All values that a field has had, the newest first; what one person typed in one go is one.
+
+        Raises Unavailable.
+        """
+        upto = await self._index.upto(graph, seq)
+        changes: list[LoggedChange] = []
+        for root, key in keys_of(owner, field):
+            changes += await self._index.of_key(graph, root, key, upto if seq is None else seq)
+        return [self._value(change) for change in in_one_go(changes)][::-1][:_MOST]
+
+    async def changes(self, graph: str, after: int, upto: int, limit: int) -> list[DocumentStep]:
+        """The newest changes of keys with `after < seq <= upto`, in order of time. Raises Unavailable."""
+        await self._index.upto(graph, upto)
+        found = await self._index.between(graph, after, upto, limit=limit)
+        return [
+            DocumentStep(c.seq, c.author, c.root, c.key, unpacked(c.before), unpacked(c.after))
+            for c in found
+        ]
+
+    def _told(self, change: LoggedChange) -> FieldBlame:
+        value = self._value(change)
+        return FieldBlame(**msgspec.structs.asdict(value), field=field_of(change.root, change.key))
+
+    def _value(self, change: LoggedChange) -> FieldValue:
+        return FieldValue(
+            unpacked(change.after),
+            unpacked(change.before),
+            self._people.person(change.author),
+            when(change.at),
+            change.seq,
+        )
+
+
+def field_of(root: Root, key: str) -> str:
+    """What a key says of its owner."""
+    if root == "meta":
+        return key
+    if root == "positions":
+        return f"waypoints/{key.partition('|')[2]}" if key.startswith("w/") else "position"
+    return key.partition("|")[2]
+
+
+def keys_of(owner: str, field: str) -> Sequence[tuple[Root, str]]:
+    """The keys that may hold a field of an owner."""
+    if owner == "":
+        return [("meta", field)]
+    if field == "position":
+        return [("positions", owner)]
+    if field.startswith("waypoints/"):
+        return [("positions", f"w/{owner}|{field.partition('/')[2]}")]
+    key = f"{owner}|{field}" if field else owner
+    return [("relations" if ">" in owner else "actions", key)]
+
+
+def in_one_go(changes: Iterable[LoggedChange]) -> list[LoggedChange]:
+    """Changes of one key, those that one person made in a row as one. One that was taken back in the
+    same go is none."""
+    found: list[LoggedChange] = []
+    for change in changes:
+        last = found[-1] if found else None
+        if last is None or last.author != change.author or change.at - last.at >= _ONE_GO:
+            found.append(change)
+        elif last.before == change.after:
+            found.pop()
+        else:
+            found[-1] = change._replace(before=last.before)
+    return found

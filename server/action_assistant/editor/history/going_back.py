@@ -1,0 +1,116 @@
+"""Going back: a whole graph, one action of it, or what one person did; each as an edit of its own."""
+
+from typing import Final
+
+import msgspec
+
+from action_assistant.editor.catalogue import server_edits
+from action_assistant.editor.catalogue.graph_reader import GraphReader
+from action_assistant.editor.history.change_index import ChangeIndex
+from action_assistant.editor.history.reverting import as_it_was, reverting
+from action_assistant.editor.log import graph_events as h
+from action_assistant.editor.rooms.open_rooms import Rooms
+from action_assistant.editor.rooms.room import Room
+from action_assistant.errors import BadInput, Conflict, NotFound, TooLarge
+from action_assistant.journal.journal import Journal
+from action_assistant.web.workers.lanes import RunInWorker, run_here
+
+_MOST: Final = 100_000  # changes of keys that are taken back at once
+
+
+class EditsOfOne(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What one person, by id, changed from the change `from_seq` to `seq`."""
+
+    author: str
+    from_seq: int
+    seq: int
+
+
+class GoneBack(msgspec.Struct, frozen=True):
+    """How far the log of the graph goes now, and of what not all was taken back, since others have changed
+    it or built on it: actions, notes and arrows by their keys."""
+
+    seq: int
+    left: tuple[str, ...] = ()
+
+
+class GoingBack:
+    """Makes the edits, and says in the log what they are."""
+
+    def __init__(
+        self,
+        journal: Journal,
+        rooms: Rooms,
+        graph_reader: GraphReader,
+        index: ChangeIndex,
+        run_in_worker: RunInWorker = run_here,
+    ) -> None:
+        self._journal = journal
+        self._rooms = rooms
+        self._graph_reader = graph_reader
+        self._index = index
+        self._run_in_worker = run_in_worker
+
+    async def restore(self, graph: str, author: str, seq: int) -> GoneBack:
+        """Make a graph what it was after its change `seq`. Raises NotFound, Conflict, Unavailable."""
+        then = await self._graph_reader.at(graph, seq)
+        async with self._rooms.enter(h.graph_stream(graph)) as room:
+            before = room.seq
+            now = await server_edits.restore(
+                room, author, then.state, run_in_worker=self._run_in_worker
+            )
+        return await self._said(graph, author, before, seq, now)
+
+    async def restore_one(self, graph: str, author: str, seq: int, owner: str) -> GoneBack:
+        """Make one action, arrow or note what it was after the change `seq`. Raises NotFound, Conflict,
+        Unavailable."""
+        upto = await self._index.upto(graph)
+        if not 1 <= seq <= upto:
+            raise Conflict(
+                f"This graph has the changes 1 to {upto}; there is no {seq}.",
+                where={"path": "/seq"},
+            )
+        then = await self._index.at(graph, seq)
+        if not owner or all(owner not in change.key for change in then):
+            raise NotFound(f"There was nothing {owner!r} in this graph after its change {seq}.")
+        async with self._rooms.enter(h.graph_stream(graph)) as room:
+            before, state = room.seq, await _state(room)
+            update = await self._run_in_worker(as_it_was, state, then, owner)
+            now = await room.submit(update, author)
+        return await self._said(graph, author, before, seq, now)
+
+    async def revert(self, graph: str, author: str, edits: EditsOfOne) -> GoneBack:
+        """Take back what somebody did. Raises BadInput, NotFound, TooLarge, Unavailable."""
+        first, last = edits.from_seq, edits.seq
+        if not 2 <= first <= last:
+            raise BadInput(
+                "What a graph began with cannot be taken back, and nothing ends before it begins.",
+                where={"path": "/from_seq"},
+            )
+        upto = await self._index.upto(graph)
+        changes = await self._index.between(
+            graph, first - 1, min(last, upto), limit=_MOST + 1, by=edits.author
+        )
+        if not changes:
+            raise NotFound("This person changed nothing then.")
+        if len(changes) > _MOST:
+            raise TooLarge("That is too much to take back at once; go back to the moment before.")
+        async with self._rooms.enter(h.graph_stream(graph)) as room:
+            before, state = room.seq, await _state(room)
+            latest = await self._index.latest_since(graph, first)
+            found = await self._run_in_worker(reverting, state, changes, latest)
+            now = await room.submit(found.update, author)
+        if now > before:
+            body = h.GraphReverted(edits.author, first, last, now)
+            await self._journal.append(h.about_stream(graph), [h.draft(h.REVERTED, author, body)])
+        return GoneBack(now, found.left)
+
+    async def _said(self, graph: str, author: str, before: int, then: int, now: int) -> GoneBack:
+        if now > before:
+            restored = h.draft(h.RESTORED, author, h.GraphRestored(then, now))
+            await self._journal.append(h.about_stream(graph), [restored])
+        return GoneBack(now)
+
+
+async def _state(room: Room) -> bytes:
+    return await room.look(lambda replica, _: replica.doc.get_update())

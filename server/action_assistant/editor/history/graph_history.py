@@ -1,0 +1,227 @@
+"""The history of a graph: events of its two streams by sitting, with what each sitting changed."""
+
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from typing import Any, Final, TypeAlias
+
+import msgspec
+from sqlalchemy import Row, select
+
+from action_assistant.editor.catalogue.people import People
+from action_assistant.editor.catalogue.versions import Versions, VersionView
+from action_assistant.editor.documents.values import ends_of
+from action_assistant.editor.history.change_index import ChangeIndex
+from action_assistant.editor.history.key_changes import LoggedChange, owner_of
+from action_assistant.editor.history.sittings import Kind, Sitting, Step, sittings
+from action_assistant.editor.history.told_changes import Changes, Stretch, told
+from action_assistant.editor.log import graph_events as h
+from action_assistant.journal.journal import Journal
+from action_assistant.schema import editor_tables
+from action_assistant.web.auth.keys import PersonRef
+from action_assistant.web.workers.lanes import RunInWorker, run_here
+
+_EVENTS: Final = (2_000, 10_000)  # that one answer looks at, if the fewer are not enough
+_CHANGES: Final = 20_000  # of keys that one answer tells of
+
+#: Events about a graph as a whole, and what history calls them.
+_WHOLE: Final[Mapping[str, Kind]] = {
+    h.CREATED: "created",
+    h.IMPORTED: "imported",
+    h.PUBLISHED: "published",
+    h.DELETED: "deleted",
+    h.RECOVERED: "recovered",
+}
+
+
+class TakenFrom(msgspec.Struct, frozen=True):
+    """The document whose parameters were taken over, "" for a file, its change then, and the name of
+    the action."""
+
+    document: str
+    seq: int
+    action: str
+
+
+class Reverted(msgspec.Struct, frozen=True):
+    """Whose changes were taken back, from which to which."""
+
+    author: PersonRef
+    from_seq: int
+    seq: int
+
+
+#: The change that was gone back to, of what parameters were taken over, or what was taken back.
+_Special: TypeAlias = int | TakenFrom | Reverted
+
+
+class HistoryEntry(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """Something that was done to a graph, between `at` and `until`.
+
+    `seq` is the change of the document that `…/umrf?at=` and `…/restore` take to see the graph as it
+    was after that edit; edits begin at `from_seq`, and others may have edited between the two.
+    `restored` is the change that was gone back to, `adapted` that of which parameters were taken over,
+    `reverted` what was taken back. `changes` is what this person changed; None where that is too much
+    to tell here, or nothing.
+    """
+
+    kind: Kind
+    author: PersonRef
+    at: datetime
+    until: datetime
+    seq: int
+    from_seq: int | None = None
+    restored: int | None = None
+    adapted: TakenFrom | None = None
+    reverted: Reverted | None = None
+    version: VersionView | None = None
+    changes: Changes | None = None
+
+
+class GraphHistory:
+    """Tells the past of graphs."""
+
+    def __init__(
+        self,
+        journal: Journal,
+        people: People,
+        versions: Versions,
+        index: ChangeIndex,
+        run_in_worker: RunInWorker = run_here,
+    ) -> None:
+        self._journal = journal
+        self._people = people
+        self._versions = versions
+        self._index = index
+        self._run_in_worker = run_in_worker
+
+    async def of(self, graph: str, *, limit: int, before: int | None) -> list[HistoryEntry]:
+        """Up to `limit` entries, newest first; with `before` only what was before that change."""
+        versions = await self._versions.by_event(graph)
+        special = await self._special(graph)
+        shown = (await self._sittings(graph, special, limit, before))[::-1][:limit]
+        changes = await self._changes(graph, shown)
+        return [
+            self._entry(sitting, special, versions, changes.get((sitting.author, sitting.seq)))
+            for sitting in shown
+        ]
+
+    async def _sittings(
+        self, graph: str, special: Mapping[int, _Special], limit: int, before: int | None
+    ) -> list[Sitting]:
+        """More than `limit`, or all that the last events make: the first of them may be a part of one."""
+        for most in _EVENTS:
+            rows = await self._rows(graph, before, most)
+            found = sittings(step for row in reversed(rows) if (step := _step(row, special)))
+            if len(found) > limit or len(rows) < most:
+                break
+        return found
+
+    def _entry(
+        self,
+        sitting: Sitting,
+        special: Mapping[int, _Special],
+        versions: Mapping[int, VersionView],
+        changes: Changes | None,
+    ) -> HistoryEntry:
+        how = special.get(sitting.seq) if sitting.from_seq is not None else None
+        version = versions[sitting.told] if sitting.kind == "published" else None
+        return HistoryEntry(
+            kind=sitting.kind,
+            author=self._people.person(sitting.author),
+            at=sitting.at,
+            until=sitting.until,
+            seq=sitting.seq if version is None else version.seq,
+            from_seq=sitting.from_seq,
+            restored=how if isinstance(how, int) else None,
+            adapted=how if isinstance(how, TakenFrom) else None,
+            reverted=how if isinstance(how, Reverted) else None,
+            version=version,
+            changes=changes,
+        )
+
+    async def _changes(
+        self, graph: str, shown: Sequence[Sitting]
+    ) -> dict[tuple[str, int], Changes]:
+        """What each sitting changed, by its author and end."""
+        edits = [
+            Stretch(sitting.author, sitting.from_seq, sitting.seq)
+            for sitting in shown
+            if sitting.from_seq is not None and sitting.seq > 1
+        ]
+        if not edits:
+            return {}
+        last = max(each.last for each in edits)
+        first = max(min(each.first for each in edits), 2)
+        await self._index.upto(graph, last)
+        rows = await self._index.between(graph, first - 1, last, limit=_CHANGES + 1)
+        if len(rows) > _CHANGES:
+            first = rows[0].seq + 1  # of which not everything may be here
+            rows = [row for row in rows if row.seq >= first]
+        edits = [each for each in edits if each.first >= first]
+        base = await self._index.at(graph, first - 1, of=_touched(rows))
+        found = await self._run_in_worker(told, base, rows, edits)
+        return {(e.author, e.last): each for e, each in zip(edits, found, strict=True)}
+
+    async def _rows(self, graph: str, before: int | None, most: int) -> list[Row[Any]]:
+        event = editor_tables.editor_event.c
+        document = h.graph_stream(graph)
+        chosen = (
+            select(event.seq, event.kind, event.author, event.at)
+            .where(event.stream.in_([document, h.about_stream(graph)]))
+            .order_by(event.position.desc())
+            .limit(most)
+        )
+        if before is not None:
+            there = select(event.position).where(event.stream == document, event.seq == before)
+            chosen = chosen.where(event.position < there.scalar_subquery())
+        return await self._journal.query(chosen)
+
+    async def _special(self, graph: str) -> dict[int, _Special]:
+        """Changes that went back to others, took over parameters or took something back."""
+        event = editor_tables.editor_event.c
+        kinds = [h.RESTORED, h.ADAPTED, h.REVERTED]
+        chosen = select(event.kind, event.body).where(
+            event.stream == h.about_stream(graph), event.kind.in_(kinds)
+        )
+        found: dict[int, _Special] = {}
+        for row in await self._journal.query(chosen):
+            match row.kind:
+                case h.RESTORED:
+                    restored = msgspec.json.decode(row.body, type=h.GraphRestored)
+                    found[restored.seq] = restored.restored
+                case h.ADAPTED:
+                    adapted = msgspec.json.decode(row.body, type=h.GraphAdapted)
+                    found[adapted.seq] = TakenFrom(adapted.source, adapted.at, adapted.name)
+                case _:
+                    back = msgspec.json.decode(row.body, type=h.GraphReverted)
+                    whose = self._people.person(back.author)
+                    found[back.seq] = Reverted(whose, back.from_seq, back.upto)
+        return found
+
+
+def _step(row: Row[Any], special: Mapping[int, _Special]) -> Step | None:
+    """The event as it is grouped; None for those that nobody is told."""
+    at = h.when(row.at)
+    if row.kind in {h.UPDATED, h.DEFERRED}:
+        if row.seq == 1:
+            return None  # what the graph was created with
+        match special.get(row.seq):
+            case int():
+                return Step("restored", row.author, at, row.seq)
+            case TakenFrom():
+                return Step("adapted", row.author, at, row.seq)
+            case Reverted():
+                return Step("reverted", row.author, at, row.seq)
+            case _:
+                return Step("edited", row.author, at, row.seq)
+    kind = _WHOLE.get(row.kind)
+    if kind is None:
+        return None
+    return Step(kind, row.author, at, 1 if kind == "created" else None, row.seq)
+
+
+def _touched(rows: Sequence[LoggedChange]) -> set[str]:
+    """What changes speak of, and the actions between which arrows are."""
+    owners = {owner_of(row.root, row.key) for row in rows}
+    ends = {end for owner in owners if (found := ends_of(owner)) for end in found[:2]}
+    return owners | ends

@@ -1,0 +1,137 @@
+"""Which keys of a document each event of its log changed, from what to what. For workers."""
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Any, Final, NamedTuple, TypeAlias, cast
+
+import msgspec
+from pycrdt import Map
+
+from action_assistant.editor.crdt.messages import Malformed
+from action_assistant.editor.crdt.replica import Panicked, Replica, ReplicaState
+from action_assistant.editor.documents.document import PLAIN, is_same
+from action_assistant.editor.documents.values import ROOTS, Root
+from action_assistant.journal.events import Event
+
+#: A plain value of the document as MessagePack; None where there is no such key.
+Packed: TypeAlias = bytes | None
+Place: TypeAlias = tuple[Root, str]
+
+
+class LoggedChange(NamedTuple):
+    """The event `seq` of a document's log gave a key of a root map another value, or took it away.
+
+    `at`: microseconds since 1970, UTC.
+    """
+
+    seq: int
+    author: str
+    at: int
+    root: Root
+    key: str
+    before: Packed
+    after: Packed
+
+    @property
+    def place(self) -> Place:
+        """Which key it is."""
+        return self.root, self.key
+
+
+class ObservedEvents(msgspec.Struct, frozen=True):
+    """What some events changed, and the document after them, as the bytes of a snapshot, at `seq`.
+
+    `damaged`: the event after `seq` cannot be applied.
+    """
+
+    document: bytes
+    seq: int
+    changes: list[LoggedChange]
+    damaged: bool = False
+
+
+def observed(document: bytes, events: Sequence[Event]) -> ObservedEvents | None:
+    """What events change that follow a document, which is a snapshot's bytes or nothing. None when these
+    bytes are no document."""
+    replica = ReplicaState.replica(document) if document else Replica()
+    if replica is None:
+        return None
+    seen = _Observer(replica)
+    seq = events[0].seq - 1
+    changes: list[LoggedChange] = []
+    damaged = False
+    try:
+        for event in replica.replay_each(events):
+            changes += seen.changes(event)
+            seq = event.seq
+    except (Malformed, Panicked):
+        damaged = True
+    finally:
+        seen.close()
+        kept = b"" if damaged else ReplicaState.of(replica)
+        replica.close()
+    if damaged and seq >= events[0].seq:  # what failed may have left something behind
+        again = observed(document, [event for event in events if event.seq <= seq])
+        kept = document if again is None else again.document
+    return ObservedEvents(kept or document, seq if damaged else events[-1].seq, changes, damaged)
+
+
+def owner_of(root: Root, key: str) -> str:
+    """What a key speaks of: an action or an end by its key, a relation by its id, a note as `g/ID`, a
+    thread as `c/THREAD`, the graph as ""."""
+    if root == "meta":
+        return ""
+    if root == "comments":
+        return f"c/{key.partition('/')[0]}"
+    if root == "positions":
+        return key.removeprefix("w/").partition("|")[0]
+    return key.partition("|")[0]
+
+
+def unpacked(value: Packed) -> Any:
+    """The plain value; None where there is none."""
+    return None if value is None else msgspec.msgpack.decode(value)
+
+
+class _Observer:
+    """Hears what each root map says of its changes, until somebody asks."""
+
+    def __init__(self, replica: Replica) -> None:
+        self._heard: dict[Place, tuple[object, object]] = {}
+        self._maps: Final = {root: _map(replica, root) for root in ROOTS}
+        self._subscriptions: Final = {
+            root: shared.observe(partial(self._hear, root)) for root, shared in self._maps.items()
+        }
+
+    def changes(self, event: Event) -> list[LoggedChange]:
+        """What was heard since this was asked last; it is the event's doing."""
+        heard, self._heard = self._heard, {}
+        return [
+            LoggedChange(event.seq, event.author, event.at, *place, _packed(before), _packed(after))
+            for place, (before, after) in heard.items()
+            if not is_same(before, after)
+        ]
+
+    def close(self) -> None:
+        """Let the document be freed."""
+        for root, shared in self._maps.items():
+            shared.unobserve(self._subscriptions[root])
+
+    def _hear(self, root: Root, event: Any) -> None:
+        for key, told in event.keys.items():
+            before, after = _plain(told.get("oldValue")), _plain(told.get("newValue"))
+            first, _ = self._heard.get((root, key), (before, None))
+            self._heard[root, key] = first, after
+
+
+def _map(replica: Replica, root: Root) -> "Map[Any]":
+    return cast("Map[Any]", replica.doc.get(root, type=Map))
+
+
+def _plain(value: object) -> object:
+    """Nested shared types, which no client of ours writes, count as nothing."""
+    return value if isinstance(value, PLAIN) else None
+
+
+def _packed(value: object) -> Packed:
+    return None if value is None else msgspec.msgpack.encode(value)

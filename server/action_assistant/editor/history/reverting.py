@@ -1,0 +1,188 @@
+"""Edits that take something back: what one person did in a sitting, or one action as it was. For workers."""
+
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Final
+
+import msgspec
+from pycrdt import Doc
+
+from action_assistant.editor.documents import document
+from action_assistant.editor.documents.document import Maps
+from action_assistant.editor.documents.values import ROOTS, ends_of
+from action_assistant.editor.history.key_changes import (
+    LoggedChange,
+    Packed,
+    Place,
+    owner_of,
+    unpacked,
+)
+from action_assistant.editor.interchange.changes import difference
+from action_assistant.umrf.model import ENTRY, EXIT, PRECONDITIONS
+
+_OUTCOMES: Final = frozenset(PRECONDITIONS)
+
+
+class TakenBack(msgspec.Struct, frozen=True):
+    """The update that takes something back. `left`: of what not all was taken back, since others have
+    changed it or built on it: actions, arrows and notes as `owner_of` names them."""
+
+    update: bytes
+    left: tuple[str, ...]
+
+
+def reverting(
+    state: bytes, changes: Sequence[LoggedChange], latest: Mapping[Place, int]
+) -> TakenBack:
+    """Take back the changes of one person in a sitting, given in order of time. `latest`: the last change
+    of each key that anybody has changed since it began.
+
+    A field that somebody has set since stays as it is; one that somebody else set in between becomes what
+    they made of it. What was made in that sitting goes only if nobody has changed it or led an arrow to
+    it since; where it stands does not matter.
+    """
+    sitting = _Sitting(changes, _places(state), latest)
+    return TakenBack(_setting(state, sitting.targets()), sitting.left())
+
+
+def as_it_was(state: bytes, then: Sequence[LoggedChange], owner: str) -> bytes:
+    """The update that makes an action, arrow or note what it was. `then`: the changes that gave each key
+    of the graph its value. An action that is not there any more comes back with its arrows."""
+    now = _places(state)
+    owners = {owner}
+    if ("actions", owner) not in now:
+        alive = {key for root, key in now if root == "actions" and "|" not in key}
+        alive |= {owner, ENTRY, EXIT}
+        for each in {owner_of(*change.place) for change in then}:
+            ends = ends_of(each)
+            if ends is not None and owner in ends[:2] and alive.issuperset(ends[:2]):
+                owners.add(each)
+    targets: dict[Place, Packed] = {place: None for place in now if owner_of(*place) in owners}
+    targets |= {change.place: change.after for change in then if owner_of(*change.place) in owners}
+    return _setting(state, targets)
+
+
+class _Sitting:
+    """What one person did to each key, beside what is there now."""
+
+    def __init__(
+        self,
+        changes: Sequence[LoggedChange],
+        now: Mapping[Place, Any],
+        latest: Mapping[Place, int],
+    ) -> None:
+        self._now = now
+        self._latest = latest
+        self._first: dict[Place, Packed] = {}
+        self._last: dict[Place, LoggedChange] = {}
+        for change in changes:
+            place, before = change.place, change.before
+            if change.root == "comments":
+                continue  # what people said stays
+            if place not in self._last or self._last[place].after != before:
+                self._first[place] = before
+            self._last[place] = change
+        self._places = _by_owner(now)
+        self._arrows = _arrows_of({_owner(place) for place in latest} & self._places.keys())
+        made = {owner for owner in map(_owner, self._first) if self._was_made(owner)}
+        self._made = made
+        self._kept = set[str]()  # of those, what stays
+        while more := {o for o in made - self._kept if self._is_in_use(o)}:
+            self._kept |= more
+
+    def targets(self) -> dict[Place, Packed]:
+        """What each key is to hold again."""
+        return {p: old for p, old in self._first.items() if self._goes_back(p)}
+
+    def left(self) -> tuple[str, ...]:
+        """Of what something stays."""
+        stay = {
+            owner_of(*place)
+            for place, old in self._first.items()
+            if not self._goes_back(place) and old != self._last[place].after
+        }
+        return tuple(sorted(stay))
+
+    def _goes_back(self, place: Place) -> bool:
+        owner = _owner(place)
+        if owner in self._made:
+            return owner not in self._kept
+        return self._is_untouched(place)
+
+    def _is_mine(self, place: Place) -> bool:
+        return place in self._last and self._is_untouched(place)
+
+    def _is_untouched(self, place: Place) -> bool:
+        """Whether nobody has set a key since this person did."""
+        mine = self._last[place]
+        return self._latest[place] == mine.seq and self._now.get(place) == unpacked(mine.after)
+
+    def _was_made(self, owner: str) -> bool:
+        """Whether a thing that is there now was made in this sitting."""
+        proofs = [place for place in self._places.get(owner, ()) if _proves(place)]
+        return bool(proofs) and all(self._first.get(place, b"") is None for place in proofs)
+
+    def _is_in_use(self, owner: str) -> bool:
+        """Whether others have changed a thing, or led an arrow to it that stays."""
+        own = [place for place in self._places[owner] if not _is_place_of_card(place)]
+        if any(place in self._latest and not self._is_mine(place) for place in own):
+            return True
+        return not self._arrows.get(owner, set()) <= self._made - self._kept
+
+
+def _owner(place: Place) -> str:
+    return owner_of(*place)
+
+
+def _proves(place: Place) -> bool:
+    """Whether the thing that a key speaks of exists because of it."""
+    root, key = place
+    match root:
+        case "actions":
+            return "|" not in key
+        case "relations":
+            return key.partition("|")[2] in _OUTCOMES
+        case _:
+            return root == "positions" and key.startswith("g/")
+
+
+def _is_place_of_card(place: Place) -> bool:
+    root, key = place
+    return root == "positions" and not key.startswith("g/")
+
+
+def _by_owner(places: Iterable[Place]) -> dict[str, list[Place]]:
+    found: dict[str, list[Place]] = defaultdict(list)
+    for place in places:
+        found[_owner(place)].append(place)
+    return found
+
+
+def _arrows_of(owners: Iterable[str]) -> dict[str, set[str]]:
+    """The arrows of each action."""
+    found: dict[str, set[str]] = defaultdict(set)
+    for owner in owners:
+        for end in (ends_of(owner) or ())[:2]:
+            found[str(end)].add(owner)
+    return found
+
+
+def _places(state: bytes) -> dict[Place, Any]:
+    doc: Doc[Any] = Doc()
+    doc.apply_update(state)
+    maps = document.maps_of(doc)
+    return {(root, key): value for root in ROOTS for key, value in maps[root].items()}
+
+
+def _setting(state: bytes, targets: Mapping[Place, Packed]) -> bytes:
+    """The update that gives keys values, and touches nothing else."""
+
+    def edit(doc: Doc[Any]) -> None:
+        wanted: Maps = {root: dict(fields) for root, fields in document.maps_of(doc).items()}
+        for (root, key), value in targets.items():
+            wanted[root].pop(key, None)
+            if value is not None:
+                wanted[root][key] = unpacked(value)
+        document.change(doc, wanted)
+
+    return difference(state, edit)

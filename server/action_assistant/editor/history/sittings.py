@@ -1,0 +1,74 @@
+"""Groups what was done to a document: the edits of one person in one go are one sitting. Pure."""
+
+from collections.abc import Iterable
+from datetime import datetime
+from typing import Final, Literal, NamedTuple, TypeAlias
+
+import msgspec
+from msgspec.structs import replace
+
+_ONE_GO: Final = 5 * 60  # seconds between two edits of one sitting
+
+Kind: TypeAlias = Literal[
+    "created",
+    "imported",
+    "edited",
+    "published",
+    "restored",
+    "reverted",
+    "adapted",
+    "deleted",
+    "recovered",
+]
+
+
+class Step(NamedTuple):
+    """An event as it is grouped. `seq`: the change of the document, None for what is none. `told`: which
+    event about the graph it is, for who tells more of it."""
+
+    kind: Kind
+    author: str
+    at: datetime
+    seq: int | None
+    told: int = 0
+
+
+class Sitting(msgspec.Struct, frozen=True):
+    """What one person did between `at` and `until`, from the change `from_seq` to `seq`; others may have
+    edited meanwhile. Of what is no edit `from_seq` is None, and `seq` the change before it."""
+
+    kind: Kind
+    author: str
+    at: datetime
+    until: datetime
+    seq: int
+    from_seq: int | None = None
+    told: int = 0
+
+
+def sittings(steps: Iterable[Step]) -> list[Sitting]:
+    """From steps in order of time, the sittings in the order of their ends. What is no mere edit ends the
+    sittings of everybody: it may speak of what was there just then."""
+    done: dict[int, Sitting] = {}
+    open_of: dict[str, int] = {}
+    seq = 1
+    for number, step in enumerate(steps):
+        seq = step.seq or seq
+        if step.kind == "imported" and done:
+            before = done.popitem()[1]
+            done[number] = replace(before, kind="imported")
+        elif step.kind == "edited":
+            mine = done.pop(open_of.get(step.author, -1), None)
+            if mine is not None and (step.at - mine.until).total_seconds() >= _ONE_GO:
+                done[open_of[step.author]] = mine
+                mine = None
+            begun = Sitting("edited", step.author, step.at, step.at, seq, seq)
+            done[number] = begun if mine is None else replace(mine, until=step.at, seq=seq)
+            open_of[step.author] = number
+        else:
+            open_of.clear()
+            changed = seq if step.seq is not None and step.kind != "created" else None
+            done[number] = Sitting(
+                step.kind, step.author, step.at, step.at, seq, changed, step.told
+            )
+    return [done[number] for number in sorted(done)]

@@ -1,0 +1,159 @@
+"""What sittings changed, as differences that people know: of actions, arrows, notes. For workers."""
+
+from collections.abc import Iterable, Mapping, Sequence, Set
+from typing import Any, Final, TypeAlias
+
+import msgspec
+
+from action_assistant.editor.documents.document import Maps, read_maps
+from action_assistant.editor.documents.values import ROOTS, ends_of
+from action_assistant.editor.history.key_changes import (
+    LoggedChange,
+    Packed,
+    Place,
+    owner_of,
+    unpacked,
+)
+from action_assistant.umrf.difference import (
+    ActionChange,
+    Difference,
+    Field,
+    NoteChange,
+    RelationChange,
+    difference,
+)
+from action_assistant.umrf.model import ENTRY, EXIT, Graph
+
+State: TypeAlias = dict[Place, Packed]
+
+_SHOWN: Final = 30  # things of one kind in one sitting
+_ENDS: Final = {ENTRY, EXIT}
+
+
+class Changes(msgspec.Struct, frozen=True, omit_defaults=True):
+    """What somebody changed, as a difference, with at most 30 things of a kind and how many more there are.
+    `comments`: threads in which something was said."""
+
+    fields: tuple[Field, ...] = ()
+    actions: tuple[ActionChange, ...] = ()
+    relations: tuple[RelationChange, ...] = ()
+    notes: tuple[NoteChange, ...] = ()
+    more: int = 0
+    comments: int = 0
+
+
+class Stretch(msgspec.Struct, frozen=True, array_like=True):
+    """The changes of one person from `first` to `last`, which are to be told."""
+
+    author: str
+    first: int
+    last: int
+
+
+def told(
+    base: Sequence[LoggedChange], changes: Sequence[LoggedChange], stretches: Sequence[Stretch]
+) -> list[Changes]:
+    """What each stretch changed. `base`: what was there before the `changes`, which are in order of
+    time, as far as it is about what they touch."""
+    state = state_of(base)
+    own: list[dict[Place, tuple[Packed, Packed]]] = [{} for _ in stretches]
+    found = [Changes() for _ in stretches]
+    current = _Current(stretches)
+    ends = sorted(range(len(stretches)), key=lambda n: stretches[n].last, reverse=True)
+    for change in changes:
+        while ends and stretches[ends[-1]].last < change.seq:
+            found[ends[-1]] = _told(own[ends[-1]], state)
+            ends.pop()
+        state[change.place] = change.after
+        if (mine := current.of(change)) is not None:
+            before, _ = own[mine].get(change.place, (change.before, None))
+            own[mine][change.place] = before, change.after
+    for n in ends:
+        found[n] = _told(own[n], state)
+    return found
+
+
+def state_of(changes: Iterable[LoggedChange]) -> State:
+    """The values that changes in order of time leave."""
+    return {change.place: change.after for change in changes}
+
+
+def maps_of(state: Mapping[Place, Packed]) -> Maps:
+    """Values as the maps of a document."""
+    maps: Maps = {root: {} for root in ROOTS}
+    for (root, key), value in state.items():
+        if value is not None:
+            maps[root][key] = unpacked(value)
+    return maps
+
+
+def document(changes: Sequence[LoggedChange]) -> bytes:
+    """The maps of a document that changes left, as JSON; bytes, which no client of ours writes, left out."""
+    maps = maps_of(state_of(changes))
+    plain = {
+        root: {key: value for key, value in fields.items() if not isinstance(value, bytes)}
+        for root, fields in maps.items()
+    }
+    return msgspec.json.encode(plain)
+
+
+def graph_of(state: Mapping[Place, Packed]) -> Graph:
+    """The graph that these values show."""
+    return read_maps(maps_of(state))
+
+
+class _Current:
+    """Which stretch a change belongs to. Those of one person follow one another."""
+
+    def __init__(self, stretches: Sequence[Stretch]) -> None:
+        self._of: dict[str, list[tuple[int, Stretch]]] = {}
+        for n, stretch in sorted(enumerate(stretches), key=lambda each: each[1].first):
+            self._of.setdefault(stretch.author, []).append((n, stretch))
+
+    def of(self, change: LoggedChange) -> int | None:
+        mine = self._of.get(change.author, [])
+        while mine and mine[0][1].last < change.seq:
+            mine.pop(0)
+        return mine[0][0] if mine and mine[0][1].first <= change.seq else None
+
+
+def _told(own: Mapping[Place, tuple[Packed, Packed]], state: State) -> Changes:
+    """The difference that one person made of what they touched, whatever others did to it since."""
+    owners = {owner_of(*place) for place in own}
+    names = {("actions", key) for owner in owners for key in _ends(owner)}
+    around = {p: value for p, value in state.items() if owner_of(*p) in owners or p in names}
+    before = around | {place: old for place, (old, _) in own.items()}
+    after = around | {place: new for place, (_, new) in own.items()}
+    found = difference((0, graph_of(before)), (0, graph_of(after)))
+    return _short(found, owners)
+
+
+def _ends(owner: str) -> set[str]:
+    """The actions between which an arrow is."""
+    ends = ends_of(owner)
+    return set() if ends is None else {ends.parent, ends.child} - _ENDS
+
+
+def _short(found: Difference, owners: Set[str]) -> Changes:
+    """At most some of each kind, and nothing that merely follows, as another number follows from a name
+    that somebody else took."""
+    actions = tuple(change for change in found.actions if change.aid in owners)
+    comments = sum(owner.startswith("c/") for owner in owners)
+    kinds: tuple[tuple[Any, ...], ...] = (actions, found.relations, found.notes)
+    return Changes(
+        found.fields,
+        _most(actions),
+        found.relations[:_SHOWN],
+        found.notes[:_SHOWN],
+        sum(max(0, len(kind) - _SHOWN) for kind in kinds),
+        comments,
+    )
+
+
+def _most(actions: Sequence[ActionChange]) -> tuple[ActionChange, ...]:
+    """What means something comes before what only stands elsewhere."""
+
+    def moved_only(change: ActionChange) -> bool:
+        return change.change == "changed" and all(f.field == "position" for f in change.fields)
+
+    return tuple(sorted(actions, key=moved_only)[:_SHOWN])

@@ -1,0 +1,143 @@
+"""The index of key changes agrees with the log that it is made of, wherever and whenever one looks."""
+
+import random
+from collections import defaultdict
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from sqlalchemy import delete
+
+from action_assistant.editor.history.change_index import ChangeIndex
+from action_assistant.editor.history.key_changes import LoggedChange, owner_of, unpacked
+from action_assistant.editor.history.told_changes import maps_of, state_of
+from action_assistant.editor.log.graph_events import graph_stream
+from action_assistant.editor.rooms.open_rooms import Rooms
+from action_assistant.journal.events import Draft
+from action_assistant.journal.journal import Journal
+from action_assistant.schema.editor_tables import key_change, key_change_head
+from editor.history.random_edits import GRAPH, edited, plain
+from support.doses import examples
+
+_ALL = 1_000_000
+
+
+def _seen(changes: list[LoggedChange]) -> bytes:
+    return plain(maps_of(state_of(changes)))
+
+
+@pytest.mark.parametrize("seed", range(examples(12)))
+async def test_the_state_at_any_moment_is_what_the_log_replays(
+    journal: Journal, rooms: Rooms, seed: int
+) -> None:
+    held = await edited(rooms, seed, 50)
+    index = ChangeIndex(journal)
+    assert await index.upto(GRAPH) == len(held)
+    for n, maps in enumerate(held):
+        assert _seen(await index.at(GRAPH, n + 1)) == plain(maps), n + 1
+
+
+@pytest.mark.parametrize("seed", range(examples(12)))
+async def test_changes_between_two_moments_lead_from_one_to_the_other(
+    journal: Journal, rooms: Rooms, seed: int
+) -> None:
+    held = await edited(rooms, seed, 50)
+    index = ChangeIndex(journal)
+    await index.upto(GRAPH)
+    dice = random.Random(seed)
+    for _ in range(20):
+        first, last = sorted(dice.choices(range(1, len(held) + 1), k=2))
+        between = await index.between(GRAPH, first, last, limit=_ALL)
+        then = state_of(await index.at(GRAPH, first))
+        assert plain(maps_of(then | state_of(between))) == plain(held[last - 1])
+        back = {change.place: change.before for change in reversed(between)}
+        now = state_of(await index.at(GRAPH, last))
+        assert plain(maps_of(now | back)) == plain(held[first - 1])
+
+
+@pytest.mark.parametrize("seed", range(examples(12)))
+async def test_who_set_a_value_is_who_a_search_of_the_whole_log_finds(
+    journal: Journal, rooms: Rooms, seed: int
+) -> None:
+    held = await edited(rooms, seed, 50)
+    events = await journal.read(graph_stream(GRAPH))
+    sought: dict[tuple[str, str], tuple[int, str, object]] = {}
+    before = {}
+    for event, maps in zip(events, held, strict=True):
+        now = {(root, key): v for root, fields in maps.items() for key, v in fields.items()}
+        for place in before.keys() | now.keys():
+            if before.get(place) != now.get(place):
+                sought[place] = event.seq, event.author, now.get(place)
+        before = now
+    index = ChangeIndex(journal)
+    await index.upto(GRAPH)
+    found = {
+        change.place: (change.seq, change.author, unpacked(change.after))
+        for change in await index.at(GRAPH, len(held))
+    }
+    assert found == {place: who for place, who in sought.items() if who[2] is not None}
+
+
+@pytest.mark.parametrize("seed", range(examples(8)))
+async def test_however_often_it_is_brought_up_it_holds_the_same(
+    journal: Journal, rooms: Rooms, seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("action_assistant.editor.history.change_index._EVENTS", 1 + seed % 7)
+    held = await edited(rooms, seed, 40)
+    index, dice = ChangeIndex(journal), random.Random(seed)
+    for upto in sorted(dice.sample(range(1, len(held) + 1), k=5)):
+        assert await index.upto(GRAPH, upto) >= upto
+    await index.upto(GRAPH)
+    pieces = await index.between(GRAPH, 0, len(held), limit=_ALL)
+    await journal.derive(lambda connection: connection.execute(delete(key_change)))
+    await journal.derive(lambda connection: connection.execute(delete(key_change_head)))
+    monkeypatch.undo()
+    await index.upto(GRAPH)
+    assert pieces == await index.between(GRAPH, 0, len(held), limit=_ALL)
+
+
+async def test_a_document_kept_by_another_version_is_made_again(
+    journal: Journal, rooms: Rooms
+) -> None:
+    held = await edited(rooms, 1, 30)
+    index = ChangeIndex(journal)
+    await index.upto(GRAPH, 5)
+    strange = key_change_head.update().values(document=b"what is this")
+    await journal.derive(lambda connection: connection.execute(strange))
+    assert await index.upto(GRAPH) == len(held)
+    assert _seen(await index.at(GRAPH, len(held))) == plain(held[-1])
+
+
+async def test_where_the_log_is_damaged_it_ends(journal: Journal, rooms: Rooms) -> None:
+    held = await edited(rooms, 2, 30)
+    await rooms.close()
+    bad = Draft("graph.updated.v1", "ada", b"\x01\x01\xff\xff\xff\xff\xff")
+    await journal.append(graph_stream(GRAPH), [bad])
+    index = ChangeIndex(journal)
+    assert await index.upto(GRAPH) == len(held)
+    assert await index.upto(GRAPH) == len(held)
+    assert _seen(await index.at(GRAPH, len(held) + 1)) == plain(held[-1])
+
+
+async def test_it_is_kept_up_while_nobody_asks(
+    journal: Journal, rooms: Rooms, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("action_assistant.editor.history.change_index._PERIOD", 0.01)
+    index = ChangeIndex(journal)
+    async with index.kept_up():
+        held = await edited(rooms, 3, 30)
+        found: dict[bool, int] = defaultdict(int)
+        while not found[True]:
+            found[len(await index.at(GRAPH, len(held))) > 0] += 1
+            assert found[False] < 5000
+
+
+@given(st.from_regex(r"[A-Za-z0-9]{12}", fullmatch=True), st.text(max_size=5))
+@settings(max_examples=examples(50), suppress_health_check=[HealthCheck.too_slow])
+def test_a_key_speaks_of_what_stands_before_its_first_bar(aid: str, rest: str) -> None:
+    assert owner_of("actions", f"{aid}|{rest}") == aid
+    assert owner_of("relations", f"{aid}>exit|{rest}") == f"{aid}>exit"
+    assert owner_of("positions", f"w/{aid}>exit|run") == f"{aid}>exit"
+    assert owner_of("positions", aid) == aid
+    assert owner_of("positions", "g/note") == "g/note"
+    assert owner_of("meta", f"x/{rest}") == ""

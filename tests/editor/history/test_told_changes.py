@@ -1,0 +1,76 @@
+"""What a sitting changed is told as whoever compares the graph before and after it finds it."""
+
+import random
+
+import pytest
+
+from action_assistant.editor.documents.document import read_maps
+from action_assistant.editor.documents.values import ends_of
+from action_assistant.editor.history.change_index import ChangeIndex
+from action_assistant.editor.history.key_changes import LoggedChange, owner_of
+from action_assistant.editor.history.told_changes import Changes, Stretch, told
+from action_assistant.editor.rooms.open_rooms import Rooms
+from action_assistant.journal.journal import Journal
+from action_assistant.umrf.difference import difference
+from editor.history.random_edits import GRAPH, PEOPLE, edited
+from support.doses import examples
+
+_ALL = 1_000_000
+
+
+def _touched(changes: list[LoggedChange]) -> set[str]:
+    owners = {owner_of(change.root, change.key) for change in changes}
+    return owners | {end for o in owners if (ends := ends_of(o)) for end in ends[:2]}
+
+
+@pytest.mark.parametrize("seed", range(examples(12)))
+async def test_what_one_person_did_alone_is_the_difference_of_the_whole_graphs(
+    journal: Journal, rooms: Rooms, seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("editor.history.random_edits.PEOPLE", PEOPLE[:1])
+    monkeypatch.setattr("action_assistant.editor.history.told_changes._SHOWN", 1000)
+    held = await edited(rooms, seed, 40)
+    index = ChangeIndex(journal)
+    await index.upto(GRAPH)
+    first = random.Random(seed).randrange(2, len(held))
+    changes = await index.between(GRAPH, first - 1, len(held), limit=_ALL)
+    base = await index.at(GRAPH, first - 1, of=_touched(changes))
+    (found,) = told(base, changes, [Stretch("ada", first, len(held))])
+    before, after = read_maps(held[first - 2]), read_maps(held[-1])
+    sought = difference((0, before), (0, after))
+    assert found.fields == sought.fields
+    assert _by_key(found) == {change.aid: change for change in sought.actions}
+    assert set(found.relations) == set(sought.relations)
+    assert found.notes == sought.notes
+
+
+def _by_key(changes: Changes) -> dict[str, object]:
+    return {change.aid: change for change in changes.actions}
+
+
+@pytest.mark.parametrize("seed", range(examples(12)))
+async def test_of_people_who_edit_at_once_each_is_told_their_own(
+    journal: Journal, rooms: Rooms, seed: int
+) -> None:
+    held = await edited(rooms, seed, 40)
+    index = ChangeIndex(journal)
+    await index.upto(GRAPH)
+    changes = await index.between(GRAPH, 1, len(held), limit=_ALL)
+    base = await index.at(GRAPH, 1)
+    found = told(base, changes, [Stretch(who, 2, len(held)) for who in PEOPLE])
+    for who, mine in zip(PEOPLE, found, strict=True):
+        touched = {owner_of(c.root, c.key) for c in changes if c.author == who}
+        assert {change.aid for change in mine.actions} <= touched
+        assert mine.comments == sum(each.startswith("c/") for each in touched)
+        ends = {">".join(change.ends) for change in mine.relations}
+        assert ends <= touched
+
+
+async def test_a_long_sitting_is_told_in_part(journal: Journal, rooms: Rooms) -> None:
+    held = await edited(rooms, 4, 400)
+    index = ChangeIndex(journal)
+    await index.upto(GRAPH)
+    changes = await index.between(GRAPH, 1, len(held), limit=_ALL)
+    (found,) = told(await index.at(GRAPH, 1), changes, [Stretch("ada", 2, len(held))])
+    assert len(found.actions) == 30
+    assert found.more > 0
