@@ -47,6 +47,9 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
         "bring UMRF files in: graphs, and actions, which go into the library",
         described=True,
     ),
+    "diff": CommandEntry(
+        "diff", "say what differs between two graphs: files, moments, versions", described=True
+    ),
     "export": CommandEntry("remote", "print a graph as UMRF", described=True),
     "graphs": CommandEntry("remote", "list the graphs", described=True),
     "runs": CommandEntry("remote", "list the runs, newest first", described=True),

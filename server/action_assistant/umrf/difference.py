@@ -160,4 +160,6 @@ def _relation_says(relation: Relation) -> dict[str, Any]:
     conditions: dict[str, Any] = msgspec.structs.asdict(relation.conditions)
     remaps = {f"remap/{remap.source}": remap.target for remap in relation.remap}
     waypoints = {f"waypoints/{response}": text for response, text in relation.waypoints}
-    return conditions | {"required": relation.required} | remaps | waypoints
+    extra = {f"parents/{field}": text for field, text in relation.parents_extra}
+    extra |= {f"children/{field}": text for field, text in relation.children_extra}
+    return conditions | {"required": relation.required} | remaps | waypoints | extra

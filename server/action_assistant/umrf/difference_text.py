@@ -1,0 +1,163 @@
+"""A difference as text, line by line, and graphs of different origins made comparable. Pure."""
+
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from typing import Any, Final
+
+import msgspec
+from msgspec.structs import replace
+
+from action_assistant.umrf.difference import (
+    ActionChange,
+    Change,
+    Difference,
+    Field,
+    RelationChange,
+)
+from action_assistant.umrf.json.text import dump, parse_small
+from action_assistant.umrf.model import PRECONDITIONS, Graph, Key
+
+_SIGNS: Final[dict[Change, str]] = {"added": "+", "removed": "-", "changed": "~"}
+_LOOKS: Final = ("position", "direction", "waypoints/", "gui_attributes")
+
+
+def by_name(graph: Graph) -> Graph:
+    """The graph with the full name of each action as its key, so that it can be compared with one that
+    was read elsewhere. Of several with one name the further ones are numbered."""
+    seen: Counter[str] = Counter()
+    keys: dict[Key, Key] = {}
+    for action in graph.actions:
+        seen[action.full_name] += 1
+        count = seen[action.full_name]
+        keys[action.key] = action.full_name if count == 1 else f"{action.full_name}#{count}"
+    return replace(
+        graph,
+        actions=tuple(replace(action, key=keys[action.key]) for action in graph.actions),
+        relations=tuple(
+            replace(
+                each,
+                parent=keys.get(each.parent, each.parent),
+                child=keys.get(each.child, each.child),
+            )
+            for each in graph.relations
+        ),
+    )
+
+
+def without_looks(found: Difference) -> Difference:
+    """What means something to a robot: nothing of where things stand, of notes, of how lines are led."""
+    actions = (replace(a, fields=_meant(a.fields)) for a in found.actions)
+    relations = (replace(r, fields=_meant(r.fields)) for r in found.relations)
+    return replace(
+        found,
+        fields=_meant(found.fields),
+        actions=tuple(a for a in actions if a.fields or a.change != "changed"),
+        relations=tuple(r for r in relations if r.fields or r.change != "changed"),
+        notes=(),
+    )
+
+
+def is_same(found: Difference) -> bool:
+    """Whether nothing differs."""
+    return not (found.fields or found.actions or found.relations or found.notes)
+
+
+def lines(found: Difference) -> Iterator[str]:
+    """The difference for people: what a robot notices first, then what only looks otherwise."""
+    meant = without_looks(found)
+    if meant.fields:
+        yield "~ graph"
+        yield from _indented(meant.fields)
+    for action in meant.actions:
+        yield from _action(action)
+    for relation in meant.relations:
+        yield from _relation(relation)
+    yield from _looks(found)
+
+
+def _action(change: ActionChange) -> Iterator[str]:
+    yield f"{_SIGNS[change.change]} {change.name}"
+    yield from _indented(change.fields)
+
+
+def _relation(change: RelationChange) -> Iterator[str]:
+    yield f"{_SIGNS[change.change]} {change.parent} -> {change.child}"
+    yield from _indented(change.fields)
+
+
+def _indented(fields: Iterable[Field]) -> Iterator[str]:
+    for field in fields:
+        for name, before, after in _members(field):
+            yield f"    {name}: {_said(before)} -> {_said(after)}"
+
+
+def _members(field: Field) -> Iterator[tuple[str, Any, Any]]:
+    """A parameter by those members that differ; everything else as a whole."""
+    name = _words(field.field)
+    was, now = _parsed(field, field.before), _parsed(field, field.after)
+    if not (isinstance(was, dict) and isinstance(now, dict)):
+        yield name, _plain(was), _plain(now)
+        return
+    for member in dict.fromkeys([*was, *now]):
+        before, after = was.get(member), now.get(member)
+        if before != after:
+            short = member.removeprefix("pvf_")
+            yield (name if short == "value" else f"{name} ({short})"), before, after
+
+
+def _parsed(field: Field, value: Any) -> Any:
+    """What stands in the text of a parameter or of a field that is kept as text."""
+    kept = field.field.startswith(("in/", "out/", "x/"))
+    return parse_small(value) if kept and isinstance(value, str) else value
+
+
+def _plain(value: Any) -> Any:
+    """A parameter that came or went: its value alone, if it has one."""
+    return value.get("pvf_value", value) if isinstance(value, dict) else value
+
+
+def _said(value: Any) -> str:
+    if value is None:
+        return "(nothing)"
+    if isinstance(
+        value, tuple | float | int
+    ):  # of a place; what was read of a text is none of these
+        return msgspec.json.encode(value).decode()
+    return dump(value)
+
+
+def _words(field: str) -> str:
+    side, slash, path = field.partition("/")
+    if slash and side in {"in", "out"}:
+        return f"{'input' if side == 'in' else 'output'} {path}"
+    if side in PRECONDITIONS:
+        return side.replace("_", " ")
+    return field
+
+
+def _looks(found: Difference) -> Iterator[str]:
+    moved = sum(any(_is_look(f) for f in action.fields) for action in found.actions)
+    led = sum(any(_is_look(f) for f in relation.fields) for relation in found.relations)
+    told = [
+        *(
+            [f"{moved} {'action stands' if moved == 1 else 'actions stand'} elsewhere"]
+            * bool(moved)
+        ),
+        *([f"{led} {'arrow is' if led == 1 else 'arrows are'} led otherwise"] * bool(led)),
+        *(["the graph is drawn otherwise"] if any(map(_is_look, found.fields)) else []),
+        *(
+            f"{_SIGNS[note.change]} note {dump(' '.join(note.text.split())[:60])}"
+            for note in found.notes
+        ),
+    ]
+    if told:
+        yield "looks only:"
+        yield from (f"    {line}" for line in told)
+
+
+def _meant(fields: Iterable[Field]) -> tuple[Field, ...]:
+    return tuple(field for field in fields if not _is_look(field))
+
+
+def _is_look(field: Field) -> bool:
+    return field.field.startswith(_LOOKS)
