@@ -92,6 +92,33 @@ def test_expected_courses_are_simulated_again_and_a_changed_graph_is_told(
     assert "B_0 is told to run" in now["why"]
 
 
+def test_the_edit_that_made_a_run_go_another_way_is_named(
+    product: Product, files: dict[str, str]
+) -> None:
+    graph = imported(product, files["graph"])
+    assert product.cli("run", graph, "--script", files["quick"]).returncode == 0
+    anyio.run(cut, product, graph)
+    run = product.cli("run", graph, "--script", files["quick"], "--no-wait").stdout.split()[0]
+    with product.runner() as runner:
+        anyio.run(until, lambda: _ended(runner.get(f"/api/runs/{run}").json(), "A_0"))
+    product.cli("stop", run)
+    found = product.cli("runs", "since", run)
+    assert found.returncode == 1, found.stdout + found.stderr
+    first, *more = found.stdout.splitlines()
+    assert first.startswith("since change 2 of ")
+    assert "    - A_0 -> B_0" in more
+    assert "B_0 is told to run before" in found.stdout
+    answer = product.cli("runs", "since", run, "--good", "2")
+    assert (answer.returncode, answer.stdout.splitlines()[0]) == (
+        0,
+        "No edit explains it: with what its actions did, the graph goes the same way.",
+    )
+
+
+def _ended(run: dict[str, Any], action: str) -> bool:
+    return any(visit["result"] == "true" for visit in run["actions"][action]["visits"])
+
+
 async def cut(product: Product, graph: str) -> None:
     """Somebody deletes the arrow from A to B."""
     doc: Doc[Any] = Doc()

@@ -9,7 +9,7 @@ from typing import Any, Final, TypeAlias
 
 import msgspec
 
-from action_assistant.commands import archives
+from action_assistant.commands import archives, since
 from action_assistant.commands.client import (
     No,
     Server,
@@ -47,7 +47,7 @@ def _add_runs(runs: argparse.ArgumentParser) -> None:
     runs.add_argument("--graph", metavar="GRAPH", help="id or name")
     runs.add_argument("--json", action="store_true", help="as JSON, for programs")
     runs.set_defaults(handler=_runs)
-    more = runs.add_subparsers(metavar="at-rest | verify | archive | restore | examples")
+    more = runs.add_subparsers(metavar="at-rest | since | verify | archive | restore | examples")
     rests = command(
         more,
         "at-rest",
@@ -58,6 +58,7 @@ def _add_runs(runs: argparse.ArgumentParser) -> None:
     rests.add_argument("--how", required=True, help="how you have seen that nothing moves")
     rests.set_defaults(handler=_at_rest)
     archives.add_to(more)
+    since.add_to(more)
     brought = command(
         more,
         "examples",

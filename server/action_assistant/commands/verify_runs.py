@@ -2,22 +2,15 @@
 
 import argparse
 from collections.abc import Iterator
-from typing import Final, Literal
+from typing import Literal
 
 import msgspec
 
 from action_assistant.commands.client import No, Server, print_json, refused, running
-from action_assistant.runner.analysis.expected_runs import (
-    Departure,
-    ExpectedStep,
-    course,
-    departure,
-)
 from action_assistant.runner.review.service import Expectation
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.semantics import script_from
-
-_WORDS: Final = {"result": "ends", "runs": "is told to", "state": "is", "hazard": "does"}
+from action_assistant.umrf.semantics.steps import Departure, course, departure, said, unnamed
 
 
 class VerifyVerdict(msgspec.Struct, frozen=True, kw_only=True):
@@ -79,27 +72,10 @@ def _verdict(each: Expectation, umrf: bytes, against: Literal["then", "now"]) ->
         return VerifyVerdict(
             name=each.name, run=each.run, against=against, same=False, why=wrong.message
         )
-    apart = departure(_unnamed(each.course), _unnamed(found))
+    apart = departure(unnamed(each.course), unnamed(found))
     why = _sentence(apart) if apart is not None else ""
     return VerifyVerdict(name=each.name, run=each.run, against=against, same=apart is None, why=why)
 
 
-def _unnamed(steps: "list[ExpectedStep] | tuple[ExpectedStep, ...]") -> list[ExpectedStep]:
-    """Without the name of the top graph: a graph may be renamed and still do the same."""
-    top = steps[0].graph if steps else ""
-    return [
-        msgspec.structs.replace(step, graph=step.graph.removeprefix(top).lstrip("_"))
-        for step in steps
-    ]
-
-
 def _sentence(apart: Departure) -> str:
-    return f"Step {apart.place + 1}: expected {_said(apart.expected)}, found {_said(apart.found)}."
-
-
-def _said(step: ExpectedStep | None) -> str:
-    if step is None:
-        return "the end"
-    if step.what == "ends":
-        return f"the graph to end {step.how}"
-    return f"{step.node or 'the graph'} {_WORDS[step.what]} {step.how}"
+    return f"Step {apart.place + 1}: expected {said(apart.expected)}, found {said(apart.found)}."

@@ -11,6 +11,7 @@ from action_assistant.editor.history.blame import Blame
 from action_assistant.editor.history.change_index import ChangeIndex
 from action_assistant.editor.history.going_back import GoingBack
 from action_assistant.editor.history.graph_history import GraphHistory
+from action_assistant.editor.history.since_when import CourseSearch
 from action_assistant.editor.rooms.colours import PersonColours
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.editor.rooms.rate_limits import ByteRateLimits
@@ -58,6 +59,7 @@ class EditorServices:
         self.going_back = GoingBack(
             journal, self.rooms, self.graph_reader, self.change_index, workers.graphs
         )
+        self.course_search = CourseSearch(self.change_index, people, workers.graphs)
         self.blame = Blame(self.change_index, people)
 
 

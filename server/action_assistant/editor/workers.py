@@ -22,6 +22,7 @@ _PRELOADED: Final = (
     "action_assistant.editor.interchange.action_packages",
     "action_assistant.editor.history.told_changes",
     "action_assistant.editor.history.reverting",
+    "action_assistant.editor.history.parting",
 )
 _NICE: Final = 5
 

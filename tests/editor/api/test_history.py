@@ -104,3 +104,15 @@ def test_one_action_goes_back_alone(http: httpx.Client) -> None:
     answer = http.post(f"/api/graphs/{graph}/restore", json={"seq": 1, "of": dock})
     assert (answer.status_code, answer.json()["seq"]) == (200, 2)  # it is as it was
     assert http.get(f"/api/graphs/{graph}/umrf").json()["graph_name"] == "later"
+
+
+def test_where_no_edit_changes_the_course_none_is_named(http: httpx.Client) -> None:
+    graph = _imported(http)
+    http.patch(f"/api/graphs/{graph}", json={"description": "to the dock"})
+    asked = {"good": 1, "script": {"behaviours": {}}}
+    found = http.post(f"/api/graphs/{graph}/since", json=asked).json()
+    assert (found["same"], found["partings"]) == (True, [])
+    wrong = http.post(f"/api/graphs/{graph}/since", json={"good": 9, "script": {}})
+    assert (wrong.status_code, wrong.json()["where"]) == (400, {"path": "/good"})
+    wrong = http.post(f"/api/graphs/{graph}/since", json={"good": 1, "script": {"what": 1}})
+    assert (wrong.status_code, wrong.json()["where"]) == (400, {"path": "/script"})

@@ -48,6 +48,20 @@ export interface EditorApi {
         uses: EditorApi["ActionUse"][];
     };
     /**
+     * AskingSince
+     * @description Between which moments to look: after the change `good`, and after `bad` (left out: now). What the
+     *     actions do, as in a script of `simulate`, is the same at every moment; it names actions as they were
+     *     called at `named_at` (left out: at `bad`).
+     */
+    AskingSince: {
+        good: number;
+        script: EditorApi["Script"];
+        /** @default null */
+        bad?: number | null;
+        /** @default null */
+        named_at?: number | null;
+    };
+    /**
      * Behaviour
      * @description One call of an action. Times are seconds.
      *
@@ -149,6 +163,23 @@ export interface EditorApi {
     Counts: {
         error: number;
         warning: number;
+    };
+    /**
+     * CourseChange
+     * @description From the change `seq` on the course is another one (`parts`), or the first one again. `place`,
+     *     `before`, `after`: the first step, from 1, in which the courses before and after this change differ,
+     *     and what is done in it, in words. `changes` is what the change did to the graph.
+     */
+    CourseChange: {
+        seq: number;
+        author: EditorApi["PersonRef"];
+        /** Format: date-time */
+        at: string;
+        parts: boolean;
+        place: number;
+        before: string;
+        after: string;
+        changes: EditorApi["Changes"];
     };
     /**
      * Describing
@@ -909,6 +940,20 @@ export interface EditorApi {
     SignedIn: {
         person: EditorApi["Person"];
         named: boolean;
+    };
+    /**
+     * SinceWhen
+     * @description Where the course changes between `good` and `bad`, in order of time. `same`: at `bad` it is the one
+     *     of `good`. `exact`: there is no further place; else only some moments were looked at, and it may have
+     *     changed and changed back between two of them. `looked`: how many moments were simulated.
+     */
+    SinceWhen: {
+        good: number;
+        bad: number;
+        same: boolean;
+        exact: boolean;
+        looked: number;
+        partings: EditorApi["CourseChange"][];
     };
     /**
      * StoredEvent

@@ -13,6 +13,7 @@ from action_assistant.editor.history import told_changes
 from action_assistant.editor.history.blame import DocumentStep, FieldBlame, FieldValue
 from action_assistant.editor.history.going_back import EditsOfOne, GoneBack
 from action_assistant.editor.history.graph_history import HistoryEntry
+from action_assistant.editor.history.since_when import AskingSince, SinceWhen
 from action_assistant.editor.log.graph_events import graph_stream
 from action_assistant.editor.services import EditorState
 from action_assistant.editor.workers import encoded
@@ -146,7 +147,20 @@ def _blaming(app_state: EditorState) -> list[ControllerRouterHandler]:
         await services.catalogue.require(graph_id)
         return await services.blame.of_field(graph_id, of, field, at)
 
-    return [get_blame, get_values]
+    @post(
+        "/api/graphs/{graph_id:str}/since",
+        status_code=200,
+        summary="Since which change a graph goes another way, by simulating it at past moments; stores "
+        "nothing",
+        operation_id="getSince",
+        guards=[Needs("see")],
+    )
+    async def get_since(graph_id: str, data: AskingSince) -> SinceWhen:
+        services = app_state.services
+        await services.catalogue.require(graph_id)
+        return await services.course_search.since(graph_id, data)
+
+    return [get_blame, get_values, get_since]
 
 
 def _going(app_state: EditorState) -> list[ControllerRouterHandler]:

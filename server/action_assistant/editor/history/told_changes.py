@@ -125,7 +125,7 @@ def _told(own: Mapping[Place, tuple[Packed, Packed]], state: State) -> Changes:
     before = around | {place: old for place, (old, _) in own.items()}
     after = around | {place: new for place, (_, new) in own.items()}
     found = difference((0, graph_of(before)), (0, graph_of(after)))
-    return _short(found, owners)
+    return shortened(found, owners)
 
 
 def _ends(owner: str) -> set[str]:
@@ -134,7 +134,7 @@ def _ends(owner: str) -> set[str]:
     return set() if ends is None else {ends.parent, ends.child} - _ENDS
 
 
-def _short(found: Difference, owners: Set[str]) -> Changes:
+def shortened(found: Difference, owners: Set[str]) -> Changes:
     """At most some of each kind, and nothing that merely follows, as another number follows from a name
     that somebody else took."""
     actions = tuple(change for change in found.actions if change.aid in owners)

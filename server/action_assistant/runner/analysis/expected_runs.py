@@ -19,24 +19,11 @@ from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.visits import ActionRun, Visit
 from action_assistant.schema.runner_tables import expectation
-from action_assistant.umrf.facts import SIMULATED
 from action_assistant.umrf.model import Graph
-from action_assistant.umrf.semantics import (
-    CUT_OFF,
-    Dispatch,
-    GraphResultEvent,
-    GraphStateEvent,
-    HazardEvent,
-    NodeResultEvent,
-    Script,
-    Trace,
-    simulate,
-)
+from action_assistant.umrf.semantics.steps import ExpectedStep
 
 #: The stream of all expectations.
 STREAM: Final = "expectations"
-_MOST: Final = 20_000  # steps of a course
-_DAY_MS: Final = 86_400_000.0
 
 Fault: TypeAlias = Literal["error", "false", "hang", "init_error"]
 
@@ -53,15 +40,6 @@ class Recorded(msgspec.Struct, frozen=True):
 
     behaviours: dict[str, list[dict[str, Any]]]
     doubts: list[Doubt]
-
-
-class ExpectedStep(msgspec.Struct, frozen=True):
-    """One step of a course: what happened to an action (empty: to the graph), and how."""
-
-    graph: str
-    node: str
-    what: Literal["runs", "result", "state", "ends", "hazard"]
-    how: str
 
 
 class Expected(msgspec.Struct, frozen=True, kw_only=True):
@@ -88,14 +66,6 @@ class Retired(msgspec.Struct, frozen=True):
     at: int
     name: str
     author: Author
-
-
-class Departure(msgspec.Struct, frozen=True):
-    """The first step in which a course is another one. None where a course has ended."""
-
-    place: int
-    expected: ExpectedStep | None
-    found: ExpectedStep | None
 
 
 def recorded(run: Run, fault: tuple[str, Fault] | None = None) -> Recorded:
@@ -183,39 +153,6 @@ def _failing(how: Fault) -> dict[str, Any]:
             return {"init_error": True}
         case "error" | "false":
             return {"after_s": 0.1, "result": f"on_{how}"}
-
-
-def course(graph: Graph, script: Script) -> tuple[ExpectedStep, ...]:
-    """What happens when this graph runs under this script, without times. Deterministic."""
-    traces = simulate(graph, script=script, facts=SIMULATED, until_ms=_DAY_MS, max_events=_MOST)
-    return tuple(step for trace in traces if (step := _step(trace)) is not None)
-
-
-def _step(trace: Trace) -> ExpectedStep | None:
-    match trace:
-        case NodeResultEvent():
-            return ExpectedStep(trace.graph, trace.node, "result", trace.result)
-        case Dispatch():
-            return ExpectedStep(trace.graph, trace.node, "runs", trace.response)
-        case GraphResultEvent():
-            return ExpectedStep(trace.graph, "", "ends", trace.value)
-        case GraphStateEvent():
-            return ExpectedStep(trace.graph, "", "state", trace.state)
-        case HazardEvent(code=code):  # that it was cut off is no part of what was expected before
-            is_cut = code == CUT_OFF
-            return None if is_cut else ExpectedStep(trace.graph, trace.node or "", "hazard", code)
-        case _:
-            return None
-
-
-def departure(expected: Sequence[ExpectedStep], found: Sequence[ExpectedStep]) -> Departure | None:
-    """Where the second course first differs from the first; None when they are the same."""
-    for place in range(max(len(expected), len(found))):
-        one = expected[place] if place < len(expected) else None
-        other = found[place] if place < len(found) else None
-        if one != other:
-            return Departure(place, one, other)
-    return None
 
 
 def fold(event: Event) -> Sequence[Executable]:

@@ -32,7 +32,8 @@ from action_assistant.schema.runner_tables import expectation, review, run_label
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.json.embedded import JsonObject, UmrfGraph
 from action_assistant.umrf.model import Graph
-from action_assistant.umrf.semantics import script_from
+from action_assistant.umrf.semantics import script_from, steps
+from action_assistant.umrf.semantics.steps import ExpectedStep
 from action_assistant.web.workers.lanes import RunInWorker
 
 log: Final = logging.getLogger(__name__)
@@ -66,7 +67,7 @@ class Expectation(msgspec.Struct, frozen=True, kw_only=True):
     author: Author
     umrf: UmrfGraph
     script: JsonObject
-    course: list[expected_runs.ExpectedStep]
+    course: list[ExpectedStep]
 
 
 class CauseShown(msgspec.Struct, frozen=True, kw_only=True):
@@ -335,7 +336,7 @@ class ReviewService:
         umrf = await self._control.history.umrf(run_id)
         recorded = expected_runs.recorded(found)
         script = {"behaviours": recorded.behaviours}
-        course = expected_runs.course(codec.read(umrf.encode()).graph, script_from(script))
+        course = steps.course(codec.read(umrf.encode()).graph, script_from(script))
         expected_runs.check_alike(found, course)
         return expected_runs.Expected(
             at=now,

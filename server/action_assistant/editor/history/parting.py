@@ -1,0 +1,222 @@
+"""Since when a graph takes another course: past moments simulated under one script. For workers."""
+
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Final
+
+import msgspec
+from msgspec.structs import replace
+
+from action_assistant.editor.history.key_changes import LoggedChange, owner_of
+from action_assistant.editor.history.told_changes import (
+    Changes,
+    State,
+    graph_of,
+    shortened,
+    state_of,
+)
+from action_assistant.umrf.difference import difference
+from action_assistant.umrf.model import Graph, Key
+from action_assistant.umrf.semantics import Script
+from action_assistant.umrf.semantics.script import DEFAULT
+from action_assistant.umrf.semantics.steps import (
+    Departure,
+    ExpectedStep,
+    course,
+    departure,
+    said,
+    unnamed,
+)
+
+_EACH: Final = 200  # moments that are all looked at
+_SAMPLES: Final = 64  # of more
+_EVENTS: Final = 4_000  # of one course
+_BUDGET_S: Final = 25.0  # of this process's time, for the samples
+#: Fields of actions that no engine reads.
+_SILENT: Final = frozenset({"description", "x/gui_attributes", "x", "in", "out"})
+
+
+class CourseParting(msgspec.Struct, frozen=True):
+    """The change `seq` from which on the course is another (`parts`), or the first one again. Before it
+    and after it the graph was simulated. `place`, `before`, `after`: the first step in which the two
+    courses differ, from 1, and the step that is taken in each, in words."""
+
+    seq: int
+    author: str
+    at: int
+    parts: bool
+    place: int
+    before: str
+    after: str
+    changes: Changes
+
+
+class Followed(msgspec.Struct, frozen=True):
+    """Where courses part between two moments, in order of time. `same`: at the later one it is the one
+    of the earlier one. `exact`: nothing lies between that was not looked at, so that there are no
+    further partings; `looked`: how many moments were simulated."""
+
+    same: bool
+    exact: bool
+    looked: int
+    partings: tuple[CourseParting, ...]
+
+
+def followed(
+    base: Sequence[LoggedChange],
+    changes: Sequence[LoggedChange],
+    script: Script,
+    named_at: int,
+    budget_s: float = _BUDGET_S,
+) -> Followed:
+    """Where the course parts from the one that the graph takes before the `changes`, which are in order
+    of time. `base`: what each key held then. The script's names are those of the moment `named_at`."""
+    past = _Past(base, changes, script, named_at)
+    if not past.moments:
+        return Followed(True, True, 1, ())
+    flips, exact = _flips(past, budget_s)
+    partings = tuple(past.parting(*flip) for flip in flips)
+    return Followed(past.is_same(len(past.moments)), exact, past.looked, partings)
+
+
+def _flips(past: "_Past", budget_s: float) -> tuple[list[tuple[int, int]], bool]:
+    """Neighbouring moments between which the verdict changes, and whether there can be no more."""
+    last = len(past.moments)
+    parts = last if last <= _EACH else _SAMPLES
+    marks = sorted({last * n // parts for n in range(parts + 1)})
+    exact = len(marks) == last + 1
+    begun, found = time.thread_time(), list[tuple[int, int]]()
+    end = past.is_same(last)
+    left = 0
+    for right in marks[1:]:
+        if time.thread_time() - begun > budget_s:
+            exact = False
+            break
+        if past.is_same(left) != past.is_same(right):
+            found.append(_narrowed(past, left, right))
+        left = right
+    if left != last and past.is_same(left) != end:
+        found.append(_narrowed(past, left, last))
+    return found, exact
+
+
+def _narrowed(past: "_Past", left: int, right: int) -> tuple[int, int]:
+    """The neighbours between two moments of different verdicts at which it changes."""
+    verdict = past.is_same(left)
+    while right - left > 1:
+        middle = (left + right) // 2
+        if past.is_same(middle) == verdict:
+            left = middle
+        else:
+            right = middle
+    return left, right
+
+
+class _Past:
+    """Moments after changes that an engine can notice; the moment 0 is before all of them."""
+
+    def __init__(
+        self,
+        base: Sequence[LoggedChange],
+        changes: Sequence[LoggedChange],
+        script: Script,
+        named_at: int,
+    ) -> None:
+        self._base = state_of(base)
+        self._changes = changes
+        self.moments: list[LoggedChange] = list(_noticed(changes))
+        self._courses: dict[int, list[ExpectedStep]] = {}
+        self._script = _by_key(script, graph_of(self._state(named_at)))
+        self._reference = self._course(0)
+
+    @property
+    def looked(self) -> int:
+        """How many moments were simulated."""
+        return len(self._courses)
+
+    def is_same(self, moment: int) -> bool:
+        """Whether the course is the first one."""
+        return self._course(moment) == self._reference
+
+    def parting(self, left: int, right: int) -> CourseParting:
+        """What happens between two neighbours, the later one told."""
+        change = self.moments[right - 1]
+        before, after = self._graph(left), self._graph(right)
+        apart = departure(self._course(left), self._course(right))
+        names = {a.key: a.full_name for a in (*before.actions, *after.actions)}
+        owners = {owner_of(c.root, c.key) for c in self._changes if c.seq == change.seq}
+        return CourseParting(
+            change.seq,
+            change.author,
+            change.at,
+            not self.is_same(right),
+            0 if apart is None else apart.place + 1,
+            *_words(apart, names),
+            shortened(difference((0, before), (0, after)), owners),
+        )
+
+    def _course(self, moment: int) -> list[ExpectedStep]:
+        found = self._courses.get(moment)
+        if found is None:
+            graph = self._graph(moment)
+            keys = {a.full_name: a.key for a in graph.actions}
+            steps = unnamed(course(graph, _by_name(self._script, graph), _EVENTS))
+            found = [
+                replace(step, node=keys.get(step.node, step.node)) if not step.graph else step
+                for step in steps
+            ]
+            self._courses[moment] = found
+        return found
+
+    def _graph(self, moment: int) -> Graph:
+        if moment == 0:
+            return graph_of(self._base)
+        return graph_of(self._state(self.moments[moment - 1].seq))
+
+    def _state(self, seq: int) -> State:
+        return self._base | {c.place: c.after for c in self._changes if c.seq <= seq}
+
+
+def _noticed(changes: Sequence[LoggedChange]) -> Iterator[LoggedChange]:
+    """One change of each event that an engine can notice."""
+    last = 0
+    for change in changes:
+        if change.seq != last and _is_noticed(change):
+            last = change.seq
+            yield change
+
+
+def _is_noticed(change: LoggedChange) -> bool:
+    if change.root not in {"actions", "relations"}:
+        return False
+    return change.key.partition("|")[2] not in _SILENT
+
+
+def _by_key(script: Script, graph: Graph) -> Script:
+    """The script with actions by their keys, which stay when they are called otherwise."""
+    found = dict(script.behaviours)
+    for action in graph.actions:
+        for name in (action.full_name, action.name, f"{graph.name}/{action.full_name}"):
+            found.pop(name, None)
+    for action in graph.actions:
+        calls = script.calls_of(graph.name, graph.name, action.full_name, action.name)
+        if not action.missing and calls != (DEFAULT,):
+            found[action.key] = calls
+    return Script(found)
+
+
+def _by_name(script: Script, graph: Graph) -> Script:
+    """The same with the names that actions have in this graph."""
+    names = {action.key: action.full_name for action in graph.actions}
+    return Script({names.get(key, key): calls for key, calls in script.behaviours.items()})
+
+
+def _words(apart: Departure | None, names: Mapping[Key, str]) -> tuple[str, str]:
+    if apart is None:
+        return "", ""
+
+    def words(step: ExpectedStep | None) -> str:
+        named = None if step is None else replace(step, node=names.get(step.node, step.node))
+        return said(named)
+
+    return words(apart.expected), words(apart.found)

@@ -1,0 +1,103 @@
+"""Since when a graph goes another way: a question to the index, answered by simulating past moments."""
+
+from datetime import datetime
+from typing import Annotated, Any, Final
+
+import msgspec
+
+from action_assistant.editor.catalogue.people import People
+from action_assistant.editor.history.change_index import ChangeIndex
+from action_assistant.editor.history.parting import followed
+from action_assistant.editor.history.told_changes import Changes
+from action_assistant.editor.log.document_events import when
+from action_assistant.errors import BadInput, TooLarge
+from action_assistant.umrf.semantics import SCRIPT, script_from
+from action_assistant.web.auth.keys import PersonRef
+from action_assistant.web.workers.lanes import RunInWorker, run_here
+
+_MOST: Final = 200_000  # changes of keys between two moments
+
+
+class AskingSince(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Between which moments to look: after the change `good`, and after `bad` (left out: now). What the
+    actions do, as in a script of `simulate`, is the same at every moment; it names actions as they were
+    called at `named_at` (left out: at `bad`)."""
+
+    good: int
+    script: Annotated[Any, SCRIPT]
+    bad: int | None = None
+    named_at: int | None = None
+
+
+class CourseChange(msgspec.Struct, frozen=True):
+    """From the change `seq` on the course is another one (`parts`), or the first one again. `place`,
+    `before`, `after`: the first step, from 1, in which the courses before and after this change differ,
+    and what is done in it, in words. `changes` is what the change did to the graph."""
+
+    seq: int
+    author: PersonRef
+    at: datetime
+    parts: bool
+    place: int
+    before: str
+    after: str
+    changes: Changes
+
+
+class SinceWhen(msgspec.Struct, frozen=True):
+    """Where the course changes between `good` and `bad`, in order of time. `same`: at `bad` it is the one
+    of `good`. `exact`: there is no further place; else only some moments were looked at, and it may have
+    changed and changed back between two of them. `looked`: how many moments were simulated."""
+
+    good: int
+    bad: int
+    same: bool
+    exact: bool
+    looked: int
+    partings: tuple[CourseChange, ...]
+
+
+class CourseSearch:
+    """Answers it."""
+
+    def __init__(
+        self, index: ChangeIndex, people: People, run_in_worker: RunInWorker = run_here
+    ) -> None:
+        self._index = index
+        self._people = people
+        self._run_in_worker = run_in_worker
+
+    async def since(self, graph: str, asked: AskingSince) -> SinceWhen:
+        """Where the course changes. Raises BadInput, TooLarge, Unavailable."""
+        try:
+            script = script_from(asked.script)
+        except ValueError as error:
+            raise BadInput(str(error), where={"path": "/script"}) from error
+        newest = await self._index.upto(graph)
+        bad = newest if asked.bad is None else asked.bad
+        named_at = bad if asked.named_at is None else asked.named_at
+        if not 1 <= asked.good <= bad <= newest or not asked.good <= named_at <= bad:
+            raise BadInput(
+                f"This graph has the changes 1 to {newest}; `good` comes before `bad`, and `named_at` "
+                "lies between them.",
+                where={"path": "/good"},
+            )
+        changes = await self._index.between(graph, asked.good, bad, limit=_MOST + 1)
+        if len(changes) > _MOST:
+            raise TooLarge("That is too long ago; name a later moment that was good.")
+        base = await self._index.at(graph, asked.good)
+        found = await self._run_in_worker(followed, base, changes, script, named_at)
+        partings = tuple(
+            CourseChange(
+                each.seq,
+                self._people.person(each.author),
+                when(each.at),
+                each.parts,
+                each.place,
+                each.before,
+                each.after,
+                each.changes,
+            )
+            for each in found.partings
+        )
+        return SinceWhen(asked.good, bad, found.same, found.exact, found.looked, partings)

@@ -1,0 +1,94 @@
+"""The course of a run as steps without times, and where two courses part. Pure."""
+
+from collections.abc import Sequence
+from typing import Final, Literal
+
+import msgspec
+
+from action_assistant.umrf.facts import SIMULATED
+from action_assistant.umrf.model import Graph
+from action_assistant.umrf.semantics.script import Script
+from action_assistant.umrf.semantics.simulate import CUT_OFF, simulate
+from action_assistant.umrf.semantics.trace import (
+    Dispatch,
+    GraphResultEvent,
+    GraphStateEvent,
+    HazardEvent,
+    NodeResultEvent,
+    Trace,
+)
+
+_MOST: Final = 20_000  # steps of a course
+_DAY_MS: Final = 86_400_000.0
+
+
+class ExpectedStep(msgspec.Struct, frozen=True):
+    """One step of a course: what happened to an action (empty: to the graph), and how."""
+
+    graph: str
+    node: str
+    what: Literal["runs", "result", "state", "ends", "hazard"]
+    how: str
+
+
+class Departure(msgspec.Struct, frozen=True):
+    """The first step in which a course is another one. None where a course has ended."""
+
+    place: int
+    expected: ExpectedStep | None
+    found: ExpectedStep | None
+
+
+def course(graph: Graph, script: Script, most: int = _MOST) -> tuple[ExpectedStep, ...]:
+    """What happens when this graph runs under this script, without times, as far as `most` events go.
+    Deterministic."""
+    traces = simulate(graph, script=script, facts=SIMULATED, until_ms=_DAY_MS, max_events=most)
+    return tuple(step for trace in traces if (step := _step(trace)) is not None)
+
+
+def _step(trace: Trace) -> ExpectedStep | None:
+    match trace:
+        case NodeResultEvent():
+            return ExpectedStep(trace.graph, trace.node, "result", trace.result)
+        case Dispatch():
+            return ExpectedStep(trace.graph, trace.node, "runs", trace.response)
+        case GraphResultEvent():
+            return ExpectedStep(trace.graph, "", "ends", trace.value)
+        case GraphStateEvent():
+            return ExpectedStep(trace.graph, "", "state", trace.state)
+        case HazardEvent(code=code):  # that it was cut off is no part of what was expected before
+            is_cut = code == CUT_OFF
+            return None if is_cut else ExpectedStep(trace.graph, trace.node or "", "hazard", code)
+        case _:
+            return None
+
+
+def departure(expected: Sequence[ExpectedStep], found: Sequence[ExpectedStep]) -> Departure | None:
+    """Where the second course first differs from the first; None when they are the same."""
+    for place in range(max(len(expected), len(found))):
+        one = expected[place] if place < len(expected) else None
+        other = found[place] if place < len(found) else None
+        if one != other:
+            return Departure(place, one, other)
+    return None
+
+
+def unnamed(steps: Sequence[ExpectedStep]) -> list[ExpectedStep]:
+    """Without the name of the top graph: a graph may be renamed and still do the same."""
+    top = steps[0].graph if steps else ""
+    return [
+        msgspec.structs.replace(step, graph=step.graph.removeprefix(top).lstrip("_"))
+        for step in steps
+    ]
+
+
+_WORDS: Final = {"result": "ends", "runs": "is told to", "state": "is", "hazard": "does"}
+
+
+def said(step: ExpectedStep | None) -> str:
+    """A step in words."""
+    if step is None:
+        return "the end"
+    if step.what == "ends":
+        return f"the graph to end {step.how}"
+    return f"{step.node or 'the graph'} {_WORDS[step.what]} {step.how}"
