@@ -62,6 +62,11 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
     "stop": CommandEntry(
         "remote", "stop a run, or all of them; exit 1 unless it is proven", described=True
     ),
+    "sync": CommandEntry(
+        "sync.sync",
+        "keep a folder of UMRF files and the graphs of a server in step",
+        described=True,
+    ),
     "watch": CommandEntry(
         "watch.watch", "print each change of a graph as it comes, until Ctrl-C", described=True
     ),

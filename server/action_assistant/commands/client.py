@@ -80,7 +80,11 @@ class Server:
 
 
 class No(Exception):
-    """The answer is no."""
+    """The answer is no; `status` is that of HTTP, 0 where nobody was asked."""
+
+    def __init__(self, why: str, status: int = 0) -> None:
+        super().__init__(why)
+        self.status = status
 
 
 def _asked(client: "httpx.Client", method: str, path: str, **body: Any) -> "httpx.Response":
@@ -94,7 +98,7 @@ def _asked(client: "httpx.Client", method: str, path: str, **body: Any) -> "http
             "Is it running? Start it with `action-assistant serve`."
         ) from error
     if answer.is_error:
-        raise No(sentence(answer))
+        raise No(sentence(answer), answer.status_code)
     return answer
 
 

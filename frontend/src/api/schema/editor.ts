@@ -572,6 +572,16 @@ export interface EditorApi {
         reading?: EditorApi["ImportReport"];
     };
     /**
+     * MergedGraph
+     * @description How far the graph goes now; whether others had changed it since the text was read; and the errors
+     *     that came with the text.
+     */
+    MergedGraph: {
+        seq: number;
+        merged: boolean;
+        problems: EditorApi["Problem"][];
+    };
+    /**
      * NodeResultEvent
      * @description How a visit of an action ended; the real engine tells nobody.
      */

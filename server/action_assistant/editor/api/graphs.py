@@ -1,9 +1,9 @@
 """Routes of graphs: the catalogue, what a graph is or was, what is wrong with it."""
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 import msgspec
-from litestar import Request, Response, delete, get, patch, post
+from litestar import Request, Response, delete, get, patch, post, put
 from litestar.params import Parameter
 from litestar.types import ControllerRouterHandler
 
@@ -12,8 +12,11 @@ from action_assistant.editor.documents import contents
 from action_assistant.editor.interchange import importing
 from action_assistant.editor.interchange.edited_text import TextEdit, edited_text
 from action_assistant.editor.interchange.importing import ImportReport, Preview
+from action_assistant.editor.interchange.text_merging import merging
+from action_assistant.editor.log.graph_events import graph_stream
 from action_assistant.editor.services import EditorState
 from action_assistant.editor.workers import encoded
+from action_assistant.errors import Conflict
 from action_assistant.umrf.json.embedded import JsonObject, UmrfGraph
 from action_assistant.umrf.model import Problem
 from action_assistant.web.auth.access import Needs, person_of
@@ -23,11 +26,22 @@ from action_assistant.web.server.openapi import answer, reads
 Asking = Request[Any, Any, Any]
 Seq = Annotated[int, Parameter(ge=1)]
 
+_TOLD: Final = 50  # keys of a conflict
+
 
 class MadeGraph(GraphView, frozen=True, omit_defaults=True):
     """A new graph; `reading` is there when it was read from a file."""
 
     reading: ImportReport | None = None
+
+
+class MergedGraph(msgspec.Struct, frozen=True):
+    """How far the graph goes now; whether others had changed it since the text was read; and the errors
+    that came with the text."""
+
+    seq: int
+    merged: bool
+    problems: tuple[Problem, ...]
 
 
 class Describing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -165,4 +179,31 @@ def _contents(app_state: EditorState) -> list[ControllerRouterHandler]:
         answer: TextEdit = encoded(await services.workers.files(edited_text, then, text))
         return answer
 
-    return [get_umrf, get_problems, get_rewriting]
+    @put(
+        "/api/graphs/{graph_id:str}/umrf",
+        summary="Merge a text, edited from that of the change `seq`, into a graph: as one edit, or not at "
+        "all where others have changed the same meanwhile",
+        operation_id="putUmrf",
+        guards=[Needs("edit")],
+        opt=reads(UmrfGraph),
+        request_max_body_size=BODY_LIMIT,
+    )
+    async def put_umrf(graph_id: str, seq: Seq, request: Asking) -> MergedGraph:
+        services, person = app_state.services, person_of(request)
+        text = await request.body()
+        await services.catalogue.require(graph_id, "graph")
+        await services.people.seen(person)
+        then = await services.graph_reader.at(graph_id, seq)
+        async with services.rooms.enter(graph_stream(graph_id)) as room:
+            now, state = await room.look(lambda replica, at: (at, replica.doc.get_update()))
+            found = await services.workers.files(merging, then, state, text)
+            if found.conflicts:
+                raise Conflict(
+                    f"Since change {seq} others have changed {len(found.conflicts)} of the fields that "
+                    "this text changes.",
+                    where={"seq": now, "keys": list(found.conflicts[:_TOLD])},
+                )
+            newest = await room.submit(found.update, person.id)
+        return MergedGraph(newest, now > seq, found.problems)
+
+    return [get_umrf, get_problems, get_rewriting, put_umrf]

@@ -1,0 +1,57 @@
+"""An edited text merged into a graph that may have changed since: key by key, or not at all. For workers."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import msgspec
+from msgspec import UNSET
+from pycrdt import Doc
+
+from action_assistant.editor.documents import document
+from action_assistant.editor.documents.contents import GraphAtSeq, maps_of, read
+from action_assistant.editor.documents.document import Maps, is_same
+from action_assistant.editor.interchange.changes import difference
+from action_assistant.editor.interchange.edited_text import KeyChange, text_edit
+from action_assistant.umrf.model import Problem
+
+
+class MergingOutcome(msgspec.Struct, frozen=True):
+    """The update that brings in what an edited text changes. `conflicts`: keys that somebody else has
+    given another value meanwhile; then there is no update. `problems`: errors that come with it."""
+
+    update: bytes
+    conflicts: tuple[str, ...]
+    problems: tuple[Problem, ...]
+
+
+def merging(then: GraphAtSeq, state: bytes, text: bytes) -> MergingOutcome:
+    """What `text`, edited from that of the moment `then`, makes of the graph as it is now.
+
+    Raises BadInput, NotUmrf, TooLarge with the place.
+    """
+    found = read(then)
+    edit = text_edit(found.moment, text, found.problems)
+    now = maps_of(state)
+    conflicts = tuple(each.key for each in edit.changes if _is_other(now, each))
+    if conflicts:
+        return MergingOutcome(b"", conflicts, edit.problems)
+    return MergingOutcome(_applied(state, edit.changes), (), edit.problems)
+
+
+def _is_other(now: Maps, change: KeyChange) -> bool:
+    """Whether a key is neither as it was nor as it shall be."""
+    value = now.get(change.root, {}).get(change.key, UNSET)
+    return not is_same(value, change.before) and not is_same(value, change.after)
+
+
+def _applied(state: bytes, changes: Sequence[KeyChange]) -> bytes:
+    def edit(doc: Doc[Any]) -> None:
+        maps = document.maps_of(doc)
+        for change in changes:
+            fields = maps.setdefault(change.root, {})
+            fields.pop(change.key, None)
+            if change.after is not UNSET:
+                fields[change.key] = change.after
+        document.change(doc, maps)
+
+    return difference(state, edit)
