@@ -1,43 +1,14 @@
 /** The library of actions: made, used, changed with the graphs that use it, imported; by keys and on a phone. */
 
-import { expect, type Locator, type Page, test } from "@playwright/test";
+import { expect, type Page, test } from "@playwright/test";
 import { card, saved } from "./canvas";
+import { action, choose, leaf, list, post, using } from "./library-actions";
 import { Product } from "./product";
 
 const product = new Product();
 
 test.beforeAll(() => product.start());
 test.afterAll(() => product.dispose());
-
-const leaf = (kind: string, more: object = {}) => ({ pvf_type: kind, ...more });
-
-function post(path: string, body: object): Promise<{ id: string }> {
-  const headers = { "content-type": "application/json" };
-  return product.ask(path, { method: "POST", body: JSON.stringify(body), headers });
-}
-
-const action = (name: string, input_parameters: object) => ({
-  ...{ name, instance_id: 0, type: "sync", input_parameters },
-});
-
-/** The id of a graph of one action. */
-async function using(graph_name: string, one: ReturnType<typeof action>): Promise<string> {
-  const end = { name: one.name, instance_id: 0 };
-  const graph = { graph_name, graph_entry: [end], graph_exit: [end], actions: [one] };
-  return (await post("/api/graphs", graph)).id;
-}
-
-const list = (page: Page): Locator => page.getByRole("navigation", { name: "Actions" });
-
-/** Chooses files as a person does. */
-async function choose(page: Page, files: { name: string; body: object }[]): Promise<void> {
-  const chooser = page.waitForEvent("filechooser");
-  await page.getByRole("button", { name: "Import", exact: true }).click();
-  const mimeType = "application/json";
-  await (await chooser).setFiles(
-    files.map(({ name, body }) => ({ name, mimeType, buffer: Buffer.from(JSON.stringify(body)) })),
-  );
-}
 
 async function addParameter(page: Page, name: string, type: string): Promise<void> {
   await page.getByRole("button", { name: "Add", exact: true }).first().click();
@@ -74,7 +45,7 @@ test("an action with a pose is made from nothing and used in a graph", async ({ 
   await page.getByRole("button", { name: /input_parameters\.hpp$/ }).click();
   await expect(page.locator("pre")).toContainText("force");
 
-  await page.goto(`${product.url}/graphs/${await using("lifting", action("Wait", {}))}`);
+  await page.goto(`${product.url}/graphs/${await using(product, "lifting", action("Wait", {}))}`);
   await saved(page);
   const library = page.getByRole("complementary", { name: "Library" });
   await library.getByText("Actions", { exact: true }).click();
@@ -92,8 +63,8 @@ test("an action with a pose is made from nothing and used in a graph", async ({ 
 
 test("a parameter is called otherwise, and graphs follow after a look", async ({ browser }) => {
   const speed = (value: number) => ({ speed: leaf("number", { pvf_value: value }) });
-  const night = await using("night_round", action("DriveSlowly", speed(3)));
-  await using("day_round", action("DriveSlowly", speed(5)));
+  const night = await using(product, "night_round", action("DriveSlowly", speed(3)));
+  await using(product, "day_round", action("DriveSlowly", speed(5)));
   const { page, context, failures } = await product.person(browser, "Ada");
   await page.goto(`${product.url}/actions?name=DriveSlowly`);
   await page.getByRole("button", { name: "Add to the library" }).click();
@@ -137,55 +108,8 @@ test("a parameter is called otherwise, and graphs follow after a look", async ({
   await context.close();
 });
 
-test("what a robot has is told apart from the library, and taken over", async ({ browser }) => {
-  const robot = { method: "POST", body: JSON.stringify({ name: "atlas" }) };
-  const headers = { "content-type": "application/json" };
-  await product.ask("/api/robots", { ...robot, headers }, product.runnerUrl);
-  await post("/api/actions", action("LiftBox", { height: leaf("number") }));
-  const { page, context, failures } = await product.person(browser, "Ada");
-  const allowed = { "access-control-allow-origin": product.url };
-  const credentials = { "access-control-allow-credentials": "true" };
-  const has = (name: string, inputs: object) => ({ name, inputs, outputs: {} });
-  const actions = [has("LiftBox", { height: "string" }), has("OnlyThere", { "at::x": "number" })];
-  await page.route("**/api/robots/atlas/known", (route) =>
-    route.fulfill({
-      headers: { ...allowed, ...credentials },
-      json: { actions, graphs: [], unread: 0 },
-    }),
-  );
-  await page.route("**/api/robots/atlas/known/OnlyThere", (route) =>
-    route.fulfill({
-      headers: { ...allowed, ...credentials },
-      json: action("OnlyThere", { at: { x: leaf("number") } }),
-    }),
-  );
-  await page.goto(`${product.url}/actions`);
-  await page.getByRole("button", { name: "On atlas" }).click();
-  await expect(list(page).getByRole("link")).toHaveCount(2);
-  await list(page)
-    .getByRole("link", { name: /LiftBox/ })
-    .click();
-  await expect(page.getByRole("list", { name: "Robots" })).toContainText("height is string");
-  await list(page)
-    .getByRole("link", { name: /OnlyThere/ })
-    .click();
-  await expect(page.getByRole("list", { name: "Robots" })).toContainText("has it");
-
-  // The same from beside a canvas.
-  await page.goto(`${product.url}/graphs/${await using("boxes", action("Wait", {}))}`);
-  const library = page.getByRole("complementary", { name: "Library" });
-  await library.getByText("Actions", { exact: true }).click();
-  await library.getByRole("button", { name: "Take over OnlyThere from atlas" }).click();
-  await expect(library.getByText("Only on robots")).toHaveCount(0);
-  await expect(library.getByRole("button", { name: /^OnlyThere/ })).toBeVisible();
-  const known = await product.ask<{ name: string; document: string | null }[]>("/api/actions");
-  expect(known.find(({ name }) => name === "OnlyThere")?.document).toBeTruthy();
-  expect(failures).toEqual([]);
-  await context.close();
-});
-
 test("errors of the last build are shown at the action, until it builds", async ({ browser }) => {
-  const { id } = await post("/api/actions", action("WeldSeam", {}));
+  const { id } = await post(product, "/api/actions", action("WeldSeam", {}));
   const told = (ended_well: boolean, errors: object[]) =>
     product.ask(`/api/actions/${id}/build`, {
       method: "PUT",
@@ -210,7 +134,7 @@ test("errors of the last build are shown at the action, until it builds", async 
 });
 
 test("edits of an action are undone, and its history leads back", async ({ browser }) => {
-  const { id } = await post("/api/actions", { name: "LookAround" });
+  const { id } = await post(product, "/api/actions", { name: "LookAround" });
   const { page, context, failures } = await product.person(browser, "Ada");
   await page.goto(`${product.url}/graphs/${id}`);
   await expect(page).toHaveURL(`${product.url}/actions/${id}`);
@@ -236,7 +160,7 @@ test("edits of an action are undone, and its history leads back", async ({ brows
 });
 
 test("two people edit an action at once, and see each other", async ({ browser }) => {
-  const { id } = await post("/api/actions", action("Together", { depth: leaf("number") }));
+  const { id } = await post(product, "/api/actions", action("Together", { depth: leaf("number") }));
   const ada = await product.person(browser, "Ada");
   const ben = await product.person(browser, "Ben");
   for (const { page } of [ada, ben]) await page.goto(`${product.url}/actions/${id}?edit`);
@@ -321,7 +245,11 @@ test("an action is made, found and deleted by keys alone", async ({ browser }) =
 test("on a phone the list and the action follow each other, and nothing is too wide", async ({
   browser,
 }) => {
-  const { id } = await post("/api/actions", action("PhoneAction", { far: leaf("number") }));
+  const { id } = await post(
+    product,
+    "/api/actions",
+    action("PhoneAction", { far: leaf("number") }),
+  );
   const phone = { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true };
   const { page, context, failures } = await product.person(browser, "Ada", phone);
   await page.getByRole("link", { name: "Actions", exact: true }).tap();

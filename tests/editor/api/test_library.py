@@ -259,6 +259,35 @@ def test_an_action_can_be_made_what_a_file_says_and_back(http: httpx.Client, nam
     assert http.put(f"/api/actions/{document}/umrf", content=b"{").status_code == 400
 
 
+def test_what_a_file_would_change_is_told_and_nothing_is_stored(
+    http: httpx.Client, name: str
+) -> None:
+    document = brought(http, action(name, **TAKES))
+    newer = action(name, place=leaf("number"), pose=TAKES["pose"])
+    told = http.post(f"/api/actions/{document}/umrf", json=newer)
+    assert told.status_code == 200, told.text
+    (change,) = told.json()["actions"]
+    assert [each["field"] for each in change["fields"]] == ["in/place"]
+    assert http.get(f"/api/graphs/{document}").json()["seq"] == 1
+    same = http.post(f"/api/actions/{document}/umrf", json=action(name, **TAKES)).json()
+    assert (same["actions"], same["relations"], same["fields"]) == ([], [], [])
+    of_another = http.post(f"/api/actions/{document}/umrf", json=action("Another"))
+    assert of_another.status_code == 409
+
+
+def test_an_action_that_somebody_changed_since_the_look_stays_as_it_is(
+    http: httpx.Client, name: str
+) -> None:
+    document = brought(http, action(name, **TAKES))
+    http.patch(f"/api/graphs/{document}", json={"description": "Goes."}).raise_for_status()
+    newer = action(name, place=leaf("number"))
+    refused = http.put(f"/api/actions/{document}/umrf?seq=1", json=newer)
+    assert (refused.status_code, refused.json()["where"]) == (409, {"graph": document})
+    file = http.get(f"/api/actions/{document}/umrf").json()
+    assert file["input_parameters"] == TAKES
+    assert http.put(f"/api/actions/{document}/umrf?seq=2", json=newer).status_code == 200
+
+
 def test_a_graph_is_no_action_and_an_action_no_graph_to_update(
     http: httpx.Client, name: str
 ) -> None:

@@ -19,7 +19,7 @@ import type { Action } from "../../graph/model";
 import { fieldOfTold } from "../../inspector/fields/field-problems";
 import { graphLabels } from "../../inspector/labels";
 import { LibraryActionForm } from "../../inspector/library-action-form";
-import type { RobotsKnowledge } from "../../library/robot-actions";
+import { type RobotsKnowledge, robotDifferences } from "../../library/robot-actions";
 import { People } from "../../people/people";
 import { roomUrl } from "../../sync/room-connection";
 import { RoomProvider, useLinkPart, useThrottledLink } from "../../sync/use-room";
@@ -28,6 +28,7 @@ import { ActionOverview } from "../details/action-overview";
 import { OnRobots } from "../details/on-robots";
 import { UsedIn } from "../details/used-in";
 import { OlderUses } from "../uses/older-uses";
+import { TakeOver } from "../uses/take-over";
 import { ActionHead } from "./action-head";
 import { NamesLine } from "./names-line";
 import style from "./open.module.css";
@@ -90,7 +91,16 @@ function Places({ known, action, knowledge, context }: PlacesProps) {
           onTake: (graph: string, name: string) => void take(graph, name),
         })}
       />
-      <OnRobots name={action.name} knowledge={knowledge} own={known ?? null} />
+      <OnRobots
+        name={action.name}
+        knowledge={knowledge}
+        own={known ?? null}
+        offer={(has) =>
+          context.mayEdit &&
+          known !== undefined &&
+          robotDifferences(known, has.action).length > 0 && <TakeOver id={context.id} has={has} />
+        }
+      />
     </>
   );
 }

@@ -1,6 +1,6 @@
 /** The library of actions, each a document of its own, as the editor answers it. */
 import { keepPreviousData, type QueryClient, useQuery } from "@tanstack/react-query";
-import { type GraphSummary, type Preview, queryKeys } from "../graphs";
+import { type GraphDifference, type GraphSummary, type Preview, queryKeys } from "../graphs";
 import { fetchJson } from "../http";
 import { serverPath } from "../page-url";
 import type { EditorApi } from "../schema/editor";
@@ -65,9 +65,15 @@ export function importAction(text: string): Promise<GraphSummary> {
   return fetchJson("/api/actions", { method: "POST", body: text });
 }
 
-/** Makes an action that the library has what its file says. */
-export function replaceAction(id: string, text: string): Promise<GraphSummary> {
-  return fetchJson(`${below(id)}/umrf`, { method: "PUT", body: text });
+/** Makes an action that the library has what its file says; with `seq` only while that is its last change. */
+export function replaceAction(id: string, text: string, seq?: number): Promise<GraphSummary> {
+  const query = seq === undefined ? "" : `?seq=${seq}`;
+  return fetchJson(`${below(id)}/umrf${query}`, { method: "PUT", body: text });
+}
+
+/** What that would change. */
+export function compareWithFile(id: string, text: string): Promise<GraphDifference> {
+  return fetchJson(`${below(id)}/umrf`, { method: "POST", body: text });
 }
 
 /** Where the browser gets the file of the action alone from. */

@@ -21,6 +21,7 @@ from action_assistant.editor.services import EditorState
 from action_assistant.editor.workers import encoded
 from action_assistant.errors import BadInput
 from action_assistant.umrf.action_updates import NO_RENAMES, Renames
+from action_assistant.umrf.difference import Difference
 from action_assistant.umrf.json.embedded import JsonObject
 from action_assistant.web.auth.access import Needs, person_of
 from action_assistant.web.server.application import BODY_LIMIT
@@ -132,19 +133,39 @@ def _actions(app_state: EditorState) -> list[ControllerRouterHandler]:
 
     @put(
         "/api/actions/{action_id:str}/umrf",
-        summary="Make an action what its UMRF file says, as an edit that can be taken back",
+        summary="Make an action what its UMRF file says, as an edit that can be taken back; with `seq` "
+        "only while that is its last change",
         operation_id="replaceAction",
         guards=[Needs("edit")],
         opt=reads(JsonObject),
         request_max_body_size=BODY_LIMIT,
     )
-    async def replace_action(action_id: str, request: Asking) -> GraphView:
+    async def replace_action(action_id: str, request: Asking, seq: Seq | None = None) -> GraphView:
         services, person = app_state.services, person_of(request)
         body = await request.body()
         await services.people.seen(person)
-        return await services.library_edits.replace(action_id, body, person.id)
+        return await services.library_edits.replace(action_id, body, person.id, seq)
 
-    return [list_actions, list_deleted_actions, create_action, get_action_umrf, replace_action]
+    @post(
+        "/api/actions/{action_id:str}/umrf",
+        status_code=200,
+        summary="What making an action what its UMRF file says would change; stores nothing",
+        operation_id="compareWithFile",
+        guards=[Needs("edit")],
+        opt=reads(JsonObject),
+        request_max_body_size=BODY_LIMIT,
+    )
+    async def compare_with_file(action_id: str, request: Asking) -> Difference:
+        body = await request.body()
+        found: Difference = encoded(
+            await app_state.services.library_edits.replacing_would(action_id, body)
+        )
+        return found
+
+    return [
+        *(list_actions, list_deleted_actions, create_action),
+        *(get_action_umrf, replace_action, compare_with_file),
+    ]
 
 
 def _uses(app_state: EditorState) -> list[ControllerRouterHandler]:

@@ -16,6 +16,7 @@ from action_assistant.editor.documents.document import new_aid
 from action_assistant.editor.interchange import library_updates
 from action_assistant.editor.interchange.action_uses import LibraryAction
 from action_assistant.editor.log import graph_events as h
+from action_assistant.editor.log.graph_events import DocumentKind
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.editor.rooms.room import Room
 from action_assistant.errors import BadInput, Conflict
@@ -159,14 +160,27 @@ class LibraryEdits:
             await self._adapt(room, action, update, author, source, name)
         return await self._catalogue.get(action)
 
-    async def replace(self, action: str, body: bytes, author: str) -> GraphView:
+    async def replacing_would(self, action: str, body: bytes) -> bytes:
+        """JSON of the `Difference` that `replace` would make now. Raises as it does."""
+        await self._catalogue.require(action, "action")
+        sight = await self._graph_reader.now(action)
+        found: bytes = await self._files(library_updates.replacing_would, sight, body)
+        return found
+
+    async def replace(
+        self, action: str, body: bytes, author: str, seq: int | None = None
+    ) -> GraphView:
         """The action becomes what its file says. Raises BadInput, NotUmrf, TooLarge with the place,
-        Conflict for the file of another."""
+        Conflict for the file of another, and where its change `seq` is not its last one any more."""
         await self._catalogue.require(action, "action")
         name = (await self._catalogue.get(action)).name
         async with self._rooms.enter(h.graph_stream(action)) as room:
             sight = await _now(room, action)
+            if seq is not None and sight.seq != seq:
+                raise _changed(GraphMoment(action, seq), sight.seq, "action")
             update = await self._files(library_updates.replacing, sight, body)
+            if seq is not None and room.seq != seq:
+                raise _changed(GraphMoment(action, seq), room.seq, "action")
             await self._adapt(room, action, update, author, GraphAtSeq("", 0, b""), name)
         return await self._catalogue.get(action)
 
@@ -227,10 +241,10 @@ async def _seen(room: Room, moment: GraphMoment) -> GraphAtSeq:
     return found
 
 
-def _changed(moment: GraphMoment, seq: int) -> Conflict:
+def _changed(moment: GraphMoment, seq: int, what: DocumentKind = "graph") -> Conflict:
     where: dict[str, Any] = {"graph": moment.graph}
     return Conflict(
-        f"Somebody has changed this graph: it was seen after its change {moment.seq}, and now has "
+        f"Somebody has changed this {what}: it was seen after its change {moment.seq}, and now has "
         f"{seq}. Nothing was written.",
         where=where,
     )

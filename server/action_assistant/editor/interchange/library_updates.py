@@ -1,6 +1,6 @@
 """What the library's documents and the graphs that use them would make of each other. For workers."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import msgspec
 from msgspec.structs import replace
@@ -153,7 +153,18 @@ def taking(sight: GraphAtSeq, graph: GraphAtSeq, aid: str | None) -> bytes:
 def replacing(sight: GraphAtSeq, body: bytes) -> bytes:
     """The update that makes the action what a file says of it, all but its place. Raises as `brought`
     does, and Conflict for the file of another action."""
-    action, file = _action_of(sight), brought(body).action
+    return editing(sight.state, _replaced(_action_of(sight), body))
+
+
+def replacing_would(sight: GraphAtSeq, body: bytes) -> bytes:
+    """What `replacing` would change, as JSON of a `Difference`. Raises as it does."""
+    graph = read(sight).moment.graph
+    after = _replaced(_action_of(sight), body)(graph)
+    return msgspec.json.encode(difference((sight.seq, graph), (sight.seq, after)))
+
+
+def _replaced(action: Action, body: bytes) -> Callable[[Graph], Graph]:
+    file = brought(body).action
     if file.name != action.name:
         raise Conflict(
             f"This is the file of {file.name!r}, and the action is {action.name!r}.",
@@ -164,7 +175,7 @@ def replacing(sight: GraphAtSeq, body: bytes) -> bytes:
         new = replace(file, key=action.key, position=action.position)
         return replace(old, actions=tuple(new if a.key == new.key else a for a in old.actions))
 
-    return editing(sight.state, replaced)
+    return replaced
 
 
 def _action_of(sight: GraphAtSeq) -> Action:
