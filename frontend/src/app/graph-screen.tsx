@@ -9,7 +9,7 @@ import { type Run, useLastRun } from "../api/runs";
 import { useMay, usePerson } from "../api/use-person";
 import { useSeed } from "../editor/dry-run/use-seed";
 import { Editor, type Shown } from "../editor/editor";
-import { useKnownActions } from "../library/known-actions";
+import { templatesOf, useKnownActions, usePlaceable } from "../library/known-actions";
 import { Sidebar } from "../library/sidebar";
 import { useReplay } from "../review/replay/use-replay";
 import { askedDryRun } from "../review/run/dry-run-link";
@@ -80,8 +80,8 @@ function useEdge(run: Run | null): number {
 function Inside({ id }: { id: string }) {
   const { person, visit } = usePerson();
   const { create, choose } = useNewGraphs();
-  const { actions } = useKnownActions();
-  const known = useMemo(() => actions.map((action) => action.template), [actions]);
+  const placeable = usePlaceable(id);
+  const known = useMemo(() => templatesOf(placeable), [placeable]);
   const { going, choose: chooseRun, live, run, label, unsure } = useRunHere(id);
   const { runner } = useLive();
   const replay = useReplay(runner, run ?? null, useEdge(run ?? null), null);

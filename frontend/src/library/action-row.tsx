@@ -26,10 +26,12 @@ function About({ known }: { known: KnownAction }) {
 
 interface Props {
   known: KnownAction;
+  /** What is said after its parameters. */
+  note?: string;
   onPlace: (template: NewAction) => void;
 }
 
-export function ActionRow({ known, onPlace }: Props) {
+export function ActionRow({ known, note = "", onPlace }: Props) {
   const { template, usedIn } = known;
   return (
     <div className={style.action}>
@@ -48,6 +50,7 @@ export function ActionRow({ known, onPlace }: Props) {
           <span className={style.sub}>
             {signature(template)}
             {usedIn.length > 0 && ` · used in ${usedIn.length}`}
+            {note !== "" && ` · ${note}`}
           </span>
         </span>
       </button>

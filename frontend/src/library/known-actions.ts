@@ -1,6 +1,11 @@
-/** The actions that can be added: those of the library and what graphs use besides, each once. */
+/** What can be added: the actions of the library and what graphs use besides, and graphs; each once. */
 import { useMemo } from "react";
-import { type LibraryAction, useLibrary } from "../api/documents/library";
+import {
+  type GraphAsAction,
+  type LibraryAction,
+  useGraphsAsActions,
+  useLibrary,
+} from "../api/documents/library";
 import type { NewAction } from "../graph/edit";
 import { pathWords } from "../graph/value-text";
 
@@ -23,9 +28,10 @@ const words = (list: Parameters): string[] =>
       `${pathWords(path)}: ${pvf_type ?? "no type"}${required ? "" : ", optional"}`,
   );
 
+const bare = (list: Parameters) => list.map(({ path, text }) => ({ path, text }));
+
 function knownAction(answer: LibraryAction): KnownAction {
   const { name, type, description, inputs, outputs, used_in, document } = answer;
-  const bare = (list: Parameters) => list.map(({ path, text }) => ({ path, text }));
   return {
     template: { name, type, description, inputs: bare(inputs), outputs: bare(outputs) },
     document,
@@ -41,6 +47,65 @@ export function useKnownActions(): { actions: readonly KnownAction[]; ready: boo
   const { data = NONE, isPending } = useLibrary();
   const actions = useMemo(() => data.map(knownAction), [data]);
   return { actions, ready: !isPending };
+}
+
+/** A graph, as the action that stands for it in another. */
+export interface KnownGraph {
+  readonly graph: string;
+  readonly template: NewAction;
+}
+
+const NO_GRAPHS: readonly GraphAsAction[] = [];
+
+const pathsOf = ({ inputs = [], outputs = [] }: NewAction): string =>
+  JSON.stringify([inputs, outputs].map((list) => list.map(({ path }) => path).sort()));
+
+interface Placeable {
+  readonly actions: readonly KnownAction[];
+  readonly graphs: readonly KnownGraph[];
+}
+
+/**
+ * Each name once. Engines look for an action before a graph of its name, so that one of the library
+ * comes first; one that only graphs use, with the parameters of a graph of its name, is that graph.
+ */
+export function placeable(
+  actions: readonly KnownAction[],
+  graphs: readonly KnownGraph[],
+  current: string | undefined,
+): Placeable {
+  const own = new Set(actions.flatMap(({ document, template }) => (document ? template.name : [])));
+  const byName = new Map(graphs.map(({ template }) => [template.name, pathsOf(template)]));
+  const isGraph = ({ document, template }: KnownAction) =>
+    document === null && byName.get(template.name) === pathsOf(template);
+  const seen = new Set<string>();
+  const others = graphs.filter(({ graph, template: { name } }) => {
+    const first = graph !== current && !own.has(name) && !seen.has(name);
+    if (first) seen.add(name);
+    return first;
+  });
+  return { actions: actions.filter((action) => !isGraph(action)), graphs: others };
+}
+
+/** What can be placed in a graph: not the graph itself. */
+export function usePlaceable(current: string | undefined): Placeable & { ready: boolean } {
+  const { actions, ready } = useKnownActions();
+  const { data = NO_GRAPHS } = useGraphsAsActions();
+  return useMemo(() => {
+    const graphs = data.map(({ graph, name, description, inputs, outputs }) => {
+      const template = { name, description, inputs: bare(inputs), outputs: bare(outputs) };
+      return { graph, template };
+    });
+    return { ...placeable(actions, graphs, current), ready };
+  }, [actions, data, current, ready]);
+}
+
+/** All of it for a search by name: of an action and a graph of one name the action. */
+export function templatesOf({ actions, graphs }: Placeable): NewAction[] {
+  const all = [...actions, ...graphs].map(({ template }) => template);
+  return [
+    ...new Map(all.reverse().map((template) => [template.name, template])).values(),
+  ].reverse();
 }
 
 /** `location, pose.position.x`, for a line under the name. */

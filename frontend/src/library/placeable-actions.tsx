@@ -1,4 +1,4 @@
-/** Actions to be placed on the canvas: of the library, of graphs, and what robots have besides. */
+/** What can be placed on the canvas: actions of the library, of graphs and of robots, and graphs. */
 
 import { Button } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
@@ -11,7 +11,7 @@ import type { NewAction } from "../graph/edit";
 import { ActionRow } from "./action-row";
 import { RowSkeletons } from "./graph-rows";
 import { matchesSearch } from "./graph-selection";
-import { type KnownAction, signature, useKnownActions } from "./known-actions";
+import { type KnownAction, type KnownGraph, signature, usePlaceable } from "./known-actions";
 import { type RobotAction, robotTemplate, useRobotsKnowledge } from "./robot-actions";
 import style from "./sidebar.module.css";
 import { takeFromRobot } from "./take-from-robot";
@@ -83,11 +83,42 @@ interface RobotsProps {
   onPlace: Place;
 }
 
-export function PlaceableActions({ search, onPlace }: { search: string; onPlace: Place }) {
-  const { actions, ready } = useKnownActions();
+/** Other graphs: each is one action that runs the whole of it. */
+function Graphs({ graphs, onPlace }: { graphs: readonly KnownGraph[]; onPlace: Place }) {
+  const { robots, unknown, graphs: indexed } = useRobotsKnowledge();
+  if (graphs.length === 0) return null;
+  const on = (name: string) => {
+    const having = indexed.get(name);
+    if (having !== undefined) return `on ${having.join(", ")}`;
+    // One that has not told what it has may have it.
+    return robots.length === 0 || unknown.length > 0 ? "" : "on no robot";
+  };
+  return (
+    <section aria-label="Graphs as actions">
+      <div className={style.heading}>
+        <h2>Graphs</h2>
+      </div>
+      <p className={style.how}>One action that runs a whole graph, where a robot has indexed it.</p>
+      {graphs.map(({ graph, template }) => (
+        <ActionRow key={graph} known={bare(template)} note={on(template.name)} onPlace={onPlace} />
+      ))}
+    </section>
+  );
+}
+
+interface Props {
+  search: string;
+  /** The graph on the canvas. */
+  current: string | undefined;
+  onPlace: Place;
+}
+
+export function PlaceableActions({ search, current, onPlace }: Props) {
+  const { actions, graphs, ready } = usePlaceable(current);
   const shown = actions.filter(({ template }) => fits(search, template));
+  const others = graphs.filter(({ template }) => fits(search, template));
   const fresh = search.trim();
-  const exact = shown.some(({ template }) => template.name === fresh);
+  const exact = [...shown, ...others].some(({ template }) => template.name === fresh);
   if (!ready) return <RowSkeletons count={4} />;
   return (
     <>
@@ -106,6 +137,7 @@ export function PlaceableActions({ search, onPlace }: { search: string; onPlace:
         known={new Set(actions.map(({ template }) => template.name))}
         onPlace={onPlace}
       />
+      <Graphs graphs={others} onPlace={onPlace} />
     </>
   );
 }

@@ -19,6 +19,8 @@ export interface RobotsKnowledge {
   readonly robots: readonly string[];
   readonly unknown: readonly string[];
   readonly byName: ReadonlyMap<string, readonly RobotAction[]>;
+  /** The robots that have a graph, by its name. */
+  readonly graphs: ReadonlyMap<string, readonly string[]>;
 }
 
 /** What each robot has told; null: nothing. */
@@ -26,15 +28,20 @@ type ToldByRobots = readonly { readonly robot: string; readonly indexed: Indexed
 
 export function knowledgeOf(told: ToldByRobots): RobotsKnowledge {
   const byName = new Map<string, RobotAction[]>();
+  const graphs = new Map<string, string[]>();
   for (const { robot, indexed } of told) {
     for (const action of indexed?.actions ?? []) {
       byName.set(action.name, [...(byName.get(action.name) ?? []), { robot, action }]);
+    }
+    for (const name of indexed?.graphs ?? []) {
+      graphs.set(name, [...(graphs.get(name) ?? []), robot]);
     }
   }
   return {
     robots: told.map(({ robot }) => robot),
     unknown: told.flatMap(({ robot, indexed }) => (indexed === null ? [robot] : [])),
     byName,
+    graphs,
   };
 }
 

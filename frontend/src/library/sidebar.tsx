@@ -97,7 +97,7 @@ export function Sidebar({ current, onNew, onImport, onPlace }: Props) {
           <GraphList search={search} current={current} />
         ) : (
           <PartBoundary waiting={<RowSkeletons count={4} />}>
-            {onPlace && <PlaceableActions search={search} onPlace={onPlace} />}
+            {onPlace && <PlaceableActions search={search} current={current} onPlace={onPlace} />}
           </PartBoundary>
         )}
       </div>

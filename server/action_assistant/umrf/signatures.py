@@ -7,7 +7,7 @@ import msgspec
 
 from action_assistant.umrf.json.text import Json, dump, parse_small
 from action_assistant.umrf.model import ENTRY, EXIT, Action, Graph, Parameter, Signature
-from action_assistant.umrf.parameters import flat_name
+from action_assistant.umrf.parameters import flat_name, without_value
 
 
 def signature_of(action: Action) -> Signature:
@@ -33,6 +33,31 @@ def signature_of_graph(graph: Graph) -> Signature:
         if relation.child == EXIT and (end := by_key.get(relation.parent)):
             outputs = _types(end.outputs)[0] or outputs
     return Signature(inputs=inputs, outputs=outputs, optional=optional)
+
+
+def action_of_graph(graph: Graph) -> Action:
+    """The action that stands for a graph in another, with the parameters of `signature_of_graph`. An
+    input that two entry actions take is required where one of them requires it."""
+    by_key = {action.key: action for action in graph.actions if not action.missing}
+    inputs: dict[str, Parameter] = {}
+    outputs: tuple[Parameter, ...] = ()
+    for relation in sorted(graph.relations, key=lambda r: r.child_order):
+        if relation.parent == ENTRY and (entry := by_key.get(relation.child)):
+            for parameter in entry.inputs:
+                if _has_value(parse_small(parameter.text)):
+                    continue
+                known = inputs.get(parameter.path)
+                if known is None or _types((known,))[1]:
+                    inputs[parameter.path] = parameter
+        if relation.child == EXIT and (end := by_key.get(relation.parent)):
+            outputs = end.outputs or outputs
+    return Action(
+        key="",
+        name=graph.name,
+        description=graph.description,
+        inputs=tuple(inputs.values()),
+        outputs=tuple(map(without_value, outputs)),
+    )
 
 
 def with_inputs(graph: Graph) -> Graph:

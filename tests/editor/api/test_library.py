@@ -288,6 +288,38 @@ def test_an_action_that_somebody_changed_since_the_look_stays_as_it_is(
     assert http.put(f"/api/actions/{document}/umrf?seq=2", json=newer).status_code == 200
 
 
+def test_a_graph_is_told_as_the_action_that_stands_for_it(http: httpx.Client, name: str) -> None:
+    first = action(name, goal=leaf("string"), speed=leaf("number", pvf_value=2))
+    first["children"] = [{"name": "Last", "instance_id": 0}]
+    last = {
+        **action("Last", hidden=leaf("bool")),
+        "output_parameters": {"at": leaf("number", pvf_value=1)},
+        "parents": [{"name": name, "instance_id": 0}],
+    }
+    whole = {
+        "graph_name": f"{name}_round",
+        "graph_description": "Goes round.",
+        "graph_entry": [{"name": name, "instance_id": 0}],
+        "graph_exit": [{"name": "Last", "instance_id": 0}],
+        "actions": [first, last],
+    }
+    made = http.post("/api/graphs", json=whole).json()["id"]
+    document = brought(http, action(f"{name}Alone"))
+
+    known = {each["graph"]: each for each in http.get("/api/actions/graphs").json()}
+    assert document not in known
+    mine = known[made]
+    assert (mine["name"], mine["description"]) == (f"{name}_round", "Goes round.")
+    assert [(each["path"], json.loads(each["text"])) for each in mine["inputs"]] == [
+        ("goal", leaf("string"))
+    ]
+    assert [(each["path"], json.loads(each["text"])) for each in mine["outputs"]] == [
+        ("at", leaf("number"))
+    ]
+    http.delete(f"/api/graphs/{made}").raise_for_status()
+    assert made not in [each["graph"] for each in http.get("/api/actions/graphs").json()]
+
+
 def test_a_graph_is_no_action_and_an_action_no_graph_to_update(
     http: httpx.Client, name: str
 ) -> None:

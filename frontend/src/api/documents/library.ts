@@ -30,6 +30,17 @@ export function useLibrary() {
   });
 }
 
+/** A graph as the action that stands for it in another: what its first actions lack, what its last one gives. */
+export type GraphAsAction = EditorApi["GraphAsAction"];
+
+export function useGraphsAsActions() {
+  return useQuery({
+    queryKey: [...queryKeys.actions, "graphs"],
+    queryFn: ({ signal }) => fetchJson<GraphAsAction[]>("/api/actions/graphs", { signal }),
+    refetchInterval: 30_000,
+  });
+}
+
 /** How the package's last build went, as somebody has told it; null before that. */
 export type ActionBuild = EditorApi["ActionBuilt"];
 

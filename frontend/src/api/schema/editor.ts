@@ -305,6 +305,18 @@ export interface EditorApi {
         left: string[];
     };
     /**
+     * GraphAsAction
+     * @description A graph, as the action that stands for it in another one: it takes what its first actions lack,
+     *     and gives what its last one gives. Robots run it so where they have indexed it.
+     */
+    GraphAsAction: {
+        graph: string;
+        name: string;
+        description: string;
+        inputs: EditorApi["LibraryParameter"][];
+        outputs: EditorApi["LibraryParameter"][];
+    };
+    /**
      * GraphMoment
      * @description A graph, and its change that somebody has seen.
      */

@@ -13,7 +13,7 @@ from action_assistant.editor.api.graphs import MadeGraph, Seq
 from action_assistant.editor.catalogue.catalogue import GraphView
 from action_assistant.editor.catalogue.library_edits import GraphMoment, UpdatedGraph
 from action_assistant.editor.interchange import library_updates
-from action_assistant.editor.interchange.action_uses import LibraryAction
+from action_assistant.editor.interchange.action_uses import GraphAsAction, LibraryAction
 from action_assistant.editor.interchange.importing import Preview
 from action_assistant.editor.interchange.library_updates import ActionUse
 from action_assistant.editor.log import graph_events as h
@@ -81,6 +81,15 @@ def _actions(app_state: EditorState) -> list[ControllerRouterHandler]:
     )
     async def list_actions() -> list[LibraryAction]:
         known: list[LibraryAction] = encoded(await app_state.services.library.all())
+        return known
+
+    @get(
+        "/api/actions/graphs",
+        summary="The graphs, each as the action that stands for it in another one, by name",
+        operation_id="listGraphsAsActions",
+    )
+    async def list_graphs_as_actions() -> list[GraphAsAction]:
+        known: list[GraphAsAction] = encoded(await app_state.services.library.graphs())
         return known
 
     @get(
@@ -163,7 +172,7 @@ def _actions(app_state: EditorState) -> list[ControllerRouterHandler]:
         return found
 
     return [
-        *(list_actions, list_deleted_actions, create_action),
+        *(list_actions, list_graphs_as_actions, list_deleted_actions, create_action),
         *(get_action_umrf, replace_action, compare_with_file),
     ]
 

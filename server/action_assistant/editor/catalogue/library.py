@@ -1,18 +1,27 @@
 """The action library: the actions that have a document, and those that graphs use, each name once."""
 
+from collections.abc import Callable
 from typing import Final
 
 from anyio import CapacityLimiter, Lock, create_task_group
 from sqlalchemy import select
 
 from action_assistant.editor.catalogue.graph_reader import GraphReader
-from action_assistant.editor.interchange.action_uses import NOTHING, ActionSource, found, merged
+from action_assistant.editor.interchange.action_uses import (
+    NOTHING,
+    ActionSource,
+    as_actions,
+    found,
+    merged,
+)
 from action_assistant.editor.log.graph_events import DocumentKind
 from action_assistant.journal.journal import Journal
 from action_assistant.schema import editor_tables
 from action_assistant.web.workers.lanes import HOPELESS
 
 _AT_ONCE: Final = 4  # documents that are read
+
+_Listing = Callable[[list[tuple[ActionSource, bytes]]], bytes]
 
 
 class Library:
@@ -23,15 +32,29 @@ class Library:
         self._graph_reader = graph_reader
         self._read: dict[str, tuple[int, bytes]] = {}
         self._reading = Lock()
-        self._shown: tuple[dict[str, int], bytes] = {}, b"[]"
+        self._shown: dict[_Listing, tuple[dict[str, int], bytes]] = {}
 
     async def all(self) -> bytes:
         """Every action by name: JSON of a list of `LibraryAction`. Documents that cannot be read are
         left out."""
-        async with self._reading:  # what one request reads the next one has
-            return await self._all()
+        return await self._listed(merged)
 
-    async def _all(self) -> bytes:
+    async def graphs(self) -> bytes:
+        """Every graph as the action that stands for it: JSON of a list of `GraphAsAction`."""
+        return await self._listed(as_actions)
+
+    async def _listed(self, listing: _Listing) -> bytes:
+        async with self._reading:  # what one request reads the next one has
+            sources = await self._sources()
+            seqs = {source.document: source.seq for source, _ in sources}
+            before = self._shown.get(listing)
+            if before is None or before[0] != seqs:
+                before = seqs, await self._graph_reader.ask(listing, sources)
+                self._shown[listing] = before
+            return before[1]
+
+    async def _sources(self) -> list[tuple[ActionSource, bytes]]:
+        """What was found in each document, the last changed first."""
         graph, event = editor_tables.graph, editor_tables.editor_event
         last = (
             select(event.c.seq)
@@ -54,16 +77,14 @@ class Library:
         async with create_task_group() as reading:
             for row in rows:
                 reading.start_soon(self._refresh, row.id, row.seq, row.kind, limit)
-        seqs = {row.id: self._read[row.id][0] for row in rows}
-        if self._shown[0] != seqs:
-            self._read = {row.id: self._read[row.id] for row in rows}
-            newest_first = sorted(rows, key=lambda row: row.at, reverse=True)
-            sources = [
-                (ActionSource(row.id, row.made_at, seqs[row.id], row.kind), self._read[row.id][1])
-                for row in newest_first
-            ]
-            self._shown = seqs, await self._graph_reader.ask(merged, sources)
-        return self._shown[1]
+        self._read = {row.id: self._read[row.id] for row in rows}
+        return [
+            (
+                ActionSource(row.id, row.made_at, self._read[row.id][0], row.kind),
+                self._read[row.id][1],
+            )
+            for row in sorted(rows, key=lambda row: row.at, reverse=True)
+        ]
 
     async def _refresh(
         self, graph: str, seq: int, kind: DocumentKind, limit: CapacityLimiter

@@ -14,6 +14,7 @@ from action_assistant.umrf.action_updates import is_like
 from action_assistant.umrf.json.text import parse_small
 from action_assistant.umrf.model import Action, Graph, JsonText, Parameter
 from action_assistant.umrf.parameters import without_value
+from action_assistant.umrf.signatures import action_of_graph
 
 
 class LibraryParameter(msgspec.Struct, frozen=True):
@@ -51,6 +52,17 @@ class LibraryAction(msgspec.Struct, frozen=True, kw_only=True):
     differs_in: tuple[str, ...] = ()
 
 
+class GraphAsAction(msgspec.Struct, frozen=True):
+    """A graph, as the action that stands for it in another one: it takes what its first actions lack,
+    and gives what its last one gives. Robots run it so where they have indexed it."""
+
+    graph: str
+    name: str
+    description: str
+    inputs: tuple[LibraryParameter, ...]
+    outputs: tuple[LibraryParameter, ...]
+
+
 class ActionSource(msgspec.Struct, frozen=True):
     """A document that has actions, and when it was made, in microseconds."""
 
@@ -61,10 +73,12 @@ class ActionSource(msgspec.Struct, frozen=True):
 
 
 class FoundActions(msgspec.Struct, frozen=True):
-    """The actions of a document that differ in what a library says of them, and its labels."""
+    """The actions of a document that differ in what a library says of them, and its labels. `whole`:
+    the action that stands for a graph; None for one without a name or without actions."""
 
     actions: tuple[Action, ...] = ()
     labels: tuple[str, ...] = ()
+    whole: Action | None = None
 
 
 #: Of a document that cannot be read.
@@ -75,10 +89,12 @@ def found(sight: GraphAtSeq, kind: DocumentKind) -> bytes:
     """The actions of a document, as msgpack of `FoundActions`."""
     graph = read(sight).moment.graph
     if kind == "graph":
-        return msgspec.msgpack.encode(FoundActions(_distinct(graph)))
+        actions = _distinct(graph)
+        whole = action_of_graph(graph) if graph.name and actions else None
+        return msgspec.msgpack.encode(FoundActions(actions, whole=whole))
     action = first_action(graph)
-    actions = () if action is None or not action.name else (action,)
-    return msgspec.msgpack.encode(FoundActions(actions, labels_of(graph)))
+    own = () if action is None or not action.name else (action,)
+    return msgspec.msgpack.encode(FoundActions(own, labels_of(graph)))
 
 
 def merged(sources: list[tuple[ActionSource, bytes]]) -> bytes:
@@ -100,6 +116,22 @@ def merged(sources: list[tuple[ActionSource, bytes]]) -> bytes:
     listed += [_of_uses(name, each) for name, each in uses.items() if name not in names]
     # Two documents of one name are possible, since people rename at the same time.
     return msgspec.json.encode(sorted(listed, key=lambda each: (each.name, each.first_seen)))
+
+
+def as_actions(sources: list[tuple[ActionSource, bytes]]) -> bytes:
+    """JSON of a list of `GraphAsAction`, by name."""
+    listed = [
+        GraphAsAction(
+            source.document,
+            whole.name,
+            whole.description,
+            tuple(map(_described, whole.inputs)),
+            tuple(map(_described, whole.outputs)),
+        )
+        for source, text in sources
+        if (whole := msgspec.msgpack.decode(text, type=FoundActions).whole) is not None
+    ]
+    return msgspec.json.encode(sorted(listed, key=lambda each: (each.name, each.graph)))
 
 
 def _by_age(uses: list[tuple[ActionSource, Action]]) -> tuple[str, ...]:
