@@ -178,6 +178,37 @@ test("two people edit an action at once, and see each other", async ({ browser }
   }
 });
 
+test("an action is talked about, also one of its parameters", async ({ browser }) => {
+  const { id } = await post(
+    product,
+    "/api/actions",
+    action("TurnWheel", { speed: leaf("number") }),
+  );
+  const ada = await product.person(browser, "Ada");
+  const ben = await product.person(browser, "Ben");
+  for (const { page } of [ada, ben]) await page.goto(`${product.url}/actions/${id}`);
+  await ada.page.getByRole("tab", { name: "Comments", exact: true }).click();
+  await ada.page.getByRole("textbox", { name: "Comment on TurnWheel" }).fill("In <b>m/s</b>?");
+  await ada.page.getByRole("combobox", { name: "What it is about" }).selectOption("about speed");
+  await ada.page.getByRole("button", { name: "Comment", exact: true }).click();
+  await saved(ada.page);
+
+  await ben.page.getByRole("tab", { name: "Comments, 1 open" }).click();
+  const thread = ben.page.getByRole("tabpanel").getByRole("listitem");
+  await expect(thread).toContainText("speed");
+  await expect(thread).toContainText("In <b>m/s</b>?");
+  await thread.getByRole("button", { name: "Answer" }).click();
+  await ben.page.getByRole("textbox", { name: "Answer" }).fill("Yes.");
+  await thread.getByRole("button", { name: "Answer" }).click();
+  await expect(ada.page.getByRole("tabpanel").getByRole("listitem")).toContainText("Yes.");
+  await thread.getByRole("button", { name: "Resolve" }).click();
+  await expect(ada.page.getByRole("tab", { name: "Comments", exact: true })).toBeVisible();
+  for (const { failures, context } of [ada, ben]) {
+    expect(failures).toEqual([]);
+    await context.close();
+  }
+});
+
 test("files of actions are imported into the library, many at once", async ({ browser }) => {
   const { page, context, failures } = await product.person(browser, "Ada");
   await page.goto(`${product.url}/actions`);

@@ -60,7 +60,10 @@ const LAYERS: Readonly<Record<string, readonly string[]>> = {
   robots: ["ui", "api", "status"],
   library: ["graph", "ui", "api", "status", "canvas"],
   // The page of actions is an editor of its own, with the same forms and rooms.
-  actions: [...BELOW_EDITOR, "people", "history", "inspector", "packages", "editor", "library"],
+  actions: [...BELOW_EDITOR, "people", "comments", "history", "inspector", "packages"].concat([
+    "editor",
+    "library",
+  ]),
   account: ["ui", "api"],
   app: ["graph", "ui", "api", "status", "offline", "canvas", "sync", "dry-run", "editor"].concat([
     "runs",

@@ -162,8 +162,8 @@ function Inside(props: Props) {
           {seq > 0 && action === undefined && <p role="status">It holds no action.</p>}
           {action && <Body {...props} action={action} context={context} seq={seq} />}
         </section>
-        <aside className={style.beside} aria-label="Package and history">
-          <SidePane id={id} seq={seq} mayEdit={context.mayEdit} />
+        <aside className={style.beside} aria-label="Package, comments and history">
+          <SidePane id={id} action={action} seq={seq} mayEdit={context.mayEdit} />
         </aside>
       </div>
       <RoomNotices />

@@ -37,6 +37,16 @@ test("a thread has its messages in order, is resolved, and opened again", () => 
   expect(threads(doc)[0]?.resolved).toBe(false);
 });
 
+test("a thread about a parameter keeps that when its first message is taken back", () => {
+  const doc = new Y.Doc();
+  const id = beginThread(doc, about, { author: ada, at: 1, text: "In m/s?" }, "in/speed");
+  reply(doc, id, { author: mari, at: 2, text: "Yes." });
+  const first = threads(doc)[0]?.messages[0]?.id ?? "";
+  deleteMessage(doc, id, first);
+  expect(threads(doc)).toMatchObject([{ about, parameter: "in/speed", messages: [{ at: 2 }] }]);
+  expect(openThreadCounts(threads(doc))).toEqual(new Map([[about, 1]]));
+});
+
 test("two people who answer at once are both heard, and everybody sees the same", () => {
   const doc = new Y.Doc();
   const id = beginThread(doc, about, { author: ada, at: 1, text: "Why?" });

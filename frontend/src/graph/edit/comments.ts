@@ -2,7 +2,8 @@
  * What people say about actions: threads in the document, one key for each message.
  *
  * `comments` holds `<thread>/<message>` → JSON text. The first message of a thread names the action
- * that it is about; a message may also say that the thread is done, or open again. Messages are
+ * that it is about, and the parameter if it is about one: apart, so that a page which knows of none
+ * has the thread at the action. A message may also say that the thread is done, or open again. Messages are
  * never edited by others' pages, so two people who answer at once both stay. The author stands in
  * the text as the page wrote it; who stored it is known by the log.
  */
@@ -29,6 +30,8 @@ export interface Thread {
   readonly id: string;
   /** The action; it may be gone. */
   readonly about: Key;
+  /** `in/speed`: one of its parameters, under the name that it had then. Null: the action as a whole. */
+  readonly parameter: string | null;
   readonly messages: readonly CommentMessage[];
   readonly resolved: boolean;
 }
@@ -36,6 +39,7 @@ export interface Thread {
 interface ParsedMessage extends CommentMessage {
   readonly thread: string;
   readonly about: Key | null;
+  readonly parameter: string | null;
   readonly resolved: boolean | null;
 }
 
@@ -53,12 +57,14 @@ function said(key: string, value: unknown): ParsedMessage | null {
     return null;
   }
   if (typeof body !== "object" || body === null) return null;
-  const { about, author, at, text: words, resolved } = body as Record<string, unknown>;
+  const fields = body as Record<string, unknown>;
+  const { about, parameter, author, at, text: words, resolved } = fields;
   const who = typeof author === "object" && author !== null ? author : {};
   return {
     thread,
     id,
     about: typeof about === "string" ? about : null,
+    parameter: text(parameter, 1_000) || null,
     author: {
       id: text(Reflect.get(who, "id"), 100),
       name: text(Reflect.get(who, "name"), 100),
@@ -82,11 +88,12 @@ export function readThreads(comments: Iterable<readonly [string, unknown]>): Thr
   const found: Thread[] = [];
   for (const [id, all] of threads) {
     all.sort((a, b) => a.at - b.at || (a.id < b.id ? -1 : 1));
-    const about = all.find((message) => message.about !== null)?.about;
+    const first = all.find((message) => message.about !== null);
     const messages = all.filter((message) => message.text !== "");
-    if (about == null || messages.length === 0) continue;
+    if (first?.about == null || messages.length === 0) continue;
+    const { about, parameter } = first;
     const last = all.filter((message) => message.resolved !== null).at(-1);
-    found.push({ id, about, messages, resolved: last?.resolved ?? false });
+    found.push({ id, about, parameter, messages, resolved: last?.resolved ?? false });
   }
   const newest = (thread: Thread) => thread.messages.at(-1)?.at ?? 0;
   return found.sort((a, b) => newest(b) - newest(a) || (a.id < b.id ? -1 : 1));
@@ -107,10 +114,16 @@ interface Words {
   readonly text: string;
 }
 
-/** Begins a thread about an action. Answers its id. */
-export function beginThread(doc: Y.Doc, about: Key, { author, at, text: words }: Words): string {
+/** Begins a thread about an action, or one of its parameters. Answers its id. */
+export function beginThread(
+  doc: Y.Doc,
+  about: Key,
+  { author, at, text: words }: Words,
+  parameter: string | null = null,
+): string {
   const thread = newAid();
-  write(doc, thread, { about, author, at, text: words });
+  const place = parameter === null ? { about } : { about, parameter };
+  write(doc, thread, { ...place, author, at, text: words });
   return thread;
 }
 
@@ -135,8 +148,9 @@ export function deleteMessage(doc: Y.Doc, thread: string, message: string): void
   asOneEdit(doc, () => {
     // The first message names the action; without its words the answers still have their place.
     if (first?.about != null) {
-      const { about, author, at } = first;
-      writeKey(doc, "comments", key, JSON.stringify({ about, author, at }));
+      const { about, parameter, author, at } = first;
+      const place = parameter === null ? { about } : { about, parameter };
+      writeKey(doc, "comments", key, JSON.stringify({ ...place, author, at }));
     } else eraseKeys(doc, "comments", key);
   });
 }

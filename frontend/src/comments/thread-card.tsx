@@ -1,0 +1,116 @@
+/** One thread: what was said, an answer, and whether it is done. */
+import { Button } from "@mantine/core";
+import { IconCheck, IconRotate2 } from "@tabler/icons-react";
+import { useState } from "react";
+import { usePerson } from "../api/use-person";
+import { useEditorContext } from "../edit-actions/editor-context";
+import { deleteMessage, reply, resolve, type Thread } from "../graph/edit/comments";
+import { usePersonColors } from "../sync/use-room";
+import { initials } from "../ui/name-colors";
+import { ago, useNow } from "../ui/times";
+import style from "./comments.module.css";
+import { Write } from "./write";
+
+interface SaidProps {
+  thread: string;
+  message: Thread["messages"][number];
+  color: string;
+}
+
+/** One message: who, when, and what. */
+function Said({ thread, message, color }: SaidProps) {
+  const { doc, mayEdit } = useEditorContext();
+  const { person } = usePerson();
+  const now = useNow(30_000);
+  return (
+    <article className={style.message}>
+      <span className={style.face} style={{ background: color }} aria-hidden>
+        {initials(message.author.name || "Guest")}
+      </span>
+      <div className={style.body}>
+        <p className={style.who}>
+          <b>{message.author.name || "Guest"}</b> {ago(message.at, now)}
+          {message.author.id === person.id && mayEdit && (
+            <button
+              type="button"
+              className={style.unsay}
+              onClick={() => deleteMessage(doc, thread, message.id)}
+            >
+              Delete
+            </button>
+          )}
+        </p>
+        <p className={style.text}>{message.text}</p>
+      </div>
+    </article>
+  );
+}
+
+interface ThreadCardProps {
+  thread: Thread;
+  /** Names what it is about; null where that is known. */
+  place: string | null;
+  /** Leads there; absent where it is in sight. */
+  onPlace?: (() => void) | undefined;
+}
+
+export function ThreadCard({ thread, place, onPlace }: ThreadCardProps) {
+  const { doc, mayEdit } = useEditorContext();
+  const { person } = usePerson();
+  const colorOf = usePersonColors(thread.messages.map(({ author }) => author.id));
+  const [answering, setAnswering] = useState(false);
+  const me = () => ({ author: { id: person.id, name: person.name }, at: Date.now() });
+  return (
+    <li className={style.thread} data-resolved={thread.resolved || undefined}>
+      {place !== null &&
+        (onPlace ? (
+          <button type="button" className={style.place} onClick={onPlace}>
+            {place}
+          </button>
+        ) : (
+          <p className={style.about}>{place}</p>
+        ))}
+      {thread.messages.map((message) => (
+        <Said
+          key={message.id}
+          thread={thread.id}
+          message={message}
+          color={colorOf(message.author.id)}
+        />
+      ))}
+      {mayEdit &&
+        (answering ? (
+          <Write
+            label="Answer"
+            button="Answer"
+            autoFocus
+            onCancel={() => setAnswering(false)}
+            onSay={(text) => {
+              reply(doc, thread.id, { ...me(), text });
+              setAnswering(false);
+            }}
+          />
+        ) : (
+          <div className={style.buttons}>
+            <Button size="compact-sm" onClick={() => setAnswering(true)}>
+              Answer
+            </Button>
+            <Button
+              size="compact-sm"
+              variant="subtle"
+              leftSection={
+                thread.resolved ? (
+                  <IconRotate2 size={13} aria-hidden />
+                ) : (
+                  <IconCheck size={13} aria-hidden />
+                )
+              }
+              onClick={() => resolve(doc, thread.id, !thread.resolved, me())}
+            >
+              {thread.resolved ? "Open again" : "Resolve"}
+            </Button>
+          </div>
+        ))}
+    </li>
+  );
+}
