@@ -1,5 +1,8 @@
 /** Files of old dialects: what was translated is shown before anything is kept. */
 
+import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { dirname, join } from "node:path";
 import { expect, type Page, test } from "@playwright/test";
 import { card, saved } from "./canvas";
 import { Product } from "./product";
@@ -88,4 +91,53 @@ test("of two files dropped at once only the old one is asked about", async ({ br
   await expect(page).toHaveTitle(/fresh/);
   expect(await count()).toBe(before + 1);
   await context.close();
+});
+
+/**
+ * Drops what lies on the disk, as a hand does: by the browser's own drag and drop, since only of such
+ * a drop the page gets folders. A DataTransfer that a script makes holds files alone, and the page's
+ * field takes no folder.
+ */
+async function dropFromDisk(page: Page, ...paths: string[]): Promise<void> {
+  const hand = await page.context().newCDPSession(page);
+  const data = { items: [], files: paths, dragOperationsMask: 1 };
+  for (const type of ["dragEnter", "dragOver", "drop"] as const) {
+    await hand.send("Input.dispatchDragEvent", { type, x: 700, y: 400, data });
+  }
+  await hand.detach();
+}
+
+test("a folder dropped on the page of actions brings all that lie in it, however deep", async ({
+  browser,
+}) => {
+  const folder = mkdtempSync(join(tmpdir(), "dropped-"));
+  const file = (path: string, body: object | string) => {
+    mkdirSync(dirname(join(folder, path)), { recursive: true });
+    writeFileSync(join(folder, path), typeof body === "string" ? body : JSON.stringify(body));
+  };
+  const action = (name: string) => ({ name, type: "sync", input_parameters: {} });
+  file("src/open_door/open_door.umrf.json", action("OpenDoor"));
+  file("src/open_door/package.json", action("NoFileOfAnAction"));
+  file("src/doors/shut/deep/shut_door.umrf.json", action("ShutDoor"));
+  // More than a folder is read of at a time.
+  for (let i = 0; i < 120; i += 1) file(`src/many/m${i}.umrf.json`, action(`Many${i}`));
+  file("src/doors/broken.umrf.json", "{");
+  try {
+    const { page, context, failures } = await product.person(browser, "Ada");
+    await page.goto(`${product.url}/actions`);
+    const list = page.getByRole("navigation", { name: "Actions" });
+    await expect(list).toBeVisible();
+    await dropFromDisk(page, join(folder, "src"));
+    for (const name of ["OpenDoor", "ShutDoor", "Many0", "Many119"]) {
+      await expect(list.getByRole("link", { name: new RegExp(`^${name}\\b`) })).toBeVisible();
+    }
+    await expect(page.getByText(/broken\.umrf\.json/)).toBeVisible();
+    const known = await product.ask<{ name: string; document: string | null }[]>("/api/actions");
+    expect(known.filter(({ name, document }) => document && /^Many/.test(name))).toHaveLength(120);
+    expect(known.map(({ name }) => name)).not.toContain("NoFileOfAnAction");
+    expect(failures).toEqual([]);
+    await context.close();
+  } finally {
+    rmSync(folder, { recursive: true });
+  }
 });
