@@ -49,7 +49,13 @@ test("the script is the default, and behaviours are a choice beside it", async (
   const dialog = page.getByRole("dialog", { name: /^Start v1/ });
   await expect(dialog.getByRole("radio", { name: /^Simulated/ })).toBeChecked();
   await expect(dialog.getByRole("radio", { name: /^Python behaviours refuse$/ })).toBeVisible();
+  await expect(dialog.getByRole("radio", { name: /^Simulator/ })).toHaveAccessibleName(
+    "Simulator nothing moves",
+  );
   await dialog.getByRole("radio", { name: /^Python behaviours/ }).check();
+  await expect(dialog.getByRole("radio", { name: /^Simulator/ })).toHaveAccessibleName(
+    "Simulator its Python may move something",
+  );
   const hold = dialog.getByRole("button", { name: "Start v1 on the simulator" });
   await expect(hold).toBeEnabled();
   await hold.focus();

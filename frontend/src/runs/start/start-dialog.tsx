@@ -60,8 +60,16 @@ function toggled(engines: readonly string[], name: string): string[] {
   return left.length < robots.length ? left : [...robots, name].sort();
 }
 
-function Choice(props: { robot: Robot; on: boolean; may: boolean; onToggle: () => void }) {
-  const { robot, on, may, onToggle } = props;
+interface ChoiceProps {
+  robot: Robot;
+  on: boolean;
+  may: boolean;
+  /** Its actions do what people have written in Python, whatever that is. */
+  behaviours: boolean;
+  onToggle: () => void;
+}
+
+function Choice({ robot, on, may, behaviours, onToggle }: ChoiceProps) {
   const off = !robot.simulated && (!may || robot.state === "no_link");
   return (
     <label className={style.choice} data-on={on || undefined} data-off={off || undefined}>
@@ -74,7 +82,9 @@ function Choice(props: { robot: Robot; on: boolean; may: boolean; onToggle: () =
       <i className={style.stripe} style={{ background: colorOfName(robot.name) }} aria-hidden />
       <span className={style.name}>{robot.simulated ? "Simulator" : robot.name}</span>
       {robot.simulated ? (
-        <span className={style.quiet}>nothing moves</span>
+        <span className={style.quiet}>
+          {behaviours ? "its Python may move something" : "nothing moves"}
+        </span>
       ) : (
         <EngineLabel robot={robot} />
       )}
@@ -83,7 +93,13 @@ function Choice(props: { robot: Robot; on: boolean; may: boolean; onToggle: () =
   );
 }
 
-function Where(props: { engines: readonly string[]; onToggle: (name: string) => void }) {
+interface WhereProps {
+  engines: readonly string[];
+  behaviours: boolean;
+  onToggle: (name: string) => void;
+}
+
+function Where(props: WhereProps) {
   const { now } = useLive();
   const may = useMay("operate");
   return (
@@ -95,6 +111,7 @@ function Where(props: { engines: readonly string[]; onToggle: (name: string) => 
           robot={robot}
           on={props.engines.includes(robot.name)}
           may={may}
+          behaviours={props.behaviours}
           onToggle={() => props.onToggle(robot.name)}
         />
       ))}
@@ -188,7 +205,7 @@ export function StartDialog(props: Props) {
       closeButtonProps={{ "aria-label": "Close" }}
       size="lg"
     >
-      <Where engines={engines} onToggle={choose} />
+      <Where engines={engines} behaviours={behaviours} onToggle={choose} />
       {choice}
       {engines.length > 0 && (
         <section
