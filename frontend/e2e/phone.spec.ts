@@ -199,3 +199,46 @@ test("the form of an action is compact, and its targets are large", async ({ bro
   expect(failures).toEqual([]);
   await context.close();
 });
+
+test("no dialog lies under STOP, however tall it is, on a phone held either way", async ({
+  browser,
+}) => {
+  const { page, context } = await product.person(browser, "Ada", PHONE);
+  const id = await product.chain(30);
+  const stop = page.getByRole("button", { name: /^Stop / });
+  /** By how much the dialog lies over STOP's place, px; the page is at rest. */
+  const overlap = async () => {
+    const dialog = page.getByRole("dialog");
+    await expect(dialog).toBeVisible();
+    await expect.poll(() => dialog.evaluate((it) => it.getAnimations().length)).toBe(0);
+    const [own, its] = [await dialog.boundingBox(), await stop.boundingBox()];
+    if (own === null || its === null) throw new Error("one of them is not on screen");
+    const across = Math.min(own.x + own.width, its.x + its.width) - Math.max(own.x, its.x);
+    const down = Math.min(own.y + own.height, its.y + its.height) - Math.max(own.y, its.y);
+    return Math.min(across, down);
+  };
+  const share = async () => {
+    await page.goto(product.url);
+    await page.getByRole("button", { name: "Ada" }).tap();
+    await page.getByRole("button", { name: /^Share/ }).tap();
+  };
+  const history = async () => {
+    const headers = { "content-type": "application/json" };
+    const change = (path: string, method: string, body: object) =>
+      product.ask(`/api/graphs/${id}${path}`, { method, headers, body: JSON.stringify(body) });
+    // Each way back is an entry of its own, so that there are more than the screen is tall.
+    for (let i = 0; i < 6; i += 1) {
+      await change("", "PATCH", { description: `the ${i}th` });
+      await change("/restore", "POST", { seq: 1 });
+    }
+    await page.goto(`${product.url}/graphs/${id}?history`);
+  };
+  for (const open of [share, history]) {
+    await open();
+    await expect.poll(overlap).toBeLessThanOrEqual(0);
+    await page.setViewportSize({ width: 844, height: 390 });
+    await expect.poll(overlap).toBeLessThanOrEqual(0);
+    await page.setViewportSize(PHONE.viewport);
+  }
+  await context.close();
+});
