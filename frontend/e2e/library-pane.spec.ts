@@ -1,6 +1,6 @@
-/** What can be placed from beside a canvas: graphs below the actions, by keys and by fingers. */
+/** What can be placed from beside a canvas: graphs below the actions, by keys and fingers; a thousand. */
 
-import { expect, type Page, test } from "@playwright/test";
+import { expect, type Locator, type Page, test } from "@playwright/test";
 import { card, saved } from "./canvas";
 import { action, leaf, using } from "./library-actions";
 import { Product } from "./product";
@@ -83,4 +83,36 @@ test("a finger places a graph, and a phone has it in the search", async ({ brows
   await saved(small.page);
   expect(small.failures).toEqual([]);
   await small.context.close();
+});
+
+test("of a thousand actions only those near what is in sight are laid out", async ({ browser }) => {
+  const graph = await using(product, "long_list", action("Wait", {}));
+  const { page, context, failures } = await product.person(browser, "Ada");
+  await page.route("**/api/actions", async (route) => {
+    const one = { description: "", type: "sync", inputs: [], outputs: [], labels: [] };
+    const known = { used_in: [], differs_in: [], first_seen: "2026-01-01T00:00:00Z", seq: 1 };
+    const json = Array.from({ length: 1000 }, (_, i) => {
+      return { ...one, ...known, name: `Action${String(i).padStart(4, "0")}`, document: `d${i}` };
+    });
+    await route.fulfill({ json });
+  });
+  const drawnRows = (list: Locator) =>
+    list.evaluateAll(
+      (rows) => rows.filter((row) => row.checkVisibility({ contentVisibilityAuto: true })).length,
+    );
+  const check = async (list: Locator) => {
+    await expect(list).toHaveCount(1000);
+    await expect.poll(() => drawnRows(list)).toBeLessThan(150);
+    // What is led to is there, wherever it is.
+    await list.last().scrollIntoViewIfNeeded();
+    await expect(list.last()).toBeInViewport();
+    await expect.poll(() => drawnRows(list)).toBeLessThan(150);
+  };
+  await page.goto(`${product.url}/actions`);
+  await check(page.getByRole("navigation", { name: "Actions" }).locator("[data-row]"));
+  await page.goto(`${product.url}/graphs/${graph}`);
+  await pane(page).getByText("Actions", { exact: true }).click();
+  await check(pane(page).locator("button[title^=Action]"));
+  expect(failures).toEqual([]);
+  await context.close();
 });

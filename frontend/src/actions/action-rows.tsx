@@ -1,7 +1,8 @@
-/** Rows of actions: each drawn once, and laid out only where it is in sight. */
+/** Rows of actions: each drawn once, and laid out only near what is in sight. */
 import { IconAlertTriangle } from "@tabler/icons-react";
 import { memo } from "react";
 import { useRouter } from "wouter";
+import { LongList } from "../ui/long-list";
 import style from "./actions-page.module.css";
 import { addressOf, type ListedAction } from "./listing";
 
@@ -59,7 +60,16 @@ interface Props {
 
 export function ActionRows({ actions, current }: Props) {
   const { base } = useRouter();
-  return actions.map((listed) => (
-    <Row key={listed.name} listed={listed} base={base} current={addressOf(listed) === current} />
-  ));
+  return (
+    <LongList rowHeight={3}>
+      {actions.map((listed) => (
+        <Row
+          key={listed.name}
+          listed={listed}
+          base={base}
+          current={addressOf(listed) === current}
+        />
+      ))}
+    </LongList>
+  );
 }

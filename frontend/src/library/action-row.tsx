@@ -1,6 +1,6 @@
 /** An action of the library: dragged or tapped onto the canvas; what it takes, and where it is used. */
-import { ActionIcon } from "@mantine/core";
-import { IconGripVertical, IconInfoCircle } from "@tabler/icons-react";
+import { IconInfoCircle } from "@tabler/icons-react";
+import { memo } from "react";
 import { actionDrag } from "../canvas/action-drag";
 import type { NewAction } from "../graph/edit";
 import { LateOpening } from "../ui/floating/late-opening";
@@ -13,13 +13,9 @@ const ActionFacts = lazyPart(() => import("./action-facts").then((part) => part.
 function About({ known }: { known: KnownAction }) {
   return (
     <LateOpening opens="menu" part={(button) => <ActionFacts button={button} known={known} />}>
-      <ActionIcon
-        size={28}
-        className={style.about ?? ""}
-        aria-label={`About ${known.template.name}`}
-      >
+      <button type="button" className={style.about} aria-label={`About ${known.template.name}`}>
         <IconInfoCircle size={15} aria-hidden />
-      </ActionIcon>
+      </button>
     </LateOpening>
   );
 }
@@ -31,7 +27,8 @@ interface Props {
   onPlace: (template: NewAction) => void;
 }
 
-export function ActionRow({ known, note = "", onPlace }: Props) {
+// There may be a thousand: while somebody types, those that stay are not drawn again.
+export const ActionRow = memo(function ActionRow({ known, note = "", onPlace }: Props) {
   const { template, usedIn } = known;
   return (
     <div className={style.action}>
@@ -42,9 +39,7 @@ export function ActionRow({ known, note = "", onPlace }: Props) {
         onPointerDown={(event) => actionDrag.press(event, template, template.name)}
         onClick={() => onPlace(template)}
       >
-        <span className={style.grip} aria-hidden>
-          <IconGripVertical size={14} />
-        </span>
+        <span className={style.grip} aria-hidden />
         <span className={style.text}>
           <span className={style.name}>{template.name}</span>
           <span className={style.sub}>
@@ -57,4 +52,4 @@ export function ActionRow({ known, note = "", onPlace }: Props) {
       {usedIn.length > 0 && <About known={known} />}
     </div>
   );
-}
+});

@@ -3,11 +3,12 @@
 import { Button } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { useQueryClient } from "@tanstack/react-query";
-import { useState } from "react";
+import { memo, useDeferredValue, useMemo, useState } from "react";
 import { refreshLibrary } from "../api/graphs";
 import { errorText } from "../api/http";
 import { useLive } from "../api/live/use-live";
 import type { NewAction } from "../graph/edit";
+import { LongList } from "../ui/long-list";
 import { ActionRow } from "./action-row";
 import { RowSkeletons } from "./graph-rows";
 import { matchesSearch } from "./graph-selection";
@@ -106,6 +107,21 @@ function Graphs({ graphs, onPlace }: { graphs: readonly KnownGraph[]; onPlace: P
   );
 }
 
+const Rows = memo(function Rows({ actions, onPlace }: ActionRowsProps) {
+  return (
+    <LongList rowHeight={2.94}>
+      {actions.map((known) => (
+        <ActionRow key={known.template.name} known={known} onPlace={onPlace} />
+      ))}
+    </LongList>
+  );
+});
+
+interface ActionRowsProps {
+  actions: readonly KnownAction[];
+  onPlace: Place;
+}
+
 interface Props {
   search: string;
   /** The graph on the canvas. */
@@ -113,9 +129,14 @@ interface Props {
   onPlace: Place;
 }
 
-export function PlaceableActions({ search, current, onPlace }: Props) {
+export function PlaceableActions({ search: typed, current, onPlace }: Props) {
   const { actions, graphs, ready } = usePlaceable(current);
-  const shown = actions.filter(({ template }) => fits(search, template));
+  // Typing is never held up by the list.
+  const search = useDeferredValue(typed);
+  const shown = useMemo(
+    () => actions.filter(({ template }) => fits(search, template)),
+    [actions, search],
+  );
   const others = graphs.filter(({ template }) => fits(search, template));
   const fresh = search.trim();
   const exact = [...shown, ...others].some(({ template }) => template.name === fresh);
@@ -123,9 +144,7 @@ export function PlaceableActions({ search, current, onPlace }: Props) {
   return (
     <>
       <p className={style.how}>Drag or tap to place.</p>
-      {shown.map((known) => (
-        <ActionRow key={known.template.name} known={known} onPlace={onPlace} />
-      ))}
+      <Rows actions={shown} onPlace={onPlace} />
       {fresh !== "" && !exact && <ActionRow known={bare({ name: fresh })} onPlace={onPlace} />}
       {shown.length === 0 && fresh === "" && (
         <p className={style.hint}>
