@@ -1,14 +1,15 @@
 /** One action over time: its visits as bars, and how it is now at the right. */
-import { Fragment, memo } from "react";
+import { Fragment, memo, useMemo, useRef } from "react";
 import type { Visit } from "../../api/runs";
 import { colorOfName } from "../../ui/name-colors";
 import { stopwatch, useNow } from "../../ui/times";
 import { durationText } from "../durations";
 import type { Progress, Tone } from "../progress";
 import { StateLabel, toneColor } from "../state-label";
-import { renewalOf, shareOf, type TimeAxis } from "./axis";
+import { shareOf, type TimeAxis } from "./axis";
 import { type Bar, barOf } from "./bars";
 import type { Lane } from "./lanes";
+import { growingWay, useMoving } from "./moving";
 import style from "./timeline.module.css";
 
 interface Props {
@@ -28,19 +29,20 @@ const percent = (share: number) => `${share * 100}%`;
 
 /** What reaches from a moment to now: moved, not drawn again, while time goes on. */
 function Growing({ axis, from, ...look }: GrowingProps) {
-  const now = useNow(renewalOf(axis));
   const left = shareOf(axis, from);
-  const room = Math.max(1e-6, 1 - left);
-  const part = Math.max(0.004, shareOf(axis, now) - left) / room;
+  const grown = useRef<HTMLElement>(null);
+  useMoving(
+    grown,
+    axis,
+    useMemo(() => growingWay(left), [left]),
+  );
   return (
     <span className={style.grows} style={{ left: percent(left) }}>
       <i
+        ref={grown}
         className={look.className}
         data-tone={look.tone}
-        style={{
-          transform: `translateX(${(Math.min(1, part) - 1) * 100}%)`,
-          ...(look.tone ? { color: toneColor[look.tone] } : {}),
-        }}
+        style={look.tone && { color: toneColor[look.tone] }}
       />
     </span>
   );

@@ -1,28 +1,39 @@
 /** Where one is in time: at the live edge, or where a replay stands. */
+import { useRef } from "react";
 import { stopwatch, useNow } from "../../ui/times";
-import { renewalOf, shareOf, type TimeAxis } from "./axis";
+import { shareOf, type TimeAxis } from "./axis";
+import { useMoving, WHOLE_WAY } from "./moving";
 import style from "./timeline.module.css";
 
-function Head({ share, label, live }: { share: number; label: string; live: boolean }) {
+/** Where the sign of a moment has room beside its line. */
+type Side = "left" | "right" | undefined;
+
+const sideOf = (share: number): Side => (share > 0.9 ? "left" : share < 0.06 ? "right" : undefined);
+
+function Cursor({ side, label, live }: { side: Side; label: string; live: boolean }) {
   return (
-    <div className={style.sweep} style={{ transform: `translateX(${share * 100}%)` }}>
-      <i className={style.cursor} data-live={live || undefined}>
-        <b data-side={share > 0.9 ? "left" : share < 0.06 ? "right" : undefined}>{label}</b>
-      </i>
-    </div>
+    <i className={style.cursor} data-live={live || undefined}>
+      <b data-side={side}>{label}</b>
+    </i>
   );
+}
+
+/** What is told of a moment is drawn anew once a second; its line moves meanwhile. */
+function LiveCursor({ axis, silentSince }: { axis: TimeAxis; silentSince: number | null }) {
+  const now = useNow(1000);
+  const words = silentSince === null ? "live" : "not known";
+  const label = `${stopwatch(now - axis.start)} ${words}`;
+  return <Cursor side={sideOf(shareOf(axis, now))} label={label} live={silentSince === null} />;
 }
 
 /** Moves with time. `silentSince`: what it shows is not known from there on. */
 function LiveHead({ axis, silentSince }: { axis: TimeAxis; silentSince: number | null }) {
-  const now = useNow(renewalOf(axis));
-  const words = silentSince === null ? "live" : "not known";
+  const sweep = useRef<HTMLDivElement>(null);
+  useMoving(sweep, axis, WHOLE_WAY);
   return (
-    <Head
-      share={shareOf(axis, now)}
-      label={`${stopwatch(now - axis.start)} ${words}`}
-      live={silentSince === null}
-    />
+    <div ref={sweep} className={style.sweep}>
+      <LiveCursor axis={axis} silentSince={silentSince} />
+    </div>
   );
 }
 
@@ -40,7 +51,9 @@ export function Playhead({ axis, cursor, goes, silentSince }: Props) {
     return (
       <>
         <i className={style.later} style={{ left: `${share * 100}%` }} />
-        <Head share={share} label={stopwatch(cursor - axis.start)} live={false} />
+        <div className={style.sweep} style={{ transform: `translateX(${share * 100}%)` }}>
+          <Cursor side={sideOf(share)} label={stopwatch(cursor - axis.start)} live={false} />
+        </div>
       </>
     );
   }
