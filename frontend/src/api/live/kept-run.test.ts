@@ -15,7 +15,10 @@ test("of a run that is told anew only what changed is another object", () => {
   );
   expect(now.actions?.A_0).toBe(before.actions?.A_0);
   expect(now.actions?.B_0?.state).toBe("FINISHED");
-  expect(withKeptParts(before, parsed(before)).actions).toBe(before.actions);
+  const later = withKeptParts(before, parsed(run({ ...before, state: "stopping" })));
+  expect(later.actions).toBe(before.actions);
+  expect(later.state).toBe("stopping");
+  expect(withKeptParts(before, parsed(before))).toBe(before);
 });
 
 test("how the run stands is told at once, what its actions do may wait for the next drawing", () => {

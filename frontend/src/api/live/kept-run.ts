@@ -18,10 +18,14 @@ function keptActions(before: RunActionsTold, now: RunActionsTold): RunActionsTol
   return changed ? kept : before;
 }
 
-/** Each message tells of all actions, and few have changed: what did not is not drawn again. */
+/**
+ * Each message tells of all actions, and few have changed: what did not is not drawn again. A run of
+ * which nothing has changed is the one from before.
+ */
 export function withKeptParts(before: Run | undefined, now: Run): Run {
   if (before?.actions == null || now.actions == null) return now;
-  return { ...now, actions: keptActions(before.actions, now.actions) };
+  const kept = { ...now, actions: keptActions(before.actions, now.actions) };
+  return isEqual(before, kept) ? before : kept;
 }
 
 /** What nobody shall see later than it can be drawn: how the run itself stands, and what is alarming. */

@@ -166,6 +166,22 @@ test("a run that ended while the link was down is asked for", async () => {
   live.close();
 });
 
+test("a run that is told as it was draws nothing, and how it stands is told at once", () => {
+  const live = new LiveSocket("http://h:1");
+  live.open();
+  const told = { ...run("running"), actions: {}, alarms: [] } as unknown as Run;
+  newest().say({ type: "hello", engines: [], runs: [told] });
+  const listener = vi.fn();
+  live.subscribe(listener);
+  newest().say({ type: "run", run: told });
+  vi.advanceTimersByTime(1_000);
+  expect(listener).not.toHaveBeenCalled();
+  newest().say({ type: "run", run: { ...told, state: "stopping" } });
+  expect(listener).toHaveBeenCalledTimes(1);
+  expect(live.state.runs.get("r")?.state).toBe("stopping");
+  live.close();
+});
+
 test("a new name dials anew without a moment of doubt", () => {
   const live = new LiveSocket("http://h:1");
   live.open();

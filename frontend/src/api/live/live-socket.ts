@@ -277,6 +277,7 @@ export class LiveSocket {
   #putRun(run: Run): void {
     const before = this.state.runs.get(run.id);
     const now = withKeptParts(before, run);
+    if (now === before) return; // the runner tells of each change of what it knows, also of the unseen
     this.state = { ...this.state, runs: new Map(this.state.runs).set(run.id, now) };
     const wait = this.#toldAt + TOGETHER - performance.now();
     if (wait <= 0 || isUrgentChange(before, now)) this.#tell();
