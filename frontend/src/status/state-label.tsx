@@ -48,16 +48,16 @@ interface Props {
 export function StateLabel({ tone, word, more, pill = false, still = false }: Props) {
   const Sign = signs[tone];
   const label = useRef<HTMLSpanElement>(null);
-  useInStep(label, tone === "run" && !still);
+  const turns = tone === "run" && !still;
+  useInStep(label, turns);
   return (
     <span
       ref={label}
       className={pill ? style.pill : style.word}
       style={{ color: toneColor[tone] }}
       data-tone={tone}
-      data-still={still || undefined}
     >
-      <span className={style.sign} aria-hidden>
+      <span className={turns ? style.turning : style.sign} aria-hidden>
         <Sign size={tone === "stopped" ? 9 : 12} stroke={2.8} />
       </span>
       {word}
