@@ -1,5 +1,6 @@
 /** At the right of the lanes: what is known of one action, and how old that is. */
-import { useLive, useRunSeenAt } from "../../api/live/use-live";
+import { useMemo } from "react";
+import { useLive } from "../../api/live/use-live";
 import { type Run, useRun } from "../../api/runs";
 import type { Graph, Key } from "../../graph/model";
 import { duration, stopwatch, useNow } from "../../ui/times";
@@ -8,10 +9,12 @@ import style from "./run-drawer.module.css";
 
 const spaced = (name: string) => name.replace(/_(\d+)$/, " $1");
 
-/** How old the newest answer of the engine is. */
+/** How old the newest answer of the engine is; looked at once a second, with all that tells times. */
 function Age({ run }: { run: Run }) {
-  const seen = useRunSeenAt(run.id);
-  const present = useNow(500, run.ended_at === null);
+  const { live } = useLive();
+  const present = useNow(1000, run.ended_at === null);
+  // biome-ignore lint/correctness/useExhaustiveDependencies: as old as it was when the clock struck
+  const seen = useMemo(() => live?.runSeenAt.get(run.id), [live, run.id, present]);
   if (run.ended_at !== null) return null;
   return <span>{seen === undefined ? "no proof yet" : `${duration(present - seen)} old`}</span>;
 }

@@ -123,8 +123,10 @@ function Across({ axis, cursor, goes, silentSince, signs, gaps }: AcrossProps) {
 }
 
 const NOTHING: readonly never[] = [];
+/** Where a lane that was out of sight comes to stand, of the height of the list. */
+const RESTS_AT = 0.4;
 
-/** What begins to run comes into view, within the list only. */
+/** What begins to run comes into view, within the list only, with room for what follows it. */
 function useNewestInView(lanes: Props["lanes"], run: Run, live: boolean) {
   const list = useRef<HTMLUListElement>(null);
   const newest = live
@@ -139,8 +141,9 @@ function useNewestInView(lanes: Props["lanes"], run: Run, live: boolean) {
     const lane = box.querySelector<HTMLElement>(`[data-lane="${CSS.escape(newest)}"]`);
     if (lane === null) return;
     const [view, at] = [box.getBoundingClientRect(), lane.getBoundingClientRect()];
-    if (at.bottom > view.bottom) box.scrollTop += at.bottom - view.bottom;
-    else if (at.top < view.top) box.scrollTop -= view.top - at.top;
+    // Seldom, as the view of the canvas: rows that come into sight have the page laid out once more.
+    if (at.bottom > view.bottom || at.top < view.top)
+      box.scrollTop += at.top - view.top - view.height * RESTS_AT;
   }, [newest]);
   return list;
 }
