@@ -1,5 +1,7 @@
 """The look before a start: what stands in the way is shown and refused alike."""
 
+from pathlib import Path
+
 import msgspec
 import pytest
 
@@ -12,6 +14,8 @@ from action_assistant.runner.robots.robot_events import StopWasProven
 from action_assistant.runner.runs.events import Override
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Parameter
+from action_assistant.umrf.packages.naming import snake_case
+from runner.colcon_workspace import changed, workspace
 from runner.harness import ANN, BEN, Harness, order, sequence, until, virtual
 from runner.registered_robots import NEVER, Open, fleet, given, group, verdicts
 
@@ -30,9 +34,23 @@ async def test_a_sound_robot_passes_every_item_and_the_look_sends_nothing() -> N
 
 @pytest.mark.parametrize(
     ("code", "overridable"),
-    [("answers", False), ("proof", True), ("actions", True), ("others", True), ("actors", True)],
+    [
+        ("answers", False),
+        ("proof", True),
+        ("actions", True),
+        ("built", True),
+        ("others", True),
+        ("actors", True),
+    ],
 )
-def test_what_stands_in_the_way_is_shown_and_refused_alike(code: str, *, overridable: bool) -> None:
+def test_what_stands_in_the_way_is_shown_and_refused_alike(
+    code: str, *, overridable: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if code == "built":
+        package = snake_case(sequence().actions[0].name)
+        monkeypatch.setenv("AMENT_PREFIX_PATH", str(workspace(tmp_path, package=package)))
+        changed(tmp_path, f"src/{package}.cpp", package)
+
     @virtual
     async def asked() -> None:
         david, graph = Open(), sequence()
@@ -46,6 +64,8 @@ def test_what_stands_in_the_way_is_shown_and_refused_alike(code: str, *, overrid
                     graph = given(graph, "colour")
                 case "others":
                     david.others = 1
+                case "built":
+                    pass
                 case _:
                     actor = msgspec.structs.replace(graph.actions[0], actor="Eve")
                     graph = msgspec.structs.replace(graph, actions=(actor, *graph.actions[1:]))

@@ -5,6 +5,7 @@ then happens.
 """
 
 from collections.abc import Collection, Sequence
+from pathlib import Path
 from typing import Final, Literal, TypeAlias
 
 import msgspec
@@ -16,6 +17,7 @@ from action_assistant.runner.robots.engine import EngineIndex
 from action_assistant.runner.robots.foreign_graphs import foreign_graphs
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start.admission import Admitted, Prepared
+from action_assistant.runner.start.built_libraries import older_libraries
 from action_assistant.umrf.check import STRUCTURAL, check
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.files import codec
@@ -161,9 +163,11 @@ def of_robot(view: EngineView, graph: Graph) -> tuple[Item, ...]:
     )
 
 
-def of_text(view: EngineView, umrf: str) -> tuple[Item, ...]:
-    """As `of_robot`, of a graph as it will be sent. For workers."""
-    return of_robot(view, codec.read(umrf).graph)
+def of_text(view: EngineView, umrf: str, prefixes: Sequence[Path] = ()) -> tuple[Item, ...]:
+    """As `of_robot`, of a graph as it will be sent, and of the workspace that is sourced here. For
+    workers."""
+    graph = codec.read(umrf).graph
+    return (*of_robot(view, graph), *_built(view, graph, prefixes))
 
 
 def check_items(items: Sequence[Item], overridden: Collection[str]) -> None:
@@ -240,6 +244,22 @@ def _actions(view: EngineView, graph: Graph) -> Item:
         overridable=not codes & _REFUSED,
         problems=problems[:_SHOWN],
     )
+
+
+def _built(view: EngineView, graph: Graph, prefixes: Sequence[Path]) -> tuple[Item, ...]:
+    """No library of its actions is older than its source, as far as this computer has the workspace."""
+    older = older_libraries(graph, prefixes)
+    if not older:
+        return ()
+    first = older[0]
+    more = f" (and {len(older) - 1} more)" if len(older) > 1 else ""
+    text = (
+        f"{first.library.name} in the workspace that is sourced here is older than "
+        f"{first.source.name}{more}: {view.name} would run {first.action} as it was before. Call "
+        "`colcon build` and restart its engine."
+    )
+    codes = ("older-library",)
+    return (Item(code="built", verdict="blocked", text=text, codes=codes, overridable=True),)
 
 
 def _again(view: EngineView, graph: Graph) -> Item:

@@ -1,5 +1,6 @@
 """The checks before a start is stored and sent, for each engine that it shall go to."""
 
+import os
 from collections.abc import Callable, Collection, Sequence
 from functools import partial
 from typing import Annotated, Final
@@ -9,6 +10,7 @@ import msgspec
 
 from action_assistant.errors import BadInput, Conflict, Refused, Unavailable
 from action_assistant.random_ids import random_id
+from action_assistant.ros_workspace import Workspace
 from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.links.behaviours.folder import BehaviourFolder
 from action_assistant.runner.links.port import SIMULATOR, Answer, Link, NoAnswer
@@ -122,6 +124,7 @@ class StartChecks:
         self._settled = settled
         self._simulator = simulator
         self._behaviours = behaviours
+        self._prefixes = Workspace.of(os.environ).prefixes
 
     async def cleared(self, asked: StartRequest) -> Cleared:
         """Look, and refuse what stands in the way. Raises Refused of many kinds."""
@@ -147,7 +150,7 @@ class StartChecks:
             raise Unavailable(silence.text, where={"path": "/engine", "item": "answers"}) from (
                 nothing
             )
-        items = await self._run_in_worker(preflight.of_text, view, ready.umrf)
+        items = await self._run_in_worker(preflight.of_text, view, ready.umrf, self._prefixes)
         preflight.check_items([preflight.of_taken(asked.engine, self._taken(asked.engine))], ())
         preflight.check_items(items, asked.override.codes if asked.override else ())
         return Cleared(
@@ -237,7 +240,7 @@ class StartChecks:
             return [preflight.of_silence(robot.registration.name, str(nothing))]
         if ready is None:
             return [preflight.of_answer(view)]
-        return list(await self._run_in_worker(preflight.of_text, view, ready.umrf))
+        return list(await self._run_in_worker(preflight.of_text, view, ready.umrf, self._prefixes))
 
     async def _view(self, robot: KnownEngine) -> EngineView:
         """The engine as it answers a get sent now, on the path that would confirm a stop. Raises

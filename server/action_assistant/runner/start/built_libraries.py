@@ -1,0 +1,83 @@
+"""Libraries of actions in the workspace that is sourced here, and whether they are older than their source.
+
+An engine says what it has indexed, which is the file of an action, and nothing of its library
+(docs/umrf-and-the-engine.md 5). Where the workspace lies on this computer, colcon's folders tell:
+`install/…/lib/libNAME.so`, and in `build/PACKAGE` the library as it was linked and where its source is.
+"""
+
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from action_assistant.umrf.model import Graph
+from action_assistant.umrf.packages.naming import snake_case
+
+_SOURCE: Final = re.compile(r"^CMAKE_HOME_DIRECTORY:INTERNAL=(.+)$", re.MULTILINE)
+#: What a library is compiled of. Other files change without it being linked anew.
+_COMPILED: Final = frozenset({".cpp", ".cc", ".cxx", ".c", ".hpp", ".hh", ".hxx", ".h"})
+_ABOVE: Final = 3  # folders between a `lib` and its workspace: install, or install/PACKAGE
+_MOST: Final = 2_000  # files of one package that are looked at
+
+
+class OlderLibrary(NamedTuple):
+    """The library of an action, and a file of its source that was changed after it was built."""
+
+    action: str
+    library: Path
+    source: Path
+
+
+def older_libraries(graph: Graph, prefixes: Sequence[Path]) -> list[OlderLibrary]:
+    """Those of a graph's actions, by name. `prefixes` as in AMENT_PREFIX_PATH, the nearest first."""
+    names = sorted({action.name for action in graph.actions if not action.missing})
+    return [found for name in names if (found := _older(name, prefixes)) is not None]
+
+
+def _older(name: str, prefixes: Iterable[Path]) -> OlderLibrary | None:
+    """Of the library that is found first, as an engine's loader would find it."""
+    file = f"lib{snake_case(name)}.so"
+    for prefix in prefixes:
+        installed = prefix / "lib" / file
+        if installed.is_file():
+            for built in _built(prefix, file):
+                if (source := _newer(built)) is not None:
+                    return OlderLibrary(name, installed, source)
+            return None
+    return None
+
+
+def _built(prefix: Path, file: str) -> Iterator[Path]:
+    """The library in the build folder of the workspace that a prefix belongs to."""
+    for above in [*prefix.parents][:_ABOVE]:
+        found = sorted((above / "build").glob(f"*/{file}"))
+        if found:
+            yield from found
+            return
+
+
+def _newer(built: Path) -> Path | None:
+    """The file of a library's source that was changed last, if that was after it was linked."""
+    try:
+        cache = (built.parent / "CMakeCache.txt").read_text(errors="replace")
+        linked = built.stat().st_mtime_ns
+    except OSError:
+        return None
+    home = _SOURCE.search(cache)
+    if home is None:
+        return None
+    newest: tuple[int, Path] | None = None
+    for _, path in zip(range(_MOST), _sources(Path(home[1])), strict=False):
+        try:
+            changed = path.stat().st_mtime_ns, path
+        except OSError:
+            continue
+        newest = changed if newest is None else max(newest, changed)
+    return newest[1] if newest is not None and newest[0] > linked else None
+
+
+def _sources(home: Path) -> Iterator[Path]:
+    """What is compiled into a library; tests are not."""
+    for path in home.rglob("*"):
+        if path.suffix in _COMPILED and "test" not in path.relative_to(home).parts:
+            yield path
