@@ -55,3 +55,52 @@ for (const [graph, cause, action, word] of FAILURES) {
     await expect(card(page, action).getByText(word)).toBeVisible();
   });
 }
+
+const headers = { "content-type": "application/json" };
+
+/** Starts the newest version in the simulator; the id of the run. */
+async function started(graph: string): Promise<string> {
+  const post = (body: object) => ({ method: "POST", headers, body: JSON.stringify(body) });
+  const path = `/api/graphs/${graph}/versions`;
+  const version = await product.ask<{ id: string; digest: string; umrf: object }>(path, post({}));
+  const request_id = crypto.randomUUID();
+  const order = { version: version.id, digest: version.digest, umrf: version.umrf, graph };
+  const body = { ...order, engine: "simulator", request_id };
+  return (await product.ask<{ id: string }>("/api/runs", post(body), product.runnerUrl)).id;
+}
+
+interface RunNow {
+  state: string;
+  actions: Record<string, { visits: { result: string | null }[] }>;
+}
+
+test("since when it fails is named: who, what, and the step that differs", async () => {
+  const { page } = ada;
+  const id = await product.chain(2);
+  const now = (run: string) => product.ask<RunNow>(`/api/runs/${run}`, {}, product.runnerUrl);
+  const good = await started(id);
+  await expect(async () => expect((await now(good)).state).toBe("finished")).toPass();
+  const umrf = `/api/graphs/${id}/umrf`;
+  const text = JSON.stringify(await product.ask<object>(umrf));
+  const broken = text.replace(/("parents".*?)on_true -> run/, "$1on_true -> ignore");
+  expect(broken).not.toBe(text);
+  await product.ask(`${umrf}?seq=1`, { method: "PUT", body: broken, headers });
+  const run = await started(id);
+  await expect(async () => {
+    expect((await now(run)).actions.Wait_0?.visits[0]?.result).toBe("true");
+  }).toPass();
+  await product.ask(`/api/runs/${run}/stop`, { method: "POST" }, product.runnerUrl);
+  await expect(async () => expect((await now(run)).state).toMatch(/stopped|halted/)).toPass();
+  await page.goto(`${product.url}/runs/${run}`);
+  await page.getByRole("button", { name: "Since when?" }).click();
+  const dialog = page.getByRole("dialog", { name: "Since when?" });
+  const place = dialog.getByRole("list", { name: "Where it goes another way" });
+  await expect(place.getByRole("listitem").first()).toContainText("from this edit on it goes");
+  await expect(place).toContainText("Wait_0 → Wait_1");
+  await expect(place).toContainText("Wait_1 is told to run");
+  await expect(dialog).toContainText(/since run \d+, which went well/);
+  await expect(place.getByRole("link", { name: "The graph then" })).toHaveAttribute(
+    "href",
+    `/graphs/${id}?at=2`,
+  );
+});

@@ -23,7 +23,7 @@ import type { Crumb } from "../../ui/top-bar";
 import { PlayerControls } from "../replay/replay-controls";
 import { silentTimesOf, timelineSignsOf } from "../replay/replay-marks";
 import { type ReplayCursor, useReplay } from "../replay/use-replay";
-import { FailureCauses } from "./causes";
+import { FailureCauses } from "../why/causes";
 import { RunEvents } from "./events";
 import { RawEvents } from "./raw-events";
 import { DryRunFromHere, RunActions } from "./run-actions";

@@ -4,6 +4,7 @@ import { type Cause, needsExplanation, useCauses } from "../../api/review";
 import type { Run } from "../../api/runs";
 import { clock, instant } from "../../ui/times";
 import style from "./causes.module.css";
+import { SinceWhenButton } from "./since-when";
 
 interface Props {
   runner: string | undefined;
@@ -51,6 +52,7 @@ export function FailureCauses({ runner, run, onShow }: Props) {
         </ol>
       )}
       {found.length > SHOWN && <p>and {found.length - SHOWN} more, among the events</p>}
+      <SinceWhenButton runner={runner} run={run} />
     </section>
   );
 }
