@@ -93,7 +93,13 @@ export function usePlaceable(current: string | undefined): Placeable & { ready: 
   const { data = NO_GRAPHS } = useGraphsAsActions();
   return useMemo(() => {
     const graphs = data.map(({ graph, name, description, inputs, outputs }) => {
-      const template = { name, description, inputs: bare(inputs), outputs: bare(outputs) };
+      const template: NewAction = {
+        name,
+        description,
+        inputs: bare(inputs),
+        outputs: bare(outputs),
+        ofGraph: true,
+      };
       return { graph, template };
     });
     return { ...placeable(actions, graphs, current), ready };

@@ -58,3 +58,13 @@ test("the search offers what fits, best first, and a new action of that name", (
   expect(candidates(known, "DRIVETO").map(({ name }) => name)).toEqual(["DriveTo"]);
   expect(candidates(known, "").length).toBe(3);
 });
+
+test("a graph comes after a new action of what was typed, unless that is its name", () => {
+  const known = [{ name: "fetch_tool", ofGraph: true } as const, { name: "FetchBox" }];
+  expect(candidates(known, "Fetch").map(({ name }) => name)).toEqual([
+    "FetchBox",
+    "Fetch",
+    "fetch_tool",
+  ]);
+  expect(candidates(known, "fetch_tool").map(({ name }) => name)).toEqual(["fetch_tool"]);
+});

@@ -23,7 +23,10 @@ interface Props {
 
 const MOST = 8;
 
-/** Known actions that fit, best first, and a new one of that name when none has it. */
+/**
+ * Known actions that fit, best first, and a new one of that name when none has it; then graphs that are
+ * called like it: who types the name of an action means one.
+ */
 export function candidates(known: readonly NewAction[], search: string): NewAction[] {
   const wanted = search.trim().toLowerCase();
   const rank = (name: string) => {
@@ -35,12 +38,15 @@ export function candidates(known: readonly NewAction[], search: string): NewActi
     .filter(({ action, rank: r }) => r < 2 || action.description?.toLowerCase().includes(wanted))
     .sort((a, b) => a.rank - b.rank || a.action.name.localeCompare(b.action.name))
     .slice(0, MOST);
-  const exact = fitting.some(({ action }) => action.name.toLowerCase() === wanted);
+  const isExact = (action: NewAction) => action.name.toLowerCase() === wanted;
+  const exact = fitting.some(({ action }) => isExact(action));
   const fresh = wanted === "" || exact ? [] : [{ name: search.trim() }];
+  const isFirst = (action: NewAction) => action.ofGraph === undefined || isExact(action);
   // What is only described so comes after what was typed.
   const named = fitting.filter(({ rank: r }) => r < 2).map(({ action }) => action);
   const described = fitting.filter(({ rank: r }) => r === 2).map(({ action }) => action);
-  return [...named, ...fresh, ...described];
+  const graphs = named.filter((action) => !isFirst(action));
+  return [...named.filter(isFirst), ...fresh, ...graphs, ...described];
 }
 
 /** The upper left corner: what an arrow was drawn to is its input. */

@@ -200,7 +200,9 @@ export function targetsOf(
     return {
       id: FRESH + template.name,
       label: isNew ? `New action “${template.name}”` : template.name,
-      sub: isNew ? "" : `one more of the library · ${template.description ?? ""}`,
+      sub: isNew
+        ? ""
+        : `${template.ofGraph ? "a graph" : "one more of the library"} · ${template.description ?? ""}`,
       icon: <IconPlus size={16} aria-hidden />,
     };
   });

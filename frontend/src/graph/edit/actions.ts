@@ -39,6 +39,8 @@ export interface NewAction {
   readonly outputs?: readonly Parameter[];
   readonly position?: Position;
   readonly extra?: Extra;
+  /** It stands for a whole graph of that name; nothing that is written. */
+  readonly ofGraph?: true;
 }
 
 /** Adds an action under the lowest free number of its name and answers its key. */
