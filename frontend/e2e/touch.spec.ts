@@ -2,7 +2,7 @@
 
 import { type CDPSession, expect, type Locator, type Page, test } from "@playwright/test";
 import { arrows, card, saved } from "./canvas";
-import { Product } from "./product";
+import { Product, pause } from "./product";
 
 const product = new Product();
 
@@ -229,6 +229,12 @@ test("a tablet: a finger bends the line of an arrow that was tapped", async ({ b
   await page.keyboard.press("Enter");
   const piece = page.getByRole("button", { name: /^Bend the line Entry → Wait 0, piece 1/ });
   await expect(piece).toHaveCSS("width", "44px");
+  // What Fit and the choice moved stands still before a finger aims at it.
+  await expect(async () => {
+    const before = await middle(piece);
+    await pause(150);
+    expect(await middle(piece)).toEqual(before);
+  }).toPass();
   const from = await middle(piece);
   const scale = await zoom(page);
   await fingers.move({ from, to: [from[0], from[1] + 90] });
