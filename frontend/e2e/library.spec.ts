@@ -98,11 +98,8 @@ test("a parameter is called otherwise, and graphs follow after a look", async ({
   await expect(dialog.getByRole("status").first()).toContainText("3 graphs are updated");
   await expect(older).toBeHidden();
   await dialog.getByRole("link", { name: "History of night_round" }).click();
-  const history = page.getByRole("dialog", { name: "What was done to this graph" });
-  await expect(history.getByRole("list", { name: "History" })).toContainText("took parameters");
-  const taken = history.getByRole("listitem").filter({ hasText: "took parameters" });
-  await taken.getByRole("button", { name: "What changed" }).click();
-  await expect(history.getByRole("list", { name: "What it changed" })).toContainText("velocity");
+  const taken = page.getByRole("region", { name: "History" }).getByRole("listitem");
+  await expect(taken.filter({ hasText: "took parameters" })).toContainText("velocity");
   const now = await product.ask<object>(`/api/graphs/${night}/umrf`);
   expect(JSON.stringify(now)).toMatch(/"velocity":\{[^}]*"pvf_value":3/);
   const later = await product.ask<object>(`/api/graphs/${evening}/umrf`);

@@ -49,10 +49,12 @@ const LAYERS: Readonly<Record<string, readonly string[]>> = {
   find: BELOW_EDITOR,
   outline: BELOW_EDITOR,
   packages: BELOW_EDITOR,
+  past: [...BELOW_EDITOR, "history"],
   inspector: [...BELOW_EDITOR, "people", "comments"],
   editor: [...BELOW_EDITOR, "people", "comments", "find", "outline", "inspector"].concat([
     "history",
     "packages",
+    "past",
   ]),
   // Features of their own know neither the editor nor each other.
   runs: ["graph", "ui", "api", "status", "canvas"],

@@ -35,7 +35,14 @@ export interface AddRequest {
   readonly into?: string;
 }
 
-export type Panel = "details" | "library" | "outline" | "json" | "comments" | "problems";
+export type Panel =
+  | "details"
+  | "library"
+  | "outline"
+  | "history"
+  | "json"
+  | "comments"
+  | "problems";
 export type Tool = "pan" | "select";
 
 /** What opens over the editor, one at a time. */
@@ -51,10 +58,16 @@ export type Overlay =
   | { readonly kind: "menu"; readonly screen: Position }
   /** The C++ packages of all actions; `action`: the name of the one that is shown first. */
   | { readonly kind: "packages"; readonly action?: string }
-  /** What was done to the graph. */
-  | { readonly kind: "history" }
   | { readonly kind: "palette" }
   | { readonly kind: "keys" };
+
+/** A moment of the past that is shown, and with what it is compared. */
+export interface PastPlace {
+  /** The change after which the graph was so. */
+  readonly at: number;
+  /** `own`: with the beginning of the sitting; else with another moment. */
+  readonly with: "own" | "nothing" | "now" | number;
+}
 
 /** What a graph can be taken away as. */
 export type ExportFormat = "umrf" | "svg" | "png";
@@ -92,7 +105,7 @@ export interface EditorContext {
   readonly graph: Graph;
   readonly canUndo: boolean;
   readonly canRedo: boolean;
-  /** Whether this person may change this graph; else everything that changes it is off. */
+  /** Whether this person may change what is shown; else everything that changes it is off. */
   readonly mayEdit: boolean;
   /** Keys of actions and ends, ids of relations. */
   readonly selection: ReadonlySet<string>;
@@ -104,6 +117,11 @@ export interface EditorContext {
   readonly view: CanvasView;
   /** The graph is played on the canvas; null while it is not. */
   readonly dryRun: DryRun | null;
+  /** The graph is shown as it was, to look at; null: as it is now. */
+  readonly past: PastPlace | null;
+  lookAt(place: PastPlace | null): void;
+  /** Whether this person may change the graph as it is now, which the past is not. */
+  readonly mayGoBack: boolean;
   /** `from`: a moment of a run, as the record has it. */
   beginDryRun(from?: DryRunSeed): void;
   select(ids: Iterable<string>): void;

@@ -67,7 +67,7 @@ export const history: EditAction = {
   shortcuts: [],
   icon: IconHistory,
   also: "history restore earlier version changes back",
-  run: (context) => context.openOverlay({ kind: "history" }),
+  run: (context) => context.setPanel("history"),
 };
 
 export const print: EditAction = {

@@ -36,9 +36,13 @@ import { RoomNotices } from "./room-notices";
 import { SaveStatus } from "./save-status";
 import { useRemoteEditAnnouncements, useRunAnnouncements } from "./use-announcements";
 import { useEditor } from "./use-editor";
+import { usePast } from "./use-past";
 
 const FindBar = lazyPart(() => import("../find/find-bar").then((part) => part.FindBar));
 const QuickAdd = lazyPart(() => import("./canvas/quick-add").then((part) => part.QuickAdd));
+const HistoryPanel = lazyPart(() =>
+  import("../past/history-panel").then((part) => part.HistoryPanel),
+);
 const Outline = lazyPart(() => import("../outline/outline").then((part) => part.Outline));
 
 /** What the page around the editor may want to know. */
@@ -157,6 +161,14 @@ function OutlinePane(props: ComponentProps<typeof Outline>) {
   );
 }
 
+function HistoryPane() {
+  return (
+    <PartBoundary>
+      <HistoryPanel />
+    </PartBoundary>
+  );
+}
+
 function FindPane(props: ComponentProps<typeof FindBar>) {
   return (
     <PartBoundary waiting={null}>
@@ -185,6 +197,27 @@ function withDryRun(start: ReactNode): ReactNode {
   );
 }
 
+/** What the bar of the page says of this graph. */
+function barParts(
+  { me, status, start }: Props,
+  context: EditorContext,
+  shown: Shown,
+  told: readonly ToldProblem[],
+): EditorBarParts {
+  return {
+    crumbs: crumbsOf(context),
+    status: (
+      <>
+        <SaveStatus />
+        <ProblemCount told={told} />
+        {!shown.compact && status(shown)}
+      </>
+    ),
+    actions: <StillPeople me={me} />,
+    start: shown.phone ? null : withDryRun(start(shown)),
+  };
+}
+
 /** Opens the dry-run that was asked for. */
 function useSeededDryRun({ beginDryRun }: EditorContext, seed: DryRunSeed | null): void {
   useEffect(() => {
@@ -201,6 +234,15 @@ function recordOf({ dryRun }: EditorContext, shown: Shown, record: Props["record
 const StillInspector = memo(Inspector);
 const StillPeople = memo(People);
 
+/** Puts an action where there is room; whether that was allowed. */
+function placeAction(context: EditorContext, template: NewAction): boolean {
+  if (!context.mayEdit) return false;
+  const at = freePosition(context);
+  context.select([addActionAt(context, template, at)]);
+  context.view.reveal(at);
+  return true;
+}
+
 /** What is typed right after their keys shall find them. */
 function usePreloaded(): void {
   useEffect(() => {
@@ -211,7 +253,8 @@ function usePreloaded(): void {
 export function Editor(props: Props) {
   const { id, known, progress } = props;
   const panels = usePanels();
-  const { context, adding, overlay, ...editor } = useEditor(id, panels.onPanel);
+  const past = usePast();
+  const { context, adding, overlay, ...editor } = useEditor(id, panels.onPanel, past);
   const link = useThrottledLink();
   const { problems, told, marks } = useToldProblems(id, link.seq, context.graph);
   const threads = useThreads();
@@ -223,11 +266,7 @@ export function Editor(props: Props) {
   useSeededDryRun(context, props.seed);
 
   const place = (template: NewAction) => {
-    if (!context.mayEdit) return;
-    const at = freePosition(context);
-    context.select([addActionAt(context, template, at)]);
-    context.view.reveal(at);
-    panels.setLeft(false);
+    if (placeAction(context, template)) panels.setLeft(false);
   };
   const shown = useShown(context, link, { seq: problems?.seq, told });
   const { compact, phone } = shown;
@@ -253,6 +292,7 @@ export function Editor(props: Props) {
     stage,
     strip,
     outline: <OutlinePane progress={progress} />,
+    history: <HistoryPane />,
     find: editor.isFindOpen && (
       <FindPane problems={problems?.problems ?? []} onClose={editor.closeFind} />
     ),
@@ -270,18 +310,7 @@ export function Editor(props: Props) {
   };
   return (
     <EditorContextProvider context={context}>
-      {props.bar({
-        crumbs: crumbsOf(context),
-        status: (
-          <>
-            <SaveStatus />
-            <ProblemCount told={told} />
-            {!compact && props.status(shown)}
-          </>
-        ),
-        actions: <StillPeople me={props.me} />,
-        start: phone ? null : withDryRun(props.start(shown)),
-      })}
+      {props.bar(barParts(props, context, shown, told))}
       {phone ? (
         <PhoneLayout {...parts} dry={context.dryRun !== null} start={() => props.start(shown)} />
       ) : (

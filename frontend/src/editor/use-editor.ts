@@ -24,6 +24,10 @@ import {
 } from "../sync/use-room";
 import { exportGraph } from "./export-graph";
 import { useFoldedFrames } from "./use-folded-frames";
+import type { Past } from "./use-past";
+
+/** Where nothing else than the graph as it is can be shown. */
+const NOW: Past = { place: null, graph: null, lookAt: () => {}, show: () => {} };
 
 const NONE: ReadonlySet<string> = new Set();
 
@@ -62,20 +66,28 @@ export interface EditorState {
 }
 
 /** What is edited, and whether this person may. */
-function useEdited(id: string) {
+function useEdited(id: string, { place: past, graph: then, lookAt }: Past) {
   const { doc, undo } = useRoom();
-  const graph = useThrottledGraph();
-  const { canUndo, canRedo } = useUndo();
+  const now = useThrottledGraph();
+  const undoable = useUndo();
   const role = useMay("edit");
   const { readOnly, seq } = useThrottledLink();
-  const { dryRun, begin: beginDryRun } = useDryRun(id, graph, seq);
+  const { dryRun, begin: beginDryRun } = useDryRun(id, now, seq);
   // What is typed before the graph is there would be joined to what arrives under it, and an edit
   // would know nothing of what it replaces.
   const arrived = useLinkPart((link) => link.seq > 0);
-  const mayEdit = role && readOnly === undefined && arrived;
+  const mayGoBack = role && readOnly === undefined && arrived;
+  const graph = past === null ? now : (then ?? now);
+  // The past is to be looked at: whatever changes the graph is off, as it is for who may only look.
+  const mayEdit = mayGoBack && past === null;
+  const canUndo = undoable.canUndo && past === null;
+  const canRedo = undoable.canRedo && past === null;
   return useMemo(
-    () => ({ id, doc, undo, graph, canUndo, canRedo, mayEdit, dryRun, beginDryRun }),
-    [id, doc, undo, graph, canUndo, canRedo, mayEdit, dryRun, beginDryRun],
+    () => ({
+      ...{ id, doc, undo, graph, canUndo, canRedo, mayEdit, dryRun, beginDryRun },
+      ...{ past, lookAt, mayGoBack },
+    }),
+    [id, doc, undo, graph, canUndo, canRedo, mayEdit, dryRun, beginDryRun, past, lookAt, mayGoBack],
   );
 }
 
@@ -112,7 +124,7 @@ function useDialogs(latest: RefObject<EditorContext | null>, onPanel: (panel: Pa
   const setPanel = useCallback(
     (next: Panel) => {
       // The lists stand beside the panel of details, which stays as it is.
-      if (next !== "outline" && next !== "library") setPanelNow(next);
+      if (next !== "outline" && next !== "library" && next !== "history") setPanelNow(next);
       onPanel(next);
     },
     [onPanel],
@@ -165,9 +177,13 @@ function canvasOf(handle: RefObject<CanvasHandle>) {
   };
 }
 
-export function useEditor(id: string, onPanel: (panel: Panel) => void): EditorState {
+export function useEditor(
+  id: string,
+  onPanel: (panel: Panel) => void,
+  past: Past = NOW,
+): EditorState {
   const latest = useRef<EditorContext | null>(null);
-  const edited = useEdited(id);
+  const edited = useEdited(id, past);
   const tools = useTools();
   const folding = useFoldedFrames(id);
   const { openers, shown } = useDialogs(latest, onPanel);

@@ -14,7 +14,7 @@ export function useGraphLink(context: EditorContext, begun: boolean): void {
   const now = useRef(context);
   now.current = context;
   useEffect(() => {
-    if (begun && asksForHistory(search)) now.current.openOverlay({ kind: "history" });
+    if (begun && asksForHistory(search)) now.current.setPanel("history");
   }, [search, begun]);
   useEffect(() => {
     const target = begun ? targetOf(search) : null;

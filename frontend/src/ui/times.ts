@@ -36,6 +36,17 @@ export function clock(at: number): string {
   return clockFormat.format(at);
 }
 
+const minuteFormat = new Intl.DateTimeFormat(undefined, {
+  hour: "2-digit",
+  minute: "2-digit",
+  hour12: false,
+});
+
+/** `14:02`: where seconds say nothing. */
+export function hourMinute(at: number): string {
+  return minuteFormat.format(at);
+}
+
 export function ago(at: number, now: number): string {
   const s = Math.max(0, Math.round((now - at) / 1000));
   if (s < 5) return "just now";

@@ -30,13 +30,15 @@ class ActionChange(msgspec.Struct, frozen=True):
 
 class RelationChange(msgspec.Struct, frozen=True):
     """An arrow that came, went or changed, between actions by full name, or `entry` and `exit`. `ends`:
-    the same by their keys."""
+    the same by their keys. `when`: of one that came or went what its child does: pairs of outcome
+    and response."""
 
     change: Change
     parent: str
     child: str
     fields: tuple[Field, ...] = ()
     ends: tuple[Key, Key] = ("", "")
+    when: tuple[tuple[str, str], ...] = ()
 
 
 class NoteChange(msgspec.Struct, frozen=True):
@@ -96,7 +98,16 @@ def _relations(old: Graph, new: Graph) -> Iterable[RelationChange]:
                 names.get(child, child),
                 fields,
                 (parent, child),
+                () if a and b else _when(b or a),
             )
+
+
+def _when(relation: Relation | None) -> tuple[tuple[str, str], ...]:
+    """What the child does, by outcome; of the entry there is nothing to say."""
+    if relation is None or relation.parent == ENTRY:
+        return ()
+    says: dict[str, str] = msgspec.structs.asdict(relation.conditions)
+    return tuple(each for each in says.items() if each[1] != "ignore")
 
 
 def _notes(old: Graph, new: Graph) -> Iterable[NoteChange]:

@@ -1,4 +1,4 @@
-/** What was done to a document, what that changed, and the way back to it. */
+/** What was done to a document, what that changed, what it was, and the ways back to it. */
 import { type QueryClient, useQuery } from "@tanstack/react-query";
 import type { GraphDifference, GraphSummary } from "../graphs";
 import { fetchJson } from "../http";
@@ -17,6 +17,17 @@ export function useHistory(id: string, seq: number) {
   });
 }
 
+/** A page of it, newest first: what was before a change, or the newest. */
+export function fetchHistory(
+  id: string,
+  limit: number,
+  before: number | null,
+  signal: AbortSignal,
+): Promise<HistoryEntry[]> {
+  const from = before === null ? "" : `&before=${before}`;
+  return fetchJson(`${below(id)}/history?limit=${limit}${from}`, { signal });
+}
+
 /** What differs from the change `from` to the change `to`; null as `from`: nothing is asked. */
 export function useDifference(id: string, from: number | null, to: number) {
   return useQuery({
@@ -28,9 +39,18 @@ export function useDifference(id: string, from: number | null, to: number) {
   });
 }
 
-/** Makes it what it was after an earlier change: an edit, which everybody sees. */
-export function restoreMoment(id: string, seq: number): Promise<GraphSummary> {
-  return fetchJson(`${below(id)}/restore`, { method: "POST", body: { seq } });
+/** Makes it what it was after an earlier change, or one thing of it, by its key: an edit, which everybody sees. */
+export function restoreMoment(id: string, seq: number, of?: string): Promise<GraphSummary> {
+  const body = of === undefined ? { seq } : { seq, of };
+  return fetchJson(`${below(id)}/restore`, { method: "POST", body });
+}
+
+/** Takes back what one person did, where nobody has changed it since. */
+export function revertEdits(
+  id: string,
+  body: EditorApi["EditsOfOne"],
+): Promise<EditorApi["GoneBack"]> {
+  return fetchJson(`${below(id)}/revert`, { method: "POST", body });
 }
 
 export function refreshHistory(client: QueryClient, id: string): Promise<void> {

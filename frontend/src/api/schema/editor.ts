@@ -863,7 +863,8 @@ export interface EditorApi {
     /**
      * RelationChange
      * @description An arrow that came, went or changed, between actions by full name, or `entry` and `exit`. `ends`:
-     *     the same by their keys.
+     *     the same by their keys. `when`: of one that came or went what its child does: pairs of outcome
+     *     and response.
      */
     RelationChange: {
         /** @enum {string} */
@@ -875,6 +876,10 @@ export interface EditorApi {
             string,
             string
         ];
+        when: [
+            string,
+            string
+        ][];
     };
     /**
      * Renames

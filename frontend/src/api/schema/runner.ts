@@ -691,7 +691,8 @@ export interface RunnerApi {
     /**
      * RelationChange
      * @description An arrow that came, went or changed, between actions by full name, or `entry` and `exit`. `ends`:
-     *     the same by their keys.
+     *     the same by their keys. `when`: of one that came or went what its child does: pairs of outcome
+     *     and response.
      */
     RelationChange: {
         /** @enum {string} */
@@ -703,6 +704,10 @@ export interface RunnerApi {
             string,
             string
         ];
+        when: [
+            string,
+            string
+        ][];
     };
     /**
      * ReplayFrame

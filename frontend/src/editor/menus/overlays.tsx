@@ -3,7 +3,6 @@
 import { useEffect } from "react";
 import type { EditorContext, Overlay } from "../../edit-actions/editor-context";
 import type { NewAction } from "../../graph/edit";
-import { useThrottledLink } from "../../sync/use-room";
 import { lazyPart } from "../../ui/parts/lazy-part";
 import { OverlayBoundary, PartBoundary } from "../../ui/parts/part-boundary";
 
@@ -18,9 +17,6 @@ const ContextMenu = lazyPart(() => import("./context-menu").then((part) => part.
 const GraphPrint = lazyPart(() => import("./graph-print").then((part) => part.GraphPrint));
 const PackagesDialog = lazyPart(() =>
   import("../../packages/packages-dialog").then((part) => part.PackagesDialog),
-);
-const HistoryDialog = lazyPart(() =>
-  import("../../history/history-dialog").then((part) => part.HistoryDialog),
 );
 const ShortcutSheet = lazyPart(() => import("./shortcut-sheet").then((part) => part.ShortcutSheet));
 
@@ -50,11 +46,6 @@ export function Overlays(props: Props) {
   );
 }
 
-function History({ context, onClose }: Pick<Props, "context" | "onClose">) {
-  const { seq } = useThrottledLink();
-  return <HistoryDialog id={context.id} seq={seq} mayEdit={context.mayEdit} onClose={onClose} />;
-}
-
 function Opened({ context, known, overlay, onClose }: Props) {
   if (overlay === null) return null;
   switch (overlay.kind) {
@@ -74,8 +65,6 @@ function Opened({ context, known, overlay, onClose }: Props) {
       return <ContextMenu context={context} screen={overlay.screen} onClose={onClose} />;
     case "packages":
       return <PackagesDialog context={context} {...overlay} onClose={onClose} />;
-    case "history":
-      return <History context={context} onClose={onClose} />;
     case "palette":
       return <CommandPalette context={context} onClose={onClose} />;
     case "keys":

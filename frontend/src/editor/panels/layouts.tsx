@@ -21,15 +21,17 @@ import type { Pane, Panels } from "./use-panels";
 
 const ListRail = lazyPart(() => import("./list-rail").then((part) => part.ListRail));
 
-const SIDES: readonly { value: ListTab | "outline"; label: string }[] = [
+const SIDES: readonly { value: ListTab | "outline" | "history"; label: string }[] = [
   { value: "graphs", label: "Graphs" },
   { value: "actions", label: "Actions" },
   { value: "outline", label: "Outline" },
+  { value: "history", label: "History" },
 ];
 
 const PANES: readonly { value: Pane; label: string }[] = [
   { value: "canvas", label: "Canvas" },
   { value: "outline", label: "Outline" },
+  { value: "history", label: "History" },
   { value: "details", label: "Details" },
   { value: "run", label: "Run" },
 ];
@@ -37,6 +39,7 @@ const PANES: readonly { value: Pane; label: string }[] = [
 interface Parts {
   panels: Panels;
   outline: ReactNode;
+  history: ReactNode;
   stage: ReactNode;
   find: ReactNode;
   details: ReactNode;
@@ -51,7 +54,7 @@ interface PhoneParts extends Parts {
 }
 
 export function PhoneLayout(props: PhoneParts) {
-  const { panels, outline, stage, find, details, strip, start, status, dry } = props;
+  const { panels, outline, history, stage, find, details, strip, start, status, dry } = props;
   const { pane, setPane } = panels;
   useEffect(() => {
     if (dry) setPane("canvas");
@@ -69,6 +72,7 @@ export function PhoneLayout(props: PhoneParts) {
         {find}
         {pane === "canvas" && stage}
         {pane === "outline" && outline}
+        {pane === "history" && history}
         {pane === "details" && <div className={style.sheet}>{details}</div>}
         {pane === "run" && (
           <div className={style.sheet}>
@@ -159,17 +163,18 @@ function SideTabs({ panels: { side, setSide } }: { panels: Panels }) {
       fullWidth
       size="xs"
       data={SIDES.filter(({ value }) => mayEdit || value !== "actions")}
-      value={side === "outline" ? side : list}
+      value={side === "library" ? list : side}
       onChange={(next) => {
-        if (next !== "outline") setTab(next);
-        setSide(next === "outline" ? next : "library");
+        const listed = next === "graphs" || next === "actions";
+        if (listed) setTab(next);
+        setSide(listed ? "library" : next);
       }}
     />
   );
 }
 
 /** The lists: beside the canvas, or over it where there is no room or a rail in their place. */
-function ListSide({ wide, panels, told, outline, list }: DeskParts) {
+function ListSide({ wide, panels, told, outline, history, list }: DeskParts) {
   const { left, side, folded, fold } = panels;
   const carrying = useSyncExternalStore(actionDrag.subscribe, actionDrag.now) !== null;
   const beside = wide && !folded;
@@ -195,7 +200,9 @@ function ListSide({ wide, panels, told, outline, list }: DeskParts) {
           <SideTabs panels={panels} />
           {beside && <FoldButton fold={fold} />}
         </div>
-        <div className={style.side}>{side === "outline" ? outline : list()}</div>
+        <div className={style.side}>
+          {side === "outline" ? outline : side === "history" ? history : list()}
+        </div>
       </aside>
     </>
   );

@@ -3,6 +3,7 @@ import { ActionIcon } from "@mantine/core";
 import {
   IconAlertTriangle,
   IconBolt,
+  IconHistory,
   IconLayoutSidebarLeftExpand,
   IconListTree,
   IconSitemap,
@@ -15,7 +16,7 @@ import { Tooltip } from "../../ui/floating/tooltip";
 import { whenThere } from "../../ui/focus-field";
 import { type ListTab, useListTab } from "../../ui/hooks/use-list-tab";
 import style from "./list-rail.module.css";
-import { type EditorSidePanel, type Panels, ROW } from "./use-panels";
+import { type EditorSidePanel, ENTRY_BUTTON, type Panels, ROW } from "./use-panels";
 
 const PARTS = [
   {
@@ -35,6 +36,14 @@ const PARTS = [
     field: "[data-search]",
   },
   { name: "Outline", side: "outline", tab: null, icon: IconListTree, changes: false, field: ROW },
+  {
+    name: "History",
+    side: "history",
+    tab: null,
+    icon: IconHistory,
+    changes: false,
+    field: ENTRY_BUTTON,
+  },
 ] as const;
 
 type Part = (typeof PARTS)[number];
@@ -177,5 +186,6 @@ export function ListRail({ panels, told }: Props) {
 /** What is open: of the lists the one whose tab is chosen, there or here. */
 function sideName(side: EditorSidePanel, tab: ListTab): Part["name"] {
   if (side === "outline") return "Outline";
+  if (side === "history") return "History";
   return tab === "actions" ? "Actions" : "Graphs";
 }

@@ -4,12 +4,15 @@ import { useCallback, useState } from "react";
 import type { Panel } from "../../edit-actions/editor-context";
 import { whenThere } from "../../ui/focus-field";
 
-export type Pane = "canvas" | "outline" | "details" | "run";
+export type Pane = "canvas" | "outline" | "history" | "details" | "run";
 
-export type EditorSidePanel = "library" | "outline";
+export type EditorSidePanel = "library" | "outline" | "history";
 
 /** The row of the outline that Tab would come to. */
 export const ROW = '[role="treegrid"] [data-row][tabindex="0"]';
+
+/** The newest entry of the history. */
+export const ENTRY_BUTTON = "[data-history] [data-entry]";
 
 /** Whether the list at the left is a rail where there is room for all of it: on this device. */
 function useFoldedList() {
@@ -35,14 +38,15 @@ export function usePanels() {
     [setFolded],
   );
   const onPanel = useCallback((next: Panel) => {
-    const listed = next === "outline" || next === "library";
+    const listed = next === "outline" || next === "history" || next === "library";
     if (listed) setSide(next);
     setRight(!listed);
     setLeft(listed);
     if (next === "library") return;
-    const outline = next === "outline";
-    setPane((now) => (outline ? "outline" : now === "outline" ? "details" : now));
-    if (outline) whenThere(ROW, (row) => row.focus());
+    const isList = next === "outline" || next === "history";
+    setPane((now) => (isList ? next : now === "outline" || now === "history" ? "details" : now));
+    if (next === "outline") whenThere(ROW, (row) => row.focus());
+    if (next === "history") whenThere(ENTRY_BUTTON, (entry) => entry.focus());
   }, []);
   return { left, setLeft, right, setRight, pane, setPane, side, setSide, folded, fold, onPanel };
 }

@@ -1,0 +1,35 @@
+/** Which moment of the past is shown, also in the address of the page. */
+import { useCallback, useEffect, useState } from "react";
+import type { PastPlace } from "../edit-actions/editor-context";
+import { pastOf, withPast } from "../edit-actions/past-links";
+import type { Graph } from "../graph/model";
+
+const WRITTEN = 300; // ms after the last step: browsers take few changes of the address in a row
+
+export interface Past {
+  readonly place: PastPlace | null;
+  /** The graph as it was then, once it is there. */
+  readonly graph: Graph | null;
+  lookAt(place: PastPlace | null): void;
+  show(graph: Graph | null): void;
+}
+
+export function usePast(): Past {
+  const [place, setPlace] = useState(() => pastOf(window.location.search));
+  const [graph, show] = useState<Graph | null>(null);
+  const lookAt = useCallback((next: PastPlace | null) => {
+    setPlace(next);
+    if (next === null) show(null);
+  }, []);
+  useEffect(() => {
+    const { pathname } = window.location;
+    const timer = setTimeout(() => {
+      const { location, history } = window;
+      const search = withPast(location.search, place);
+      if (location.pathname !== pathname || search === location.search) return;
+      history.replaceState(history.state, "", `${pathname}${search}${location.hash}`);
+    }, WRITTEN);
+    return () => clearTimeout(timer);
+  }, [place]);
+  return { place, graph, lookAt, show };
+}

@@ -1,0 +1,104 @@
+import { expect, test } from "vitest";
+import { entryLines, lineText, shortened, spokenName, whenWords } from "./entry-words";
+
+type SittingChanges = Parameters<typeof entryLines>[0];
+type Arrow = NonNullable<SittingChanges["relations"]>[number];
+
+const words = (changes: SittingChanges) => entryLines(changes).map(lineText);
+const number = (value: number) => JSON.stringify({ pvf_type: "number", pvf_value: value });
+const changed = (aid: string, name: string, ...fields: [string, unknown, unknown][]) => ({
+  change: "changed" as const,
+  aid,
+  name,
+  fields: fields.map(([field, before, after]) => ({ field, before, after })),
+});
+const arrow = (change: Arrow["change"], parent: string, child: string): Arrow => ({
+  change,
+  parent: `${parent}_0`,
+  child: `${child}_0`,
+  ends: [parent, child],
+  fields: [],
+  when: [["on_true", "run"]],
+});
+
+test("actions that came and went, with the arrows that went along", () => {
+  const removed = { change: "removed" as const, aid: "w", name: "WaitForCooling_0", fields: [] };
+  const added = { change: "added" as const, aid: "p", name: "WatchPressure_2", fields: [] };
+  const relations = [
+    arrow("removed", "w", "x"),
+    arrow("removed", "y", "w"),
+    arrow("added", "Dock", "Charge"),
+  ];
+  expect(words({ actions: [removed, added], relations })).toEqual([
+    "added WatchPressure 2",
+    "connected Dock → Charge when true",
+    "removed WaitForCooling and its 2 arrows",
+  ]);
+});
+
+test("values, names and places", () => {
+  const changes = {
+    actions: [
+      changed("c", "CloseValve_0", ["in/torque", number(12.5), number(85)]),
+      changed("d", "DriveTo_0", ["name", "Drive_0", "DriveTo_0"], ["position", [0, 0], [1, 1]]),
+      changed("e", "Wait_0", ["position", [0, 0], [1, 1]], ["actor", "", "atlas"]),
+    ],
+  };
+  expect(words(changes)).toEqual([
+    "set CloseValve torque 12.5 → 85",
+    "renamed Drive to DriveTo",
+    "set Wait robot atlas",
+    "moved 2 cards",
+  ]);
+});
+
+test("what an arrow says of an outcome", () => {
+  const fields = [
+    { field: "on_true", before: "ignore", after: "run" },
+    { field: "on_false", before: "run", after: "ignore" },
+    { field: "on_error", before: "run", after: "stop" },
+    { field: "waypoints/run", before: null, after: "[]" },
+  ];
+  expect(words({ relations: [{ ...arrow("changed", "A", "B"), fields }] })).toEqual([
+    "connected A → B when true",
+    "disconnected A → B when false",
+    "set A → B when error run → stop",
+    "bent 1 arrow",
+  ]);
+  expect(
+    whenWords([
+      ["on_true", "run"],
+      ["on_error", "run"],
+      ["on_false", "stop"],
+    ]),
+  ).toBe("when true or error, when false: stop");
+});
+
+test("what people wrote", () => {
+  const note = { change: "added" as const, id: "n", text: "Steam at the\nnorth side." };
+  const fields = [{ field: "name", before: "task_1", after: "valves" }];
+  expect(words({ notes: [note], comments: 1, fields })).toEqual([
+    "renamed the graph task_1 → valves",
+    "wrote a note “Steam at the north side.”",
+    "wrote a comment",
+  ]);
+});
+
+test("a few are told, of the others how many", () => {
+  const actions = Array.from({ length: 9 }, (_, i) =>
+    changed(`${i}`, `A_${i}`, ["type", "a", "b"]),
+  );
+  const { lines, more } = shortened({ actions, more: 2 }, 4);
+  expect([lines.length, more]).toEqual([4, 7]);
+  expect(shortened({ actions: actions.slice(0, 5) }, 4).more).toBe(0);
+});
+
+test("names are said without their number where it is 0", () => {
+  expect(["entry", "Drive_0", "Drive_3", "odd", "_0"].map(spokenName)).toEqual([
+    "Entry",
+    "Drive",
+    "Drive 3",
+    "odd",
+    "an action",
+  ]);
+});

@@ -1,0 +1,127 @@
+/** The history of the open graph beside its canvas: days, what people did in words, versions and runs. */
+import { Button, Skeleton } from "@mantine/core";
+import { type KeyboardEvent, useEffect, useRef, useState } from "react";
+import type { HistoryEntry } from "../api/documents/history";
+import { versionName } from "../api/graphs";
+import { errorText } from "../api/http";
+import { useEditorContext } from "../edit-actions/editor-context";
+import { doneWords } from "../history/history-words";
+import { usePersonColors, useThrottledLink } from "../sync/use-room";
+import { day, useNow } from "../ui/times";
+import { EntryRow } from "./entry-row";
+import { useGoingBack } from "./going-back";
+import style from "./history-panel.module.css";
+import { RunRow, VersionRow } from "./marks-in-list";
+import { daysOf, entryAt, entryKey, type TimelineItem } from "./timeline";
+import { type Timeline, useTimeline } from "./use-timeline";
+
+const sentence = (words: string): string => words.charAt(0).toUpperCase() + words.slice(1);
+
+/** ↑ and ↓ go from entry to entry, and to the ways back of the chosen one by Tab. */
+function onArrowKeys(event: KeyboardEvent<HTMLElement>): void {
+  if (event.key !== "ArrowDown" && event.key !== "ArrowUp") return;
+  const all = [...event.currentTarget.querySelectorAll<HTMLElement>("[data-entry], [data-run] a")];
+  const at = all.indexOf(document.activeElement as HTMLElement);
+  if (at < 0) return;
+  event.preventDefault();
+  all[at + (event.key === "ArrowDown" ? 1 : -1)]?.focus();
+}
+
+/** What is said of an entry besides what it changed. */
+function didWords(entry: HistoryEntry, entries: readonly HistoryEntry[], now: number) {
+  if (entry.kind === "edited") return entry.changes === undefined ? "changed it" : null;
+  if (entry.reverted) return `undid what ${entry.reverted.author.name || "somebody"} did`;
+  if (entry.restored === undefined) return doneWords(entry);
+  const of = entryAt(entries, entry.restored);
+  const at = of === null ? null : Date.parse(of.until);
+  return at === null ? "made it so again" : `made it so again as ${day(at, now)}`;
+}
+
+/** Loads what is older as soon as one comes near the end. */
+function Older({ timeline }: { timeline: Timeline }) {
+  const end = useRef<HTMLDivElement>(null);
+  const load = useRef(timeline.loadOlder);
+  load.current = timeline.loadOlder;
+  useEffect(() => {
+    const seen = new IntersectionObserver(([each]) => each?.isIntersecting && load.current());
+    if (end.current) seen.observe(end.current);
+    return () => seen.disconnect();
+  }, []);
+  return (
+    <div ref={end} className={style.older}>
+      <Button
+        size="compact-sm"
+        variant="subtle"
+        loading={timeline.isLoadingOlder}
+        onClick={timeline.loadOlder}
+      >
+        What was before
+      </Button>
+    </div>
+  );
+}
+
+function Items({ items, timeline }: { items: readonly TimelineItem[]; timeline: Timeline }) {
+  const context = useEditorContext();
+  const { past, lookAt, mayGoBack } = context;
+  const { seq } = useThrottledLink();
+  const now = useNow(60_000);
+  const { entries, versions } = timeline;
+  const colorOf = usePersonColors(entries.map(({ author }) => author.id));
+  const { busy, revert, restore } = useGoingBack(context);
+  const [chosen, setChosen] = useState("");
+  const here = past && entries.find((e) => e.seq === past.at && entryKey(e) === chosen);
+  const shown = past && (here ?? entryAt(entries, past.at));
+  return items.map((item) => {
+    if (item.kind === "run") {
+      const { run } = item;
+      return <RunRow key={run.id} run={run} version={versionName(versions, run.version)} />;
+    }
+    const { entry } = item;
+    const choose = () => {
+      if (entry.seq < 1) return;
+      setChosen(entryKey(entry));
+      lookAt(shown === entry ? null : { at: entry.seq, with: "own" });
+    };
+    const common = { entry, chosen: shown === entry, onChoose: choose };
+    if (entry.kind === "published") {
+      const name = versionName(versions, entry.version?.id ?? null) || entry.version?.label;
+      return <VersionRow key={entryKey(entry)} {...common} name={name || "version"} />;
+    }
+    return (
+      <EntryRow
+        key={entryKey(entry)}
+        {...common}
+        color={colorOf(entry.author.id)}
+        did={didWords(entry, entries, now)}
+        now={seq}
+        mayEdit={mayGoBack}
+        busy={busy}
+        onRevert={() => void revert(entry)}
+        onRestore={() => void restore(entry.seq)}
+      />
+    );
+  });
+}
+
+export function HistoryPanel() {
+  const { id } = useEditorContext();
+  const timeline = useTimeline(id);
+  const now = useNow(60_000);
+  return (
+    <section className={style.panel} aria-label="History" data-history onKeyDown={onArrowKeys}>
+      <h2 className="visually-hidden">History</h2>
+      {timeline.isPending && <Skeleton height={160} m="sm" />}
+      {timeline.error && <p role="alert">{errorText(timeline.error)}</p>}
+      {daysOf(timeline.items).map(({ at, items }) => (
+        <section key={new Date(at).toDateString()} className={style.day}>
+          <h3>{sentence(day(at, now))}</h3>
+          <ol>
+            <Items items={items} timeline={timeline} />
+          </ol>
+        </section>
+      ))}
+      {timeline.hasOlder && <Older timeline={timeline} />}
+    </section>
+  );
+}
