@@ -12,6 +12,8 @@ import { stopwatch, useNow } from "../ui/times";
 import style from "./action-card.module.css";
 import { CardStateContext, useDataRole, useIsDimmed, useOpenThreadCount } from "./card-highlights";
 import { CardLines } from "./card-lines";
+import { useChangeMark } from "./changes/change-marks";
+import { ChangeTag } from "./changes/change-tag";
 import type { CardNode } from "./elements";
 import { CARD_LINES, cardSize } from "./geometry/arrange";
 import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "./outcome";
@@ -54,6 +56,7 @@ export const ActionCard = memo(function ActionCard({
   const talk = useOpenThreadCount(action.key);
   const role = useDataRole(action.key);
   const instead = use(CardStateContext)?.(action.key);
+  const change = useChangeMark(action.key);
   const card = useRef<HTMLDivElement>(null);
   useInStep(card, progress?.tone === "run");
   return (
@@ -71,6 +74,7 @@ export const ActionCard = memo(function ActionCard({
       data-dim={dim || undefined}
       data-flow={role}
       data-direction={direction}
+      data-change={change?.change}
     >
       <Handle
         type="target"
@@ -83,6 +87,7 @@ export const ActionCard = memo(function ActionCard({
         aria-label={`Input of ${action.name} ${action.instanceId}`}
       />
       {action.actor !== "" && <span className={style.robot}>{action.actor}</span>}
+      {change && <ChangeTag mark={change} beside={action.actor !== ""} />}
       {mark && <ProblemBadge mark={mark} on="card" />}
       {talk > 0 && (
         <span className={style.talk} data-beside={mark ? true : undefined} title="Open comments">
@@ -93,6 +98,7 @@ export const ActionCard = memo(function ActionCard({
       <div className={style.head}>
         <b className={style.name} title={action.name}>
           {action.missing && <IconGhost2 size={13} aria-hidden />}
+          {change?.oldName && <del>{change.oldName}</del>}
           {action.name}
         </b>
         {action.instanceId > 0 && <span className={style.instance}>{action.instanceId}</span>}
@@ -103,6 +109,7 @@ export const ActionCard = memo(function ActionCard({
         rows={rows}
         most={says ? CARD_LINES - 1 : CARD_LINES}
         selected={selected}
+        old={change?.oldValues}
         inferred={progress?.inferred ?? false}
       />
       {OUTCOMES.map((outcome, i) => (

@@ -10,8 +10,15 @@ const TITLES: Readonly<Record<CardRow["kind"], string>> = {
   seen: ", as the engine reported it",
 };
 
-/** `inferred`: the visit that they belong to was not seen but follows from other things. */
-function Line({ row, inferred }: { row: CardRow; inferred: boolean }) {
+interface LineProps {
+  row: CardRow;
+  /** The visit that it belongs to was not seen but follows from other things. */
+  inferred: boolean;
+  /** What it was, where two moments are compared. */
+  old: string | undefined;
+}
+
+function Line({ row, inferred, old }: LineProps) {
   const { name, kind, text } = row;
   const doubt = kind === "seen" && inferred;
   return (
@@ -24,6 +31,7 @@ function Line({ row, inferred }: { row: CardRow; inferred: boolean }) {
       <span className={style.name}>{name}</span>
       <span className={style.value}>
         {kind === "from" && <IconArrowLeft size={11} aria-label="from" />}
+        {old !== undefined && <del className={style.old}>{old === "?" ? "nothing" : old}</del>}
         {kind === "open" ? "to fill in" : text}
         {doubt && <span className="visually-hidden"> inferred</span>}
       </span>
@@ -37,10 +45,16 @@ interface Props {
   most: number;
   selected: boolean;
   inferred: boolean;
+  /** What rows were, by their name: those come first. */
+  old?: ReadonlyMap<string, string> | undefined;
 }
 
-export function CardLines({ rows, most, selected, inferred }: Props) {
-  const line = (row: CardRow) => <Line key={row.name} row={row} inferred={inferred} />;
+export function CardLines({ rows: all, most, selected, inferred, old }: Props) {
+  const line = (row: CardRow) => (
+    <Line key={row.name} row={row} inferred={inferred} old={old?.get(row.name)} />
+  );
+  const isOld = (row: CardRow) => old?.has(row.name) === true;
+  const rows = old ? [...all.filter(isOld), ...all.filter((row) => !isOld(row))] : all;
   const more = selected ? rows.slice(most) : [];
   return (
     <>

@@ -9,6 +9,8 @@ import { useIsOpen, useLine } from "./arrows/line-store";
 import { type DraggedOutcome, useOutcomeDrag } from "./arrows/outcome-drag";
 import type { Point } from "./arrows/scene";
 import type { RoutedLine } from "./arrows/simple-lines";
+import { useChangeMark } from "./changes/change-marks";
+import { ChangeSign } from "./changes/change-tag";
 import type { Arrow } from "./elements";
 import { type Outcome, OutcomeSign, outcomeColor, outcomeWord } from "./outcome";
 import style from "./outcome-arrow.module.css";
@@ -87,24 +89,36 @@ interface BundleProps {
 }
 
 function BundleLine({ id, data, line, pill, selected, opened }: BundleProps & { opened: boolean }) {
-  const tone = toneOf(data);
+  const change = useChangeMark(data.relation)?.change;
+  const tone = change ?? toneOf(data);
   const lit = data.lit || data.came !== null;
-  const points = pill && opened ? [pill, ...behindPill(line)] : line.points;
+  const path = pathOf(pill && opened ? [pill, ...behindPill(line)] : line.points);
   return (
-    <BaseEdge
-      id={id}
-      path={pathOf(points)}
-      interactionWidth={22}
-      markerEnd={`url(#tip-${tone})`}
-      style={{
-        stroke: TIPS[tone],
-        strokeWidth: lit ? 2.75 : selected ? 2.5 : 1.8,
-        ...(data.passed ? { opacity: 0.38 } : {}),
-        ...(data.bundle.optional ? { strokeDasharray: "5 4" } : {}),
-      }}
-    />
+    <>
+      {change === "changed" && <path d={path} className={style.double} />}
+      <BaseEdge
+        id={id}
+        path={path}
+        interactionWidth={22}
+        markerEnd={`url(#tip-${tone})`}
+        style={{
+          stroke: TIPS[tone],
+          strokeWidth: lit || change ? 2.75 : selected ? 2.5 : 1.8,
+          ...(data.passed ? { opacity: 0.38 } : {}),
+          ...(data.bundle.optional ? { strokeDasharray: "5 4" } : {}),
+          ...(change ? CHANGED_LINES[change] : {}),
+        }}
+      />
+    </>
   );
 }
+
+/** What came is one line, what went is dashed, what changed is double: its middle is left out. */
+const CHANGED_LINES = {
+  added: { strokeDasharray: "none" },
+  removed: { strokeDasharray: "7 5" },
+  changed: { stroke: "var(--canvas)", strokeWidth: 1.6, strokeDasharray: "none" },
+} as const;
 
 /** What a bundle says; whoever cannot see it hears it from its arrows. */
 function Pill({ id, data, pill: [x, y], selected }: BundleProps & { pill: Point }) {
@@ -112,6 +126,7 @@ function Pill({ id, data, pill: [x, y], selected }: BundleProps & { pill: Point 
   const editing = use(LineEditingContext);
   const [dragged, setDragged] = useState<DraggedOutcome | null>(null);
   const word = pillWord(data.bundle);
+  const change = useChangeMark(data.relation);
   return (
     <>
       {dragged && <DraggedLine from={[x, y]} dragged={dragged} />}
@@ -120,10 +135,12 @@ function Pill({ id, data, pill: [x, y], selected }: BundleProps & { pill: Point 
           className={style.pill}
           data-selected={selected || undefined}
           data-passed={data.passed || undefined}
+          data-change={change?.change}
           // Once for a relation, whatever it says: who looks for it finds one.
           data-relation={data.answers || data.entry ? data.relation : undefined}
           style={{ transform: `translate(-50%, -50%) translate(${x}px, ${y}px)` }}
         >
+          {change && <ChangeSign mark={change} />}
           {data.mark && (
             // biome-ignore lint/a11y/noStaticElementInteractions: chosen by keys like every arrow
             // biome-ignore lint/a11y/useKeyWithClickEvents: the arrow itself is chosen by keys
@@ -208,6 +225,9 @@ const TIPS = {
   on_false: "var(--false)",
   on_error: "var(--error)",
   on_stopped: "var(--stopped)",
+  added: "var(--added)",
+  removed: "var(--removed)",
+  changed: "var(--changed)",
 } as const;
 
 /** Arrow heads in the colours of the outcomes; once per canvas. */

@@ -206,7 +206,10 @@ export const selectNone: EditAction = {
   icon: IconDeselect,
   changes: false,
   enabled: always,
-  run: (context) => context.select([]),
+  run: (context) => {
+    if (context.selection.size > 0 || context.past === null) context.select([]);
+    else context.lookAt(null);
+  },
 };
 
 /** Where a chain goes on: at the end of the one arrow that is selected, as after drawing it. */

@@ -23,7 +23,8 @@ export const dryRun: EditAction = {
   label: "Dry-run",
   shortcuts: ["d"],
   icon: IconFlask,
-  enabled: (context) => context.dryRun !== null || context.graph.actions.length > 0,
+  enabled: ({ dryRun: open, past, graph }) =>
+    open !== null || (past === null && graph.actions.length > 0),
   run: (context) => (context.dryRun === null ? context.beginDryRun() : context.dryRun.close()),
 };
 

@@ -3,7 +3,8 @@ import { Button, Kbd, Skeleton } from "@mantine/core";
 import { IconFocus2, IconRouteAltLeft } from "@tabler/icons-react";
 import { ReactFlowProvider } from "@xyflow/react";
 import { type ReactNode, useEffect, useMemo, useRef } from "react";
-import type { ProblemMarks } from "../canvas/problem-marks";
+import { ChangeMarksContext } from "../canvas/changes/change-marks";
+import { NO_PROBLEM_MARKS, type ProblemMarks } from "../canvas/problem-marks";
 import { type EditorContext, useEditorContext } from "../edit-actions/editor-context";
 import { EMPTY_GRAPH, type Key, type Position } from "../graph/model";
 import { RobotFilter } from "../outline/robot-filter";
@@ -24,7 +25,9 @@ import style from "./canvas-pane.module.css";
 import { Toolbar } from "./menus/toolbar";
 import type { EditorState } from "./use-editor";
 import { useGraphLink } from "./use-graph-link";
+import type { Past } from "./use-past";
 
+const PastBar = lazyPart(() => import("../past/past-bar").then((part) => part.PastBar));
 const DryRunBar = lazyPart(() => import("./dry-run/dry-run-bar").then((part) => part.DryRunBar));
 
 interface Props {
@@ -42,6 +45,7 @@ interface Props {
   writing: string | null;
   /** In the lower right corner. */
   corner: ReactNode;
+  past: Past;
   /** Whether cards that stand nowhere are about to be placed, which is an edit. */
   onPlacing: (placing: boolean) => void;
 }
@@ -57,7 +61,7 @@ function Emptiness({ waiting, context }: { waiting: boolean; context: EditorCont
       </div>
     );
   }
-  if (context.graph.actions.length > 0) return null;
+  if (context.graph.actions.length > 0 || context.past !== null) return null;
   if (!context.mayEdit) {
     return (
       <div className={style.empty}>
@@ -92,6 +96,14 @@ function Emptiness({ waiting, context }: { waiting: boolean; context: EditorCont
   );
 }
 
+function Tools({ compact, hidden }: { compact: boolean; hidden: boolean }) {
+  return (
+    <div className={style.tools} data-covers="bottom" data-hidden={hidden || undefined}>
+      <Toolbar compact={compact} />
+    </div>
+  );
+}
+
 function FollowRun({ onFollow }: { onFollow: () => void }) {
   return (
     <Button size="compact-sm" leftSection={<IconFocus2 size={15} />} onClick={onFollow}>
@@ -101,17 +113,18 @@ function FollowRun({ onFollow }: { onFollow: () => void }) {
 }
 
 function Inside(props: Props) {
-  const { me, canvasHandle, progress, marks, compact, phone, run, writing, record, corner } = props;
-  const calm = useEditorContext();
-  const graph = useGraph();
-  // The canvas keeps up with the hands of others; what stands beside it comes after.
-  const context = useMemo<EditorContext>(() => ({ ...calm, graph }), [calm, graph]);
+  const { me, canvasHandle, compact, phone, writing, corner, past } = props;
+  const context = useDrawnContext(past);
+  const { graph } = context;
+  const dry = context.dryRun !== null || undefined;
+  const then = context.past !== null || undefined;
+  const { progress, marks, run } = then ? NOTHING_RUNS : props;
   const arrived = useLinkPart(({ seq }) => seq > 0);
   const first = useFirstLayout(context, arrived, props.onPlacing);
   const { selection, select, folded } = context;
   const canvas = useCanvasElements({
     graph: first.pending ? EMPTY_GRAPH : context.graph,
-    ...{ selection, select, folded, marks },
+    ...{ selection, select, folded, marks, alone: then === true },
     progress: context.dryRun?.sighting.progress ?? progress,
     laidOut: first.places,
   });
@@ -120,7 +133,6 @@ function Inside(props: Props) {
   const pointer = useRef<Position | null>(null);
   const waiting = !arrived || (first.pending && context.graph.actions.length > 1);
   const begun = arrived && context.graph.actions.length > 0 && !first.pending;
-  const dry = context.dryRun !== null || undefined;
   const { view, lost, onPanned, onFollow } = useViewport({
     flow,
     frame,
@@ -139,25 +151,33 @@ function Inside(props: Props) {
   useEffect(() => {
     canvasHandle.current = { positions: () => places, sizes: () => sizes, view: followed.view };
   }, [canvasHandle, followed, places, sizes]);
-
+  const endFollowing = () => {
+    onPanned();
+    followed.end();
+  };
   useDryRunInView(context);
   useGraphLink(context, begun);
 
   return (
     <div className={style.whole}>
-      <div className={style.stage} ref={frame} aria-busy={first.busy} data-dry={dry}>
-        <EditableCanvas
-          context={context}
-          canvas={canvas}
-          me={me}
-          map={!compact && context.graph.actions.length > 3}
-          onPanned={() => {
-            onPanned();
-            followed.end();
-          }}
-          pointer={pointer}
-          writing={writing}
-        />
+      <div
+        className={style.stage}
+        ref={frame}
+        aria-busy={first.busy}
+        data-dry={dry}
+        data-then={then}
+      >
+        <ChangeMarksContext value={past.seen?.changes?.marks ?? null}>
+          <EditableCanvas
+            context={context}
+            canvas={canvas}
+            me={me}
+            map={!compact && context.graph.actions.length > 3}
+            onPanned={endFollowing}
+            pointer={pointer}
+            writing={writing}
+          />
+        </ChangeMarksContext>
         <Emptiness waiting={waiting} context={context} />
         {!compact && (
           <div className={style.robots} data-covers="top">
@@ -165,28 +185,52 @@ function Inside(props: Props) {
           </div>
         )}
         <FollowFrame />
-        <div
-          className={style.tools}
-          data-covers="bottom"
-          data-hidden={(phone && context.dryRun !== null) || undefined}
-        >
-          <Toolbar compact={compact} />
-        </div>
+        <Tools compact={compact} hidden={phone && (dry ?? then) === true} />
         <div className={style.corner}>
           {lost && <FollowRun onFollow={onFollow} />}
           {!context.dryRun && corner}
         </div>
       </div>
-      {context.dryRun && (
-        <PartBoundary>
-          <DryRunBar context={context} run={context.dryRun} record={record} />
-        </PartBoundary>
-      )}
+      <Below context={context} record={props.record} show={past.show} />
     </div>
   );
 }
 
 const NOTHING: ReadonlyMap<Key, Progress> = new Map();
+/** Runs and problems are of the graph as it is now. */
+const NOTHING_RUNS = { progress: NOTHING, marks: NO_PROBLEM_MARKS, run: null };
+
+/** The canvas keeps up with the hands of others; what stands beside it comes after. */
+function useDrawnContext({ seen }: Past): EditorContext {
+  const calm = useEditorContext();
+  const now = useGraph();
+  // What is gone since then is drawn where it stood.
+  const graph = calm.past === null ? now : (seen?.changes?.shown ?? calm.graph);
+  return useMemo<EditorContext>(() => ({ ...calm, graph }), [calm, graph]);
+}
+
+interface BelowProps {
+  context: EditorContext;
+  record: ReactNode;
+  show: Past["show"];
+}
+
+/** What plays on the canvas, or which moment of the past it shows. */
+function Below({ context: { past, dryRun, ...context }, record, show }: BelowProps) {
+  if (dryRun) {
+    return (
+      <PartBoundary>
+        <DryRunBar context={{ ...context, past, dryRun }} run={dryRun} record={record} />
+      </PartBoundary>
+    );
+  }
+  if (past === null) return null;
+  return (
+    <PartBoundary>
+      <PastBar place={past} show={show} />
+    </PartBoundary>
+  );
+}
 
 /** What begins to run in a dry-run comes into view. */
 function useDryRunInView(context: EditorContext): void {

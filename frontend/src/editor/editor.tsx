@@ -10,6 +10,8 @@ import {
   addActionAt,
   type EditorContext,
   freePosition,
+  type Panel,
+  useEditorContext,
 } from "../edit-actions/editor-context";
 import { useShortcuts } from "../edit-actions/keys/shortcuts";
 import { type NewAction, setGraphName } from "../graph/edit";
@@ -36,13 +38,14 @@ import { RoomNotices } from "./room-notices";
 import { SaveStatus } from "./save-status";
 import { useRemoteEditAnnouncements, useRunAnnouncements } from "./use-announcements";
 import { useEditor } from "./use-editor";
-import { usePast } from "./use-past";
+import { type Past, usePast } from "./use-past";
 
 const FindBar = lazyPart(() => import("../find/find-bar").then((part) => part.FindBar));
 const QuickAdd = lazyPart(() => import("./canvas/quick-add").then((part) => part.QuickAdd));
 const HistoryPanel = lazyPart(() =>
   import("../past/history-panel").then((part) => part.HistoryPanel),
 );
+const PastDetails = lazyPart(() => import("../past/past-details").then((part) => part.PastDetails));
 const Outline = lazyPart(() => import("../outline/outline").then((part) => part.Outline));
 
 /** What the page around the editor may want to know. */
@@ -94,6 +97,7 @@ interface Checked {
 }
 
 function obstacleOf(context: EditorContext, link: RoomLink, checked: Checked, placing: boolean) {
+  if (context.past !== null) return "you look at the past";
   if (link.state !== "live") return "not connected to the editor";
   if (placing) return "its cards are being placed";
   if (link.unsaved > 0) return "saving";
@@ -157,6 +161,27 @@ function OutlinePane(props: ComponentProps<typeof Outline>) {
   return (
     <PartBoundary>
       <Outline {...props} />
+    </PartBoundary>
+  );
+}
+
+interface DetailsProps {
+  past: Past;
+  panel: Panel;
+  /** The history is open beside the canvas. */
+  beside: boolean;
+  children: ReactNode;
+}
+
+/** The details; who looks at the history is told first who set what. */
+function DetailsPane({ past: { place, seen }, panel, beside, children }: DetailsProps) {
+  const { selection } = useEditorContext();
+  if (place === null && !(beside && selection.size === 1)) return children;
+  return (
+    <PartBoundary>
+      <PastDetails changes={seen?.changes ?? null} panel={panel}>
+        {children}
+      </PastDetails>
     </PartBoundary>
   );
 }
@@ -225,6 +250,8 @@ function useSeededDryRun({ beginDryRun }: EditorContext, seed: DryRunSeed | null
   }, [seed, beginDryRun]);
 }
 
+const NOTHING_TOLD: readonly never[] = [];
+
 /** How the dry-run that is open becomes a run. */
 function recordOf({ dryRun }: EditorContext, shown: Shown, record: Props["record"]): ReactNode {
   return dryRun && record(shown, scriptOf(dryRun.decided), dryRun.close);
@@ -283,10 +310,12 @@ export function Editor(props: Props) {
       writing={overlay?.kind === "note" ? overlay.key : null}
       corner={phone ? null : props.corner}
       onPlacing={shown.onPlacing}
+      past={past}
     />
   );
   // A dry-run is told apart from runs that are over; one that goes on is never out of sight.
-  const strip = context.dryRun && props.run === null ? null : props.strip(shown);
+  const aside = context.dryRun !== null || context.past !== null;
+  const strip = aside && props.run === null ? null : props.strip(shown);
   const parts = {
     panels,
     stage,
@@ -297,14 +326,16 @@ export function Editor(props: Props) {
       <FindPane problems={problems?.problems ?? []} onClose={editor.closeFind} />
     ),
     details: (
-      <StillInspector
-        id={id}
-        seq={link.seq}
-        panel={editor.panel}
-        problems={problems}
-        told={told}
-        threads={threads}
-      />
+      <DetailsPane past={past} panel={editor.panel} beside={!phone && panels.side === "history"}>
+        <StillInspector
+          id={id}
+          seq={context.past?.at ?? link.seq}
+          panel={editor.panel}
+          problems={context.past === null ? problems : undefined}
+          told={context.past === null ? told : NOTHING_TOLD}
+          threads={threads}
+        />
+      </DetailsPane>
     ),
     status: () => props.status(shown),
   };
@@ -312,7 +343,7 @@ export function Editor(props: Props) {
     <EditorContextProvider context={context}>
       {props.bar(barParts(props, context, shown, told))}
       {phone ? (
-        <PhoneLayout {...parts} dry={context.dryRun !== null} start={() => props.start(shown)} />
+        <PhoneLayout {...parts} onCanvas={aside} start={() => props.start(shown)} />
       ) : (
         <DeskLayout {...parts} wide={!compact} told={told} list={() => props.list(place)} />
       )}

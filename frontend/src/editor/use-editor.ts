@@ -27,7 +27,7 @@ import { useFoldedFrames } from "./use-folded-frames";
 import type { Past } from "./use-past";
 
 /** Where nothing else than the graph as it is can be shown. */
-const NOW: Past = { place: null, graph: null, lookAt: () => {}, show: () => {} };
+const NOW: Past = { place: null, seen: null, lookAt: () => {}, show: () => {} };
 
 const NONE: ReadonlySet<string> = new Set();
 
@@ -66,7 +66,7 @@ export interface EditorState {
 }
 
 /** What is edited, and whether this person may. */
-function useEdited(id: string, { place: past, graph: then, lookAt }: Past) {
+function useEdited(id: string, { place: past, seen, lookAt }: Past) {
   const { doc, undo } = useRoom();
   const now = useThrottledGraph();
   const undoable = useUndo();
@@ -77,7 +77,7 @@ function useEdited(id: string, { place: past, graph: then, lookAt }: Past) {
   // would know nothing of what it replaces.
   const arrived = useLinkPart((link) => link.seq > 0);
   const mayGoBack = role && readOnly === undefined && arrived;
-  const graph = past === null ? now : (then ?? now);
+  const graph = past === null ? now : (seen?.graph ?? now);
   // The past is to be looked at: whatever changes the graph is off, as it is for who may only look.
   const mayEdit = mayGoBack && past === null;
   const canUndo = undoable.canUndo && past === null;

@@ -4,13 +4,15 @@ import { useEffect, useRef } from "react";
 import { useSearch } from "wouter";
 import type { EditorContext } from "../edit-actions/editor-context";
 import { asksForHistory, present, targetOf } from "../edit-actions/graph-links";
+import { withPast } from "../edit-actions/past-links";
 import { shownKeys } from "../edit-actions/view";
 import { focusField } from "../ui/focus-field";
 
 const SETTLED = 160; // ms after which the canvas has measured its cards and shown the whole
 
 export function useGraphLink(context: EditorContext, begun: boolean): void {
-  const search = useSearch();
+  // Steps through the past stand in the address too, and point at nothing else.
+  const search = withPast(useSearch(), null);
   const now = useRef(context);
   now.current = context;
   useEffect(() => {

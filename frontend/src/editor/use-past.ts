@@ -2,21 +2,21 @@
 import { useCallback, useEffect, useState } from "react";
 import type { PastPlace } from "../edit-actions/editor-context";
 import { pastOf, withPast } from "../edit-actions/past-links";
-import type { Graph } from "../graph/model";
+import type { SeenPast } from "../past/past-bar";
 
 const WRITTEN = 300; // ms after the last step: browsers take few changes of the address in a row
 
 export interface Past {
   readonly place: PastPlace | null;
-  /** The graph as it was then, once it is there. */
-  readonly graph: Graph | null;
+  /** The graph as it was then, and what differs, once it is there. */
+  readonly seen: SeenPast | null;
   lookAt(place: PastPlace | null): void;
-  show(graph: Graph | null): void;
+  show(seen: SeenPast | null): void;
 }
 
 export function usePast(): Past {
   const [place, setPlace] = useState(() => pastOf(window.location.search));
-  const [graph, show] = useState<Graph | null>(null);
+  const [seen, show] = useState<SeenPast | null>(null);
   const lookAt = useCallback((next: PastPlace | null) => {
     setPlace(next);
     if (next === null) show(null);
@@ -31,5 +31,5 @@ export function usePast(): Past {
     }, WRITTEN);
     return () => clearTimeout(timer);
   }, [place]);
-  return { place, graph, lookAt, show };
+  return { place, seen, lookAt, show };
 }

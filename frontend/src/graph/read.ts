@@ -58,6 +58,18 @@ export function readGraph(maps: Maps): Graph {
   return new Reader(maps).graph();
 }
 
+/** A graph that follows keys as they are told, from whatever keeps them. */
+export interface SteppedGraph {
+  /** `undefined`: there is nothing under this key. */
+  set(root: Root, key: string, value: unknown): void;
+  /** What did not change since the last time keeps its identity. */
+  graph(): Graph;
+}
+
+export function stepGraph(maps: Maps): SteppedGraph {
+  return new Reader(maps);
+}
+
 /** The ghosts that real actions took up, and under which ids their arrows are shown since. */
 export function readTakenUp(maps: Maps): {
   readonly ghosts: readonly Key[];

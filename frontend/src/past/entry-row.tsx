@@ -7,8 +7,8 @@ import { authorName } from "../api/graphs";
 import { isWayBack } from "../history/history-words";
 import { initials } from "../ui/name-colors";
 import { hourMinute, instant } from "../ui/times";
-import { type EntryLine, type LinePart, shortened } from "./entry-words";
 import style from "./history-panel.module.css";
+import { type EntryLine, type LinePart, shortened } from "./told/entry-words";
 
 const MOST = 6; // lines of an entry
 

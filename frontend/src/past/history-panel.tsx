@@ -12,8 +12,8 @@ import { EntryRow } from "./entry-row";
 import { useGoingBack } from "./going-back";
 import style from "./history-panel.module.css";
 import { RunRow, VersionRow } from "./marks-in-list";
-import { daysOf, entryAt, entryKey, type TimelineItem } from "./timeline";
-import { type Timeline, useTimeline } from "./use-timeline";
+import { daysOf, entryAt, entryKey, type TimelineItem } from "./told/timeline";
+import { type Timeline, useTimeline } from "./told/use-timeline";
 
 const sentence = (words: string): string => words.charAt(0).toUpperCase() + words.slice(1);
 

@@ -28,6 +28,25 @@ export function fetchHistory(
   return fetchJson(`${below(id)}/history?limit=${limit}${from}`, { signal });
 }
 
+/** The root maps of the document as they were after a change. */
+export function fetchDocument(
+  id: string,
+  at: number,
+  signal: AbortSignal,
+): Promise<EditorApi["PastDocument"]> {
+  return fetchJson(`${below(id)}/document?at=${at}`, { signal });
+}
+
+/** The steps from one moment to another, key by key, in order of time. */
+export function fetchChanges(
+  id: string,
+  after: number,
+  upto: number,
+  signal: AbortSignal,
+): Promise<EditorApi["DocumentStep"][]> {
+  return fetchJson(`${below(id)}/changes?after=${after}&upto=${upto}`, { signal });
+}
+
 /** What differs from the change `from` to the change `to`; null as `from`: nothing is asked. */
 export function useDifference(id: string, from: number | null, to: number) {
   return useQuery({
@@ -36,6 +55,32 @@ export function useDifference(id: string, from: number | null, to: number) {
     queryFn: ({ signal }) =>
       fetchJson<GraphDifference>(`${below(id)}/diff?from=${from}&to=${to}`, { signal }),
     staleTime: Number.POSITIVE_INFINITY,
+  });
+}
+
+export type FieldBlame = EditorApi["FieldBlame"];
+export type FieldValue = EditorApi["FieldValue"];
+
+/** Who gave each field of an action, arrow or note, or of the graph (""), the value that it had then. */
+export function useBlame(id: string, of: string, at: number) {
+  return useQuery({
+    enabled: at > 0,
+    queryKey: ["history", id, "blame", of, at],
+    queryFn: ({ signal }) =>
+      fetchJson<FieldBlame[]>(`${below(id)}/blame?of=${encodeURIComponent(of)}&at=${at}`, {
+        signal,
+      }),
+    retry: false,
+  });
+}
+
+/** All values that a field has had until then, newest first. */
+export function useFieldValues(id: string, of: string, field: string, at: number) {
+  const query = new URLSearchParams({ of, field, at: String(at) });
+  return useQuery({
+    queryKey: ["history", id, "values", of, field, at],
+    queryFn: ({ signal }) =>
+      fetchJson<FieldValue[]>(`${below(id)}/blame/values?${query}`, { signal }),
   });
 }
 

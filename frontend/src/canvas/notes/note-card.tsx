@@ -5,6 +5,8 @@ import { type NodeProps, NodeResizer, NodeToolbar, Position } from "@xyflow/reac
 import { createContext, memo, use, useEffect, useRef } from "react";
 import { type NewNote, NOTE_COLORS, type Note } from "../../graph/edit/notes";
 import { Tooltip } from "../../ui/floating/tooltip";
+import { useChangeMark } from "../changes/change-marks";
+import { ChangeTag } from "../changes/change-tag";
 import { FoldButton } from "./fold-button";
 import { LinkNames } from "./link-names";
 import style from "./note-card.module.css";
@@ -112,13 +114,16 @@ export const NoteCard = memo(function NoteCard({ data, selected }: NodeProps<Not
   const { note } = data;
   const editing = notes?.editing === note.key;
   const empty = note.kind === "frame" ? "Frame" : "Note";
+  const change = useChangeMark(note.key);
   return (
     <div
       className={style.note}
       data-kind={note.kind}
+      data-change={change?.change}
       data-selected={selected || undefined}
       style={{ "--c": noteColor[note.color] } as React.CSSProperties}
     >
+      {change && <ChangeTag mark={change} />}
       {notes && <NoteTools note={note} notes={notes} above={note.kind === "frame" ? 36 : 10} />}
       {notes && (
         <NodeResizer

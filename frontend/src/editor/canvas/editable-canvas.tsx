@@ -246,13 +246,17 @@ function Drawing({
       <ArrowTips />
       <ZoomDetail />
       <Background variant={BackgroundVariant.Dots} gap={20} size={1.4} />
-      <Cursors />
-      <PeopleAtCards
-        me={me}
-        places={canvas.places}
-        sizes={canvas.sizes}
-        blockOf={canvas.folding?.blockOf}
-      />
+      {context.past === null && (
+        <>
+          <Cursors />
+          <PeopleAtCards
+            me={me}
+            places={canvas.places}
+            sizes={canvas.sizes}
+            blockOf={canvas.folding?.blockOf}
+          />
+        </>
+      )}
       {map && <GraphMap nodes={canvas.nodes} flow={canvas.flow} />}
     </ReactFlow>
   );

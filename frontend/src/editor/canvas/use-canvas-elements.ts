@@ -64,7 +64,11 @@ interface CanvasElementsInput {
   laidOut: Positions | null;
   /** Keys of the frames that are folded. */
   folded: ReadonlySet<string>;
+  /** What others drag and choose is not seen: they do it to the graph as it is now. */
+  alone: boolean;
 }
+
+const NOBODY: readonly Participant[] = [];
 
 /** Where everything stands while people drag it. */
 export function dragged(
@@ -304,7 +308,8 @@ function useFolding(
 
 export function useCanvasElements(given: CanvasElementsInput) {
   const { graph, selection, select, progress, marks, laidOut, folded } = given;
-  const people = usePeople();
+  const here = usePeople();
+  const people = given.alone ? NOBODY : here;
   const flow: ReactFlowInstance<CanvasNode, Arrow> = useReactFlow<CanvasNode, Arrow>();
   const [sizes, setSizes] = useState<ReadonlyMap<Key, MeasuredSize>>(new Map());
   const [drag, setDrag] = useState<Positions | null>(null);

@@ -48,17 +48,17 @@ interface Parts {
 }
 
 interface PhoneParts extends Parts {
-  /** A dry-run is open: it is on the canvas. */
-  dry: boolean;
+  /** A dry-run is open, or the past is shown: both are on the canvas. */
+  onCanvas: boolean;
   start: () => ReactNode;
 }
 
 export function PhoneLayout(props: PhoneParts) {
-  const { panels, outline, history, stage, find, details, strip, start, status, dry } = props;
+  const { panels, outline, history, stage, find, details, strip, start, status, onCanvas } = props;
   const { pane, setPane } = panels;
   useEffect(() => {
-    if (dry) setPane("canvas");
-  }, [dry, setPane]);
+    if (onCanvas) setPane("canvas");
+  }, [onCanvas, setPane]);
   return (
     <main className={style.phone}>
       <Segments

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
-import type { HistoryEntry } from "../api/documents/history";
-import type { ListedRun } from "../api/review";
+import type { HistoryEntry } from "../../api/documents/history";
+import type { ListedRun } from "../../api/review";
 import { daysOf, entryAt, joined, nextPage, timelineOf } from "./timeline";
 
 const time = (minute: number) => new Date(2026, 10, 23, 12, minute).toISOString();

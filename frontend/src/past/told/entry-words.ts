@@ -1,6 +1,6 @@
 /** What an entry of the history changed, in words about actions, arrows and notes. Pure. */
-import type { HistoryEntry } from "../api/documents/history";
-import { type FieldChange, linesOf } from "../history/difference-words";
+import type { HistoryEntry } from "../../api/documents/history";
+import { type FieldChange, linesOf } from "../../history/difference-words";
 
 /** `looks`: only where things stand, which means nothing to a robot. `said`: notes and comments. */
 type LineSign = "added" | "removed" | "changed" | "looks" | "said";

@@ -1,11 +1,11 @@
 /** The history of a graph, its versions and its runs, as they are loaded and renewed. */
 import { useInfiniteQuery, useQuery, useQueryClient } from "@tanstack/react-query";
 import { useEffect, useMemo } from "react";
-import { fetchHistory, type HistoryEntry } from "../api/documents/history";
-import { useVersions, type Version } from "../api/graphs";
-import { newestRun, useLive } from "../api/live/use-live";
-import { listRuns, NO_FILTER } from "../api/review";
-import { useThrottledLink } from "../sync/use-room";
+import { fetchHistory, type HistoryEntry } from "../../api/documents/history";
+import { useVersions, type Version } from "../../api/graphs";
+import { newestRun, useLive } from "../../api/live/use-live";
+import { listRuns, NO_FILTER } from "../../api/review";
+import { useThrottledLink } from "../../sync/use-room";
 import { joined, nextPage, type TimelineItem, timelineOf } from "./timeline";
 
 const PAGE = 40; // entries

@@ -1,7 +1,7 @@
 /** The history as one list by time: what people did, versions and runs, day by day. Pure. */
-import type { HistoryEntry } from "../api/documents/history";
-import type { ListedRun } from "../api/review";
-import { instant } from "../ui/times";
+import type { HistoryEntry } from "../../api/documents/history";
+import type { ListedRun } from "../../api/review";
+import { instant } from "../../ui/times";
 
 export type TimelineItem =
   | { readonly kind: "entry"; readonly at: number; readonly entry: HistoryEntry }
