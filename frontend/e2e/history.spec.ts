@@ -1,0 +1,209 @@
+/** Somebody finds out who broke a graph, looks at how it was, and takes it back. */
+
+import { readFileSync } from "node:fs";
+import { createRequire } from "node:module";
+import { expect, type Page, test } from "@playwright/test";
+import type { AxeResults } from "axe-core";
+import { add, boxOf, card, saved, umrfOf } from "./canvas";
+import { type Person, Product } from "./product";
+
+const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
+
+const product = new Product();
+let ada: Person;
+let mari: Person;
+let graph: string;
+
+const named = (name: string) => ({ name, instance_id: 0 });
+const after = (name: string) => ({
+  ...named(name),
+  conditions: [
+    "on_true -> run",
+    "on_false -> ignore",
+    "on_error -> ignore",
+    "on_stopped -> ignore",
+  ],
+});
+const at = (x: number, y: number) => ({ gui_attributes: { position: { x, y } } });
+const speed = { speed: { pvf_type: "number", pvf_value: 0.4 } };
+const VALVES = {
+  graph_name: "valves",
+  graph_entry: [named("Drive")],
+  graph_exit: [after("Report")],
+  gui_attributes: { action_assistant: { direction: "right" } },
+  actions: [
+    {
+      ...named("Drive"),
+      type: "sync",
+      ...at(140, 120),
+      input_parameters: speed,
+      children: [named("Cool")],
+    },
+    {
+      ...named("Cool"),
+      type: "sync",
+      ...at(440, 120),
+      parents: [after("Drive")],
+      children: [named("Report")],
+    },
+    { ...named("Report"), type: "sync", ...at(740, 120), parents: [after("Cool")] },
+  ],
+};
+
+const post = <T>(path: string, body: object, base = product.url): Promise<T> => {
+  const headers = { "content-type": "application/json" };
+  return product.ask<T>(path, { method: "POST", body: JSON.stringify(body), headers }, base);
+};
+
+/** Runs the graph as it is now in the simulator, to its end. */
+async function ran(): Promise<void> {
+  const { id, digest } = await post<{ id: string; digest: string }>(
+    `/api/graphs/${graph}/versions`,
+    {},
+  );
+  const { umrf } = await product.ask<{ umrf: unknown }>(`/api/versions/${id}`);
+  const head = { version: id, digest, graph, engine: "simulator", request_id: "e2e-history" };
+  const script = { behaviours: { "*": [{ after_s: 0.1 }] } };
+  const run = await post<{ id: string }>("/api/runs", { ...head, script, umrf }, product.runnerUrl);
+  const state = async () =>
+    (await product.ask<{ state: string }>(`/api/runs/${run.id}`, {}, product.runnerUrl)).state;
+  await expect.poll(state, { timeout: 20_000 }).toBe("finished");
+}
+
+/** Chooses an action; the view may be elsewhere, since it follows runs. */
+async function choose(page: Page, name: string): Promise<void> {
+  await page.getByRole("button", { name: "Fit", exact: true }).click();
+  await boxOf(card(page, name));
+  await card(page, name).click({ position: { x: 50, y: 20 } });
+}
+
+async function setSpeed(page: Page, value: string): Promise<void> {
+  await choose(page, "Drive");
+  const field = page.getByRole("textbox", { name: /^speed/ });
+  await field.fill(value);
+  await field.press("Enter");
+  await saved(page);
+  await page.keyboard.press("Escape");
+  await page.keyboard.press("Escape");
+}
+
+test.beforeAll(async ({ browser }) => {
+  await product.start();
+  graph = (await post<{ id: string }>("/api/graphs", VALVES)).id;
+  ada = await product.person(browser, "Ada");
+  mari = await product.person(browser, "Mari");
+  for (const { page } of [ada, mari]) await page.goto(`${product.url}/graphs/${graph}`);
+  await setSpeed(ada.page, "0.9");
+  await ran();
+  // Mari breaks it: an action is gone, and with it the way to the end.
+  await choose(mari.page, "Cool");
+  await mari.page.keyboard.press("Delete");
+  await expect(card(mari.page, "Cool")).toHaveCount(0);
+  await saved(mari.page);
+});
+
+test.afterAll(async () => {
+  expect([...ada.failures, ...mari.failures]).toEqual([]);
+  await product.dispose();
+});
+
+const panel = (page: Page) => page.getByRole("region", { name: "History" });
+const entries = (page: Page) => panel(page).getByRole("listitem");
+const bar = (page: Page) => page.getByRole("region", { name: "The past" });
+const moment = (page: Page) => page.getByRole("slider", { name: "Moment of the past" });
+
+/** What axe says of the page, by the rules of WCAG. */
+async function violations(page: Page): Promise<string[]> {
+  await page.evaluate(AXE);
+  const found = await page.evaluate(
+    () =>
+      Reflect.get(window, "axe").run(document, {
+        runOnly: ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa"],
+        // Faces of people show initials and are named in full.
+        rules: { "label-content-name-mismatch": { enabled: false } },
+      }) as Promise<AxeResults>,
+  );
+  return found.violations.map(({ id, nodes }) => `${id}: ${nodes[0]?.html}`);
+}
+
+async function openHistory(page: Page): Promise<void> {
+  await page.getByRole("radiogroup", { name: "What is listed" }).getByText("History").click();
+}
+
+test("the list says who did what, between versions and runs", async () => {
+  const { page } = ada;
+  await openHistory(page);
+  const broke = entries(page).filter({ hasText: "Mari" });
+  await expect(broke).toContainText("removed Cool and its 2 arrows");
+  await expect(entries(page).filter({ hasText: "set Drive speed" })).toContainText("0.4 → 0.9");
+  await expect(entries(page).filter({ hasText: "Run 1" })).toContainText("finished");
+  await expect(entries(page).filter({ hasText: "kept by" })).toContainText("v1");
+  const kinds = await entries(page).allTextContents();
+  const order = [/Mari/, /Run 1/, /v1/, /set Drive/, /imported/].map((what) =>
+    kinds.findIndex((text) => what.test(text)),
+  );
+  expect(order).toEqual([...order].sort((a, b) => a - b));
+});
+
+test("the past is looked at and changes nothing; what others do goes on", async () => {
+  const { page } = ada;
+  await entries(page).filter({ hasText: "Mari" }).getByRole("button").first().click();
+  await expect(bar(page)).toContainText("You look at the past.");
+  // What is gone stands where it stood, and is marked.
+  await expect(card(page, "Cool").locator('[data-change="removed"]').first()).toBeVisible();
+  await expect(bar(page).getByRole("list", { name: "What differs" })).toContainText(
+    "1 card, 2 arrows",
+  );
+  await page.keyboard.press("n");
+  await expect(bar(page).getByRole("status")).toContainText("1 of 3 · Cool removed");
+  await page.keyboard.press("Delete");
+  await page.keyboard.press("a");
+  await expect(page.getByRole("combobox", { name: "Name of an action" })).toHaveCount(0);
+  await expect(page.getByText("STOP", { exact: true }).first()).toBeVisible();
+
+  await moment(page).press("Home");
+  await expect(card(page, "Drive")).toContainText("0.4");
+  await expect(page).toHaveURL(/[?&]at=1(&|$)/);
+  await moment(page).press("ArrowRight");
+  await expect(card(page, "Drive")).toContainText("0.9");
+  await setSpeed(mari.page, "1.5");
+  await add(mari.page, "Wave");
+  await saved(mari.page);
+  await expect(card(page, "Wave")).toHaveCount(0);
+  const then = page.url();
+  await moment(page).press("Escape");
+  await expect(bar(page)).toHaveCount(0);
+  await expect(card(page, "Wave")).toBeVisible();
+  await page.goto(then);
+  await expect(card(page, "Drive")).toContainText("0.9");
+  await page.getByRole("button", { name: "Back to now" }).click();
+  await expect(page).not.toHaveURL(/at=/);
+});
+
+test("who set a value is told, with what it was", async () => {
+  const { page } = ada;
+  await openHistory(page);
+  await choose(page, "Drive");
+  const fields = page.getByRole("list", { name: "Who set what" }).getByRole("listitem");
+  const row = fields.filter({ hasText: "speed" });
+  await expect(row).toContainText(/0\.9\s*1\.5.*Mari/);
+  await row.getByRole("button").first().click();
+  await expect(page.getByRole("list", { name: "Values of speed" })).toContainText(/0\.9.*Ada/);
+  expect(await violations(page)).toEqual([]);
+  await page.keyboard.press("Escape");
+});
+
+test("what broke it is undone", async () => {
+  const { page } = ada;
+  await openHistory(page);
+  const broke = entries(page).filter({ hasText: "removed Cool" });
+  await broke.getByRole("button").first().click();
+  await expect(bar(page)).toBeVisible();
+  expect(await violations(page)).toEqual([]);
+  await broke.getByRole("button", { name: "Undo what Mari did" }).click();
+  await expect(bar(page)).toHaveCount(0);
+  for (const each of [page, mari.page]) await expect(card(each, "Cool")).toBeVisible();
+  await expect(entries(page).first()).toContainText("undid what Mari did");
+  const { actions } = await umrfOf(product, graph);
+  expect(actions.map(({ name }) => name).sort()).toEqual(["Cool", "Drive", "Report"]);
+});
