@@ -113,3 +113,30 @@ test("while the runner's disk is full, and the page says that it is not recorded
   expect(failures).toEqual([]);
   await context.close();
 });
+
+test("in sight on every width, whatever else the bar has to say", async ({ browser }) => {
+  const { page, context, failures } = await product.person(browser, "Ada Lovelace");
+  await running(page);
+  const mari = await product.person(browser, "Mari Kask");
+  await mari.page.goto(page.url());
+  const id = page.url().split("/").at(-1);
+  const name = "inspection of the north hall with a long name";
+  const headers = { "content-type": "application/json" };
+  const body = JSON.stringify({ name });
+  await product.ask(`/api/graphs/${id}`, { method: "PATCH", headers, body });
+  await expect(page.getByText("Draft differs from running")).toBeVisible();
+  for (const width of [1600, 1440, 1280, 1101, 1024, 801, 640, 390]) {
+    await page.setViewportSize({ width, height: 860 });
+    await expect(async () => {
+      const box = await page.getByRole("button", { name: /^Stop run/ }).boundingBox();
+      expect(box).not.toBeNull();
+      expect(box?.x).toBeGreaterThanOrEqual(0);
+      expect((box?.x ?? 0) + (box?.width ?? 0)).toBeLessThanOrEqual(width);
+    }, `at ${width} px`).toPass();
+  }
+  await page.getByRole("button", { name: /^Stop run/ }).click();
+  await expect.poll(async () => (await states())[0]).toBe("stopped");
+  expect([...failures, ...mari.failures]).toEqual([]);
+  await mari.context.close();
+  await context.close();
+});
