@@ -1,8 +1,10 @@
 """The index of key changes agrees with the log that it is made of, wherever and whenever one looks."""
 
+import itertools
 import random
 from collections import defaultdict
 
+import anyio
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -130,6 +132,27 @@ async def test_it_is_kept_up_while_nobody_asks(
         while not found[True]:
             found[len(await index.at(GRAPH, len(held))) > 0] += 1
             assert found[False] < 5000
+
+
+async def test_a_document_that_cannot_be_read_ends_nothing(
+    journal: Journal,
+    rooms: Rooms,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    monkeypatch.setattr("action_assistant.editor.history.change_index._PERIOD", 0.01)
+    tries, thrice = itertools.count(1), anyio.Event()
+
+    async def fails(*_: object) -> object:
+        if next(tries) == 3:
+            thrice.set()
+        raise RuntimeError
+
+    await edited(rooms, 3, 5)
+    async with ChangeIndex(journal, fails).kept_up():  # type: ignore[arg-type]
+        with anyio.fail_after(20):
+            await thrice.wait()
+    assert "cannot be indexed" in caplog.text
 
 
 @given(st.from_regex(r"[A-Za-z0-9]{12}", fullmatch=True), st.text(max_size=5))

@@ -116,6 +116,8 @@ class ChangeIndex:
                     await self.upto(graph)
                 except Refused as error:
                     log.warning("%s: its changes are not indexed: %s", graph, error.detail)
+                except Exception:  # whatever one document holds, the editor is not ended by it
+                    log.exception("%s: its changes cannot be indexed", graph)
             await anyio.sleep(_PERIOD)
 
     async def _behind(self) -> list[str]:
