@@ -115,3 +115,27 @@ async def test_when_postgres_has_stopped_and_is_back_the_editor_goes_on_by_itsel
         await waiting
         await hand.write("after")
         assert await seen(editor, graph) == {"before", "while it was away", "after"}
+
+
+def test_the_past_is_asked_of_postgres_as_of_a_file(postgres: Server, tmp_path: Path) -> None:
+    database = postgres.new_database()
+    with running(tmp_path / "data", database) as editor, editor.client() as http:
+        graph = http.post("/api/graphs", json={"name": "task"}).json()["id"]
+        for name in ("second", "third"):
+            http.patch(f"/api/graphs/{graph}", json={"name": name})
+        below = f"/api/graphs/{graph}"
+        edited, created = http.get(f"{below}/history").json()
+        assert edited["changes"]["fields"] == [
+            {"field": "name", "before": "task", "after": "third"}
+        ]
+        assert created["kind"] == "created"
+        assert http.get(f"{below}/document", params={"at": 2}).json()["meta"]["name"] == "second"
+        (name,) = [
+            each
+            for each in http.get(f"{below}/blame", params={"of": ""}).json()
+            if each["field"] == "name"
+        ]
+        assert (name["value"], name["before"], name["seq"]) == ("third", "second", 3)
+        back = {"author": "local", "from_seq": 2, "seq": 3}
+        assert http.post(f"{below}/revert", json=back).json() == {"seq": 4, "left": []}
+        assert http.get(f"{below}/umrf").json()["graph_name"] == "task"
