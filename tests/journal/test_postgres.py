@@ -13,6 +13,7 @@ from action_assistant.errors import BadInput, CannotStart, Unavailable
 from action_assistant.journal import postgres as module
 from action_assistant.journal.events import Draft, Event, nothing
 from action_assistant.journal.journal import Journal
+from action_assistant.journal.postgres import PostgresSession
 from action_assistant.schema import editor_tables
 from journal.proxy import Verdict, proxy
 from journal.servers import Server, binaries, server
@@ -172,6 +173,26 @@ async def test_a_connection_that_dies_in_a_commit_stores_exactly_once(
         assert [e.body.decode() for e in stored] == [f"bad-luck {n}" for n in range(cuts)]
         assert await journal.verify() == []
         await journal.close()
+
+
+@pytest.mark.parametrize("closing", ["is let go", "cannot even be let go"])
+async def test_after_a_connection_that_was_aborted_another_one_writes(
+    postgres: Server, closing: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As the driver aborts one that did not answer in time, now and then."""
+    journal = await opened(postgres.new_database())
+    await journal.append("a", [draft()])
+    session = journal._writer._session
+    assert isinstance(session, PostgresSession)
+    session._raw._abort()
+    if closing != "is let go":
+        monkeypatch.setattr(session, "close", lambda: 1 / 0)
+    async with asyncio.timeout(30):
+        assert await journal.append("a", [draft()]) == 2
+        await journal.close()
+    monkeypatch.undo()
+    if not session._loop.is_closed():
+        await asyncio.to_thread(session.close)
 
 
 async def test_cuts_anywhere_under_load_lose_nothing_and_double_nothing(postgres: Server) -> None:

@@ -109,12 +109,16 @@ class PostgresSession:
 
     def close(self) -> None:
         """Let go at once: what is not committed has not happened."""
-        self._loop.run_until_complete(self._end())
-        self._loop.close()
+        try:
+            self._loop.run_until_complete(self._end())
+        finally:
+            self._loop.close()
 
     async def _end(self) -> None:
         if self._open is not None:
-            if self._raw is None or self._raw.is_in_transaction():
+            # One that was aborted, as after a silence, does not even know whether it is in a transaction.
+            gone = self._raw is None or self._raw.is_closed()
+            if gone or self._raw.is_in_transaction():
                 await _quietly(self._open.invalidate())
             else:
                 await _quietly(self._raw.close(timeout=1))

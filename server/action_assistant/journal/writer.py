@@ -295,8 +295,12 @@ class Writer:
 
     def _disconnect(self) -> None:
         session, self._session, self._transaction = self._session, None, None
-        if session is not None:
+        if session is None:
+            return
+        try:
             session.close()
+        except Exception:  # the thread lives on with another one
+            log.exception("a connection to %s could not be closed", self._database.name)
 
 
 def _scalar(session: WriterSession, chosen: Select[Any]) -> object:
