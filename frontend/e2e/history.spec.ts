@@ -193,6 +193,20 @@ test("who set a value is told, with what it was", async () => {
   await page.keyboard.press("Escape");
 });
 
+test("what is another since it went well is one press away", async () => {
+  const { page } = ada;
+  await openHistory(page);
+  const since = panel(page).getByRole("button", { name: "What changed since run 1" });
+  await since.click();
+  const compared = bar(page).getByRole("combobox", { name: "Compare with" });
+  await expect(compared.locator("option:checked")).toHaveText("the last good run, run 1");
+  const differs = bar(page).getByRole("list", { name: "What differs" });
+  await expect(differs).toContainText("1 card, 2 arrows");
+  await expect(card(page, "Wave").locator('[data-change="added"]').first()).toBeVisible();
+  await since.click();
+  await expect(bar(page)).toHaveCount(0);
+});
+
 test("what broke it is undone", async () => {
   const { page } = ada;
   await openHistory(page);

@@ -104,6 +104,27 @@ function Items({ items, timeline }: { items: readonly TimelineItem[]; timeline: 
   });
 }
 
+/** The question after a run that failed: what is another since it went well? */
+function SinceLastGood({ timeline: { lastGood } }: { timeline: Timeline }) {
+  const { past, lookAt } = useEditorContext();
+  const { seq } = useThrottledLink();
+  if (lastGood === null || lastGood.seq >= seq) return null;
+  const on = past?.at === seq && past.with === lastGood.seq;
+  return (
+    <div className={style.since}>
+      <Button
+        fullWidth
+        size="compact-sm"
+        variant="light"
+        aria-pressed={on}
+        onClick={() => lookAt(on ? null : { at: seq, with: lastGood.seq })}
+      >
+        What changed since run {lastGood.run}, which went well
+      </Button>
+    </div>
+  );
+}
+
 export function HistoryPanel() {
   const { id } = useEditorContext();
   const timeline = useTimeline(id);
@@ -113,6 +134,7 @@ export function HistoryPanel() {
       <h2 className="visually-hidden">History</h2>
       {timeline.isPending && <Skeleton height={160} m="sm" />}
       {timeline.error && <p role="alert">{errorText(timeline.error)}</p>}
+      <SinceLastGood timeline={timeline} />
       {daysOf(timeline.items).map(({ at, items }) => (
         <section key={new Date(at).toDateString()} className={style.day}>
           <h3>{sentence(day(at, now))}</h3>

@@ -67,11 +67,14 @@ interface CompareProps {
 function CompareWith({ place, timeline, newest }: CompareProps) {
   const { lookAt } = useEditorContext();
   const now = useNow(60_000);
-  const { versions, entries } = timeline;
+  const { versions, entries, lastGood } = timeline;
   const marked = typeof place.with === "number" ? place.with : null;
-  const isVersion = versions.some(({ seq }) => seq === marked);
+  const isVersion = lastGood?.seq === marked || versions.some(({ seq }) => seq === marked);
   const data = [
     { value: "own", label: "the moment before this sitting" },
+    ...(lastGood === null
+      ? []
+      : [{ value: `${lastGood.seq}`, label: `the last good run, run ${lastGood.run}` }]),
     { value: "now", label: "now" },
     ...versions.map((version) => ({
       value: `${version.seq}`,

@@ -14,16 +14,21 @@ export interface SinceAnswer {
   readonly found: SinceWhen | null;
 }
 
-/** The last run before this one that went well, as far as it is known. */
-export function lastGoodRun(runs: readonly Run[], run: Run): Run | null {
-  const before = runs.filter(
+type Ended = Pick<Run, "number" | "version" | "state" | "result">;
+
+/** The last run, before one, that went well, as far as it is known. */
+export function lastGoodRun<R extends Ended>(
+  runs: readonly R[],
+  before = Number.POSITIVE_INFINITY,
+): R | null {
+  const good = runs.filter(
     (each) =>
-      each.number < run.number &&
+      each.number < before &&
       each.version !== null &&
       each.state === "finished" &&
       (each.result === "on_true" || each.result === null),
   );
-  return before.reduce<Run | null>(
+  return good.reduce<R | null>(
     (last, each) => (last === null || each.number > last.number ? each : last),
     null,
   );
@@ -37,7 +42,7 @@ async function asked(runner: string, run: Run, graph: string): Promise<SinceAnsw
     fetchJson<Version[]>(`${below}/versions`),
   ]);
   const seqOf = (of: Run) => versions.find(({ id }) => id === of.version)?.seq;
-  const good = lastGoodRun(runs, run);
+  const good = lastGoodRun(runs, run.number);
   const [from, to] = [good === null ? undefined : seqOf(good), seqOf(run)];
   if (good === null || from === undefined || to === undefined || from > to) {
     return { good: null, found: null };

@@ -2,6 +2,7 @@
 import { useInfiniteQuery, useQuery, useQueryClient } from "@tanstack/react-query";
 import { useEffect, useMemo } from "react";
 import { fetchHistory, type HistoryEntry } from "../../api/documents/history";
+import { lastGoodRun } from "../../api/documents/since";
 import { useVersions, type Version } from "../../api/graphs";
 import { newestRun, useLive } from "../../api/live/use-live";
 import { listRuns, NO_FILTER } from "../../api/review";
@@ -18,6 +19,8 @@ export interface Timeline {
   readonly entries: readonly HistoryEntry[];
   readonly items: readonly TimelineItem[];
   readonly versions: readonly Version[];
+  /** The moment of the last run that went well. */
+  readonly lastGood: { readonly run: number; readonly seq: number } | null;
   readonly isPending: boolean;
   readonly error: Error | null;
   readonly hasOlder: boolean;
@@ -65,10 +68,16 @@ export function useTimeline(id: string): Timeline {
     () => timelineOf(entries, runs, !hasNextPage),
     [entries, runs, hasNextPage],
   );
+  const lastGood = useMemo(() => {
+    const run = lastGoodRun(runs);
+    const seq = versions.find((version) => version.id === run?.version)?.seq;
+    return run === null || seq === undefined ? null : { run: run.number, seq };
+  }, [runs, versions]);
   return {
     entries,
     items,
     versions,
+    lastGood,
     isPending: pages.isPending,
     error: pages.error,
     hasOlder: hasNextPage,
