@@ -23,8 +23,7 @@ export function lastRuns(runs: readonly Run[]): Map<string, Run> {
   const newest = new Map<string, Run>();
   for (const run of runs) {
     if (run.graph === null) continue;
-    const known = newest.get(run.graph);
-    if (known === undefined || known.number < run.number) newest.set(run.graph, run);
+    if (run.number > (newest.get(run.graph)?.number ?? -1)) newest.set(run.graph, run);
   }
   return newest;
 }
@@ -37,8 +36,8 @@ export function matchesSearch(search: string, ...texts: readonly (string | undef
 }
 
 function says({ name, description, robots, labels, people }: GraphSummary): string {
-  const names = people?.map((person) => person.name) ?? [];
-  return [name, description, ...(robots ?? []), ...(labels ?? []), ...names].join(" ");
+  const names = people?.map((person) => person.name);
+  return [name, description, robots, labels, names].flat().join(" ");
 }
 
 export function allLabels(graphs: readonly GraphSummary[]): string[] {

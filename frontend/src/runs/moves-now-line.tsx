@@ -36,7 +36,7 @@ export function MovesNowLine() {
   if (moving.length === 0) return null;
   const all = moving.map(({ robot, words }) => `${robot}: ${words}`).join(" · ");
   return (
-    <section className={style.line} data-moves aria-label="Moves now" title={`Moves now: ${all}`}>
+    <section className={style.line} aria-label="Moves now" title={all}>
       <span className={style.head} aria-hidden>
         Moves now
       </span>
