@@ -128,7 +128,7 @@ export class Product {
     const headers = { authorization: `Bearer ${TOKEN}`, ...(init.headers ?? {}) };
     const answer = await fetch(base + path, { ...init, headers });
     if (!answer.ok) throw new Error(`${path}: ${answer.status} ${await answer.text()}`);
-    return (await answer.json()) as T;
+    return (answer.status === 204 ? undefined : await answer.json()) as T;
   }
 
   /** The id of a new graph of one action after the other. The simulator gives each a second. */
