@@ -8,6 +8,7 @@ with. Imports nothing but the standard library, since it runs before anything el
 
 import importlib.machinery
 import os
+import re
 import site
 import sys
 from collections.abc import Mapping, Sequence
@@ -30,6 +31,8 @@ _BESIDE: Final[Mapping[str, tuple[str, ...]]] = {
     "numpy": ("core/_multiarray_umath", "_core/_multiarray_umath"),
     "yaml": (),
 }
+_SOURCE: Final = re.compile(r"^CMAKE_HOME_DIRECTORY:INTERNAL=(.+)$", re.MULTILINE)
+_CACHE: Final = 4_000_000  # bytes of CMake's cache that are read
 _EXTENSION: Final = "_rclpy_pybind11"
 
 
@@ -130,6 +133,18 @@ def prefix_of(file: str) -> str:
         if (each / _INDEX).is_dir():
             return str(each)
     return str(Path(file).parent)
+
+
+def source_of(build: Path) -> Path | None:
+    """Where the source of a package lies that colcon has built in this folder, as CMake keeps it; None
+    where that is not known."""
+    try:
+        with (build / "CMakeCache.txt").open("rb") as file:
+            cache = file.read(_CACHE).decode(errors="replace")
+    except OSError:
+        return None
+    found = _SOURCE.search(cache)
+    return None if found is None else Path(found[1])
 
 
 def _for_another(prefix: Path, version: str) -> str:

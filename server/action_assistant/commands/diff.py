@@ -8,6 +8,7 @@ from typing import Final, NamedTuple
 import msgspec
 
 from action_assistant.commands.client import No, Server, add_server, refused, running
+from action_assistant.commands.files import file_text, refusal
 from action_assistant.errors import CannotStart
 from action_assistant.safe_text import one_line
 from action_assistant.umrf.difference import Difference, difference
@@ -49,7 +50,7 @@ def _diff(options: argparse.Namespace) -> int:
     given = [options.before, options.after]
     try:
         if all(Path(each).is_file() for each in given):
-            found = _of_texts(*(_text(each) for each in given))
+            found = _of_texts(*((each, file_text(Path(each))) for each in given))
         else:
             with running(options) as server:
                 found = _on_server(server, given)
@@ -95,20 +96,13 @@ def _fetched(server: Server, place: str | _Moment | _Version) -> tuple[str, byte
     """What to call it, and its text."""
     match place:
         case str():
-            return _text(place)
+            return place, file_text(Path(place))
         case _Moment(graph, seq):
             query = {} if seq is None else {"at": seq}
             answer = server.editor("GET", f"/api/graphs/{graph}/umrf", params=query)
             return graph, answer.content
         case _Version(id=name, umrf=text):
             return name, bytes(text)
-
-
-def _text(path: str) -> tuple[str, bytes]:
-    try:
-        return path, Path(path).read_bytes()
-    except OSError as error:
-        raise CannotStart(f"Cannot read {path}: {error.strerror}.") from error
 
 
 def _of_texts(before: tuple[str, bytes], after: tuple[str, bytes]) -> Difference:
@@ -120,6 +114,4 @@ def _graph(name: str, text: bytes) -> Graph:
     try:
         return codec.read(text).graph
     except codec.Unreadable as error:
-        within = f" at {error.path}" if error.path else ""
-        place = f"{name}:{error.line}:{error.column}"
-        raise CannotStart(f"{place}: {error.message}{within}") from error
+        raise CannotStart(refusal(name, error)) from error

@@ -103,16 +103,18 @@ def _command(text: str) -> tuple[float, str, str | None]:
     return float(moment), handler, graph or None
 
 
-def _text(path: Path) -> bytes:
+def file_text(path: Path) -> bytes:
+    """What is in a file. Raises CannotStart."""
     try:
         return path.read_bytes()
     except OSError as error:
         raise CannotStart(f"Cannot read {path}: {error.strerror}.") from error
 
 
-def _refusal(path: Path, error: codec.Unreadable) -> str:
+def refusal(name: Path | str, error: codec.Unreadable) -> str:
+    """Why a text cannot be read, with its place."""
     within = f" at {error.path}" if error.path else ""
-    return f"{path}:{error.line}:{error.column}: {error.message}{within}"
+    return f"{name}:{error.line}:{error.column}: {error.message}{within}"
 
 
 def _at(where: Where) -> str:
@@ -144,7 +146,7 @@ def _verdict(
     graphs: Mapping[str, Graph] | None,
     used: Collection[str],
 ) -> CheckVerdict:
-    text = _text(path)
+    text = file_text(path)
     try:
         reading = codec.read(text)
         if reading.dialect in ACTION_DIALECTS:
@@ -177,7 +179,7 @@ def _given(paths: Sequence[Path]) -> dict[str, Graph]:
     found: dict[str, Graph] = {}
     for path in paths:
         try:
-            reading = codec.read(_text(path))
+            reading = codec.read(file_text(path))
         except codec.Unreadable:
             continue  # told when it is checked itself
         if reading.dialect not in ACTION_DIALECTS and not checks.refused_by_parser(reading):
@@ -199,9 +201,9 @@ def _print(verdict: CheckVerdict) -> None:
 
 def _convert(options: argparse.Namespace) -> int:
     try:
-        reading = codec.read(_text(options.file))
+        reading = codec.read(file_text(options.file))
     except codec.Unreadable as error:
-        print(_refusal(options.file, error), file=sys.stderr)
+        print(refusal(options.file, error), file=sys.stderr)
         return 1
     graph = reading.graph
     if options.examples:
@@ -239,7 +241,7 @@ def _through_document(graph: Graph) -> Graph:
 
 def _simulate(options: argparse.Namespace) -> int:
     try:
-        reading = codec.read(_text(options.file))
+        reading = codec.read(file_text(options.file))
         if refusals := checks.refused_by_parser(reading):
             _print_refusals(options.file, refusals)
             return 1
@@ -249,7 +251,7 @@ def _simulate(options: argparse.Namespace) -> int:
             if isinstance(event, semantics.HazardEvent) and event.code == semantics.CUT_OFF:
                 cut_off = event
     except codec.Unreadable as error:
-        print(_refusal(options.file, error), file=sys.stderr)
+        print(refusal(options.file, error), file=sys.stderr)
         return 1
     if cut_off is None:
         return 0
@@ -284,7 +286,7 @@ def _print_refusals(path: Path, refusals: Sequence[Problem]) -> None:
 
 def _script(path: Path) -> semantics.Script:
     try:
-        return semantics.script_from(json.loads(_text(path)))
+        return semantics.script_from(json.loads(file_text(path)))
     except ValueError as error:
         raise CannotStart(f"{path} is no script: {error}.") from error
 
@@ -294,9 +296,9 @@ def _library(folder: Path | None) -> Mapping[str, Graph]:
     found: dict[str, Graph] = {}
     for path in sorted(folder.rglob("*graph.json")) if folder else ():
         try:
-            reading = codec.read(_text(path))
+            reading = codec.read(file_text(path))
         except codec.Unreadable as error:
-            print(f"left out {_refusal(path, error)}", file=sys.stderr)
+            print(f"left out {refusal(path, error)}", file=sys.stderr)
             continue
         if refusals := checks.refused_by_parser(reading):
             print(f"left out {path}: {refusals[0].message}", file=sys.stderr)
@@ -310,9 +312,9 @@ def _actions(folder: Path) -> Mapping[str, Signature]:
     found: dict[str, Signature] = {}
     for path in sorted(folder.rglob("*umrf.json")):
         try:
-            reading = codec.read_action(_text(path))
+            reading = codec.read_action(file_text(path))
         except codec.Unreadable as error:
-            print(f"left out {_refusal(path, error)}", file=sys.stderr)
+            print(f"left out {refusal(path, error)}", file=sys.stderr)
             continue
         found.setdefault(reading.action.name, signature_of(reading.action))
     return found

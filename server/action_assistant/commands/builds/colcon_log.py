@@ -14,6 +14,7 @@ from typing import Final
 import msgspec
 
 from action_assistant.errors import CannotStart
+from action_assistant.ros_workspace import source_of
 
 #: Of one package; what comes after the first errors is mostly their consequence.
 MOST_ERRORS: Final = 50
@@ -30,7 +31,6 @@ _CMAKE: Final = re.compile(
     r"^CMake Error at (?P<file>[^:\n]+):(?P<line>\d+) \([^)]*\):\n(?P<message>(?:  .*\n|\n(?=  ))+)",
     re.MULTILINE,
 )
-_SOURCE: Final = re.compile(r"^CMAKE_HOME_DIRECTORY:INTERNAL=(.+)$", re.MULTILINE)
 
 
 class BuildError(msgspec.Struct, frozen=True):
@@ -74,7 +74,7 @@ def last_builds(workspace: Path) -> tuple[PackageBuild, ...]:
 def _build(
     workspace: Path, latest: Path, package: str, ended_well: bool, at: datetime
 ) -> PackageBuild:
-    source = _source(workspace / "build" / package)
+    source = source_of(workspace / "build" / package)
     if ended_well:
         return PackageBuild(package, True, at, (), source)
     try:
@@ -110,14 +110,6 @@ def _below(file: str, source: Path | None) -> str:
     if source is not None and PurePosixPath(file).is_relative_to(source):
         return PurePosixPath(file).relative_to(source).as_posix()
     return file
-
-
-def _source(build: Path) -> Path | None:
-    try:
-        found = _SOURCE.search(_text(build / "CMakeCache.txt"))
-    except OSError:
-        return None
-    return None if found is None else Path(found[1])
 
 
 def _text(path: Path) -> str:

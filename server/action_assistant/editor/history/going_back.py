@@ -7,6 +7,7 @@ import msgspec
 from action_assistant.editor.catalogue import server_edits
 from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.history.change_index import ChangeIndex
+from action_assistant.editor.history.key_changes import owner_of
 from action_assistant.editor.history.reverting import as_it_was, reverting
 from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.rooms.open_rooms import Rooms
@@ -71,7 +72,7 @@ class GoingBack:
                 where={"path": "/seq"},
             )
         then = await self._index.at(graph, seq)
-        if not owner or all(owner not in change.key for change in then):
+        if not owner or all(owner_of(*change.place) != owner for change in then):
             raise NotFound(f"There was nothing {owner!r} in this graph after its change {seq}.")
         async with self._rooms.enter(h.graph_stream(graph)) as room:
             before, state = room.seq, await _state(room)

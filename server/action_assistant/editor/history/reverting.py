@@ -5,10 +5,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
 import msgspec
+from msgspec import UNSET
 from pycrdt import Doc
 
 from action_assistant.editor.documents import document
-from action_assistant.editor.documents.document import Maps
 from action_assistant.editor.documents.values import ROOTS, ends_of
 from action_assistant.editor.history.key_changes import (
     LoggedChange,
@@ -17,7 +17,7 @@ from action_assistant.editor.history.key_changes import (
     owner_of,
     unpacked,
 )
-from action_assistant.editor.interchange.changes import difference
+from action_assistant.editor.interchange.changes import setting
 from action_assistant.umrf.model import ENTRY, EXIT, PRECONDITIONS
 
 _OUTCOMES: Final = frozenset(PRECONDITIONS)
@@ -175,14 +175,6 @@ def _places(state: bytes) -> dict[Place, Any]:
 
 
 def _setting(state: bytes, targets: Mapping[Place, Packed]) -> bytes:
-    """The update that gives keys values, and touches nothing else."""
-
-    def edit(doc: Doc[Any]) -> None:
-        wanted: Maps = {root: dict(fields) for root, fields in document.maps_of(doc).items()}
-        for (root, key), value in targets.items():
-            wanted[root].pop(key, None)
-            if value is not None:
-                wanted[root][key] = unpacked(value)
-        document.change(doc, wanted)
-
-    return difference(state, edit)
+    return setting(
+        state, {p: UNSET if value is None else unpacked(value) for p, value in targets.items()}
+    )

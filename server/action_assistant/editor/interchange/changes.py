@@ -1,8 +1,9 @@
 """Edits that are made on a copy of a document, as updates (rule R9). For workers."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
+from msgspec import UNSET
 from msgspec.structs import replace
 from pycrdt import Doc, merge_updates
 
@@ -63,6 +64,21 @@ def editing(state: bytes, edit: Callable[[Graph], Graph]) -> bytes:
         document.change(doc, changed(maps, old, edit(old)))
 
     return difference(state, edited)
+
+
+def setting(state: bytes, targets: Mapping[tuple[str, str], object]) -> bytes:
+    """The update that gives keys of root maps these values, and touches nothing else. UNSET: none."""
+
+    def edit(doc: Doc[Any]) -> None:
+        maps = document.maps_of(doc)
+        for (root, key), value in targets.items():
+            fields = maps.setdefault(root, {})
+            fields.pop(key, None)
+            if value is not UNSET:
+                fields[key] = value
+        document.change(doc, maps)
+
+    return difference(state, edit)
 
 
 def restoring(state: bytes, then: bytes) -> bytes:

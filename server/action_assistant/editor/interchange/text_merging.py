@@ -1,16 +1,11 @@
 """An edited text merged into a graph that may have changed since: key by key, or not at all. For workers."""
 
-from collections.abc import Sequence
-from typing import Any
-
 import msgspec
 from msgspec import UNSET
-from pycrdt import Doc
 
-from action_assistant.editor.documents import document
 from action_assistant.editor.documents.contents import GraphAtSeq, maps_of, read
 from action_assistant.editor.documents.document import Maps, is_same
-from action_assistant.editor.interchange.changes import difference
+from action_assistant.editor.interchange.changes import setting
 from action_assistant.editor.interchange.edited_text import KeyChange, text_edit
 from action_assistant.umrf.model import Problem
 
@@ -35,23 +30,11 @@ def merging(then: GraphAtSeq, state: bytes, text: bytes) -> MergingOutcome:
     conflicts = tuple(each.key for each in edit.changes if _is_other(now, each))
     if conflicts:
         return MergingOutcome(b"", conflicts, edit.problems)
-    return MergingOutcome(_applied(state, edit.changes), (), edit.problems)
+    targets = {(each.root, each.key): each.after for each in edit.changes}
+    return MergingOutcome(setting(state, targets), (), edit.problems)
 
 
 def _is_other(now: Maps, change: KeyChange) -> bool:
     """Whether a key is neither as it was nor as it shall be."""
     value = now.get(change.root, {}).get(change.key, UNSET)
     return not is_same(value, change.before) and not is_same(value, change.after)
-
-
-def _applied(state: bytes, changes: Sequence[KeyChange]) -> bytes:
-    def edit(doc: Doc[Any]) -> None:
-        maps = document.maps_of(doc)
-        for change in changes:
-            fields = maps.setdefault(change.root, {})
-            fields.pop(change.key, None)
-            if change.after is not UNSET:
-                fields[change.key] = change.after
-        document.change(doc, maps)
-
-    return difference(state, edit)

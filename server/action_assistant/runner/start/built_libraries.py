@@ -5,15 +5,14 @@ An engine says what it has indexed, which is the file of an action, and nothing 
 `install/…/lib/libNAME.so`, and in `build/PACKAGE` the library as it was linked and where its source is.
 """
 
-import re
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Final, NamedTuple
 
+from action_assistant.ros_workspace import source_of
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.packages.naming import snake_case
 
-_SOURCE: Final = re.compile(r"^CMAKE_HOME_DIRECTORY:INTERNAL=(.+)$", re.MULTILINE)
 #: What a library is compiled of. Other files change without it being linked anew.
 _COMPILED: Final = frozenset({".cpp", ".cc", ".cxx", ".c", ".hpp", ".hh", ".hxx", ".h"})
 _ABOVE: Final = 3  # folders between a `lib` and its workspace: install, or install/PACKAGE
@@ -58,16 +57,12 @@ def _built(prefix: Path, file: str) -> Iterator[Path]:
 
 def _newer(built: Path) -> Path | None:
     """The file of a library's source that was changed last, if that was after it was linked."""
-    try:
-        cache = (built.parent / "CMakeCache.txt").read_text(errors="replace")
-        linked = built.stat().st_mtime_ns
-    except OSError:
-        return None
-    home = _SOURCE.search(cache)
+    home = source_of(built.parent)
     if home is None:
         return None
+    linked = built.stat().st_mtime_ns
     newest: tuple[int, Path] | None = None
-    for _, path in zip(range(_MOST), _sources(Path(home[1])), strict=False):
+    for _, path in zip(range(_MOST), _sources(home), strict=False):
         try:
             changed = path.stat().st_mtime_ns, path
         except OSError:
