@@ -7,10 +7,10 @@ from typing import Literal
 import msgspec
 
 from action_assistant.commands.client import No, Server, print_json, refused, running
-from action_assistant.runner.review.service import Expectation
+from action_assistant.runner.analysis.expected_runs import Expectation
+from action_assistant.umrf.courses.expected import checked
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.semantics import script_from
-from action_assistant.umrf.semantics.steps import Departure, course, departure, said, unnamed
 
 
 class VerifyVerdict(msgspec.Struct, frozen=True, kw_only=True):
@@ -67,15 +67,12 @@ def _now(server: Server, each: Expectation, graph: str) -> VerifyVerdict:
 def _verdict(each: Expectation, umrf: bytes, against: Literal["then", "now"]) -> VerifyVerdict:
     script = script_from(msgspec.json.decode(each.script))
     try:
-        found = course(codec.read(umrf).graph, script)
+        was, now = codec.read(bytes(each.umrf)).graph, codec.read(umrf).graph
     except codec.Unreadable as wrong:
         return VerifyVerdict(
             name=each.name, run=each.run, against=against, same=False, why=wrong.message
         )
-    apart = departure(unnamed(each.course), unnamed(found))
-    why = _sentence(apart) if apart is not None else ""
-    return VerifyVerdict(name=each.name, run=each.run, against=against, same=apart is None, why=why)
-
-
-def _sentence(apart: Departure) -> str:
-    return f"Step {apart.place + 1}: expected {said(apart.expected)}, found {said(apart.found)}."
+    check = checked(was, each.course, script, now)
+    return VerifyVerdict(
+        name=each.name, run=each.run, against=against, same=check.apart is None, why=check.why
+    )

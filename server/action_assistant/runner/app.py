@@ -34,6 +34,7 @@ from action_assistant.runner.review.service import ReviewService
 from action_assistant.runner.review.worker_queries import StoragePaths, WorkerQueries
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.robots.registry import Robots
+from action_assistant.runner.start.start_checks import StartSources
 from action_assistant.runner.workers import RunnerWorkers
 from action_assistant.settings import ARCHIVE, Keep, RunnerSettings
 from action_assistant.web.auth.keys import Keys
@@ -108,7 +109,10 @@ async def _executing(
                 clock_us=utc_us,
                 run_in_worker=workers.starts,
                 simulator=Simulators(),
-                behaviours=services.behaviours,
+                sources=StartSources(
+                    services.behaviours,
+                    lambda *of: asked.value(ReviewService.checked_courses, *of),
+                ),
                 # What moves again is read whole.
                 past=lambda run, whole: (ours if whole else asked).past(run, whole),
             ) as control,

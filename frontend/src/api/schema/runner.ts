@@ -79,6 +79,32 @@ export interface RunnerApi {
         file: string;
     };
     /**
+     * ArrowCoverage
+     * @description What some courses took together. `untaken` and `unvisited`: what none of them did, in the order
+     *     of the file, as many as are shown.
+     */
+    ArrowCoverage: {
+        arrows: number;
+        taken: number;
+        actions: number;
+        visited: number;
+        untaken: RunnerApi["OutcomeArrow"][];
+        unvisited: string[];
+    };
+    /**
+     * ArrowProposal
+     * @description What a search for an arrow came to. `verdict`: `reached` (with a `script`), `unreachable` (all
+     *     `states` were looked at) or `undecided` (and `why`).
+     */
+    ArrowProposal: {
+        verdict: string;
+        script: {
+            [key: string]: unknown;
+        } | null;
+        states: number;
+        why: string;
+    };
+    /**
      * AtRestShown
      * @description How rest was seen where no answer of the engine could prove it: by whom (null: the runner saw the
      *     engine's process end), when, and how.
@@ -211,6 +237,42 @@ export interface RunnerApi {
         at: string;
     };
     /**
+     * CheckRequest
+     * @description Which expected courses, those of `graph`, and the graph as it is now.
+     */
+    CheckRequest: {
+        /** @description The UMRF graph itself, as approved, or a string that holds its JSON text */
+        umrf: {
+            [key: string]: unknown;
+        } | string;
+        graph: string;
+    };
+    /**
+     * CheckedCourse
+     * @description One expected course against the graph. `same` is null where it was not looked at; `why`: where
+     *     it parts. `run` is empty of one that was made of a dry-run.
+     */
+    CheckedCourse: {
+        name: string;
+        run: string;
+        author: RunnerApi["Author"];
+        at: number;
+        same: boolean | null;
+        why: string;
+        taken: RunnerApi["OutcomeArrow"][];
+        script: {
+            [key: string]: unknown;
+        };
+    };
+    /**
+     * CheckedCourses
+     * @description All expected courses of a graph, by name, and what those cover together that it still takes.
+     */
+    CheckedCourses: {
+        courses: RunnerApi["CheckedCourse"][];
+        coverage: RunnerApi["ArrowCoverage"];
+    };
+    /**
      * ComparedVisit
      * @description The `visit`-th visit (from 1) of an action in both runs. `slower` names the run in which it
      *     took notably longer, whatever of its bounds is true.
@@ -256,11 +318,20 @@ export interface RunnerApi {
     };
     /**
      * Expect
-     * @description A run whose course shall be expected from now on, under a name.
+     * @description What shall be expected from now on, under a name: the course of a `run`, or that of a graph in
+     *     a dry-run, in which actions do what the script says.
      */
     Expect: {
-        run: string;
         name: string;
+        /** @default  */
+        run?: string;
+        /** @default  */
+        graph?: string;
+        /** @description The UMRF graph itself, as approved, or a string that holds its JSON text */
+        umrf?: {
+            [key: string]: unknown;
+        } | string;
+        script?: RunnerApi["Script"];
     };
     /**
      * Expectation
@@ -529,6 +600,16 @@ export interface RunnerApi {
         text: string;
     };
     /**
+     * OutcomeArrow
+     * @description One outcome of an arrow. `parent` and `child` are keys of actions, or `entry` and `exit`.
+     */
+    OutcomeArrow: {
+        parent: string;
+        child: string;
+        /** @enum {string} */
+        outcome: "on_error" | "on_false" | "on_stopped" | "on_true";
+    };
+    /**
      * Overridden
      * @description A problem that stood in the way of a start, as the look before it told it. `aid` and `path`
      *     are its place in the graph that was sent.
@@ -602,6 +683,17 @@ export interface RunnerApi {
             line?: number;
             column?: number;
         };
+    };
+    /**
+     * ProposalRequest
+     * @description A graph, and the outcome of an arrow that a test of it shall take.
+     */
+    ProposalRequest: {
+        /** @description The UMRF graph itself, as approved, or a string that holds its JSON text */
+        umrf: {
+            [key: string]: unknown;
+        } | string;
+        arrow: RunnerApi["OutcomeArrow"];
     };
     /**
      * RawHour

@@ -15,10 +15,10 @@ from action_assistant.editor.history.told_changes import (
     shortened,
     state_of,
 )
+from action_assistant.umrf.courses.expected import keyed, scripted_by_key, scripted_by_name
 from action_assistant.umrf.difference import difference
 from action_assistant.umrf.model import Graph, Key
 from action_assistant.umrf.semantics import Script
-from action_assistant.umrf.semantics.script import DEFAULT
 from action_assistant.umrf.semantics.steps import (
     Departure,
     ExpectedStep,
@@ -126,7 +126,7 @@ class _Past:
         self._changes = changes
         self.moments: list[LoggedChange] = list(_noticed(changes))
         self._courses: dict[int, list[ExpectedStep]] = {}
-        self._script = _by_key(script, graph_of(self._state(named_at)))
+        self._script = scripted_by_key(script, graph_of(self._state(named_at)))
         self._reference = self._course(0)
 
     @property
@@ -160,11 +160,8 @@ class _Past:
         if found is None:
             graph = self._graph(moment)
             keys = {a.full_name: a.key for a in graph.actions}
-            steps = unnamed(course(graph, _by_name(self._script, graph), _EVENTS))
-            found = [
-                replace(step, node=keys.get(step.node, step.node)) if not step.graph else step
-                for step in steps
-            ]
+            steps = unnamed(course(graph, scripted_by_name(self._script, graph), _EVENTS))
+            found = keyed(steps, keys)
             self._courses[moment] = found
         return found
 
@@ -190,25 +187,6 @@ def _is_noticed(change: LoggedChange) -> bool:
     if change.root not in {"actions", "relations"}:
         return False
     return change.key.partition("|")[2] not in _SILENT
-
-
-def _by_key(script: Script, graph: Graph) -> Script:
-    """The script with actions by their keys, which stay when they are called otherwise."""
-    found = dict(script.behaviours)
-    for action in graph.actions:
-        for name in (action.full_name, action.name, f"{graph.name}/{action.full_name}"):
-            found.pop(name, None)
-    for action in graph.actions:
-        calls = script.calls_of(graph.name, graph.name, action.full_name, action.name)
-        if not action.missing and calls != (DEFAULT,):
-            found[action.key] = calls
-    return Script(found)
-
-
-def _by_name(script: Script, graph: Graph) -> Script:
-    """The same with the names that actions have in this graph."""
-    names = {action.key: action.full_name for action in graph.actions}
-    return Script({names.get(key, key): calls for key, calls in script.behaviours.items()})
 
 
 def _words(apart: Departure | None, names: Mapping[Key, str]) -> tuple[str, str]:

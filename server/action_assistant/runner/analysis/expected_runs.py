@@ -12,20 +12,49 @@ import msgspec
 from sqlalchemy import Executable
 from sqlalchemy.dialects.sqlite import insert as upsert
 
-from action_assistant.errors import Conflict
+from action_assistant.errors import BadInput, Conflict
 from action_assistant.journal.events import Event
 from action_assistant.runner.runs.durations import of_visit
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.visits import ActionRun, Visit
+from action_assistant.runner.sent_graph import SentGraph, read_sent
 from action_assistant.schema.runner_tables import expectation
+from action_assistant.umrf.files import codec
+from action_assistant.umrf.json.embedded import JsonObject, UmrfGraph
 from action_assistant.umrf.model import Graph
+from action_assistant.umrf.semantics import SCRIPT, script_from, steps
+from action_assistant.umrf.semantics.script import script_json
 from action_assistant.umrf.semantics.steps import ExpectedStep
 
 #: The stream of all expectations.
 STREAM: Final = "expectations"
 
 Fault: TypeAlias = Literal["error", "false", "hang", "init_error"]
+
+
+class Expect(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What shall be expected from now on, under a name: the course of a `run`, or that of a graph in
+    a dry-run, in which actions do what the script says."""
+
+    name: str
+    run: str = ""
+    graph: str = ""
+    umrf: SentGraph = msgspec.field(default_factory=msgspec.Raw)
+    script: Annotated[msgspec.Raw, SCRIPT] = msgspec.field(default_factory=msgspec.Raw)
+
+
+class Expectation(msgspec.Struct, frozen=True, kw_only=True):
+    """A run that shall go the same for ever, with all that simulating it again takes."""
+
+    name: str
+    run: str
+    graph: str | None
+    graph_name: str
+    author: Author
+    umrf: UmrfGraph
+    script: JsonObject
+    course: list[ExpectedStep]
 
 
 class Doubt(msgspec.Struct, frozen=True):
@@ -174,6 +203,71 @@ def fold(event: Event) -> Sequence[Executable]:
             return (expectation.delete().where(expectation.c.name == gone.name),)
         case _:
             return ()
+
+
+def name_of(given: str) -> str:
+    """The name of an expectation as it is kept. Raises BadInput."""
+    name = " ".join(given.split())
+    if not 1 <= len(name) <= 100:
+        raise BadInput("A name has 1 to 100 characters.", where={"path": "/name"})
+    return name
+
+
+def of_run(found: Run, umrf: str, name: str, author: Author, now: int) -> Expected:
+    """The course of a run that is over. Raises Conflict where the simulator does not repeat it."""
+    script = {"behaviours": recorded(found).behaviours}
+    course = steps.course(codec.read(umrf.encode()).graph, script_from(script))
+    check_alike(found, course)
+    return Expected(
+        at=now,
+        name=name,
+        author=author,
+        run=found.id,
+        graph=found.graph,
+        graph_name=found.graph_name,
+        umrf=umrf,
+        script=msgspec.json.encode(script).decode(),
+        course=course,
+    )
+
+
+def of_dry_run(wanted: Expect, name: str, author: Author, now: int) -> Expected:
+    """The course that a graph takes in the simulator. Raises BadInput, NotUmrf, TooLarge."""
+    if wanted.graph == "":
+        raise BadInput("Of which graph?", where={"path": "/graph"})
+    text, reading = read_sent(bytes(wanted.umrf))
+    try:
+        script = script_from(msgspec.json.decode(bytes(wanted.script) or b"{}"))
+    except ValueError as wrong:
+        raise BadInput(str(wrong), where={"path": "/script"}) from wrong
+    course = steps.course(reading.graph, script)
+    if not any(step.node for step in course):
+        raise BadInput("No action runs in it, so nothing can be expected.", where={"path": "/umrf"})
+    return Expected(
+        at=now,
+        name=name,
+        author=author,
+        run="",
+        graph=wanted.graph,
+        graph_name=reading.graph.name,
+        umrf=text.decode(),
+        script=msgspec.json.encode(script_json(script)).decode(),
+        course=course,
+    )
+
+
+def shown(saved: Expected) -> Expectation:
+    """An expectation as programs see it."""
+    return Expectation(
+        name=saved.name,
+        run=saved.run,
+        graph=saved.graph,
+        graph_name=saved.graph_name,
+        author=saved.author,
+        umrf=msgspec.Raw(saved.umrf.encode()),
+        script=msgspec.Raw(saved.script.encode()),
+        course=list(saved.course),
+    )
 
 
 def check_alike(found: Run, course: tuple[ExpectedStep, ...]) -> None:

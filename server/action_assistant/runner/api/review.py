@@ -1,4 +1,4 @@
-"""The routes of review: replays, marks, comparisons, statistics, files, expectations."""
+"""The routes of review: replays, marks, comparisons, statistics, files."""
 
 import time
 from collections.abc import AsyncIterator
@@ -6,7 +6,7 @@ from typing import Annotated, Any, Final, Protocol, TypeVar, cast
 
 import msgspec
 from anyio import to_thread
-from litestar import MediaType, Request, Response, delete, get, patch, post
+from litestar import MediaType, Request, Response, get, patch, post
 from litestar.params import Parameter
 from litestar.response import Stream
 from litestar.types import ControllerRouterHandler
@@ -24,7 +24,6 @@ from action_assistant.runner.archives.retention import Retention, Swept
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.review.service import (
     CauseShown,
-    Expectation,
     Format,
     ReviewService,
     RunMarks,
@@ -50,13 +49,6 @@ _TYPES: Final[dict[str, str]] = {
 def json_of(text: bytes, _: type[T]) -> Response[T]:
     """An answer that was encoded elsewhere; the type is for those who read the interface."""
     return cast("Response[T]", Response(text, media_type=MediaType.JSON))
-
-
-class Expect(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A run whose course shall be expected from now on, under a name."""
-
-    run: str
-    name: str
 
 
 class Fit(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -87,7 +79,7 @@ class ReviewServices(Protocol):
 
 def routes(services: ReviewServices) -> list[ControllerRouterHandler]:
     """All routes."""
-    return [*_of_one(services), *_of_many(services), *_expecting(services), _archiving(services)]
+    return [*_of_one(services), *_of_many(services), _archiving(services)]
 
 
 def _archiving(services: ReviewServices) -> ControllerRouterHandler:
@@ -209,26 +201,6 @@ def _of_many(services: ReviewServices) -> list[ControllerRouterHandler]:
         return await services.review_service.take_in(texts, author_of(request))
 
     return [comparison, statistics, take_in_examples]
-
-
-def _expecting(services: ReviewServices) -> list[ControllerRouterHandler]:
-    @get("/api/expectations", summary="Runs that shall go the same for ever")
-    async def listed() -> Response[list[Expectation]]:
-        return json_of(await services.asked.text(ReviewService.expectations), list[Expectation])
-
-    @post(
-        "/api/expectations",
-        summary="Save the course of a run as what is expected",
-        guards=[Needs("edit")],
-    )
-    async def expect(data: Expect, request: _Asking) -> Expectation:
-        return await services.review_service.expect(data.run, data.name, author_of(request))
-
-    @delete("/api/expectations/{name:str}", summary="Expect it no more", guards=[Needs("edit")])
-    async def retire(name: str, request: _Asking) -> None:
-        await services.review_service.retire(name, author_of(request))
-
-    return [listed, expect, retire]
 
 
 def _fault(

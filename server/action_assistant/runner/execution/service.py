@@ -17,7 +17,6 @@ from action_assistant.random_ids import random_id
 from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.execution import interventions
 from action_assistant.runner.execution.run_loop import OpenRun
-from action_assistant.runner.links.behaviours.folder import BehaviourFolder
 from action_assistant.runner.links.port import SIMULATOR, ForeignCommand, Link, Order, Registration
 from action_assistant.runner.links.simulator import Simulator, in_this_process
 from action_assistant.runner.links.unreachable import UnreachableLink
@@ -33,11 +32,13 @@ from action_assistant.runner.start.admission import StartRequest
 from action_assistant.runner.start.idempotency import IdempotentStarts, StopOrder, booked
 from action_assistant.runner.start.preflight import Preflight, Settled, check_items, of_taken
 from action_assistant.runner.start.start_checks import (
+    NO_SOURCES,
     Cleared,
     Grouped,
     GroupRequest,
     StartChecks,
     Started,
+    StartSources,
 )
 from action_assistant.runner.stop.foreign_stop import ForeignStopLoop
 from action_assistant.runner.stop.late_activity import LateActivity
@@ -65,7 +66,7 @@ class ExecutionService:
         run_in_worker: RunInWorker,
         simulator: Simulator,
         past: Past | None = None,
-        behaviours: BehaviourFolder | None = None,
+        sources: StartSources = NO_SOURCES,
     ) -> None:
         self.robots = robots
         self.history = RunHistory(ledger, past)
@@ -87,7 +88,7 @@ class ExecutionService:
             going=self._going,
             settled=self._settled_on,
             simulator=simulator,
-            behaviours=behaviours,
+            sources=sources,
         )
         self._late_activity = LateActivity(
             self.open, self.history, robots, self._tasks, clock_us=clock_us, reopen=self._reopen
@@ -107,10 +108,11 @@ class ExecutionService:
         run_in_worker: RunInWorker = anyio.to_thread.run_sync,
         simulator: Simulator = in_this_process,
         past: Past | None = None,
-        behaviours: BehaviourFolder | None = None,
+        sources: StartSources = NO_SOURCES,
     ) -> "AsyncIterator[ExecutionService]":
         """The service, after it has taken up what an earlier process left. `past` reads runs that
-        are over, `simulator` makes what simulated ones run on, some of them with `behaviours`."""
+        are over, `simulator` makes what simulated ones run on. `sources`: what starts have, and are
+        looked at with, besides."""
         async with anyio.create_task_group() as tasks:
             control = cls(
                 ledger,
@@ -120,7 +122,7 @@ class ExecutionService:
                 run_in_worker=run_in_worker,
                 simulator=simulator,
                 past=past,
-                behaviours=behaviours,
+                sources=sources,
             )
             await control._take_up()
             try:

@@ -6,7 +6,7 @@ from datetime import datetime
 from typing import Any, Concatenate, Final, Literal, ParamSpec, Protocol, TypeAlias, TypeVar
 
 import msgspec
-from sqlalchemy import Row, Select, select
+from sqlalchemy import ColumnElement, Row, Select, select
 
 from action_assistant.errors import BadInput, Conflict, NotFound
 from action_assistant.journal.events import Draft, Event
@@ -14,6 +14,7 @@ from action_assistant.runner.analysis import annotations, expected_runs, exports
 from action_assistant.runner.analysis.cause_texts import words
 from action_assistant.runner.analysis.causes import causes
 from action_assistant.runner.analysis.comparison import RunComparison, compare
+from action_assistant.runner.analysis.course_checks import CheckedCourses, check_courses
 from action_assistant.runner.analysis.keyframes import KeyframeStore
 from action_assistant.runner.analysis.replay import RunReplay, run_replay
 from action_assistant.runner.archives import examples
@@ -30,10 +31,7 @@ from action_assistant.runner.runs.run import Run
 from action_assistant.runner.sent_graph import read_sent
 from action_assistant.schema.runner_tables import expectation, review, run_label
 from action_assistant.umrf.files import codec
-from action_assistant.umrf.json.embedded import JsonObject, UmrfGraph
 from action_assistant.umrf.model import Graph
-from action_assistant.umrf.semantics import script_from, steps
-from action_assistant.umrf.semantics.steps import ExpectedStep
 from action_assistant.web.workers.lanes import RunInWorker
 
 log: Final = logging.getLogger(__name__)
@@ -55,19 +53,6 @@ class RunMarks(msgspec.Struct, frozen=True):
     pinned: bool
     note: str
     labels: list[str]
-
-
-class Expectation(msgspec.Struct, frozen=True, kw_only=True):
-    """A run that shall go the same for ever, with all that simulating it again takes."""
-
-    name: str
-    run: str
-    graph: str | None
-    graph_name: str
-    author: Author
-    umrf: UmrfGraph
-    script: JsonObject
-    course: list[ExpectedStep]
 
 
 class CauseShown(msgspec.Struct, frozen=True, kw_only=True):
@@ -308,52 +293,51 @@ class ReviewService:
 
     # --- expectations -------------------------------------------------------------------------
 
-    async def expect(self, run_id: str, name: str, author: Author) -> Expectation:
-        """Save the course of a run as what is expected for ever. Raises NotFound, BadInput,
+    async def expect(
+        self, wanted: expected_runs.Expect, author: Author
+    ) -> expected_runs.Expectation:
+        """Save a course as what is expected for ever. Raises NotFound, BadInput, NotUmrf, TooLarge,
         Conflict when the simulator does not take the same course as the run."""
-        name = " ".join(name.split())
-        if not 1 <= len(name) <= 100:
-            raise BadInput("A name has 1 to 100 characters.", where={"path": "/name"})
-        if run_id in self._control.open:
+        name = expected_runs.name_of(wanted.name)
+        now = self._clock_us()
+        if wanted.run in self._control.open:
             raise Conflict("The run is not over yet.")
         if self._asked is None:
-            saved = await self.expected(run_id, name, author, self._clock_us())
+            saved = await self.expected(wanted, name, author, now)
         else:
-            saved = await self._asked.value(
-                ReviewService.expected, run_id, name, author, self._clock_us()
-            )
+            saved = await self._asked.value(ReviewService.expected, wanted, name, author, now)
         draft = Draft(saved.kind, author.id, msgspec.json.encode(saved))
         await self._ledger.append(expected_runs.STREAM, [draft])
-        return _shown(saved)
+        return expected_runs.shown(saved)
 
     async def expected(
-        self, run_id: str, name: str, author: Author, now: int
+        self,
+        wanted: expected_runs.Expect,
+        name: str,
+        author: Author,
+        now: int,
     ) -> expected_runs.Expected:
-        """What would be expected. Raises NotFound, Conflict."""
-        found = await self.known(run_id)
+        """What would be expected. Raises NotFound, BadInput, NotUmrf, TooLarge, Conflict."""
+        if wanted.run == "":
+            return expected_runs.of_dry_run(wanted, name, author, now)
+        found = await self.known(wanted.run)
         if found.end is None:
             raise Conflict("The run is not over yet.")
-        umrf = await self._control.history.umrf(run_id)
-        recorded = expected_runs.recorded(found)
-        script = {"behaviours": recorded.behaviours}
-        course = steps.course(codec.read(umrf.encode()).graph, script_from(script))
-        expected_runs.check_alike(found, course)
-        return expected_runs.Expected(
-            at=now,
-            name=name,
-            author=author,
-            run=found.id,
-            graph=found.graph,
-            graph_name=found.graph_name,
-            umrf=umrf,
-            script=msgspec.json.encode(script).decode(),
-            course=course,
-        )
+        umrf = await self._control.history.umrf(wanted.run)
+        return expected_runs.of_run(found, umrf, name, author, now)
 
-    async def expectations(self) -> list[Expectation]:
+    async def expectations(self) -> list[expected_runs.Expectation]:
         """All of them, by name."""
-        rows = await self._ledger.query(select(expectation).order_by(expectation.c.name))
-        return [_shown(await self._saved(row.seq)) for row in rows]
+        return [expected_runs.shown(saved) for saved in await self._all_saved()]
+
+    async def checked_courses(self, graph: str, umrf: bytes) -> CheckedCourses:
+        """The expected courses of a graph against it as it is now. Raises BadInput, NotUmrf, TooLarge."""
+        saved = await self._all_saved(expectation.c.graph == graph)
+        return await self._run_in_worker(lambda: check_courses(saved, umrf))
+
+    async def _all_saved(self, *where: ColumnElement[bool]) -> list[expected_runs.Expected]:
+        asked = select(expectation).where(*where).order_by(expectation.c.name)
+        return [await self._saved(row.seq) for row in await self._ledger.query(asked)]
 
     async def _saved(self, seq: int) -> expected_runs.Expected:
         (event,) = await self._ledger.read(expected_runs.STREAM, after=seq - 1, upto=seq)
@@ -366,16 +350,3 @@ class ReviewService:
         retired = expected_runs.Retired(self._clock_us(), name, author)
         draft = Draft(retired.kind, author.id, msgspec.json.encode(retired))
         await self._ledger.append(expected_runs.STREAM, [draft])
-
-
-def _shown(saved: expected_runs.Expected) -> Expectation:
-    return Expectation(
-        name=saved.name,
-        run=saved.run,
-        graph=saved.graph,
-        graph_name=saved.graph_name,
-        author=saved.author,
-        umrf=msgspec.Raw(saved.umrf.encode()),
-        script=msgspec.Raw(saved.script.encode()),
-        course=list(saved.course),
-    )

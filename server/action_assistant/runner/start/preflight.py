@@ -92,6 +92,11 @@ def summed(engine: str, items: Sequence[Item], digest: str = "") -> Preflight:
     )
 
 
+def with_items(look: Preflight, more: Sequence[Item]) -> Preflight:
+    """The same with items that stand in nobody's way."""
+    return msgspec.structs.replace(look, items=(*look.items, *more))
+
+
 def of_refusal(code: str, refused: Refused) -> Item:
     """A refusal as an item. Problems that a person may answer for stay so."""
     where = refused.where or {}

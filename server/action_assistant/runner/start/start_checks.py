@@ -1,9 +1,9 @@
 """The checks before a start is stored and sent, for each engine that it shall go to."""
 
 import os
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Awaitable, Callable, Collection, Sequence
 from functools import partial
-from typing import Annotated, Final
+from typing import Annotated, Final, TypeAlias
 
 import anyio
 import msgspec
@@ -11,6 +11,7 @@ import msgspec
 from action_assistant.errors import BadInput, Conflict, Refused, Unavailable
 from action_assistant.random_ids import random_id
 from action_assistant.ros_workspace import Workspace
+from action_assistant.runner.analysis.course_checks import CheckedCourses
 from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.links.behaviours.folder import BehaviourFolder
 from action_assistant.runner.links.port import SIMULATOR, Answer, Link, NoAnswer
@@ -22,6 +23,7 @@ from action_assistant.runner.runs.run import Run
 from action_assistant.runner.sent_graph import SentGraph
 from action_assistant.runner.start import preflight
 from action_assistant.runner.start.admission import Prepared, StartRequest, decoded, prepared
+from action_assistant.runner.start.course_items import of_courses, of_unknown_courses
 from action_assistant.runner.start.preflight import EngineView, Item, Preflight, Settled
 from action_assistant.umrf.facts import SIMULATED, EngineFacts, facts_of
 from action_assistant.web.workers.lanes import RunInWorker
@@ -31,6 +33,9 @@ _ITSELF: Final = msgspec.structs.replace(SIMULATED, pauses_safely=True)
 _PREFLIGHT_S: Final = 2.0
 _MOST: Final = 20  # engines of one group
 _TOLD: Final = 40  # overridden problems that are kept with a run
+
+#: The expected courses of a graph (its id), held against its text.
+CoursesOf: TypeAlias = Callable[[str, bytes], Awaitable[CheckedCourses]]
 
 _Name = Annotated[str, msgspec.Meta(min_length=1, max_length=100)]
 
@@ -99,10 +104,21 @@ class Grouped(msgspec.Struct, frozen=True):
     fresh: bool
 
 
+class StartSources(msgspec.Struct, frozen=True):
+    """What starts have besides robots: the folder of `behaviours`, and `courses(graph, umrf)`, which
+    holds what is expected of a graph against it."""
+
+    behaviours: BehaviourFolder | None = None
+    courses: CoursesOf | None = None
+
+
+NO_SOURCES: Final = StartSources()
+
+
 class StartChecks:
     """Looks before starts. `taken(engine)` is the run that an engine has from here, if any;
     `going(engine)` the ids of all that go on there; `settled(engine)` what somebody has seen at rest
-    there; `behaviours` is the folder of them, if there is one."""
+    there."""
 
     def __init__(
         self,
@@ -114,16 +130,17 @@ class StartChecks:
         going: Callable[[str], Collection[str]],
         settled: Callable[[str], Sequence[Settled]],
         simulator: Simulator,
-        behaviours: BehaviourFolder | None = None,
+        sources: StartSources,
     ) -> None:
         self._robots = robots
+        self._courses = sources.courses
         self._clock_us = clock_us
         self._run_in_worker = run_in_worker
         self._taken = taken
         self._going = going
         self._settled = settled
         self._simulator = simulator
-        self._behaviours = behaviours
+        self._behaviours = sources.behaviours
         self._prefixes = Workspace.of(os.environ).prefixes
 
     async def cleared(self, asked: StartRequest) -> Cleared:
@@ -199,14 +216,29 @@ class StartChecks:
     async def look(self, asked: GroupRequest) -> list[Preflight]:
         """Look, and tell all of it. Never raises Refused; nothing is stored or sent but a get."""
         found: dict[str, Preflight] = {}
+        expected: list[Item] = []
 
         async def look(engine: str) -> None:
             found[engine] = await self._look(asked.of(engine))
 
+        async def hold_against() -> None:
+            expected.extend(await self._expected(asked))
+
         async with anyio.create_task_group() as tasks:
+            tasks.start_soon(hold_against)
             for engine in asked.engines:
                 tasks.start_soon(look, engine)
-        return [found[engine] for engine in asked.engines]
+        return [preflight.with_items(found[engine], expected) for engine in asked.engines]
+
+    async def _expected(self, asked: GroupRequest) -> Sequence[Item]:
+        """Whether the graph goes as it is expected to. That warns, and never stands in the way: not
+        even when it cannot be looked at."""
+        if self._courses is None or asked.graph is None:
+            return ()
+        try:
+            return of_courses(await self._courses(asked.graph, bytes(asked.umrf)))
+        except Refused as refused:
+            return (of_unknown_courses(refused.detail),)
 
     async def _look(self, asked: StartRequest) -> Preflight:
         items: list[Item] = []

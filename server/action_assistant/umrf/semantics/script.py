@@ -51,6 +51,24 @@ class Script(msgspec.Struct, frozen=True):
         return (DEFAULT,)
 
 
+def script_json(script: Script) -> dict[str, Any]:
+    """A script as JSON values, as `script_from` reads them, without what is so by default."""
+    usual = msgspec.to_builtins(DEFAULT)
+    return {
+        "behaviours": {
+            key: [
+                {
+                    name: value
+                    for name, value in msgspec.to_builtins(call).items()
+                    if value != usual[name]
+                }
+                for call in calls
+            ]
+            for key, calls in script.behaviours.items()
+        }
+    }
+
+
 def script_from(value: object) -> Script:
     """A script from JSON values. Raises `ValueError` naming the place."""
     if not isinstance(value, dict) or not isinstance(value.get("behaviours", {}), dict):

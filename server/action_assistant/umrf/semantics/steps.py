@@ -1,6 +1,6 @@
 """The course of a run as steps without times, and where two courses part. Pure."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Final, Literal
 
 import msgspec
@@ -8,7 +8,7 @@ import msgspec
 from action_assistant.umrf.facts import SIMULATED
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics.script import Script
-from action_assistant.umrf.semantics.simulate import CUT_OFF, simulate
+from action_assistant.umrf.semantics.simulate import CUT_OFF, DAY_MS, simulate
 from action_assistant.umrf.semantics.trace import (
     Dispatch,
     GraphResultEvent,
@@ -18,8 +18,7 @@ from action_assistant.umrf.semantics.trace import (
     Trace,
 )
 
-_MOST: Final = 20_000  # steps of a course
-_DAY_MS: Final = 86_400_000.0
+MOST: Final = 20_000  # events of a course
 
 
 class ExpectedStep(msgspec.Struct, frozen=True):
@@ -39,10 +38,15 @@ class Departure(msgspec.Struct, frozen=True):
     found: ExpectedStep | None
 
 
-def course(graph: Graph, script: Script, most: int = _MOST) -> tuple[ExpectedStep, ...]:
+def course(graph: Graph, script: Script, most: int = MOST) -> tuple[ExpectedStep, ...]:
     """What happens when this graph runs under this script, without times, as far as `most` events go.
     Deterministic."""
-    traces = simulate(graph, script=script, facts=SIMULATED, until_ms=_DAY_MS, max_events=most)
+    traces = simulate(graph, script=script, facts=SIMULATED, until_ms=DAY_MS, max_events=most)
+    return steps_of(traces)
+
+
+def steps_of(traces: Iterable[Trace]) -> tuple[ExpectedStep, ...]:
+    """What a trace tells, as steps."""
     return tuple(step for trace in traces if (step := _step(trace)) is not None)
 
 

@@ -1,0 +1,127 @@
+"""Expected courses against a graph as it is now: which it still takes, and what they cover. For workers."""
+
+import time
+from collections.abc import Iterable
+from typing import Final
+
+import msgspec
+
+from action_assistant.errors import BadInput
+from action_assistant.runner.analysis.expected_runs import Expected
+from action_assistant.runner.runs.events import Author
+from action_assistant.runner.sent_graph import SentGraph, read_sent
+from action_assistant.umrf.courses.coverage import (
+    ArrowCoverage,
+    OutcomeArrow,
+    TakenArrows,
+    coverage,
+)
+from action_assistant.umrf.courses.expected import checked
+from action_assistant.umrf.courses.reaching import ArrowReached, Reaching, reaching
+from action_assistant.umrf.files import codec
+from action_assistant.umrf.json.embedded import JsonObject
+from action_assistant.umrf.model import Graph
+from action_assistant.umrf.semantics import script_from
+from action_assistant.umrf.semantics.script import script_json
+
+#: Of this process's time, for all courses of a graph.
+BUDGET_S: Final = 10.0
+
+
+class CheckRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Which expected courses, those of `graph`, and the graph as it is now."""
+
+    umrf: SentGraph
+    graph: str
+
+
+class ProposalRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A graph, and the outcome of an arrow that a test of it shall take."""
+
+    umrf: SentGraph
+    arrow: OutcomeArrow
+
+
+class CheckedCourse(msgspec.Struct, frozen=True, kw_only=True):
+    """One expected course against the graph. `same` is null where it was not looked at; `why`: where
+    it parts. `run` is empty of one that was made of a dry-run."""
+
+    name: str
+    run: str
+    author: Author
+    at: int
+    same: bool | None
+    why: str = ""
+    taken: tuple[OutcomeArrow, ...] = ()
+    script: JsonObject
+
+
+class CheckedCourses(msgspec.Struct, frozen=True):
+    """All expected courses of a graph, by name, and what those cover together that it still takes."""
+
+    courses: list[CheckedCourse]
+    coverage: ArrowCoverage
+
+
+class ArrowProposal(msgspec.Struct, frozen=True, kw_only=True):
+    """What a search for an arrow came to. `verdict`: `reached` (with a `script`), `unreachable` (all
+    `states` were looked at) or `undecided` (and `why`)."""
+
+    verdict: str
+    script: JsonObject | None = None
+    states: int = 0
+    why: str = ""
+
+
+def check_courses(
+    saved: Iterable[Expected], umrf: bytes, budget_s: float = BUDGET_S
+) -> CheckedCourses:
+    """Simulate the expected courses with this graph. Raises BadInput, NotUmrf, TooLarge."""
+    _, reading = read_sent(umrf)
+    until = time.thread_time() + budget_s
+    found: list[CheckedCourse] = []
+    kept: list[TakenArrows] = []
+    for each in saved:
+        course, took = _checked(each, reading.graph, looks=time.thread_time() < until)
+        found.append(course)
+        if took is not None:
+            kept.append(took)
+    return CheckedCourses(found, coverage(reading.graph, kept))
+
+
+def _checked(
+    saved: Expected, now: Graph, *, looks: bool
+) -> tuple[CheckedCourse, TakenArrows | None]:
+    """One of them, and what it took if that is what was expected."""
+    told = CheckedCourse(
+        name=saved.name,
+        run=saved.run,
+        author=saved.author,
+        at=saved.at,
+        same=None,
+        script=msgspec.Raw(saved.script.encode()),
+    )
+    if not looks:
+        return told, None
+    was = codec.read(saved.umrf.encode()).graph
+    script = script_from(msgspec.json.decode(saved.script))
+    check = checked(was, saved.course, script, now)
+    same = check.apart is None
+    arrows = tuple(sorted(check.taken.arrows))
+    told = msgspec.structs.replace(told, same=same, why=check.why, taken=arrows)
+    return told, check.taken if same else None
+
+
+def propose(umrf: bytes, arrow: OutcomeArrow) -> ArrowProposal:
+    """Search for a script under which the arrow is taken. Raises BadInput, NotUmrf, TooLarge."""
+    _, reading = read_sent(umrf)
+    graph = reading.graph
+    if not any(
+        (each.parent, each.child) == (arrow.parent, arrow.child) for each in graph.relations
+    ):
+        raise BadInput("The graph has no such arrow.", where={"path": "/arrow"})
+    found: Reaching = reaching(graph, arrow)
+    if isinstance(found, ArrowReached):
+        script = msgspec.json.encode(script_json(found.script))
+        return ArrowProposal(verdict="reached", script=msgspec.Raw(script))
+    return ArrowProposal(**msgspec.to_builtins(found))

@@ -1,0 +1,97 @@
+"""The routes of expected courses: saved, dropped, held against a graph, and proposed."""
+
+from typing import Any, Protocol
+
+from litestar import Request, Response, delete, get, post
+from litestar.types import ControllerRouterHandler
+
+from action_assistant.runner.analysis.course_checks import (
+    ArrowProposal,
+    CheckedCourses,
+    CheckRequest,
+    ProposalRequest,
+    propose,
+)
+from action_assistant.runner.analysis.expected_runs import Expect, Expectation
+from action_assistant.runner.api.caller import COUNTED, GRAPH_BODY, author_of, body_of
+from action_assistant.runner.api.review import json_of
+from action_assistant.runner.review.service import ReviewService
+from action_assistant.runner.review.worker_queries import WorkerQueries
+from action_assistant.runner.start.admission import decoded
+from action_assistant.web.auth.access import Needs
+from action_assistant.web.network.connection_limits import ConcurrencyLimit
+from action_assistant.web.server.openapi import reads
+from action_assistant.web.workers.lanes import RunInWorker
+
+_Asking = Request[Any, Any, Any]
+
+
+class CourseServices(Protocol):
+    """What these routes work on; all of it is there before the first request."""
+
+    review_service: ReviewService
+    asked: WorkerQueries
+    run_in_worker: RunInWorker
+    body_limit: ConcurrencyLimit
+
+
+def routes(services: CourseServices) -> list[ControllerRouterHandler]:
+    """All routes."""
+    return [*_saving(services), *_checking(services)]
+
+
+def _saving(services: CourseServices) -> list[ControllerRouterHandler]:
+    @get("/api/expectations", summary="Courses that graphs shall take for ever")
+    async def listed() -> Response[list[Expectation]]:
+        return json_of(await services.asked.text(ReviewService.expectations), list[Expectation])
+
+    @post(
+        "/api/expectations",
+        summary="Save the course of a run, or of a dry-run, as what is expected",
+        opt=reads(Expect) | COUNTED,
+        guards=[Needs("edit")],
+        request_max_body_size=GRAPH_BODY,
+    )
+    async def expect(request: _Asking) -> Expectation:
+        async with body_of(request, services.body_limit) as body:
+            wanted = decoded(body, Expect)
+            return await services.review_service.expect(wanted, author_of(request))
+
+    @delete("/api/expectations/{name:str}", summary="Expect it no more", guards=[Needs("edit")])
+    async def retire(name: str, request: _Asking) -> None:
+        await services.review_service.retire(name, author_of(request))
+
+    return [listed, expect, retire]
+
+
+def _checking(services: CourseServices) -> list[ControllerRouterHandler]:
+    @post(
+        "/api/expectations/check",
+        status_code=200,
+        summary="The expected courses of a graph against it as it is now, and what they cover",
+        opt=reads(CheckRequest) | COUNTED,
+        guards=[Needs("see")],
+        request_max_body_size=GRAPH_BODY,
+    )
+    async def check(request: _Asking) -> Response[CheckedCourses]:
+        async with body_of(request, services.body_limit) as body:
+            asked = decoded(body, CheckRequest)
+            text = await services.asked.text(
+                ReviewService.checked_courses, asked.graph, bytes(asked.umrf)
+            )
+        return json_of(text, CheckedCourses)
+
+    @post(
+        "/api/expectations/proposal",
+        status_code=200,
+        summary="What actions would have to do for an arrow to be taken, if anything makes it so",
+        opt=reads(ProposalRequest) | COUNTED,
+        guards=[Needs("see")],
+        request_max_body_size=GRAPH_BODY,
+    )
+    async def proposal(request: _Asking) -> ArrowProposal:
+        async with body_of(request, services.body_limit) as body:
+            asked = decoded(body, ProposalRequest)
+            return await services.run_in_worker(propose, bytes(asked.umrf), asked.arrow)
+
+    return [check, proposal]

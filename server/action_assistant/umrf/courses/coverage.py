@@ -1,0 +1,126 @@
+"""Coverage: which arrows of a graph some courses took, and which actions they came to. Pure.
+
+An arrow is taken when its parent ends with that outcome and the engine asks the child for anything but
+to ignore it, ready or not: the trace tells so (docs/contracts.md 5.1, `edge`).
+"""
+
+from collections.abc import Iterable, Iterator
+from typing import Final
+
+import msgspec
+
+from action_assistant.umrf.model import (
+    ENTRY,
+    EXIT,
+    PRECONDITIONS,
+    Graph,
+    Key,
+    Precondition,
+    Relation,
+)
+from action_assistant.umrf.semantics.parts import ENTRY_NODE, EXIT_NODE
+from action_assistant.umrf.semantics.trace import EdgeEval, NodeStateEvent, Trace
+
+#: Arrows and actions of an answer.
+SHOWN: Final = 2_000
+
+
+class OutcomeArrow(msgspec.Struct, frozen=True, order=True):
+    """One outcome of an arrow. `parent` and `child` are keys of actions, or `entry` and `exit`."""
+
+    parent: Key
+    child: Key
+    outcome: Precondition
+
+
+class TakenArrows(msgspec.Struct, frozen=True):
+    """What one course took."""
+
+    arrows: frozenset[OutcomeArrow]
+    actions: frozenset[Key]
+
+
+class ArrowCoverage(msgspec.Struct, frozen=True, kw_only=True):
+    """What some courses took together. `untaken` and `unvisited`: what none of them did, in the order
+    of the file, as many as are shown."""
+
+    arrows: int
+    taken: int
+    actions: int
+    visited: int
+    untaken: tuple[OutcomeArrow, ...] = ()
+    unvisited: tuple[Key, ...] = ()
+
+
+def arrows_of(graph: Graph) -> Iterator[OutcomeArrow]:
+    """Every outcome that a child answers with anything but to ignore it, each once."""
+    there = {action.key for action in graph.actions if not action.missing} | {ENTRY, EXIT}
+    found: dict[OutcomeArrow, None] = {}
+    for relation in graph.relations:
+        if not there.issuperset((relation.parent, relation.child)):
+            continue
+        for outcome in outcomes_of(relation):
+            found[OutcomeArrow(relation.parent, relation.child, outcome)] = None
+    order = {action.key: n for n, action in enumerate(graph.actions)} | {
+        ENTRY: -1,
+        EXIT: len(there),
+    }
+    rank = {outcome: n for n, outcome in enumerate(PRECONDITIONS)}
+    return iter(sorted(found, key=lambda a: (order[a.parent], order[a.child], rank[a.outcome])))
+
+
+def outcomes_of(relation: Relation) -> list[Precondition]:
+    """The outcomes of its parent that its child answers."""
+    if relation.parent == ENTRY:
+        return ["on_true"]  # an entry says nothing else, whatever its conditions
+    return [o for o in PRECONDITIONS if relation.conditions.answer(o) != "ignore"]
+
+
+def taken(graph: Graph, traces: Iterable[Trace]) -> TakenArrows:
+    """What a course of this graph took. What happens in its sub-graphs is theirs."""
+    keys = {a.full_name: a.key for a in graph.actions if not a.missing}
+    ends = keys | {ENTRY_NODE: ENTRY, EXIT_NODE: EXIT}
+    labels = {f"{p} => {c}": (ends[p], ends[c]) for p, c in _pairs(graph, ends)}
+    outcomes: dict[str, Precondition] = {outcome: outcome for outcome in PRECONDITIONS}
+    arrows: set[OutcomeArrow] = set()
+    actions: set[Key] = set()
+    for trace in traces:
+        match trace:
+            case EdgeEval(graph=graph.name, edge=edge, eval=answer) if edge in labels:
+                result, _, response = answer.partition(" -> ")
+                outcome = outcomes.get(result)
+                if outcome is not None and response != "ignore":
+                    arrows.add(OutcomeArrow(*labels[edge], outcome))
+            case NodeStateEvent(graph=graph.name, node=node, state="RUNNING") if node in keys:
+                actions.add(keys[node])
+            case _:
+                pass
+    return TakenArrows(frozenset(arrows), frozenset(actions))
+
+
+def _pairs(graph: Graph, ends: dict[str, Key]) -> Iterator[tuple[str, str]]:
+    names = {key: name for name, key in ends.items()}
+    for relation in graph.relations:
+        if relation.parent in names and relation.child in names:
+            yield names[relation.parent], names[relation.child]
+
+
+def coverage(graph: Graph, courses: Iterable[TakenArrows]) -> ArrowCoverage:
+    """What of this graph these courses took together."""
+    took: set[OutcomeArrow] = set()
+    came: set[Key] = set()
+    for each in courses:
+        took |= each.arrows
+        came |= each.actions
+    arrows = list(arrows_of(graph))
+    actions = [action.key for action in graph.actions if not action.missing]
+    untaken = [arrow for arrow in arrows if arrow not in took]
+    unvisited = [key for key in actions if key not in came]
+    return ArrowCoverage(
+        arrows=len(arrows),
+        taken=len(arrows) - len(untaken),
+        actions=len(actions),
+        visited=len(actions) - len(unvisited),
+        untaken=tuple(untaken[:SHOWN]),
+        unvisited=tuple(unvisited[:SHOWN]),
+    )

@@ -1,0 +1,277 @@
+"""How a graph comes to take an arrow: a search for the results of actions, and the order of their ends.
+
+Every state that can follow from another by one end of an action is looked at once, those first from
+which the fewest arrows lead to the parent. What is found is played by the simulator, which decides. A
+search that runs out of states proves that no results and no order of ends take the arrow, as long as
+actions give their outputs and stop when they are told to.
+"""
+
+from collections.abc import Iterator, Sequence
+from heapq import heappop, heappush
+from typing import Final, NamedTuple, TypeAlias
+
+import msgspec
+
+from action_assistant.umrf.courses.coverage import OutcomeArrow, taken
+from action_assistant.umrf.courses.instants import DUE, GIVING_UP, IDLE, RUNS, STOPS, Instant, State
+from action_assistant.umrf.courses.network import EdgeQuestion, Network
+from action_assistant.umrf.facts import SIMULATED
+from action_assistant.umrf.model import ENTRY, EXIT, PRECONDITIONS, Graph, Precondition
+from action_assistant.umrf.semantics.script import Behaviour, Script
+from action_assistant.umrf.semantics.simulate import DAY_MS, simulate
+from action_assistant.umrf.semantics.steps import MOST
+
+#: Places of states that one search may look at: about two seconds.
+BUDGET: Final = 2_000_000
+#: Between two ends; far less than what a stop may take.
+_GAP_S: Final = 0.1
+_RESULTS: Final[tuple[Precondition, ...]] = ("on_true", "on_false", "on_error")
+_FAR: Final = 1 << 30
+
+
+class ArrowReached(msgspec.Struct, frozen=True, tag_field="verdict", tag="reached"):
+    """Under this script the arrow is taken."""
+
+    script: Script
+
+
+class ArrowUnreachable(msgspec.Struct, frozen=True, tag_field="verdict", tag="unreachable"):
+    """Nothing takes it: so many states are all that there are."""
+
+    states: int
+
+
+class ArrowUndecided(msgspec.Struct, frozen=True, tag_field="verdict", tag="undecided"):
+    """After so many states it is not known, and why."""
+
+    states: int
+    why: str
+
+
+Reaching: TypeAlias = ArrowReached | ArrowUnreachable | ArrowUndecided
+
+
+class _End(NamedTuple):
+    """One action ends. `result` counts where it runs."""
+
+    place: int
+    result: Precondition
+
+
+class _GraphState(NamedTuple):
+    """A state of the whole graph: of each place, and how many run and are active."""
+
+    states: tuple[State, ...]
+    running: int
+    active: int
+
+
+class _Asked(Instant):
+    """An instant that notes which edges were answered with anything but to ignore it."""
+
+    __slots__ = ("asked",)
+
+    def __init__(self, net: Network, moment: _GraphState) -> None:
+        super().__init__(net, moment.states.__getitem__, 0.0, moment.running, moment.active)
+        self.asked: set[tuple[int, int, Precondition]] = set()
+
+    def _ask(self, place: int, edge: EdgeQuestion, result: Precondition) -> bool:
+        if edge.responses[result] != "ignore":
+            self.asked.add((place, edge.child, result))
+        return super()._ask(place, edge, result)
+
+    def after(self, before: _GraphState) -> _GraphState:
+        """The state that follows. Times do not matter: any order of ends is looked at."""
+        states = list(before.states)
+        for place, state in self.states.items():
+            states[place] = state._replace(due=0.0)
+        return _GraphState(tuple(states), self.running, self.active)
+
+
+def reaching(graph: Graph, wanted: OutcomeArrow, budget: int = BUDGET) -> Reaching:
+    """Search for a script under which an arrow is taken."""
+    net = Network(graph)
+    places = {action.key: net.place.get(action.full_name, -2) for action in graph.actions}
+    places |= {ENTRY: -1, EXIT: net.exit}
+    parent, child = places.get(wanted.parent, -2), places.get(wanted.child, -2)
+    if -2 in (parent, child):
+        return ArrowUnreachable(0)
+    search = _Search(net, (parent, child, wanted.outcome), budget)
+    ends = search.found()
+    if ends is None:
+        if search.spent >= budget:
+            return ArrowUndecided(search.looked, "There are more states than are looked at.")
+        if any(action.type == "spontaneous" for action in graph.actions):
+            return ArrowUndecided(search.looked, "Spontaneous actions end whenever they like.")
+        return ArrowUnreachable(search.looked)
+    script = search.script(ends)
+    traces = simulate(graph, script=script, facts=SIMULATED, until_ms=DAY_MS, max_events=MOST)
+    if wanted in taken(graph, traces).arrows:
+        return ArrowReached(script)
+    return ArrowUndecided(search.looked, "The simulator does not go the way that was found.")
+
+
+class _Search:
+    """The search for one arrow. `looked`: states; `spent`: places of them."""
+
+    def __init__(self, net: Network, wanted: tuple[int, int, Precondition], budget: int) -> None:
+        self.looked = 0
+        self.spent = 0
+        self._net = net
+        self._wanted = wanted
+        self._budget = budget
+        self._far = _distances(net, wanted[0])
+        self._results = [self._telling(row) for row in net.edges]
+
+    def found(self) -> tuple[_End, ...] | None:
+        """The ends after which the arrow is taken, in their order; None if they were not found."""
+        first = _first(self._net)
+        instant = _Asked(self._net, first)
+        instant.begin()
+        if self._wanted in instant.asked:
+            return ()
+        if instant.end is not None:
+            return None
+        known: dict[_GraphState, tuple[_GraphState, _End] | None] = {instant.after(first): None}
+        open_: list[tuple[int, int, int, _GraphState]] = []
+        self._push(open_, next(iter(known)), 0)
+        while open_ and self.spent < self._budget:
+            _, depth, _, moment = heappop(open_)
+            for end in self._ends(moment):
+                self.spent += len(moment.states)
+                instant = _Asked(self._net, moment)
+                instant.ends(end.place, end.result)
+                if self._wanted in instant.asked:
+                    return (*_way(known, moment), end)
+                if instant.end is None and (then := instant.after(moment)) not in known:
+                    known[then] = moment, end
+                    self._push(open_, then, depth + 1)
+        return None
+
+    def _push(
+        self, open_: list[tuple[int, int, int, _GraphState]], moment: _GraphState, depth: int
+    ) -> None:
+        self.looked += 1
+        active = (n for n, state in enumerate(moment.states) if state.does in DUE)
+        far = min((self._far[place] for place in active), default=_FAR)
+        if far < _FAR:  # else nothing that goes on leads there
+            heappush(open_, (2 * far + depth, depth, self.looked, moment))
+
+    def _ends(self, moment: _GraphState) -> Iterator[_End]:
+        for place, state in enumerate(moment.states):
+            match state.does:
+                case 1:
+                    yield from (_End(place, result) for result in self._results[place])
+                case 2:
+                    yield _End(place, "on_stopped")
+                case 4:
+                    yield _End(place, "on_error")
+                case _:
+                    pass
+
+    def _telling(self, row: Sequence[EdgeQuestion | None]) -> list[Precondition]:
+        """The results of an action that can make a difference: a failed one gives nothing and may
+        begin anew, and a bypass hands on the result itself."""
+        if any(edge is None or "bypass" in edge.responses.values() for edge in row):
+            return list(_RESULTS)
+        found: dict[tuple[object, ...], Precondition] = {}
+        for result in _RESULTS:
+            answers = tuple(edge.responses[result] for edge in row if edge is not None)
+            own = result if result in {"on_error", self._wanted[2]} else ""
+            found.setdefault((own, *answers), result)
+        return list(found.values())
+
+    def script(self, ends: Sequence[_End]) -> Script:
+        """Behaviours that make actions end so, one after the other."""
+        visits: dict[int, list[_Visit]] = {}
+        before = _first(self._net)
+        for step, end in enumerate((None, *ends)):
+            instant = _Asked(self._net, before)
+            if end is None:
+                instant.begin()
+            else:
+                instant.ends(end.place, end.result)
+                own = visits[end.place]
+                own[-1] = own[-1]._replace(ended=step, result=end.result)
+            after = instant.after(before)
+            for place, state in instant.states.items():
+                own = visits.setdefault(place, [])
+                is_ended = end is not None and end.place == place
+                was = IDLE if is_ended else before.states[place].does
+                if state.does == RUNS and was != RUNS:
+                    own.append(_Visit(step))
+                elif state.does in (STOPS, GIVING_UP) and was not in (STOPS, GIVING_UP):
+                    own[-1] = own[-1]._replace(stopped=step)
+            before = after
+        last = len(ends)
+        names = self._net.names
+        return Script(
+            {names[p]: tuple(_behaviours(own, last)) for p, own in sorted(visits.items()) if own}
+        )
+
+
+class _Visit(NamedTuple):
+    """From when to when an action goes on, in steps; -1 is never."""
+
+    begun: int
+    stopped: int = -1
+    ended: int = -1
+    result: Precondition = "on_true"
+
+
+def _behaviours(visits: Sequence[_Visit], last: int) -> Iterator[Behaviour]:
+    """One for each visit; whoever is not asked to end otherwise ends true after all that."""
+    for visit in visits:
+        if visit.stopped >= 0:
+            ended = visit.ended if visit.ended >= 0 else last + 1
+            stop_s = max(1, ended - visit.stopped) * _GAP_S
+            yield Behaviour(never=True, stop_s=round(stop_s, 3))
+        else:
+            ended = visit.ended if visit.ended >= 0 else last + 1
+            after_s = round((ended - visit.begun) * _GAP_S, 3)
+            yield Behaviour(after_s=after_s, result=visit.result)
+    yield Behaviour()
+
+
+def _first(net: Network) -> _GraphState:
+    return _GraphState(tuple(State(has=has) for has in net.has), 0, 0)
+
+
+def _way(
+    known: dict[_GraphState, tuple[_GraphState, _End] | None], moment: _GraphState
+) -> tuple[_End, ...]:
+    found: list[_End] = []
+    before = known[moment]
+    while before is not None:
+        moment, end = before
+        found.append(end)
+        before = known[moment]
+    return tuple(reversed(found))
+
+
+def _distances(net: Network, to: int) -> list[int]:
+    """How many arrows lead at least from each place to this one."""
+    above: dict[int, list[int]] = {}
+    for place, row in enumerate(net.edges):
+        for edge in row:
+            answers = edge is not None and set(edge.responses.values()) != {"ignore"}
+            if edge is not None and answers:
+                above.setdefault(edge.child, []).append(place)
+    far = [_FAR] * (len(net.nodes) + 1)
+    if to < 0:
+        return far  # the entry is asked at the start, and never again
+    far[to] = 0
+    border = [to]
+    while border:
+        border = [p for place in border for p in above.get(place, ()) if _nearer(far, p, place)]
+    return far
+
+
+def _nearer(far: list[int], place: int, child: int) -> bool:
+    if far[place] <= far[child] + 1:
+        return False
+    far[place] = far[child] + 1
+    return True
+
+
+assert set(_RESULTS) < set(PRECONDITIONS)
