@@ -218,10 +218,6 @@ export function useRaw(runner: string | undefined, run: Run) {
   });
 }
 
-export function expectRun(runner: string, run: string, name: string): Promise<unknown> {
-  return fetchJson(`${runner}/api/expectations`, { method: "POST", body: { run, name } });
-}
-
 /** Where a run can be fetched as a file. */
 export function exportUrl(runner: string, run: string, format: "jsonl" | "csv" | "mcap"): string {
   return `${runner}${path(run)}/export?format=${format}`;

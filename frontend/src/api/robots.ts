@@ -117,11 +117,11 @@ export function commandedGraph(runner: string, name: string, seq: number): Promi
 /** What stands between a graph and its start, engine by engine. Sends nothing but a get. */
 export function runPreflight(
   runner: string,
-  umrf: string,
+  { graph, umrf }: { graph: string; umrf: string },
   engines: readonly string[],
   behaviours: boolean,
   signal: AbortSignal,
 ): Promise<Preflight[]> {
-  const body = { engines, ...(behaviours ? { behaviours } : {}), umrf };
+  const body = { engines, ...(behaviours ? { behaviours } : {}), graph, umrf };
   return fetchJson(`${runner}/api/preflight`, { method: "POST", body, signal });
 }

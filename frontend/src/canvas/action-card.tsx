@@ -10,7 +10,13 @@ import { useInStep } from "../status/use-in-step";
 import { colorOfName } from "../ui/name-colors";
 import { stopwatch, useNow } from "../ui/times";
 import style from "./action-card.module.css";
-import { CardStateContext, useDataRole, useIsDimmed, useOpenThreadCount } from "./card-highlights";
+import {
+  CardStateContext,
+  useDataRole,
+  useIsDimmed,
+  useIsUnvisited,
+  useOpenThreadCount,
+} from "./card-highlights";
 import { CardLines } from "./card-lines";
 import { useChangeMark } from "./changes/change-marks";
 import { ChangeTag } from "./changes/change-tag";
@@ -57,6 +63,7 @@ export const ActionCard = memo(function ActionCard({
   const role = useDataRole(action.key);
   const instead = use(CardStateContext)?.(action.key);
   const change = useChangeMark(action.key);
+  const never = useIsUnvisited(action.key);
   const card = useRef<HTMLDivElement>(null);
   useInStep(card, progress?.tone === "run");
   return (
@@ -75,6 +82,7 @@ export const ActionCard = memo(function ActionCard({
       data-flow={role}
       data-direction={direction}
       data-change={change?.change}
+      data-unvisited={never || undefined}
     >
       <Handle
         type="target"
@@ -88,6 +96,7 @@ export const ActionCard = memo(function ActionCard({
       />
       {action.actor !== "" && <span className={style.robot}>{action.actor}</span>}
       {change && <ChangeTag mark={change} beside={action.actor !== ""} />}
+      {never && <span className={style.never}>never run</span>}
       {mark && <ProblemBadge mark={mark} on="card" />}
       {talk > 0 && (
         <span className={style.talk} data-beside={mark ? true : undefined} title="Open comments">

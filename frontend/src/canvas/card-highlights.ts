@@ -1,6 +1,6 @@
 /** Highlights on cards: whose robot's actions stand out, who gives and takes a value, open threads. */
 import { createContext, type ReactNode, useSyncExternalStore } from "react";
-import type { Key } from "../graph/model";
+import type { Key, Precondition } from "../graph/model";
 
 /** The actions that give a value, and those that take it. */
 interface TouchedActions {
@@ -8,16 +8,24 @@ interface TouchedActions {
   readonly consumers: ReadonlySet<Key>;
 }
 
+/** Outcomes of arrows that nothing takes, by relation, and actions that nothing comes to. */
+export interface UntakenPlaces {
+  readonly outcomes: ReadonlyMap<string, readonly Precondition[]>;
+  readonly actions: ReadonlySet<Key>;
+}
+
 interface CardHighlights {
   /** The robot whose actions stand out; null: all. The empty name is that of any robot. */
   readonly robot: string | null;
   /** Open threads by action. */
   readonly openThreads: ReadonlyMap<Key, number>;
+  /** What no expected course takes, while that is looked at. */
+  readonly untaken: UntakenPlaces | null;
   /** Whom the parameter in focus ties together; null: none is in focus. */
   readonly touched: TouchedActions | null;
 }
 
-const ALL: CardHighlights = { robot: null, openThreads: new Map(), touched: null };
+const ALL: CardHighlights = { robot: null, openThreads: new Map(), untaken: null, touched: null };
 
 /** One for the page: there is one canvas. Cards listen for themselves, so that few draw again. */
 class CardHighlightStore {
@@ -67,6 +75,24 @@ export function useOpenThreadCount(key: Key): number {
   return useSyncExternalStore(
     cardHighlights.subscribe,
     () => cardHighlights.now().openThreads.get(key) ?? 0,
+  );
+}
+
+const NONE: readonly Precondition[] = [];
+
+/** The outcomes of a relation that nothing takes, while that is looked at. */
+export function useUntakenOutcomes(relation: string): readonly Precondition[] {
+  return useSyncExternalStore(
+    cardHighlights.subscribe,
+    () => cardHighlights.now().untaken?.outcomes.get(relation) ?? NONE,
+  );
+}
+
+/** Whether nothing comes to an action, while that is looked at. */
+export function useIsUnvisited(key: Key): boolean {
+  return useSyncExternalStore(
+    cardHighlights.subscribe,
+    () => cardHighlights.now().untaken?.actions.has(key) ?? false,
   );
 }
 

@@ -9,6 +9,7 @@ import { useIsOpen, useLine } from "./arrows/line-store";
 import { type DraggedOutcome, useOutcomeDrag } from "./arrows/outcome-drag";
 import type { Point } from "./arrows/scene";
 import type { RoutedLine } from "./arrows/simple-lines";
+import { useUntakenOutcomes } from "./card-highlights";
 import { useChangeMark } from "./changes/change-marks";
 import { ChangeSign } from "./changes/change-tag";
 import type { Arrow } from "./elements";
@@ -127,6 +128,8 @@ function Pill({ id, data, pill: [x, y], selected }: BundleProps & { pill: Point 
   const [dragged, setDragged] = useState<DraggedOutcome | null>(null);
   const word = pillWord(data.bundle);
   const change = useChangeMark(data.relation);
+  const untaken = useUntakenOutcomes(data.relation);
+  const never = data.bundle.outcomes.filter((outcome) => untaken.includes(outcome));
   return (
     <>
       {dragged && <DraggedLine from={[x, y]} dragged={dragged} />}
@@ -136,6 +139,7 @@ function Pill({ id, data, pill: [x, y], selected }: BundleProps & { pill: Point 
           data-selected={selected || undefined}
           data-passed={data.passed || undefined}
           data-change={change?.change}
+          data-untaken={never.length > 0 || undefined}
           // Once for a relation, whatever it says: who looks for it finds one.
           data-relation={data.answers || data.entry ? data.relation : undefined}
           style={{ transform: `translate(-50%, -50%) translate(${x}px, ${y}px)` }}
@@ -151,7 +155,13 @@ function Pill({ id, data, pill: [x, y], selected }: BundleProps & { pill: Point 
           {data.entry ? null : selected && editing ? (
             <OutcomeHandles bundle={data.bundle} editing={editing} onDrag={setDragged} />
           ) : (
-            <Glyphs outcomes={data.bundle.outcomes} />
+            <Glyphs outcomes={data.bundle.outcomes} untaken={untaken} />
+          )}
+          {never.length > 0 && (
+            <span className={style.never}>
+              <span aria-hidden>∅</span>
+              <span className="visually-hidden">never taken</span>
+            </span>
           )}
           {word !== "" && (
             <span className={style.word} aria-hidden>
@@ -164,9 +174,20 @@ function Pill({ id, data, pill: [x, y], selected }: BundleProps & { pill: Point 
   );
 }
 
-function Glyphs({ outcomes }: { outcomes: readonly Outcome[] }) {
+interface GlyphsProps {
+  outcomes: readonly Outcome[];
+  /** Those that no expected course takes. */
+  untaken: readonly Outcome[];
+}
+
+function Glyphs({ outcomes, untaken }: GlyphsProps) {
   return outcomes.map((outcome) => (
-    <span key={outcome} className={style.glyph} style={{ color: outcomeColor[outcome] }}>
+    <span
+      key={outcome}
+      className={style.glyph}
+      data-untaken={untaken.includes(outcome) || undefined}
+      style={{ color: outcomeColor[outcome] }}
+    >
       <OutcomeSign outcome={outcome} size={11} />
     </span>
   ));

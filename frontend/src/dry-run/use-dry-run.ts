@@ -158,6 +158,7 @@ function useResult(id: string, open: boolean, seq: number, decided: Decisions) {
 export function useDryRun(id: string, graph: Graph, seq: number) {
   const [open, setOpen] = useState(false);
   const [seed, setSeed] = useState<DryRunSeed | null>(null);
+  const [beginning, setBeginning] = useState(NOTHING_DECIDED);
   const [decided, setDecided] = useState(NOTHING_DECIDED);
   const [at, setAt] = useState(0);
   const [goal, setGoal] = useState<number | null>(null);
@@ -185,17 +186,22 @@ export function useDryRun(id: string, graph: Graph, seq: number) {
 
   const deciding = useDeciding(shown, setDecided, setGoal);
   const restart = useCallback(() => {
-    setDecided(decidedBy(seed));
+    setDecided(beginning);
     setAt(0);
     play(false);
-  }, [seed]);
-  const begin = useCallback((from: DryRunSeed | null = null) => {
-    setSeed(from);
-    setDecided(decidedBy(from));
-    setAt(0);
-    play(false);
-    setOpen(true);
-  }, []);
+  }, [beginning]);
+  const begin = useCallback(
+    (from: DryRunSeed | null = null, script: DryRunSeed["behaviours"] = {}) => {
+      const before = from === null ? { ...NOTHING_DECIDED, before: script } : decidedBy(from);
+      setSeed(from);
+      setBeginning(before);
+      setDecided(before);
+      setAt(0);
+      play(false);
+      setOpen(true);
+    },
+    [],
+  );
   const close = useCallback(() => {
     begin();
     setOpen(false);

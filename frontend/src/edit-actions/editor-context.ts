@@ -42,6 +42,7 @@ export type Panel =
   | "history"
   | "json"
   | "comments"
+  | "courses"
   | "problems";
 export type Tool = "pan" | "select";
 
@@ -122,8 +123,8 @@ export interface EditorContext {
   lookAt(place: PastPlace | null): void;
   /** Whether this person may change the graph as it is now, which the past is not. */
   readonly mayGoBack: boolean;
-  /** `from`: a moment of a run, as the record has it. */
-  beginDryRun(from?: DryRunSeed): void;
+  /** `from`: a moment of a run, as the record has it; `script`: what actions do to begin with. */
+  beginDryRun(from?: DryRunSeed | null, script?: DryRunSeed["behaviours"]): void;
   select(ids: Iterable<string>): void;
   setTool(tool: Tool): void;
   setSnap(snap: boolean): void;
@@ -142,7 +143,7 @@ export const EditorReactContext = createContext<EditorContext | null>(null);
 
 export function useEditorContext(): EditorContext {
   const context = use(EditorReactContext);
-  if (context === null) throw new Error("useBench needs an editor around it");
+  if (context === null) throw new Error("useEditorContext needs an editor around it");
   return context;
 }
 

@@ -1,5 +1,5 @@
 /** Edit actions that open a panel, find or a dry-run. */
-import { IconListTree, IconMessageCircle, IconSearch } from "@tabler/icons-react";
+import { IconListTree, IconMessageCircle, IconSearch, IconShieldCheck } from "@tabler/icons-react";
 import type { EditAction } from "./edit-action";
 
 const look = { group: "Look", changes: false, enabled: () => true } as const;
@@ -32,5 +32,14 @@ export const PANELS: readonly EditAction[] = [
     icon: IconMessageCircle,
     also: "talk threads",
     run: (context) => context.setPanel("comments"),
+  },
+  {
+    ...look,
+    name: "courses",
+    label: "Show the expected courses",
+    shortcuts: [],
+    icon: IconShieldCheck,
+    also: "tests coverage verify",
+    run: (context) => context.setPanel("courses"),
   },
 ];

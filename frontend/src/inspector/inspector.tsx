@@ -1,6 +1,6 @@
 /** The panel on the right: properties of what is selected, JSON, problems. */
 import { Tabs } from "@mantine/core";
-import { IconMessageCircle } from "@tabler/icons-react";
+import { IconMessageCircle, IconShieldCheck } from "@tabler/icons-react";
 import type { Problems } from "../api/graphs";
 import {
   type EditorContext,
@@ -31,6 +31,9 @@ const RunConditions = lazyPart(() => forms().then((part) => part.RunConditions))
 const ProblemList = lazyPart(() => import("./problem-list").then((part) => part.ProblemList));
 const ProblemsHere = lazyPart(() => import("./problem-list").then((part) => part.ProblemsHere));
 const Comments = lazyPart(() => import("../comments/comments").then((part) => part.Comments));
+const CoursesPanel = lazyPart(() =>
+  import("../courses/courses-panel").then((part) => part.CoursesPanel),
+);
 const JsonView = lazyPart(() => import("./json/json-view").then((part) => part.JsonView));
 
 interface Props {
@@ -140,6 +143,11 @@ export function Inspector({ id, seq, panel, problems, told, threads }: Props) {
             {open > 0 && <span className={style.count}>{open}</span>}
           </span>
         </Tabs.Tab>
+        <Tabs.Tab value="courses" aria-label="Expected courses">
+          <span className={style.tabWords}>
+            <IconShieldCheck size={15} aria-hidden />
+          </span>
+        </Tabs.Tab>
         <Tabs.Tab value="problems">
           <ProblemsTab told={told} />
         </Tabs.Tab>
@@ -168,6 +176,11 @@ export function Inspector({ id, seq, panel, problems, told, threads }: Props) {
       <Tabs.Panel value="comments" className={style.panel ?? ""}>
         <PartBoundary>
           <Comments threads={threads} />
+        </PartBoundary>
+      </Tabs.Panel>
+      <Tabs.Panel value="courses" className={style.panel ?? ""}>
+        <PartBoundary>
+          <CoursesPanel seq={seq} />
         </PartBoundary>
       </Tabs.Panel>
       <Tabs.Panel value="problems" className={style.panel ?? ""}>

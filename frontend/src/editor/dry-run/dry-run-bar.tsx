@@ -12,6 +12,7 @@ import {
 import type { ReactNode } from "react";
 import { errorText } from "../../api/http";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
+import { KeepDryRun } from "../../courses/keep-dry-run";
 import type { RunningAction } from "../../dry-run/playback";
 import { type DecidedFaultKind, faultWords } from "../../dry-run/script";
 import { DRY_RUN_SPEEDS, type DryRun } from "../../dry-run/use-dry-run";
@@ -268,6 +269,7 @@ export function DryRunBar({
       </div>
       <div className={style.note}>
         <span>Nothing of this is recorded.</span>
+        <KeepDryRun run={run} />
         {record}
       </div>
     </section>

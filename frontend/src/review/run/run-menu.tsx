@@ -11,10 +11,10 @@ import {
 } from "@tabler/icons-react";
 import { useState } from "react";
 import { useLocation } from "wouter";
+import { expectRun } from "../../api/courses";
 import { graphMoment } from "../../api/documents/texts";
 import { useVersions, versionName } from "../../api/graphs";
 import { errorText } from "../../api/http";
-import { expectRun } from "../../api/review";
 import type { Run } from "../../api/runs";
 import { FaultDialog } from "./fault-dialog";
 import { type Repeated, type RepeatedVersion, repeatRun } from "./repeat-run";
@@ -49,7 +49,8 @@ function ExpectDialog({ runner, run, onClose }: Props & { onClose: () => void })
       onClose();
       notifications.show({
         title: "Expected from now on",
-        message: "“action-assistant runs verify” tells when it would go another way.",
+        message:
+          "The tests of the graph tell when it would go another way, and so does each start.",
       });
     } catch (error) {
       setRefused(errorText(error));

@@ -16,6 +16,7 @@ const WAITING: Readonly<Record<string, string>> = {
   quiet: "Nothing else runs",
   others: "Nobody else starts things",
   actors: "Whose actions these are",
+  courses: "It goes as expected",
 };
 
 const SIGNS = { passed: IconCheck, warned: IconAlertTriangle, blocked: IconX } as const;

@@ -4,7 +4,8 @@ import { IconPlayerPlayFilled, IconRefresh } from "@tabler/icons-react";
 import { useQuery } from "@tanstack/react-query";
 import { useState } from "react";
 import { Link } from "wouter";
-import { errorText, fetchText } from "../../api/http";
+import { identifiedText } from "../../api/courses";
+import { errorText } from "../../api/http";
 import { useLive } from "../../api/live/use-live";
 import { type Preflight, type Robot, runPreflight, SIMULATOR } from "../../api/robots";
 import type { Run } from "../../api/runs";
@@ -35,14 +36,13 @@ function useLook(graph: string, seq: number, engines: readonly string[], behavio
   const { runner } = useLive();
   const umrf = useQuery({
     queryKey: ["umrf", graph, seq],
-    queryFn: ({ signal }) =>
-      fetchText(`/api/graphs/${encodeURIComponent(graph)}/umrf?at=${seq}`, { signal }),
+    queryFn: ({ signal }) => identifiedText(graph, seq, signal),
     staleTime: Number.POSITIVE_INFINITY,
   });
   const look = useQuery({
     queryKey: ["preflight", graph, seq, behaviours, ...engines],
     queryFn: ({ signal }) =>
-      runPreflight(runner ?? "", umrf.data ?? "", engines, behaviours, signal),
+      runPreflight(runner ?? "", { graph, umrf: umrf.data ?? "" }, engines, behaviours, signal),
     enabled: umrf.data !== undefined && runner !== undefined && engines.length > 0,
     refetchInterval: LOOK_AGAIN,
     gcTime: 0,

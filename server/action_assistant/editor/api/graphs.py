@@ -17,6 +17,7 @@ from action_assistant.editor.log.graph_events import graph_stream
 from action_assistant.editor.services import EditorState
 from action_assistant.editor.workers import encoded
 from action_assistant.errors import Conflict
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.json.embedded import JsonObject, UmrfGraph
 from action_assistant.umrf.model import Problem
 from action_assistant.web.auth.access import Needs, person_of
@@ -140,15 +141,18 @@ def _catalogue(app_state: EditorState) -> list[ControllerRouterHandler]:
 def _contents(app_state: EditorState) -> list[ControllerRouterHandler]:
     @get(
         "/api/graphs/{graph_id:str}/umrf",
-        summary="A graph as UMRF, now or after its change `at`",
+        summary="A graph as UMRF, now or after its change `at`; `identities`: with those of its actions",
         operation_id="getUmrf",
         responses={200: answer(UmrfGraph)},
     )
-    async def get_umrf(graph_id: str, at: Seq | None = None) -> Response[bytes]:
+    async def get_umrf(
+        graph_id: str, at: Seq | None = None, *, identities: bool = False
+    ) -> Response[bytes]:
         services = app_state.services
         await services.catalogue.require(graph_id)
         sight = await services.graph_reader.moment(graph_id, at)
-        text = await services.graph_reader.ask(contents.umrf, sight)
+        stamp = codec.Stamp(graph_id, None, None) if identities else None
+        text = await services.graph_reader.ask(contents.umrf, sight, stamp)
         return Response(text, media_type="application/json", headers={"x-seq": str(sight.seq)})
 
     @get(

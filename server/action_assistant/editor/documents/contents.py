@@ -131,9 +131,9 @@ def problems(sight: GraphAtSeq) -> bytes:
     return msgspec.json.encode(read(sight).problems)
 
 
-def umrf(sight: GraphAtSeq) -> bytes:
+def umrf(sight: GraphAtSeq, stamp: codec.Stamp | None = None) -> bytes:
     """The canonical text."""
-    return codec.write(read(sight).moment.graph).encode()
+    return codec.write(read(sight).moment.graph, stamp).encode()
 
 
 def released(sight: GraphAtSeq, stamp: codec.Stamp) -> tuple[str, bytes]:

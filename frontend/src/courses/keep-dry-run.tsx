@@ -1,0 +1,59 @@
+/** Makes a dry-run an expected course: with the decisions made in it. */
+import { Button } from "@mantine/core";
+import { notifications } from "@mantine/notifications";
+import { IconShieldCheck } from "@tabler/icons-react";
+import { useQueryClient } from "@tanstack/react-query";
+import { useState } from "react";
+import { expectDryRun, refreshCourses } from "../api/courses";
+import { useLive } from "../api/live/use-live";
+import { commandsOf, scriptOf } from "../dry-run/script";
+import type { DryRun } from "../dry-run/use-dry-run";
+import { useEditorContext } from "../edit-actions/editor-context";
+import { useThrottledLink } from "../sync/use-room";
+import { NameField } from "./name-field";
+
+/** Why a dry-run cannot be expected; null where it can. */
+function obstacleOf(run: DryRun): string | null {
+  if (run.moments.length === 0) return "nothing happens in it";
+  return commandsOf(run.decided).length === 0 ? null : "somebody presses Stop in it";
+}
+
+export function KeepDryRun({ run }: { run: DryRun }) {
+  const { id, graph, mayEdit, setPanel } = useEditorContext();
+  const { runner } = useLive();
+  const { seq, unsaved } = useThrottledLink();
+  const client = useQueryClient();
+  const [naming, setNaming] = useState(false);
+  if (!mayEdit || runner === undefined) return null;
+  const obstacle = obstacleOf(run);
+  const keep = async (name: string) => {
+    await expectDryRun(runner, { graph: id, seq, script: scriptOf(run.decided) }, name);
+    await refreshCourses(client);
+    setPanel("courses");
+    notifications.show({
+      title: "Expected from now on",
+      message: `“${name}” is held against every later version of the graph.`,
+    });
+  };
+  if (naming) {
+    return (
+      <NameField
+        proposed={`${graph.name || "Untitled"} goes so`.slice(0, 100)}
+        onKeep={keep}
+        onClose={() => setNaming(false)}
+      />
+    );
+  }
+  return (
+    <Button
+      size="compact-sm"
+      variant="default"
+      leftSection={<IconShieldCheck size={14} aria-hidden />}
+      disabled={obstacle !== null || unsaved > 0}
+      title={obstacle ?? undefined}
+      onClick={() => setNaming(true)}
+    >
+      Expect this course …
+    </Button>
+  );
+}
