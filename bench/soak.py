@@ -94,6 +94,11 @@ PARTS: Final[dict[str, Part]] = {
             "tests/test_stop_latency.py",
         ),
     ),
+    "sync": Part(
+        "1,000 schedules of a folder that is edited while it is kept in step with a server",
+        {"TEST_EXAMPLES": "100"},
+        ("tests/commands/sync/test_sync.py", "-k", "anybody_wrote"),
+    ),
     "archives": Part(
         "kill -9 at every step of putting runs and raw messages into archives",
         {"SOAK_ARCHIVE_EVERY": "1"},
