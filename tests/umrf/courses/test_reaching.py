@@ -140,6 +140,21 @@ def test_an_arrow_of_a_stopped_action_is_reached_by_having_it_stopped() -> None:
     assert found.script.behaviours["A0_0"][0].never
 
 
+def test_an_arrow_that_a_bypass_takes_on_its_way_to_the_exit_is_reached() -> None:
+    """Found by chance: A0 bypasses itself and A1 when it fails, and so the graph ends at once."""
+    usual = Conditions("run", "run", "bypass")
+    arrows = (
+        Relation(parent=ENTRY, child="k0", conditions=ENTRY_CONDITIONS),
+        Relation(parent="k0", child="k0", conditions=usual, required=False),
+        Relation(parent="k0", child="k1", conditions=usual, required=False),
+        Relation(parent="k1", child=EXIT, conditions=usual, required=False),
+    )
+    actions = tuple(Action(key=f"k{n}", name=f"A{n}") for n in range(2))
+    graph = Graph(name="g", actions=actions, relations=arrows)
+    found = reaching(graph, OutcomeArrow("k1", EXIT, "on_error"))
+    assert not isinstance(found, ArrowUnreachable), found
+
+
 def test_an_arrow_behind_something_that_waits_for_ever_is_unreachable() -> None:
     """A2 wants to hear of A3, which only A2 begins."""
     graph = chain(Conditions("run"), Conditions("run"))

@@ -80,6 +80,9 @@ class _Asked(Instant):
             self.asked.add((place, edge.child, result))
         return super()._ask(place, edge, result)
 
+    def _only_ends(self) -> bool:
+        return False  # each edge shall be seen, also where it is known to lead to the exit
+
     def after(self, before: _GraphState) -> _GraphState:
         """The state that follows. Times do not matter: any order of ends is looked at."""
         states = list(before.states)
