@@ -20,6 +20,29 @@ export function identifiedText(graph: string, seq: number, signal?: AbortSignal)
   return fetchText(route, { ...(signal && { signal }) });
 }
 
+/** The expected courses of a graph held against a text of it. */
+function checkCourses(
+  runner: string,
+  graph: string,
+  umrf: string,
+  signal: AbortSignal,
+): Promise<CheckedCourses> {
+  const url = `${runner}/api/expectations/check`;
+  return fetchJson(url, { method: "POST", body: { graph, umrf }, signal, timeoutMs: LONG });
+}
+
+/** The same for a text that is no moment of the graph yet; `of` tells it from others. */
+export function useCoursesOfText(graph: string, umrf: string, of: readonly unknown[]) {
+  const { runner } = useLive();
+  return useQuery({
+    queryKey: [COURSES, graph, "text", ...of],
+    queryFn: ({ signal }) => checkCourses(runner ?? "", graph, umrf, signal),
+    enabled: runner !== undefined,
+    placeholderData: keepPreviousData,
+    staleTime: 30_000,
+  });
+}
+
 /** The expected courses held against a moment; the last answer stays until the next. */
 export function useCheckedCourses(graph: string, seq: number) {
   const { runner } = useLive();
@@ -27,9 +50,7 @@ export function useCheckedCourses(graph: string, seq: number) {
     queryKey: [COURSES, graph, seq],
     queryFn: async ({ signal }) => {
       const umrf = await identifiedText(graph, seq, signal);
-      const url = `${runner}/api/expectations/check`;
-      const body = { graph, umrf };
-      return fetchJson<CheckedCourses>(url, { method: "POST", body, signal, timeoutMs: LONG });
+      return checkCourses(runner ?? "", graph, umrf, signal);
     },
     enabled: runner !== undefined && seq > 0,
     placeholderData: keepPreviousData,
