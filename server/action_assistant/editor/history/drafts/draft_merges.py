@@ -49,8 +49,7 @@ class WantedMerge(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class MergePreview(msgspec.Struct, frozen=True, kw_only=True):
     """What a merge would do to the side `into`, where everything that has no choice stays as it is there.
 
-    `seq`, `draft_seq`: the moments that it is about. `changes`: what would change. `dropped`: arrows
-    that stay away, since what they lead to is not there. `problems`: those that this side has not now.
+    `seq`, `draft_seq`: the moments that it is about. `changes`: what would change. `problems`: those that this side has not now.
     `authors`: whose changes they are. `origin_did`, `draft_did`: what each side did since they were one.
     """
 
@@ -59,7 +58,6 @@ class MergePreview(msgspec.Struct, frozen=True, kw_only=True):
     draft_seq: int
     changes: Changes
     conflicts: tuple[DraftConflict, ...]
-    dropped: tuple[str, ...]
     problems: tuple[Problem, ...]
     authors: tuple[PersonRef, ...]
     origin_did: Changes
@@ -106,7 +104,6 @@ class DraftMerges:
             draft_seq=pair.draft.seq,
             changes=found.changes,
             conflicts=found.conflicts,
-            dropped=found.dropped,
             problems=found.problems,
             authors=tuple(self._people.person(each) for each in authors),
             origin_did=found.did["origin"],

@@ -45,11 +45,10 @@ class FoundConflict(msgspec.Struct, frozen=True):
 
 class KeyMerge(msgspec.Struct, frozen=True):
     """What our side has to set so that it is merged; UNSET for what goes. Where nobody has chosen, what
-    stands on our side stays. `dropped`: arrows that would have led to what is not there."""
+    stands on our side stays."""
 
     targets: dict[Place, Any]
     conflicts: tuple[FoundConflict, ...]
-    dropped: tuple[str, ...]
 
 
 def merged(base: Places, ours: Places, theirs: Places, choices: Choices) -> KeyMerge:
@@ -107,14 +106,14 @@ class _Merge:
                     self._choose(place, owner)
         for place in lists:
             self._join(place)
-        dropped = self._drop(arrows)
+        self._drop(arrows)
         ours = self._sides["ours"]
         targets = {
             place: self._result.get(place, UNSET)
             for place in sorted({*ours, *self._result})
             if not is_same(ours.get(place, UNSET), self._result.get(place, UNSET))
         }
-        return KeyMerge(targets, tuple(self._conflicts), dropped)
+        return KeyMerge(targets, tuple(self._conflicts))
 
     # --- what came or went ------------------------------------------------------------------------
 
@@ -204,25 +203,20 @@ class _Merge:
 
     # --- arrows without ends -----------------------------------------------------------------------
 
-    def _drop(self, arrows: Iterable[str]) -> tuple[str, ...]:
+    def _drop(self, arrows: Iterable[str]) -> None:
         """No arrow comes to be without its ends; what was like that on our side is left alone."""
         alive = exist(self._result) | _ENDS
         ours, there = self._sides["ours"], self._there["ours"]
-        dropped = []
         for arrow in arrows:
             ends = ends_of(arrow)
             if ends is None or alive.issuperset(ends[:2]):
                 continue
             places = self._owners[arrow]
             was_so = arrow in there and not (there | _ENDS).issuperset(ends[:2])
-            had = any(place in self._result for place in places if place[0] == "relations")
             for place in places:
                 self._result.pop(place, None)
             if was_so:
                 self._result.update({place: ours[place] for place in places if place in ours})
-            elif had:
-                dropped.append(arrow)
-        return tuple(dropped)
 
 
 def _is_order(place: Place) -> bool:

@@ -51,7 +51,6 @@ class FoundMerge(msgspec.Struct, frozen=True):
     places: tuple[Place, ...]
     conflicts: tuple[DraftConflict, ...]
     changes: Changes
-    dropped: tuple[str, ...]
     problems: tuple[Problem, ...]
     did: dict[DraftSide, Changes]
 
@@ -84,7 +83,6 @@ def merging(
         tuple(found.targets),
         tuple(teller.told(conflict) for conflict in found.conflicts),
         _changes(mine.moment.graph, graph, {owner_of(*place) for place in found.targets}),
-        tuple(teller.label(arrow) for arrow in found.dropped),
         tuple(worse[:_WORSE]),
         teller.did,
     )
