@@ -307,7 +307,8 @@ export interface EditorApi {
         at: string;
         note: string;
         seq: number;
-        answers: EditorApi["DraftAnswer"][];
+        /** @default [] */
+        answers?: EditorApi["DraftAnswer"][];
     };
     /**
      * DraftView
@@ -332,7 +333,7 @@ export interface EditorApi {
         state: "merged" | "open" | "proposed";
         ahead: number | null;
         behind: number | null;
-        proposal: EditorApi["DraftProposal"] | null;
+        proposal?: EditorApi["DraftProposal"];
     };
     /**
      * EdgeEval
@@ -387,7 +388,7 @@ export interface EditorApi {
         /** Format: date-time */
         at: string;
         seq: number;
-        merged: EditorApi["MergedBy"] | null;
+        merged?: EditorApi["MergedBy"];
         field: string;
     };
     /**
@@ -402,7 +403,7 @@ export interface EditorApi {
         /** Format: date-time */
         at: string;
         seq: number;
-        merged: EditorApi["MergedBy"] | null;
+        merged?: EditorApi["MergedBy"];
     };
     /**
      * GoneBack

@@ -22,7 +22,7 @@ _ONE_GO: Final = (
 _MOST: Final = 1000  # values of one field
 
 
-class FieldValue(msgspec.Struct, frozen=True):
+class FieldValue(msgspec.Struct, frozen=True, omit_defaults=True):
     """The value that somebody gave a field by the change `seq`, and the one before. None is no value.
     `merged`: how it came from a draft, where that person gave it the value; `seq` is then the merge."""
 
@@ -34,7 +34,7 @@ class FieldValue(msgspec.Struct, frozen=True):
     merged: MergedBy | None = None
 
 
-class FieldBlame(FieldValue, frozen=True, kw_only=True):
+class FieldBlame(FieldValue, frozen=True, kw_only=True, omit_defaults=True):
     """Of which field, as the document's keys name it (docs/contracts.md 1): `in/speed`, `on_true`, "" for
     the name of an action; and `position`."""
 

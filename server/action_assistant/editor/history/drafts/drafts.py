@@ -39,7 +39,7 @@ class DraftAnswer(msgspec.Struct, frozen=True):
     seq: int
 
 
-class DraftProposal(msgspec.Struct, frozen=True):
+class DraftProposal(msgspec.Struct, frozen=True, omit_defaults=True):
     """Somebody would like the draft to be merged. `answers`: the last one of each person, in order of
     time."""
 
@@ -57,7 +57,7 @@ class DraftMoment(msgspec.Struct, frozen=True):
     seq: int
 
 
-class DraftView(msgspec.Struct, frozen=True, kw_only=True):
+class DraftView(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """A draft. `seq` and `origin_seq` are the last changes of it and of what it is a draft of; `ahead` and
     `behind`: how many things either changed since they were one, None where that cannot be said."""
 
