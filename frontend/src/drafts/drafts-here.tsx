@@ -91,7 +91,7 @@ export function DraftsHere() {
   const { id, past, mayEdit } = useEditorContext();
   const found = useDrafts(id);
   const [making, setMaking] = useState(false);
-  const [merging, setMerging] = useState<Draft | null>(null);
+  const [merging, setMerging] = useState<GraphDraft | null>(null);
   const drafts = [...(found.data ?? [])].sort((a, b) => rank(a) - rank(b));
   if (drafts.length === 0 && !mayEdit) return null;
   return (
