@@ -14,8 +14,8 @@ from litestar.response import Stream
 from litestar.types import ControllerRouterHandler
 
 from action_assistant.errors import BadInput, NotFound, TooMany
+from action_assistant.runner.api import approvals, robots
 from action_assistant.runner.api import review as review
-from action_assistant.runner.api import robots
 from action_assistant.runner.api.caller import COUNTED, GRAPH_BODY, author_of, body_of, start_of
 from action_assistant.runner.api.live import (
     PageMessage,
@@ -57,6 +57,7 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
         *_moves(services),
         *_reads(services),
         *robots.routes(services),
+        *approvals.routes(services),
         *review.routes(services),
         _live(services),
     ]
