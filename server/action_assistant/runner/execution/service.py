@@ -71,10 +71,8 @@ class ExecutionService:
         self.robots = robots
         self.history = RunHistory(ledger, past)
         self.open: dict[str, OpenRun] = {}
-        self._ledger = ledger
-        self._clock_us = clock_us
-        self._tasks = tasks
-        self._run_in_worker = run_in_worker
+        self._ledger, self._clock_us = ledger, clock_us
+        self._tasks, self._run_in_worker = tasks, run_in_worker
         self._watchers: list[Callable[[OpenRun], None]] = []
         self._news = anyio.Event()
         self._places: dict[str, anyio.Lock] = {}
