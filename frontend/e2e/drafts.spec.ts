@@ -175,3 +175,11 @@ test("a merge is undone like what somebody did", async () => {
     await expect(card(each, "Drive")).toContainText("0.9");
   }
 });
+
+test("a draft is deleted, and can be brought back", async () => {
+  const { page } = ada;
+  await drafts(page).getByRole("button", { name: "Delete the draft gentler grip" }).click();
+  await expect(drafts(page).getByRole("listitem")).toHaveCount(0);
+  const deleted = await product.ask<{ draft_of?: { name: string } }[]>("/api/graphs?deleted=true");
+  expect(deleted.map(({ draft_of }) => draft_of?.name)).toEqual(["gentler grip"]);
+});

@@ -1,5 +1,6 @@
 /** Above the canvas of a draft: of what it is one, how far both are apart, and what can be done. */
 import { Button } from "@mantine/core";
+import { useDebouncedValue } from "@mantine/hooks";
 import { IconGitBranch } from "@tabler/icons-react";
 import { useState } from "react";
 import { Link } from "wouter";
@@ -15,6 +16,9 @@ import { useDraftStep } from "./use-draft-step";
 const MergeDialog = lazyPart(() => import("./merge-dialog").then((part) => part.MergeDialog));
 const CompareDialog = lazyPart(() => import("./compare-dialog").then((part) => part.CompareDialog));
 const ProposeDialog = lazyPart(() => import("./propose-dialog").then((part) => part.ProposeDialog));
+
+/** How far both are apart is asked for when the hands rest. */
+const SETTLED_MS = 800;
 
 type Dialog = "compare" | "merge" | "take-over" | "propose";
 
@@ -96,7 +100,7 @@ function Steps({ draft, onOpen }: StepsProps) {
 }
 
 function Bar({ id }: { id: string }) {
-  const { seq } = useThrottledLink();
+  const [seq] = useDebouncedValue(useThrottledLink().seq, SETTLED_MS);
   const [open, setOpen] = useState<Dialog | null>(null);
   const draft = useDraft(id, seq).data;
   if (!draft) return null;

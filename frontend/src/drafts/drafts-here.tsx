@@ -1,10 +1,12 @@
 /** The drafts of the open graph, above its history: proposals first, and a new one. */
-import { Button } from "@mantine/core";
-import { IconCheck, IconGitBranch, IconX } from "@tabler/icons-react";
+import { ActionIcon, Button } from "@mantine/core";
+import { notifications } from "@mantine/notifications";
+import { IconCheck, IconGitBranch, IconTrash, IconX } from "@tabler/icons-react";
+import { type QueryClient, useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
 import { Link } from "wouter";
 import { answerProposal, type GraphDraft, useDrafts } from "../api/documents/drafts";
-import { authorName } from "../api/graphs";
+import { authorName, deleteGraph, refreshGraphs } from "../api/graphs";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { lazyPart } from "../ui/parts/lazy-part";
 import { OverlayBoundary } from "../ui/parts/part-boundary";
@@ -67,8 +69,20 @@ function ProposalOf({ draft, onMerge }: DraftRowProps) {
   );
 }
 
+async function deleteDraft({ id, name }: GraphDraft, client: QueryClient): Promise<void> {
+  await deleteGraph(id);
+  await refreshGraphs(client);
+  notifications.show({
+    title: `“${name}” is deleted`,
+    message: "It can be brought back from the list of graphs.",
+  });
+}
+
 function Row(props: DraftRowProps) {
   const { draft } = props;
+  const { mayEdit } = useEditorContext();
+  const client = useQueryClient();
+  const { busy, wrong, step } = useDraftStep();
   return (
     <li className={style.row} data-state={draft.state}>
       <Link to={`/graphs/${draft.id}`}>
@@ -79,7 +93,18 @@ function Row(props: DraftRowProps) {
         {" · "}
         {draft.state === "merged" ? "merged" : apartWords(draft)}
       </span>
+      {mayEdit && (
+        <ActionIcon
+          className={style.remove ?? ""}
+          aria-label={`Delete the draft ${draft.name}`}
+          loading={busy}
+          onClick={() => void step(() => deleteDraft(draft, client))}
+        >
+          <IconTrash size={15} />
+        </ActionIcon>
+      )}
       <ProposalOf {...props} />
+      {wrong !== "" && <p role="alert">{wrong}</p>}
     </li>
   );
 }

@@ -1,5 +1,6 @@
 """The drafts of graphs: made, told of, proposed, and answered."""
 
+from collections import OrderedDict
 from collections.abc import Sequence
 from datetime import datetime
 from typing import Annotated, Any, Final, Literal, TypeAlias
@@ -25,6 +26,10 @@ from action_assistant.web.workers.lanes import RunInWorker, run_here
 #: `merged`: it holds nothing that its origin has not been given.
 DraftState: TypeAlias = Literal["open", "proposed", "merged"]
 Remark: TypeAlias = Annotated[str, msgspec.Meta(max_length=2000)]
+
+#: A draft, what both sides are compared with, and the last changes of both.
+_Moments: TypeAlias = tuple[Any, ...]
+_REMEMBERED: Final = 500
 
 _ABOUT: Final = (h.PROPOSED, h.WITHDRAWN, h.ANSWERED, h.MERGED)
 
@@ -112,6 +117,7 @@ class Drafts:
         self._people = people
         self._index = index
         self._run_in_worker = run_in_worker
+        self._distances: OrderedDict[_Moments, tuple[int, int]] = OrderedDict()
 
     async def make(self, origin: str, author: str, new: NewDraft) -> DraftView:
         """A draft of a graph. Raises BadInput, NotFound, Conflict, Unavailable."""
@@ -214,8 +220,8 @@ class Drafts:
 
     async def _view(self, row: Row[Any]) -> DraftView:
         draft: GraphView = await self._catalogue.get(row.id)
-        ahead, behind, origin_seq = await self._distance(row)
-        origin = (await self._rows(graph_table.c.id == row.draft_of))[0]
+        (origin,) = await self._rows(graph_table.c.id == row.draft_of)
+        ahead, behind, origin_seq = await self._distance(row, origin)
         proposal = await self._proposal(row)
         merged = row.merged_seq == draft.seq
         return DraftView(
@@ -236,13 +242,22 @@ class Drafts:
             proposal=None if merged else proposal,
         )
 
-    async def _distance(self, row: Row[Any]) -> tuple[int | None, int | None, int]:
-        try:
+    async def _distance(
+        self, row: Row[Any], origin: Row[Any]
+    ) -> tuple[int | None, int | None, int]:
+        """How far both sides are apart, and the last change of the origin."""
+        newest = [await self._journal.newest(h.graph_stream(g)) for g in (origin.id, row.id)]
+        if origin.deleted_at is not None:
+            return None, None, newest[0]
+        moments = row.id, row.base_graph, row.base_seq, *newest
+        known = self._distances.get(moments)
+        if known is None:
             pair = await self.pair(row.id)
-        except NotFound:  # what it is a draft of was deleted
-            return None, None, await self._journal.newest(h.graph_stream(row.draft_of))
-        did = await self._run_in_worker(apart, pair.base, pair.origin, pair.draft)
-        return count(did["draft"]), count(did["origin"]), pair.origin.seq
+            did = await self._run_in_worker(apart, pair.base, pair.origin, pair.draft)
+            known = self._distances[moments] = count(did["draft"]), count(did["origin"])
+            if len(self._distances) > _REMEMBERED:
+                self._distances.popitem(last=False)
+        return *known, newest[0]
 
     async def _row(self, draft: str) -> Row[Any]:
         await self._catalogue.require(draft, "graph")

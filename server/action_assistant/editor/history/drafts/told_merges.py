@@ -111,6 +111,9 @@ class _Teller:
         self._graph = read_maps(base)
         self._sides = {side: _places(maps) for side, maps in sides.items()}
         self._graphs = {side: read_maps(maps) for side, maps in sides.items()}
+        self._differences = {
+            side: difference((0, self._graph), (0, graph)) for side, graph in self._graphs.items()
+        }
         self._into: Final = into
         shown = [self._graph, self._graphs[_other(into)], self._graphs[into]]
         self._names = {a.key: a.full_name for graph in shown for a in graph.actions}
@@ -144,7 +147,7 @@ class _Teller:
 
     def _thing(self, conflict: FoundConflict, side: DraftSide) -> Changes:
         """What a side did to an action and its arrows, or to an arrow."""
-        found = difference((0, self._graph), (0, self._graphs[side]))
+        found = self._differences[side]
         owner, ends = conflict.owner, ends_of(conflict.owner)
 
         def belongs(change: RelationChange) -> bool:
@@ -168,7 +171,7 @@ class _Teller:
         if is_aid(owner):
             return Changes(actions=(ActionChange("changed", owner, label, (field,)),))
         if owner:
-            notes = difference((0, self._graph), (0, self._graphs[side])).notes
+            notes = self._differences[side].notes
             mine: tuple[NoteChange, ...] = tuple(n for n in notes if f"g/{n.id}" == owner)
             return Changes(notes=mine)
         return Changes(fields=(field,))
