@@ -124,7 +124,7 @@ test("in sight on every width, whatever else the bar has to say", async ({ brows
   const headers = { "content-type": "application/json" };
   const body = JSON.stringify({ name });
   await product.ask(`/api/graphs/${id}`, { method: "PATCH", headers, body });
-  await expect(page.getByText("Draft differs from running")).toBeVisible();
+  await expect(page.getByText("Graph differs from running")).toBeVisible();
   for (const width of [1600, 1440, 1280, 1101, 1024, 801, 640, 390]) {
     await page.setViewportSize({ width, height: 860 });
     await expect(async () => {

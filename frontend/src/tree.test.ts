@@ -50,11 +50,13 @@ const LAYERS: Readonly<Record<string, readonly string[]>> = {
   outline: BELOW_EDITOR,
   packages: BELOW_EDITOR,
   past: [...BELOW_EDITOR, "history"],
+  drafts: [...BELOW_EDITOR, "history", "past"],
   inspector: [...BELOW_EDITOR, "people", "comments"],
   editor: [...BELOW_EDITOR, "people", "comments", "find", "outline", "inspector"].concat([
     "history",
     "packages",
     "past",
+    "drafts",
   ]),
   // Features of their own know neither the editor nor each other.
   runs: ["graph", "ui", "api", "status", "canvas"],

@@ -229,3 +229,23 @@ def test_a_run_fails_the_command_only_if_it_did_not_finish_or_is_known_to_have_f
     assert found == code
     assert words.startswith(state)
     assert ("does not tell" in words) == (state == "finished" and result is None and code == 0)
+
+
+def test_a_draft_is_made_looked_at_and_merged(product: Product, files: dict[str, str]) -> None:
+    graph = imported(product, files["graph"])
+    draft = product.cli("drafts", "new", graph, "--name", "gentler grip").stdout.strip()
+    assert f"{draft}  open  0 ahead, 0 behind  gentler grip" in (
+        product.cli("drafts", "list", graph).stdout
+    )
+    assert "pair" in product.cli("export", draft).stdout
+    for each, name in ((draft, "one"), (graph, "other")):
+        with product.editor() as http:
+            http.patch(f"/api/graphs/{each}", json={"name": name})
+    looked = product.cli("drafts", "merge", draft)
+    assert looked.returncode == 1
+    assert "? both changed name of the graph: --choose 'meta/name=origin|draft'" in looked.stdout
+    assert 'draft: name: "pair" -> "one"' in looked.stdout
+    merged = product.cli("drafts", "merge", draft, "--choose", "meta/name=draft")
+    assert (merged.returncode, merged.stdout.splitlines()[-1]) == (0, "merged: change 3")
+    assert product.cli("drafts", "merge", draft, "--choose", "nowhere").returncode == 2
+    assert product.cli("export", "AbCdEfGhIjKl").returncode == 1

@@ -114,6 +114,21 @@ export function commandedGraph(runner: string, name: string, seq: number): Promi
   return fetchText(`${path(runner, name)}/events/${seq}/umrf`);
 }
 
+export type Approval = RunnerApi["Approval"];
+
+/** Who has said yes to exactly the graph with this digest. */
+export function fetchApprovals(
+  runner: string,
+  digest: string,
+  signal: AbortSignal,
+): Promise<Approval[]> {
+  return fetchJson(`${runner}/api/approvals?digest=${encodeURIComponent(digest)}`, { signal });
+}
+
+export function approve(runner: string, body: RunnerApi["ApprovalRequest"]): Promise<Approval> {
+  return fetchJson(`${runner}/api/approvals`, { method: "POST", body });
+}
+
 /** What stands between a graph and its start, engine by engine. Sends nothing but a get. */
 export function runPreflight(
   runner: string,

@@ -28,6 +28,7 @@ import { useGraphLink } from "./use-graph-link";
 import type { Past } from "./use-past";
 
 const PastBar = lazyPart(() => import("../past/past-bar").then((part) => part.PastBar));
+const DraftBar = lazyPart(() => import("../drafts/draft-bar").then((part) => part.DraftBar));
 const DryRunBar = lazyPart(() => import("./dry-run/dry-run-bar").then((part) => part.DryRunBar));
 
 interface Props {
@@ -160,6 +161,7 @@ function Inside(props: Props) {
 
   return (
     <div className={style.whole}>
+      <Above id={context.id} />
       <div
         className={style.stage}
         ref={frame}
@@ -207,6 +209,15 @@ function useDrawnContext({ seen }: Past): EditorContext {
   // What is gone since then is drawn where it stood.
   const graph = calm.past === null ? now : (seen?.changes?.shown ?? calm.graph);
   return useMemo<EditorContext>(() => ({ ...calm, graph }), [calm, graph]);
+}
+
+/** Of what this is a draft, if it is one. */
+function Above({ id }: { id: string }) {
+  return (
+    <PartBoundary waiting={null}>
+      <DraftBar id={id} />
+    </PartBoundary>
+  );
 }
 
 interface BelowProps {

@@ -45,6 +45,7 @@ const QuickAdd = lazyPart(() => import("./canvas/quick-add").then((part) => part
 const HistoryPanel = lazyPart(() =>
   import("../past/history-panel").then((part) => part.HistoryPanel),
 );
+const DraftsHere = lazyPart(() => import("../drafts/drafts-here").then((part) => part.DraftsHere));
 const PastDetails = lazyPart(() => import("../past/past-details").then((part) => part.PastDetails));
 const Outline = lazyPart(() => import("../outline/outline").then((part) => part.Outline));
 
@@ -187,9 +188,14 @@ function DetailsPane({ past: { place, seen }, panel, beside, children }: Details
 }
 
 function HistoryPane() {
+  const drafts = (
+    <PartBoundary waiting={null}>
+      <DraftsHere />
+    </PartBoundary>
+  );
   return (
     <PartBoundary>
-      <HistoryPanel />
+      <HistoryPanel above={drafts} />
     </PartBoundary>
   );
 }

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import type { HistoryEntry } from "../api/documents/history";
-import { doneWords, isWayBack, momentBefore } from "./history-words";
+import { doneWords, isWayBack, momentBefore, namesWords } from "./history-words";
 
 const entry = (more: Partial<HistoryEntry>): HistoryEntry => ({
   kind: "edited",
@@ -21,4 +21,22 @@ test("the moment on screen is no way back", () => {
   expect(isWayBack(entry({}), 4)).toBe(false);
   expect(isWayBack(entry({}), 5)).toBe(true);
   expect(doneWords(entry({ kind: "restored" }))).toBe("went back");
+});
+
+test("a merge names the draft and those who worked on it", () => {
+  const people = ["Ben", "Mari"].map((name) => ({ id: name, name }));
+  const merged = { draft: "d", name: "gentler grip", from_seq: 2, seq: 9, authors: people };
+  const words = (source: string) =>
+    doneWords(entry({ kind: "merged", merged: { ...merged, source } }));
+  expect(words("d")).toBe("merged the draft “gentler grip” by Ben and Mari");
+  expect(words("g")).toBe("took over what Ben and Mari did");
+});
+
+test("names are said as people say them", () => {
+  const all = ["Ben", "Mari", "Ada", "Zoe"].map((name) => ({ id: name, name }));
+  expect(namesWords([])).toBe("nobody");
+  expect(namesWords(all.slice(0, 1))).toBe("Ben");
+  expect(namesWords(all.slice(0, 3))).toBe("Ben, Mari and Ada");
+  expect(namesWords(all)).toBe("Ben, Mari and 2 others");
+  expect(namesWords([{ id: "x", name: "" }])).toBe("somebody");
 });

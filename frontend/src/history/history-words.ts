@@ -1,5 +1,6 @@
 /** What was done to a document, in a few words. Pure. */
 import type { HistoryEntry } from "../api/documents/history";
+import { authorName, type VersionAuthor } from "../api/graphs";
 
 const DONE: Readonly<Record<HistoryEntry["kind"], string>> = {
   created: "made it",
@@ -8,21 +9,38 @@ const DONE: Readonly<Record<HistoryEntry["kind"], string>> = {
   restored: "went back",
   reverted: "took changes back",
   adapted: "took parameters over",
+  merged: "merged a draft",
   published: "kept a version",
   deleted: "deleted it",
   recovered: "brought it back",
 };
 
-type Done = Pick<HistoryEntry, "kind" | "version" | "adapted">;
+type Done = Pick<HistoryEntry, "kind" | "version" | "adapted" | "merged">;
+type MergedIn = NonNullable<HistoryEntry["merged"]>;
 
-export function doneWords({ kind, version, adapted }: Done): string {
+/** `Ben and Mari`, `Ben, Mari and 2 others`. */
+export function namesWords(people: readonly VersionAuthor[]): string {
+  const names = people.map((person) => authorName(person));
+  if (names.length > 3) return `${names.slice(0, 2).join(", ")} and ${names.length - 2} others`;
+  const last = names.pop() ?? "nobody";
+  return names.length === 0 ? last : `${names.join(", ")} and ${last}`;
+}
+
+function mergedWords({ draft, name, source, authors }: MergedIn): string {
+  const who = namesWords(authors);
+  return source === draft ? `merged the draft “${name}” by ${who}` : `took over what ${who} did`;
+}
+
+export function doneWords({ kind, version, adapted, merged }: Done): string {
+  if (merged) return mergedWords(merged);
   if (adapted) return `took parameters of ${adapted.action} over`;
   return kind === "published" && version?.label ? `kept version ${version.label}` : DONE[kind];
 }
 
 /** The moment before it, with which it is compared; null where there was nothing. */
 export function momentBefore({ kind, seq, from_seq }: HistoryEntry): number | null {
-  if (kind !== "edited" && kind !== "restored" && kind !== "adapted") return null;
+  if (kind !== "edited" && kind !== "restored" && kind !== "adapted" && kind !== "merged")
+    return null;
   const before = (from_seq ?? seq) - 1;
   return before >= 1 ? before : null;
 }

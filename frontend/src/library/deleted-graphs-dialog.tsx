@@ -47,7 +47,10 @@ function Row({ graph, kind, now }: { graph: GraphSummary; kind: Kind; now: numbe
   return (
     <li className={style.row}>
       <span className={style.text}>
-        <bdi className={style.name}>{graph.name || "Untitled"}</bdi>
+        <bdi className={style.name}>
+          {graph.name || "Untitled"}
+          {graph.draft_of && `, draft “${graph.draft_of.name}”`}
+        </bdi>
         <span className={style.sub}>
           {[
             ...(kind === "graph" ? [actionsOf(graph)] : []),

@@ -15,6 +15,7 @@ function subtitle(graph: GraphSummary, words: string | null, now: number): strin
   if (graph.actions !== undefined) {
     parts.push(graph.actions === 1 ? "1 action" : `${graph.actions} actions`);
   }
+  if (graph.drafts) parts.push(graph.drafts === 1 ? "1 draft" : `${graph.drafts} drafts`);
   const at = instant(graph.updated_at);
   if (at !== null) parts.push(ago(at, now));
   return parts.join(" · ");

@@ -31,8 +31,13 @@ function LineWords({ parts }: { parts: readonly LinePart[] }) {
   return parts.map((part, i) => <Part key={i} part={part} />);
 }
 
-function Lines({ changes }: { changes: NonNullable<HistoryEntry["changes"]> }) {
-  const { lines, more } = shortened(changes, MOST);
+interface LinesProps {
+  changes: NonNullable<HistoryEntry["changes"]>;
+  most?: number;
+}
+
+export function ChangeLines({ changes, most = MOST }: LinesProps) {
+  const { lines, more } = shortened(changes, most);
   return (
     <>
       {lines.map((line, i) => (
@@ -129,7 +134,7 @@ export function EntryRow(props: Props) {
             <time dateTime={entry.until}>{timeRange(entry)}</time>
           </span>
           {did !== null && <span className={style.did}>{did}</span>}
-          {entry.changes && <Lines changes={entry.changes} />}
+          {entry.changes && <ChangeLines changes={entry.changes} />}
         </span>
       </button>
       {chosen && mayEdit && <WaysBack {...props} />}

@@ -1,6 +1,6 @@
 /** The history of the open graph beside its canvas: days, what people did in words, versions and runs. */
 import { Button, Skeleton } from "@mantine/core";
-import { type KeyboardEvent, useEffect, useRef, useState } from "react";
+import { type KeyboardEvent, type ReactNode, useEffect, useRef, useState } from "react";
 import type { HistoryEntry } from "../api/documents/history";
 import { versionName } from "../api/graphs";
 import { errorText } from "../api/http";
@@ -125,7 +125,8 @@ function SinceLastGood({ timeline: { lastGood } }: { timeline: Timeline }) {
   );
 }
 
-export function HistoryPanel() {
+/** `above`: what else is there of the graph, as its drafts. */
+export function HistoryPanel({ above }: { above?: ReactNode }) {
   const { id } = useEditorContext();
   const timeline = useTimeline(id);
   const now = useNow(60_000);
@@ -134,6 +135,7 @@ export function HistoryPanel() {
       <h2 className="visually-hidden">History</h2>
       {timeline.isPending && <Skeleton height={160} m="sm" />}
       {timeline.error && <p role="alert">{errorText(timeline.error)}</p>}
+      {above}
       <SinceLastGood timeline={timeline} />
       {daysOf(timeline.items).map(({ at, items }) => (
         <section key={new Date(at).toDateString()} className={style.day}>

@@ -17,7 +17,12 @@ import { blamedName, blamedValue, toldFields } from "./blame-words";
 import { useGoingBack } from "./going-back";
 import style from "./past-details.module.css";
 
-function By({ value, color }: { value: Pick<FieldValue, "author" | "at">; color: string }) {
+interface ByProps {
+  value: Pick<FieldValue, "author" | "at" | "merged">;
+  color: string;
+}
+
+function By({ value, color }: ByProps) {
   const now = useNow(60_000);
   const at = instant(value.at);
   return (
@@ -25,6 +30,12 @@ function By({ value, color }: { value: Pick<FieldValue, "author" | "at">; color:
       <i style={{ "--c": color } as CSSProperties} aria-hidden />
       <bdi>{authorName(value.author)}</bdi>
       {at !== null && ` · ${day(at, now)} ${hourMinute(at)}`}
+      {value.merged && (
+        <span>
+          {" · merged by "}
+          <bdi>{authorName(value.merged.by)}</bdi>
+        </span>
+      )}
     </span>
   );
 }

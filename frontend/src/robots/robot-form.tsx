@@ -69,6 +69,11 @@ function Profile(props: {
         checked={is("bypass_fixed")}
         onChange={(event) => put("bypass_fixed", event.currentTarget.checked)}
       />
+      <Switch
+        label="It takes only what a second person has said yes to"
+        checked={is("second_person")}
+        onChange={(event) => put("second_person", event.currentTarget.checked)}
+      />
     </Stack>
   );
 }

@@ -30,7 +30,7 @@ export function DraftStatus({ run, label, graph, seq, settle, obstacle }: Props)
   if (run === null || run.ended_at !== null) return null;
   return (
     <span className={style.word} data-differs={found.length > 0 || undefined}>
-      {found.length > 0 ? "Draft differs from running" : "Running"} <i>{label}</i>
+      {found.length > 0 ? "Graph differs from running" : "Running"} <i>{label}</i>
       {found.length > 0 && (
         <PartBoundary waiting={null}>
           <ModifyRun

@@ -3,13 +3,14 @@
 import argparse
 import contextlib
 import os
+import re
 import socket
 import ssl
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import msgspec
 
@@ -20,6 +21,10 @@ from action_assistant.web.network.certificate import Certificate
 
 if TYPE_CHECKING:  # slow to load, and most commands do not need it
     import httpx
+
+
+#: As ids of graphs are made.
+_MADE_ID: Final = re.compile(r"[A-Za-z0-9]{12}")
 
 
 def command(
@@ -69,6 +74,8 @@ class Server:
         if any(graph["id"] == asked for graph in graphs):
             return asked
         named = [graph["id"] for graph in graphs if graph["name"] == asked]
+        if not named and _MADE_ID.fullmatch(asked):  # drafts stand in no list
+            return str(self.editor("GET", f"/api/graphs/{asked}").json()["id"])
         if len(named) != 1:
             raise No(
                 f"No graph is called {asked!r}."

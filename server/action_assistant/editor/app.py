@@ -12,6 +12,7 @@ from litestar.types import ASGIApp, ControllerRouterHandler
 
 from action_assistant import paths
 from action_assistant.editor.api import (
+    drafts,
     drawing,
     editor,
     graphs,
@@ -137,6 +138,7 @@ def _routes(
         *graphs.routes(app_state),
         *history.routes(app_state),
         *versions.routes(app_state),
+        *drafts.routes(app_state),
         *drawing.routes(app_state),
         *packages.routes(app_state),
         *library.routes(app_state),

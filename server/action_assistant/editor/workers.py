@@ -24,6 +24,7 @@ _PRELOADED: Final = (
     "action_assistant.editor.history.told_changes",
     "action_assistant.editor.history.reverting",
     "action_assistant.editor.history.parting",
+    "action_assistant.editor.history.drafts.told_merges",
 )
 _NICE: Final = 5
 

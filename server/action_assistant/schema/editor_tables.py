@@ -9,7 +9,9 @@ from action_assistant.schema.log_tables import NAMES, log_tables
 EDITOR: Final = MetaData(naming_convention=NAMES)
 editor_event, editor_head, editor_snapshot = log_tables(EDITOR)
 #: A graph of the catalogue, or an action of the library (`kind`). `name` and `description` follow the
-#: document.
+#: document. A draft was made of the graph `draft_of` after its change `drafted_seq`; what both are compared
+#: with is `base_graph` after its change `base_seq`; `merged_seq` is the change up to which the draft was
+#: merged.
 graph: Final = Table(
     "graph",
     EDITOR,
@@ -20,6 +22,13 @@ graph: Final = Table(
     Column("made_by", Text, nullable=False),
     Column("deleted_at", BigInteger),
     Column("kind", Text, nullable=False, server_default="graph"),
+    Column("draft_of", Text),
+    Column("draft_name", Text),
+    Column("base_graph", Text),
+    Column("drafted_seq", BigInteger),
+    Column("base_seq", BigInteger),
+    Column("merged_seq", BigInteger),
+    Index(None, "draft_of"),
 )
 #: A published version. Its UMRF stands in the body of the event `(stream, event_seq)`.
 version: Final = Table(

@@ -67,9 +67,17 @@ class BadProfile(ValueError):
         self.path = path
 
 
+#: What a profile may demand of people besides what it says of an engine: that somebody else than the
+#: starter has said yes to a graph.
+SECOND_PERSON: Final = "second_person"
+
+
 def facts_of(profile: Mapping[str, object]) -> EngineFacts:
     """The facts of a robot's engine: those of its `commit` (without one, of the pinned engine), and
     whatever else the profile says of it, by the names of `EngineFacts`. Raises BadProfile."""
+    if not isinstance(profile.get(SECOND_PERSON, False), bool):
+        raise BadProfile(f"{SECOND_PERSON} is true or false.", f"/{SECOND_PERSON}")
+    profile = {key: value for key, value in profile.items() if key != SECOND_PERSON}
     for key in profile:
         if key not in EngineFacts.__struct_fields__:
             known = ", ".join(EngineFacts.__struct_fields__)

@@ -48,6 +48,32 @@ export interface EditorApi {
         uses: EditorApi["ActionUse"][];
     };
     /**
+     * Answering
+     * @description Yes or no to a proposal, of somebody who has seen the draft after its change `seq`.
+     */
+    Answering: {
+        yes: boolean;
+        seq: number;
+        /** @default  */
+        note?: string;
+    };
+    /**
+     * AskedMerge
+     * @description Into which side what the other did is brought, and whose value counts where both changed the same,
+     *     by the places of the conflicts.
+     */
+    AskedMerge: {
+        /**
+         * @default origin
+         * @enum {string}
+         */
+        into?: "draft" | "origin";
+        /** @default {} */
+        choices?: {
+            [key: string]: "draft" | "origin";
+        };
+    };
+    /**
      * AskingSince
      * @description Between which moments to look: after the change `good`, and after `bad` (left out: now). What the
      *     actions do, as in a script of `simulate`, is the same at every moment; it names actions as they were
@@ -229,6 +255,87 @@ export interface EditorApi {
         after: unknown;
     };
     /**
+     * DraftAnswer
+     * @description Somebody's yes or no, having seen the draft after its change `seq`.
+     */
+    DraftAnswer: {
+        author: EditorApi["PersonRef"];
+        /** Format: date-time */
+        at: string;
+        yes: boolean;
+        note: string;
+        seq: number;
+    };
+    /**
+     * DraftConflict
+     * @description What both sides changed since they were last one. `place` is what a choice names; `what` says in
+     *     words what it is about; `removed`: the side that removed it, while the other went on with it.
+     *     `origin` and `draft`: what each side did to it.
+     */
+    DraftConflict: {
+        place: string;
+        what: string;
+        removed: ("draft" | "origin") | null;
+        origin: EditorApi["Changes"];
+        draft: EditorApi["Changes"];
+    };
+    /**
+     * DraftMoment
+     * @description What both sides are compared with: what the graph was after its change `seq`.
+     */
+    DraftMoment: {
+        graph: string;
+        seq: number;
+    };
+    /**
+     * DraftOf
+     * @description Of which graph something is a draft, since which change of it, and what the draft is called.
+     */
+    DraftOf: {
+        graph: string;
+        seq: number;
+        name: string;
+    };
+    /**
+     * DraftProposal
+     * @description Somebody would like the draft to be merged. `answers`: the last one of each person, in order of
+     *     time.
+     */
+    DraftProposal: {
+        author: EditorApi["PersonRef"];
+        /** Format: date-time */
+        at: string;
+        note: string;
+        seq: number;
+        /** @default [] */
+        answers?: EditorApi["DraftAnswer"][];
+    };
+    /**
+     * DraftView
+     * @description A draft. `seq` and `origin_seq` are the last changes of it and of what it is a draft of; `ahead` and
+     *     `behind`: how many things either changed since they were one, null where that cannot be said.
+     */
+    DraftView: {
+        id: string;
+        name: string;
+        origin: string;
+        origin_name: string;
+        made_by: EditorApi["PersonRef"];
+        /** Format: date-time */
+        made_at: string;
+        /** Format: date-time */
+        updated_at: string;
+        drafted_seq: number;
+        base: EditorApi["DraftMoment"];
+        seq: number;
+        origin_seq: number;
+        /** @enum {string} */
+        state: "merged" | "open" | "proposed";
+        ahead: number | null;
+        behind: number | null;
+        proposal?: EditorApi["DraftProposal"];
+    };
+    /**
      * EdgeEval
      * @description One relation was asked: `parent => child`, and what came of it: `result -> response`.
      */
@@ -281,11 +388,13 @@ export interface EditorApi {
         /** Format: date-time */
         at: string;
         seq: number;
+        merged?: EditorApi["MergedBy"];
         field: string;
     };
     /**
      * FieldValue
      * @description The value that somebody gave a field by the change `seq`, and the one before. null is no value.
+     *     `merged`: how it came from a draft, where that person gave it the value; `seq` is then the merge.
      */
     FieldValue: {
         value: unknown;
@@ -294,6 +403,7 @@ export interface EditorApi {
         /** Format: date-time */
         at: string;
         seq: number;
+        merged?: EditorApi["MergedBy"];
     };
     /**
      * GoneBack
@@ -353,7 +463,8 @@ export interface EditorApi {
      *
      *     `damaged`: the first change that cannot be read; the graph is what it was before, and nobody can
      *     change it. `people`: who is in it now. `problems` counts what the check found; `wrong` and
-     *     `to_fill_in` what people are told of it, one thing once, as the page tells it.
+     *     `to_fill_in` what people are told of it, one thing once, as the page tells it. `drafts`: how many
+     *     there are of it.
      */
     GraphView: {
         id: string;
@@ -381,6 +492,9 @@ export interface EditorApi {
          * @enum {string}
          */
         kind?: "action" | "graph";
+        draft_of?: EditorApi["DraftOf"];
+        /** @default 0 */
+        drafts?: number;
     };
     /**
      * Guest
@@ -418,12 +532,12 @@ export interface EditorApi {
      *     `seq` is the change of the document that `…/umrf?at=` and `…/restore` take to see the graph as it
      *     was after that edit; edits begin at `from_seq`, and others may have edited between the two.
      *     `restored` is the change that was gone back to, `adapted` that of which parameters were taken over,
-     *     `reverted` what was taken back. `changes` is what this person changed; null where that is too much
+     *     `reverted` what was taken back, `merged` what was brought in. `changes` is what this person changed; null where that is too much
      *     to tell here, or nothing.
      */
     HistoryEntry: {
         /** @enum {string} */
-        kind: "adapted" | "created" | "deleted" | "edited" | "imported" | "published" | "recovered" | "restored" | "reverted";
+        kind: "adapted" | "created" | "deleted" | "edited" | "imported" | "merged" | "published" | "recovered" | "restored" | "reverted";
         author: EditorApi["PersonRef"];
         /** Format: date-time */
         at: string;
@@ -434,6 +548,7 @@ export interface EditorApi {
         restored?: number;
         adapted?: EditorApi["TakenFrom"];
         reverted?: EditorApi["Reverted"];
+        merged?: EditorApi["MergedIn"];
         version?: EditorApi["VersionView"];
         changes?: EditorApi["Changes"];
     };
@@ -581,7 +696,51 @@ export interface EditorApi {
          * @enum {string}
          */
         kind?: "action" | "graph";
+        draft_of?: EditorApi["DraftOf"];
+        /** @default 0 */
+        drafts?: number;
         reading?: EditorApi["ImportReport"];
+    };
+    /**
+     * MergePreview
+     * @description What a merge would do to the side `into`, where everything that has no choice stays as it is there.
+     *
+     *     `seq`, `draft_seq`: the moments that it is about. `changes`: what would change. `problems`: those that this side has not now.
+     *     `authors`: whose changes they are. `origin_did`, `draft_did`: what each side did since they were one.
+     */
+    MergePreview: {
+        /** @enum {string} */
+        into: "draft" | "origin";
+        seq: number;
+        draft_seq: number;
+        changes: EditorApi["Changes"];
+        conflicts: EditorApi["DraftConflict"][];
+        problems: EditorApi["Problem"][];
+        authors: EditorApi["PersonRef"][];
+        origin_did: EditorApi["Changes"];
+        draft_did: EditorApi["Changes"];
+    };
+    /**
+     * MergedBy
+     * @description How a value came from another graph: which, and its change there; by whom and when it was merged;
+     *     what the draft is called.
+     */
+    MergedBy: {
+        graph: string;
+        seq: number;
+        name: string;
+        by: EditorApi["PersonRef"];
+        /** Format: date-time */
+        at: string;
+    };
+    /**
+     * MergedDraft
+     * @description The side into which was merged, and how far its log goes now; whether that changed anything.
+     */
+    MergedDraft: {
+        graph: string;
+        seq: number;
+        changed: boolean;
     };
     /**
      * MergedGraph
@@ -592,6 +751,29 @@ export interface EditorApi {
         seq: number;
         merged: boolean;
         problems: EditorApi["Problem"][];
+    };
+    /**
+     * MergedIn
+     * @description What was brought in: the changes `from_seq` to `seq` of the graph `source`, which is the draft that
+     *     is called `name`, or what that is a draft of; and whose they are.
+     */
+    MergedIn: {
+        draft: string;
+        name: string;
+        source: string;
+        from_seq: number;
+        seq: number;
+        authors: EditorApi["PersonRef"][];
+    };
+    /**
+     * NewDraft
+     * @description What to call a draft, and of which change of the graph it begins; left out: of the last one.
+     */
+    NewDraft: {
+        /** @default  */
+        name?: string;
+        /** @default null */
+        seq?: number | null;
     };
     /**
      * NodeResultEvent
@@ -817,6 +999,14 @@ export interface EditorApi {
     Problems: {
         seq: number;
         problems: EditorApi["Problem"][];
+    };
+    /**
+     * Proposing
+     * @description What to say with a proposal.
+     */
+    Proposing: {
+        /** @default  */
+        note?: string;
     };
     /**
      * Publishing
@@ -1064,6 +1254,24 @@ export interface EditorApi {
         at: string;
         umrf?: {
             [key: string]: unknown;
+        };
+    };
+    /**
+     * WantedMerge
+     * @description The merge that was looked at: of the origin as it was after its change `seq`, and of the draft after
+     *     its change `draft_seq`.
+     */
+    WantedMerge: {
+        seq: number;
+        draft_seq: number;
+        /**
+         * @default origin
+         * @enum {string}
+         */
+        into?: "draft" | "origin";
+        /** @default {} */
+        choices?: {
+            [key: string]: "draft" | "origin";
         };
     };
     /**

@@ -70,6 +70,32 @@ export interface RunnerApi {
         text: string;
     };
     /**
+     * Approval
+     * @description Somebody's yes to exactly the graph with this digest.
+     */
+    Approval: {
+        digest: string;
+        author: RunnerApi["Author"];
+        /** Format: date-time */
+        at: string;
+        graph: string | null;
+        version: string;
+        note: string;
+    };
+    /**
+     * ApprovalRequest
+     * @description A yes to exactly one graph.
+     */
+    ApprovalRequest: {
+        digest: string;
+        /** @default null */
+        graph?: string | null;
+        /** @default  */
+        version?: string;
+        /** @default  */
+        note?: string;
+    };
+    /**
      * ArchivedShown
      * @description Since when the events of a run are in an archive, and in which file of its folder.
      */

@@ -52,7 +52,7 @@ export function GraphPrint({ context }: { context: EditorContext }) {
   };
   const what = version
     ? versionName(versions, version.id)
-    : `draft, moment ${seq}${unsaved > 0 ? " and edits that are not saved yet" : ""}${
+    : `moment ${seq}${unsaved > 0 ? " and edits that are not saved yet" : ""}${
         newest ? `, after ${versionName(versions, newest.id)}` : ", never published"
       }`;
   return (

@@ -101,6 +101,7 @@ function GraphCard({ graph, names, last }: GraphCardProps) {
             <GraphCounts graph={graph} />
             <span>
               {graph.actions === 1 ? "1 action" : `${graph.actions ?? 0} actions`}
+              {graph.drafts && ` · ${graph.drafts === 1 ? "1 draft" : `${graph.drafts} drafts`}`}
               {at !== null && ` · changed ${ago(at, now)}`}
             </span>
           </div>

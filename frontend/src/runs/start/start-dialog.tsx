@@ -15,6 +15,7 @@ import { HoldButton } from "../../ui/floating/hold-button";
 import { colorOfName } from "../../ui/name-colors";
 import { useBehaviours } from "./behaviours-choice";
 import { PreflightList } from "./preflight-list";
+import { SecondPerson } from "./second-person";
 import style from "./start-dialog.module.css";
 import { rememberEngines, useStart } from "./use-start";
 
@@ -174,7 +175,6 @@ export function StartDialog(props: Props) {
   const start = useStart(graph);
   const looks = look.data;
   const codes = [...new Set((looks ?? []).flatMap((each) => each.override))];
-  const never = (looks ?? []).some((each) => each.never);
   const digest = looks?.find((each) => each.digest !== "")?.digest ?? "";
   const why =
     now.link === "down"
@@ -239,7 +239,8 @@ export function StartDialog(props: Props) {
           ))}
         </section>
       )}
-      {codes.length > 0 && !never && (
+      <SecondPerson graph={graph} label={label} looks={looks} />
+      {codes.length > 0 && !looks?.some(({ never }) => never) && (
         <Textarea
           label="Why start anyway? It is recorded with the run."
           value={reason}

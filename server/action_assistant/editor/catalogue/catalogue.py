@@ -4,12 +4,13 @@ from datetime import datetime
 from typing import Any, Final
 
 import msgspec
-from sqlalchemy import Row, Select, select
+from sqlalchemy import Row, Select, func, select
 
 from action_assistant.editor.catalogue import server_edits
 from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.documents.contents import Counts, GraphInfo, info_of
 from action_assistant.editor.interchange import changes, importing
+from action_assistant.editor.interchange.changes import drafted
 from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import BadInput, NotFound
@@ -26,13 +27,22 @@ NAME_LIMIT: Final = 200  # characters
 DESCRIPTION_LIMIT: Final = 10_000
 
 
+class DraftOf(msgspec.Struct, frozen=True):
+    """Of which graph something is a draft, since which change of it, and what the draft is called."""
+
+    graph: str
+    seq: int
+    name: str
+
+
 class GraphView(msgspec.Struct, frozen=True, omit_defaults=True):
     """A graph, or an action of the library, as lists and pages show it. `seq` counts the changes of its
     document.
 
     `damaged`: the first change that cannot be read; the graph is what it was before, and nobody can
     change it. `people`: who is in it now. `problems` counts what the check found; `wrong` and
-    `to_fill_in` what people are told of it, one thing once, as the page tells it.
+    `to_fill_in` what people are told of it, one thing once, as the page tells it. `drafts`: how many
+    there are of it.
     """
 
     id: str
@@ -51,6 +61,8 @@ class GraphView(msgspec.Struct, frozen=True, omit_defaults=True):
     deleted_at: datetime | None = None
     damaged: int | None = None
     kind: h.DocumentKind = "graph"
+    draft_of: DraftOf | None = None
+    drafts: int = 0
 
 
 class NewGraph(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -87,10 +99,12 @@ class Catalogue:
     async def all(
         self, *, deleted: bool = False, kind: h.DocumentKind = "graph"
     ) -> list[GraphView]:
-        """Every document of a kind, the last changed first; or those that were deleted."""
-        gone = editor_tables.graph.c.deleted_at
+        """Every document of a kind, the last changed first, drafts left out; or all that were
+        deleted."""
+        graph = editor_tables.graph.c
+        shown = [graph.deleted_at.is_(None), graph.draft_of.is_(None)]
         chosen = _rows().where(
-            editor_tables.graph.c.kind == kind, gone.is_not(None) if deleted else gone.is_(None)
+            graph.kind == kind, *([graph.deleted_at.is_not(None)] if deleted else shown)
         )
         rows = await self._journal.query(chosen)
         views = [await self._view(row) for row in rows]
@@ -169,6 +183,18 @@ class Catalogue:
             drafts.append(Draft(h.IMPORTED, author, file))
         return await self._add(changes.first(graph), info_of(graph, check(graph)), drafts, author)
 
+    async def add_draft(self, origin: str, seq: int, name: str, author: str) -> GraphView:
+        """A graph that begins as another one was after its change `seq`, with the same keys. What people
+        said about that one stays there. Raises NotFound, Conflict, Unavailable."""
+        row = await self._row(origin, kind="graph")
+        then = await self._graph_reader.at(origin, seq)
+        update, about = await self._graph_reader.ask(drafted, then)
+        drafts = [
+            h.draft(h.CREATED, author, h.GraphCreated(row.name, row.description)),
+            h.draft(h.DRAFTED, author, h.GraphDrafted(origin, seq, name)),
+        ]
+        return await self._add(update, about, drafts, author)
+
     async def _add(
         self, update: bytes, of: GraphInfo, about: list[Draft], author: str
     ) -> GraphView:
@@ -222,6 +248,10 @@ class Catalogue:
             deleted_at=None if row.deleted_at is None else h.when(row.deleted_at),
             damaged=summary.damaged,
             kind=row.kind,
+            draft_of=None
+            if row.draft_of is None
+            else DraftOf(row.draft_of, row.drafted_seq, row.draft_name),
+            drafts=row.drafts,
         )
 
 
@@ -235,7 +265,14 @@ def _rows() -> Select[Any]:
         .limit(1)
     )
     at = last.with_only_columns(event.c.at)
-    return select(graph, last.scalar_subquery().label("seq"), at.scalar_subquery().label("at"))
+    of = graph.alias("draft")
+    drafts = select(func.count()).where(of.c.draft_of == graph.c.id, of.c.deleted_at.is_(None))
+    return select(
+        graph,
+        last.scalar_subquery().label("seq"),
+        at.scalar_subquery().label("at"),
+        drafts.scalar_subquery().label("drafts"),
+    )
 
 
 def fit(name: str, description: str) -> tuple[str, str]:

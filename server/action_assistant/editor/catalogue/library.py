@@ -70,7 +70,7 @@ class Library:
                 last.scalar_subquery().label("seq"),
                 last.with_only_columns(event.c.at).scalar_subquery().label("at"),
             )
-            .where(graph.c.deleted_at.is_(None))
+            .where(graph.c.deleted_at.is_(None), graph.c.draft_of.is_(None))
             .order_by(graph.c.made_at, graph.c.id)
         )
         limit = CapacityLimiter(_AT_ONCE)

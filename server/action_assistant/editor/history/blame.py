@@ -1,6 +1,6 @@
 """Who gave each field of an action, an arrow or the graph the value that it has, and when."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Sequence, Set
 from datetime import datetime
 from typing import Any, Final
 
@@ -9,7 +9,9 @@ import msgspec
 from action_assistant.editor.catalogue.people import People
 from action_assistant.editor.documents.values import Root
 from action_assistant.editor.history.change_index import ChangeIndex
+from action_assistant.editor.history.grafts import Grafts, MergedBy
 from action_assistant.editor.history.key_changes import LoggedChange, unpacked
+from action_assistant.editor.history.places import field_of
 from action_assistant.editor.log.document_events import when
 from action_assistant.errors import NotFound
 from action_assistant.web.auth.keys import PersonRef
@@ -20,17 +22,19 @@ _ONE_GO: Final = (
 _MOST: Final = 1000  # values of one field
 
 
-class FieldValue(msgspec.Struct, frozen=True):
-    """The value that somebody gave a field by the change `seq`, and the one before. None is no value."""
+class FieldValue(msgspec.Struct, frozen=True, omit_defaults=True):
+    """The value that somebody gave a field by the change `seq`, and the one before. None is no value.
+    `merged`: how it came from a draft, where that person gave it the value; `seq` is then the merge."""
 
     value: Any
     before: Any
     author: PersonRef
     at: datetime
     seq: int
+    merged: MergedBy | None = None
 
 
-class FieldBlame(FieldValue, frozen=True, kw_only=True):
+class FieldBlame(FieldValue, frozen=True, kw_only=True, omit_defaults=True):
     """Of which field, as the document's keys name it (docs/contracts.md 1): `in/speed`, `on_true`, "" for
     the name of an action; and `position`."""
 
@@ -51,9 +55,10 @@ class DocumentStep(msgspec.Struct, frozen=True):
 class Blame:
     """Asks the index who did what."""
 
-    def __init__(self, index: ChangeIndex, people: People) -> None:
+    def __init__(self, index: ChangeIndex, people: People, grafts: Grafts) -> None:
         self._index = index
         self._people = people
+        self._grafts = grafts
 
     async def of(self, graph: str, owner: str, seq: int | None) -> list[FieldBlame]:
         """Every field of an action, arrow or note that has a value after the change `seq`, by field.
@@ -64,7 +69,10 @@ class Blame:
         found = await self._index.at(graph, upto if seq is None else seq, of={owner})
         if not found:
             raise NotFound(f"There is nothing {owner!r} in this graph at that moment.")
-        told = [self._told(change) for change in found]
+        told = [
+            FieldBlame(**msgspec.structs.asdict(value), field=field_of(change.root, change.key))
+            for change, value in zip(found, await self._values(graph, found), strict=True)
+        ]
         return sorted(told, key=lambda each: each.field)
 
     async def of_field(
@@ -78,7 +86,9 @@ class Blame:
         changes: list[LoggedChange] = []
         for root, key in keys_of(owner, field):
             changes += await self._index.of_key(graph, root, key, upto if seq is None else seq)
-        return [self._value(change) for change in in_one_go(changes)][::-1][:_MOST]
+        alone = (await self._grafts.of(graph)).keys()
+        shown = in_one_go(changes, alone)[::-1][:_MOST]
+        return await self._values(graph, shown)
 
     async def changes(self, graph: str, after: int, upto: int, limit: int) -> list[DocumentStep]:
         """The newest changes of keys with `after < seq <= upto`, in order of time. Raises Unavailable."""
@@ -89,27 +99,20 @@ class Blame:
             for c in found
         ]
 
-    def _told(self, change: LoggedChange) -> FieldBlame:
-        value = self._value(change)
-        return FieldBlame(**msgspec.structs.asdict(value), field=field_of(change.root, change.key))
-
-    def _value(self, change: LoggedChange) -> FieldValue:
-        return FieldValue(
-            unpacked(change.after),
-            unpacked(change.before),
-            self._people.person(change.author),
-            when(change.at),
-            change.seq,
-        )
-
-
-def field_of(root: Root, key: str) -> str:
-    """What a key says of its owner."""
-    if root == "meta":
-        return key
-    if root == "positions":
-        return f"waypoints/{key.partition('|')[2]}" if key.startswith("w/") else "position"
-    return key.partition("|")[2]
+    async def _values(self, graph: str, changes: Sequence[LoggedChange]) -> list[FieldValue]:
+        """What people gave, whoever merged it."""
+        originals = await self._grafts.originals(graph, changes)
+        return [
+            FieldValue(
+                unpacked(change.after),
+                unpacked(change.before),
+                self._people.person(original.change.author),
+                when(original.change.at),
+                change.seq,
+                self._grafts.merged_by(change, original),
+            )
+            for change, original in zip(changes, originals, strict=True)
+        ]
 
 
 def keys_of(owner: str, field: str) -> Sequence[tuple[Root, str]]:
@@ -124,13 +127,14 @@ def keys_of(owner: str, field: str) -> Sequence[tuple[Root, str]]:
     return [("relations" if ">" in owner else "actions", key)]
 
 
-def in_one_go(changes: Iterable[LoggedChange]) -> list[LoggedChange]:
-    """Changes of one key, those that one person made in a row as one. One that was taken back in the
-    same go is none."""
+def in_one_go(changes: Iterable[LoggedChange], alone: Set[int] = frozenset()) -> list[LoggedChange]:
+    """Changes of one key, those that one person made in a row as one, but for some that stand alone. One
+    that was taken back in the same go is none."""
     found: list[LoggedChange] = []
     for change in changes:
         last = found[-1] if found else None
-        if last is None or last.author != change.author or change.at - last.at >= _ONE_GO:
+        parts = last is None or last.author != change.author or change.at - last.at >= _ONE_GO
+        if last is None or parts or not alone.isdisjoint({last.seq, change.seq}):
             found.append(change)
         elif last.before == change.after:
             found.pop()

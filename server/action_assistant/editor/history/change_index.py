@@ -88,7 +88,13 @@ class ChangeIndex:
         """The change that gave each key the value that it has after the change `seq`: of everything, or
         of some owners."""
         if of is None:
-            return _changes(await self._journal.query(_last(graph, seq)))
+            return _changes(
+                await self._journal.query(_last(graph, seq).where(_c.after.is_not(None)))
+            )
+        return [each for each in await self.latest(graph, seq, of=of) if each.after is not None]
+
+    async def latest(self, graph: str, seq: int, *, of: Collection[str]) -> list[LoggedChange]:
+        """The last change of each key of some owners up to the change `seq`, also of keys that are gone."""
         owners = sorted(of)
         found: list[LoggedChange] = []
         for start in range(0, len(owners), _OWNERS):
@@ -181,7 +187,7 @@ def _changes(rows: Iterable[Row[Any]]) -> list[LoggedChange]:
 
 
 def _last(graph: str, seq: int, *also: ColumnElement[bool]) -> Select[Any]:
-    """The last change of each key up to a change, of the keys that are there after it."""
+    """The last change of each key up to a change."""
     newest = (
         select(_c.root, _c.key, func.max(_c.seq).label("seq"))
         .where(_c.graph == graph, _c.seq <= seq, *also)
@@ -194,4 +200,4 @@ def _last(graph: str, seq: int, *also: ColumnElement[bool]) -> Select[Any]:
         _c.key == newest.c.key,
         _c.seq == newest.c.seq,
     )
-    return _CHANGE.select_from(key_change.join(newest, same)).where(_c.after.is_not(None))
+    return _CHANGE.select_from(key_change.join(newest, same))

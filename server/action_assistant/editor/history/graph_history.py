@@ -50,8 +50,20 @@ class Reverted(msgspec.Struct, frozen=True):
     seq: int
 
 
-#: The change that was gone back to, of what parameters were taken over, or what was taken back.
-_Special: TypeAlias = int | TakenFrom | Reverted
+class MergedIn(msgspec.Struct, frozen=True):
+    """What was brought in: the changes `from_seq` to `seq` of the graph `source`, which is the draft that
+    is called `name`, or what that is a draft of; and whose they are."""
+
+    draft: str
+    name: str
+    source: str
+    from_seq: int
+    seq: int
+    authors: tuple[PersonRef, ...]
+
+
+#: The change that was gone back to, of what parameters were taken over, what was taken back or merged.
+_Special: TypeAlias = int | TakenFrom | Reverted | MergedIn
 
 
 class HistoryEntry(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
@@ -60,7 +72,7 @@ class HistoryEntry(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True
     `seq` is the change of the document that `…/umrf?at=` and `…/restore` take to see the graph as it
     was after that edit; edits begin at `from_seq`, and others may have edited between the two.
     `restored` is the change that was gone back to, `adapted` that of which parameters were taken over,
-    `reverted` what was taken back. `changes` is what this person changed; None where that is too much
+    `reverted` what was taken back, `merged` what was brought in. `changes` is what this person changed; None where that is too much
     to tell here, or nothing.
     """
 
@@ -73,6 +85,7 @@ class HistoryEntry(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True
     restored: int | None = None
     adapted: TakenFrom | None = None
     reverted: Reverted | None = None
+    merged: MergedIn | None = None
     version: VersionView | None = None
     changes: Changes | None = None
 
@@ -135,6 +148,7 @@ class GraphHistory:
             restored=how if isinstance(how, int) else None,
             adapted=how if isinstance(how, TakenFrom) else None,
             reverted=how if isinstance(how, Reverted) else None,
+            merged=how if isinstance(how, MergedIn) else None,
             version=version,
             changes=changes,
         )
@@ -177,13 +191,15 @@ class GraphHistory:
         return await self._journal.query(chosen)
 
     async def _special(self, graph: str) -> dict[int, _Special]:
-        """Changes that went back to others, took over parameters or took something back."""
+        """Changes that went back to others, took over parameters, took something back or merged."""
         event = editor_tables.editor_event.c
-        kinds = [h.RESTORED, h.ADAPTED, h.REVERTED]
+        kinds = [h.RESTORED, h.ADAPTED, h.REVERTED, h.MERGED]
         chosen = select(event.kind, event.body).where(
             event.stream == h.about_stream(graph), event.kind.in_(kinds)
         )
-        found: dict[int, _Special] = {}
+        found: dict[
+            int, _Special
+        ] = {}  # merges that changed nothing are under 0, which is no change
         for row in await self._journal.query(chosen):
             match row.kind:
                 case h.RESTORED:
@@ -192,11 +208,19 @@ class GraphHistory:
                 case h.ADAPTED:
                     adapted = msgspec.json.decode(row.body, type=h.GraphAdapted)
                     found[adapted.seq] = TakenFrom(adapted.source, adapted.at, adapted.name)
+                case h.MERGED:
+                    merged = msgspec.json.decode(row.body, type=h.GraphMerged)
+                    found[merged.seq] = self._merged(merged)
                 case _:
                     back = msgspec.json.decode(row.body, type=h.GraphReverted)
                     whose = self._people.person(back.author)
                     found[back.seq] = Reverted(whose, back.from_seq, back.upto)
         return found
+
+    def _merged(self, merged: h.GraphMerged) -> MergedIn:
+        authors = tuple(self._people.person(each) for each in merged.authors)
+        of = (merged.draft, merged.name, merged.source)
+        return MergedIn(*of, merged.from_seq, merged.upto, authors)
 
 
 def _step(row: Row[Any], special: Mapping[int, _Special]) -> Step | None:
@@ -212,6 +236,8 @@ def _step(row: Row[Any], special: Mapping[int, _Special]) -> Step | None:
                 return Step("adapted", row.author, at, row.seq)
             case Reverted():
                 return Step("reverted", row.author, at, row.seq)
+            case MergedIn():
+                return Step("merged", row.author, at, row.seq)
             case _:
                 return Step("edited", row.author, at, row.seq)
     kind = _WHOLE.get(row.kind)

@@ -1,15 +1,12 @@
 """Edits that take something back: what one person did in a sitting, or one action as it was. For workers."""
 
-from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Final
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import msgspec
 from msgspec import UNSET
-from pycrdt import Doc
 
-from action_assistant.editor.documents import document
-from action_assistant.editor.documents.values import ROOTS, ends_of
+from action_assistant.editor.documents.values import ends_of
 from action_assistant.editor.history.key_changes import (
     LoggedChange,
     Packed,
@@ -17,10 +14,15 @@ from action_assistant.editor.history.key_changes import (
     owner_of,
     unpacked,
 )
+from action_assistant.editor.history.places import (
+    arrows_of,
+    by_owner,
+    is_place_of_card,
+    places_of,
+    proves,
+)
 from action_assistant.editor.interchange.changes import setting
-from action_assistant.umrf.model import ENTRY, EXIT, PRECONDITIONS
-
-_OUTCOMES: Final = frozenset(PRECONDITIONS)
+from action_assistant.umrf.model import ENTRY, EXIT
 
 
 class TakenBack(msgspec.Struct, frozen=True):
@@ -41,14 +43,14 @@ def reverting(
     they made of it. What was made in that sitting goes only if nobody has changed it or led an arrow to
     it since; where it stands does not matter.
     """
-    sitting = _Sitting(changes, _places(state), latest)
+    sitting = _Sitting(changes, places_of(state), latest)
     return TakenBack(_setting(state, sitting.targets()), sitting.left())
 
 
 def as_it_was(state: bytes, then: Sequence[LoggedChange], owner: str) -> bytes:
     """The update that makes an action, arrow or note what it was. `then`: the changes that gave each key
     of the graph its value. An action that is not there any more comes back with its arrows."""
-    now = _places(state)
+    now = places_of(state)
     owners = {owner}
     if ("actions", owner) not in now:
         alive = {key for root, key in now if root == "actions" and "|" not in key}
@@ -82,8 +84,8 @@ class _Sitting:
             if place not in self._last or self._last[place].after != before:
                 self._first[place] = before
             self._last[place] = change
-        self._places = _by_owner(now)
-        self._arrows = _arrows_of({_owner(place) for place in latest} & self._places.keys())
+        self._places = by_owner(now)
+        self._arrows = arrows_of({_owner(place) for place in latest} & self._places.keys())
         made = {owner for owner in map(_owner, self._first) if self._was_made(owner)}
         self._made = made
         self._kept = set[str]()  # of those, what stays
@@ -119,12 +121,12 @@ class _Sitting:
 
     def _was_made(self, owner: str) -> bool:
         """Whether a thing that is there now was made in this sitting."""
-        proofs = [place for place in self._places.get(owner, ()) if _proves(place)]
+        proofs = [place for place in self._places.get(owner, ()) if proves(place)]
         return bool(proofs) and all(self._first.get(place, b"") is None for place in proofs)
 
     def _is_in_use(self, owner: str) -> bool:
         """Whether others have changed a thing, or led an arrow to it that stays."""
-        own = [place for place in self._places[owner] if not _is_place_of_card(place)]
+        own = [place for place in self._places[owner] if not is_place_of_card(place)]
         if any(place in self._latest and not self._is_mine(place) for place in own):
             return True
         return not self._arrows.get(owner, set()) <= self._made - self._kept
@@ -132,46 +134,6 @@ class _Sitting:
 
 def _owner(place: Place) -> str:
     return owner_of(*place)
-
-
-def _proves(place: Place) -> bool:
-    """Whether the thing that a key speaks of exists because of it."""
-    root, key = place
-    match root:
-        case "actions":
-            return "|" not in key
-        case "relations":
-            return key.partition("|")[2] in _OUTCOMES
-        case _:
-            return root == "positions" and key.startswith("g/")
-
-
-def _is_place_of_card(place: Place) -> bool:
-    root, key = place
-    return root == "positions" and not key.startswith("g/")
-
-
-def _by_owner(places: Iterable[Place]) -> dict[str, list[Place]]:
-    found: dict[str, list[Place]] = defaultdict(list)
-    for place in places:
-        found[_owner(place)].append(place)
-    return found
-
-
-def _arrows_of(owners: Iterable[str]) -> dict[str, set[str]]:
-    """The arrows of each action."""
-    found: dict[str, set[str]] = defaultdict(set)
-    for owner in owners:
-        for end in (ends_of(owner) or ())[:2]:
-            found[str(end)].add(owner)
-    return found
-
-
-def _places(state: bytes) -> dict[Place, Any]:
-    doc: Doc[Any] = Doc()
-    doc.apply_update(state)
-    maps = document.maps_of(doc)
-    return {(root, key): value for root in ROOTS for key, value in maps[root].items()}
 
 
 def _setting(state: bytes, targets: Mapping[Place, Packed]) -> bytes:

@@ -17,6 +17,7 @@ Kind: TypeAlias = Literal[
     "restored",
     "reverted",
     "adapted",
+    "merged",
     "deleted",
     "recovered",
 ]

@@ -9,7 +9,13 @@ from pycrdt import Doc, merge_updates
 
 from action_assistant.editor.crdt.messages import NOTHING_NEW
 from action_assistant.editor.documents import document
-from action_assistant.editor.documents.contents import first_action, maps_of
+from action_assistant.editor.documents.contents import (
+    GraphAtSeq,
+    GraphInfo,
+    first_action,
+    info,
+    maps_of,
+)
 from action_assistant.editor.documents.document import Maps
 from action_assistant.editor.log.graph_events import DocumentKind
 from action_assistant.umrf.model import Graph
@@ -33,6 +39,14 @@ def difference(state: bytes, edit: Callable[[Doc[Any]], None]) -> bytes:
 def first(graph: Graph) -> bytes:
     """The update that makes a document of a graph."""
     return difference(b"", lambda doc: document.fill(doc, graph))
+
+
+def drafted(then: GraphAtSeq) -> tuple[bytes, GraphInfo]:
+    """The update that makes a document that holds what another one did, under the same keys, and what
+    lists say of it; without what people said."""
+    maps = {**maps_of(then.state), "comments": {}}
+    update = difference(b"", lambda doc: document.change(doc, maps))
+    return update, info(then)
 
 
 def renaming(

@@ -4,9 +4,10 @@ import msgspec
 from msgspec import UNSET
 
 from action_assistant.editor.documents.contents import GraphAtSeq, maps_of, read
-from action_assistant.editor.documents.document import Maps, is_same
+from action_assistant.editor.documents.document import Maps
 from action_assistant.editor.interchange.changes import setting
 from action_assistant.editor.interchange.edited_text import KeyChange, text_edit
+from action_assistant.editor.interchange.three_way import chosen
 from action_assistant.umrf.model import Problem
 
 
@@ -37,4 +38,4 @@ def merging(then: GraphAtSeq, state: bytes, text: bytes) -> MergingOutcome:
 def _is_other(now: Maps, change: KeyChange) -> bool:
     """Whether a key is neither as it was nor as it shall be."""
     value = now.get(change.root, {}).get(change.key, UNSET)
-    return not is_same(value, change.before) and not is_same(value, change.after)
+    return chosen(change.before, value, change.after) is None

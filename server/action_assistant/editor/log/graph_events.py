@@ -24,6 +24,11 @@ DESCRIBED: Final = "graph.described.v1"
 RESTORED: Final = "graph.restored.v1"
 REVERTED: Final = "graph.reverted.v1"
 ADAPTED: Final = "graph.adapted.v1"
+DRAFTED: Final = "graph.drafted.v1"
+MERGED: Final = "graph.merged.v1"
+PROPOSED: Final = "draft.proposed.v1"
+WITHDRAWN: Final = "draft.withdrawn.v1"
+ANSWERED: Final = "draft.answered.v1"
 BUILT: Final = "action.built.v1"
 DELETED: Final = "graph.deleted.v1"
 RECOVERED: Final = "graph.recovered.v1"
@@ -89,6 +94,43 @@ class GraphAdapted(msgspec.Struct, frozen=True):
     source: str
     at: int
     name: str
+
+
+class GraphDrafted(msgspec.Struct, frozen=True):
+    """The graph was made as a draft: what `origin` was after its change `seq`, under the same keys."""
+
+    origin: str
+    seq: int
+    name: str
+
+
+class GraphMerged(msgspec.Struct, frozen=True):
+    """The edit `seq` brought in what `authors` had changed in the graph `source` from `from_seq` to `upto`.
+    Of the two `draft` is the draft, which is called `name`. `seq` 0: everything stayed as it was, since
+    people chose so."""
+
+    draft: str
+    name: str
+    source: str
+    from_seq: int
+    upto: int
+    seq: int
+    authors: tuple[str, ...]
+
+
+class DraftProposed(msgspec.Struct, frozen=True):
+    """Somebody would like the draft, as it was after its change `seq`, to be merged."""
+
+    note: str
+    seq: int
+
+
+class DraftAnswered(msgspec.Struct, frozen=True):
+    """Somebody said yes or no to a proposal, having seen the draft after its change `seq`."""
+
+    yes: bool
+    note: str
+    seq: int
 
 
 class BuildFault(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -241,6 +283,13 @@ def _about(event: Event, graph: str) -> Sequence[Executable]:
         case "graph.described.v1":
             now = msgspec.json.decode(event.body, type=GraphDescribed)
             return [this.values(name=now.name, description=now.description)]
+        case "graph.drafted.v1":
+            drafted = msgspec.json.decode(event.body, type=GraphDrafted)
+            base: dict[str, Any] = {"base_graph": drafted.origin, "base_seq": drafted.seq}
+            of = {"draft_of": drafted.origin, "draft_name": drafted.name}
+            return [this.values(**of, **base, drafted_seq=drafted.seq)]
+        case "graph.merged.v1":
+            return _merged(msgspec.json.decode(event.body, type=GraphMerged))
         case "graph.deleted.v1":
             return [this.values(deleted_at=event.at)]
         case "graph.recovered.v1":
@@ -249,6 +298,15 @@ def _about(event: Event, graph: str) -> Sequence[Executable]:
             return [insert(editor_tables.version).values(_version(event, graph))]
         case _:
             return ()
+
+
+def _merged(merged: GraphMerged) -> Sequence[Executable]:
+    """From here on both sides are compared with what was merged."""
+    draft = update(editor_tables.graph).where(editor_tables.graph.c.id == merged.draft)
+    base: dict[str, Any] = {"base_graph": merged.source, "base_seq": merged.upto}
+    if merged.source == merged.draft:
+        base["merged_seq"] = merged.upto
+    return [draft.values(base)]
 
 
 def _version(event: Event, graph: str) -> dict[str, Any]:

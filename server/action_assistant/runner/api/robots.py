@@ -29,7 +29,7 @@ from action_assistant.umrf.files import codec
 from action_assistant.umrf.files.action_files import write_action
 from action_assistant.umrf.json.embedded import JsonObject, UmrfGraph
 from action_assistant.umrf.model import Signature
-from action_assistant.web.auth.access import Needs
+from action_assistant.web.auth.access import Needs, person_of
 from action_assistant.web.network.connection_limits import ConcurrencyLimit
 from action_assistant.web.server.openapi import FileBytes, answer, reads
 from action_assistant.web.workers.lanes import RunInWorker
@@ -245,7 +245,7 @@ def _starts(services: RobotServices) -> list[ControllerRouterHandler]:
     )
     async def look(request: _Asking) -> list[Preflight]:
         async with body_of(request, services.body_limit) as body:
-            return await services.control.look(read_group(body))
+            return await services.control.look(read_group(body), person_of(request).id)
 
     @post(
         "/api/groups",

@@ -14,7 +14,7 @@ from litestar.response import Stream
 from litestar.types import ControllerRouterHandler
 
 from action_assistant.errors import BadInput, NotFound, TooMany
-from action_assistant.runner.api import courses, robots
+from action_assistant.runner.api import approvals, courses, robots
 from action_assistant.runner.api import review as review
 from action_assistant.runner.api.caller import COUNTED, GRAPH_BODY, author_of, body_of, start_of
 from action_assistant.runner.api.live import (
@@ -57,6 +57,7 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
         *_moves(services),
         *_reads(services),
         *robots.routes(services),
+        *approvals.routes(services),
         *courses.routes(services),
         *review.routes(services),
         _live(services),

@@ -18,6 +18,7 @@ from action_assistant.runner.runs.events import Author, Override
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.sent_graph import SentGraph
 from action_assistant.runner.start.admission import StartRequest, decoded, prepared
+from action_assistant.runner.start.approvals import Approvals
 from action_assistant.runner.start.preflight import not_matched_in
 from action_assistant.umrf.facts import SIMULATED
 from action_assistant.web.workers.lanes import RunInWorker
@@ -67,6 +68,7 @@ async def modify(
     author: Author,
     *,
     engine: KnownEngine | None,
+    approvals: Approvals,
     run_in_worker: RunInWorker,
 ) -> Run:
     """Give a running graph another structure; `body` is a ModifyRequest, `engine` None that of a
@@ -82,6 +84,7 @@ async def modify(
     facts = SIMULATED if engine is None else engine.facts
     ready = await run_in_worker(prepared, _as_start(asked, run), facts, run.id)
     if engine is not None:
+        await approvals.require(engine.registration, ready.digest, author.id)
         await _require_matched(engine, ready.umrf, run_in_worker)
     _require_moving(opened.run)  # somebody may have stopped it meanwhile
     if ready.name != run.graph_name:

@@ -29,6 +29,7 @@ from action_assistant.runner.runs.events import Author, Ended, MovesAgain
 from action_assistant.runner.runs.history import Ledger, Past, RunHistory
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start.admission import StartRequest
+from action_assistant.runner.start.approvals import Approvals
 from action_assistant.runner.start.idempotency import IdempotentStarts, StopOrder, booked
 from action_assistant.runner.start.preflight import Preflight, Settled, check_items, of_taken
 from action_assistant.runner.start.start_checks import (
@@ -71,17 +72,17 @@ class ExecutionService:
         self.robots = robots
         self.history = RunHistory(ledger, past)
         self.open: dict[str, OpenRun] = {}
-        self._ledger = ledger
-        self._clock_us = clock_us
-        self._tasks = tasks
-        self._run_in_worker = run_in_worker
+        self._ledger, self._clock_us = ledger, clock_us
+        self._tasks, self._run_in_worker = tasks, run_in_worker
         self._watchers: list[Callable[[OpenRun], None]] = []
         self._news = anyio.Event()
         self._places: dict[str, anyio.Lock] = {}
         self._book = IdempotentStarts(ledger, tasks, clock_us)
         self.under_way: Final = self._book.under_way
+        self.approvals: Final = Approvals(ledger, clock_us)
         self._starting = StartChecks(
             robots,
+            approvals=self.approvals,
             clock_us=clock_us,
             run_in_worker=run_in_worker,
             taken=self._taken,
@@ -155,7 +156,7 @@ class ExecutionService:
             async with AsyncExitStack() as places:
                 if asked.engine != SIMULATOR:
                     await places.enter_async_context(self._place(asked.engine))
-                cleared = await self._starting.cleared(asked)
+                cleared = await self._starting.cleared(asked, author.id)
                 run = await self._begin(asked, cleared, author, stops)
             return Started(run, fresh=True)
 
@@ -176,7 +177,7 @@ class ExecutionService:
             async with AsyncExitStack() as places:
                 for each in starts:  # in the order of their names, so that no two groups wait
                     await places.enter_async_context(self._place(each.engine))
-                cleared = await self._starting.all_cleared(starts)
+                cleared = await self._starting.all_cleared(starts, author.id)
                 return await self._begin_group(starts, cleared, author, stops)
 
     async def _begin_group(
@@ -196,9 +197,10 @@ class ExecutionService:
                 failed[each.engine] = why.detail
         return Grouped(group, runs, failed, fresh=True)
 
-    async def look(self, asked: GroupRequest) -> list[Preflight]:
-        """What stands between a graph and its start on each engine. Sends nothing but a get."""
-        return await self._starting.look(asked)
+    async def look(self, asked: GroupRequest, starter: str = "") -> list[Preflight]:
+        """What stands between a graph and its start on each engine by this person. Sends nothing but
+        a get."""
+        return await self._starting.look(asked, starter)
 
     def _place(self, engine: str) -> anyio.Lock:
         """One start at a time for each robot, and none while it is registered anew."""
@@ -337,7 +339,12 @@ class ExecutionService:
         opened = await self._movable(run)
         engine = self.robots.link(opened.run.engine)
         return await interventions.modify(
-            opened, body, author, engine=engine, run_in_worker=self._run_in_worker
+            opened,
+            body,
+            author,
+            engine=engine,
+            approvals=self.approvals,
+            run_in_worker=self._run_in_worker,
         )
 
     async def confirm_rest(self, run: str, asked: interventions.RestRequest, author: Author) -> Run:

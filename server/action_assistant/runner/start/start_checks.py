@@ -23,6 +23,7 @@ from action_assistant.runner.runs.run import Run
 from action_assistant.runner.sent_graph import SentGraph
 from action_assistant.runner.start import preflight
 from action_assistant.runner.start.admission import Prepared, StartRequest, decoded, prepared
+from action_assistant.runner.start.approvals import Approvals
 from action_assistant.runner.start.course_items import of_courses, of_unknown_courses
 from action_assistant.runner.start.preflight import EngineView, Item, Preflight, Settled
 from action_assistant.umrf.facts import SIMULATED, EngineFacts, facts_of
@@ -130,9 +131,11 @@ class StartChecks:
         going: Callable[[str], Collection[str]],
         settled: Callable[[str], Sequence[Settled]],
         simulator: Simulator,
+        approvals: Approvals,
         sources: StartSources,
     ) -> None:
         self._robots = robots
+        self._approvals = approvals
         self._courses = sources.courses
         self._clock_us = clock_us
         self._run_in_worker = run_in_worker
@@ -143,8 +146,9 @@ class StartChecks:
         self._behaviours = sources.behaviours
         self._prefixes = Workspace.of(os.environ).prefixes
 
-    async def cleared(self, asked: StartRequest) -> Cleared:
-        """Look, and refuse what stands in the way. Raises Refused of many kinds."""
+    async def cleared(self, asked: StartRequest, starter: str) -> Cleared:
+        """Look, and refuse what stands in the way of a start by this person. Raises Refused of many
+        kinds."""
         if asked.engine == SIMULATOR:
             return await self._cleared_simulation(asked)
         robot = self._robots.reachable(asked.engine)
@@ -153,6 +157,7 @@ class StartChecks:
         if asked.behaviours:
             raise BadInput("Only the simulator runs behaviours.", where={"path": "/behaviours"})
         ready = await self._run_in_worker(prepared, asked, robot.facts, random_id())
+        await self._approvals.require(robot.registration, ready.digest, starter)
         free = preflight.of_taken(asked.engine, self._taken(asked.engine))
         preflight.check_items([free], ())
         if self._robots.foreign_stops.going(asked.engine):
@@ -191,14 +196,14 @@ class StartChecks:
             despite=_despite(ready, ()),
         )
 
-    async def all_cleared(self, starts: Sequence[StartRequest]) -> list[Cleared]:
+    async def all_cleared(self, starts: Sequence[StartRequest], starter: str) -> list[Cleared]:
         """Look at several engines at once, and refuse all if one has to be. Raises Conflict."""
         cleared: dict[str, Cleared] = {}
         refused: dict[str, Refused] = {}
 
         async def look(each: StartRequest) -> None:
             try:
-                cleared[each.engine] = await self.cleared(each)
+                cleared[each.engine] = await self.cleared(each, starter)
             except Refused as why:
                 refused[each.engine] = why
 
@@ -213,13 +218,13 @@ class StartChecks:
             )
         return [cleared[each.engine] for each in starts]
 
-    async def look(self, asked: GroupRequest) -> list[Preflight]:
+    async def look(self, asked: GroupRequest, starter: str) -> list[Preflight]:
         """Look, and tell all of it. Never raises Refused; nothing is stored or sent but a get."""
         found: dict[str, Preflight] = {}
         expected: list[Item] = []
 
         async def look(engine: str) -> None:
-            found[engine] = await self._look(asked.of(engine))
+            found[engine] = await self._look(asked.of(engine), starter)
 
         async def hold_against() -> None:
             expected.extend(await self._expected(asked))
@@ -240,7 +245,7 @@ class StartChecks:
         except Refused as refused:
             return (of_unknown_courses(refused.detail),)
 
-    async def _look(self, asked: StartRequest) -> Preflight:
+    async def _look(self, asked: StartRequest, starter: str) -> Preflight:
         items: list[Item] = []
         robot: KnownEngine | None = None
         ready: Prepared | None = None
@@ -262,6 +267,7 @@ class StartChecks:
         if robot is not None:
             items.append(preflight.of_taken(asked.engine, self._taken(asked.engine)))
             items += await self._look_at(robot, ready)
+            items += await self._said_yes(robot, ready, starter)
         digest = ready.digest if ready is not None else ""
         return preflight.summed(asked.engine, items, digest)
 
@@ -273,6 +279,14 @@ class StartChecks:
         if ready is None:
             return [preflight.of_answer(view)]
         return list(await self._run_in_worker(preflight.of_text, view, ready.umrf, self._prefixes))
+
+    async def _said_yes(
+        self, robot: KnownEngine, ready: Prepared | None, starter: str
+    ) -> list[Item]:
+        if ready is None:
+            return []
+        item = await self._approvals.item(robot.registration, ready.digest, starter)
+        return [] if item is None else [item]
 
     async def _view(self, robot: KnownEngine) -> EngineView:
         """The engine as it answers a get sent now, on the path that would confirm a stop. Raises

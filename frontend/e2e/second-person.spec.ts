@@ -1,0 +1,81 @@
+/** A robot that takes only what a second person has said yes to: one asks, the other says yes, it starts. */
+
+import { expect, type Page, test } from "@playwright/test";
+import { saved } from "./canvas";
+import { DOMAIN, NO_ROS, StandIn } from "./emulated-robot";
+import { type Person, Product } from "./product";
+
+test.skip(NO_ROS !== "", NO_ROS);
+test.describe.configure({ mode: "serial" });
+
+const product = new Product();
+const david = new StandIn("David");
+let ada: Person;
+let ben: Person;
+let graph: string;
+
+const dialog = (page: Page) => page.getByRole("dialog");
+const lookedAt = (page: Page) => page.getByRole("list", { name: "Looked at on David" });
+const yes = (page: Page) => dialog(page).getByRole("button", { name: /^Say yes to v1/ });
+
+async function openStart(page: Page): Promise<void> {
+  await page.goto(`${product.url}/graphs/${graph}`);
+  await saved(page);
+  await page.getByRole("button", { name: "Choose where to start" }).click();
+  await page.getByRole("checkbox", { name: /^David/ }).check();
+  await expect(lookedAt(page).getByText("A stop can be proven")).toBeVisible({ timeout: 30_000 });
+}
+
+test.beforeAll(async ({ browser }) => {
+  david.start(product.data, { "*": { after_s: 1 } });
+  await product.start();
+  const robot = { name: david.name, domain: DOMAIN, get_service: david.path };
+  await product.ask(
+    "/api/robots",
+    {
+      method: "POST",
+      body: JSON.stringify({ ...robot, profile: { second_person: true } }),
+      headers: { "content-type": "application/json" },
+    },
+    product.runnerUrl,
+  );
+  graph = await product.chain(1);
+  ada = await product.person(browser, "Ada");
+  ben = await product.person(browser, "Ben");
+});
+
+test.afterAll(async () => {
+  await david.kill();
+  expect([...ada.failures, ...ben.failures]).toEqual([]);
+  await product.dispose();
+});
+
+test("nobody starts alone, also who has said yes", async () => {
+  const { page } = ada;
+  await openStart(page);
+  await expect(lookedAt(page)).toContainText("nobody else has said yes to exactly this graph");
+  await expect(page.getByRole("button", { name: /Something stands in the way/ })).toBeDisabled();
+  await yes(page).click();
+  await expect(dialog(page)).toContainText("You said yes to v1: somebody else may start it.");
+  await dialog(page).getByRole("button", { name: "Look again" }).click();
+  await expect(lookedAt(page)).toContainText("nobody else has said yes to exactly this graph");
+});
+
+test("what another has said yes to starts", async () => {
+  await openStart(ben.page);
+  await expect(lookedAt(ben.page)).toContainText("Ada said yes to exactly this graph.");
+  await yes(ben.page).click();
+  const { page } = ada;
+  await expect(lookedAt(page)).toContainText("Ben said yes to exactly this graph.", {
+    timeout: 20_000,
+  });
+  const start = page.getByRole("button", { name: /^Start v1 on David/ });
+  await expect(start).toBeEnabled();
+  await start.focus();
+  await page.keyboard.down("Enter");
+  await expect(dialog(page)).toBeHidden();
+  await page.keyboard.up("Enter");
+  const state = async () =>
+    (await product.ask<{ state: string }[]>("/api/runs", {}, product.runnerUrl))[0]?.state;
+  await expect.poll(state, { timeout: 20_000 }).toBe("finished");
+});

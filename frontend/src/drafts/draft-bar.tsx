@@ -1,0 +1,137 @@
+/** Above the canvas of a draft: of what it is one, how far both are apart, and what can be done. */
+import { Button } from "@mantine/core";
+import { useDebouncedValue } from "@mantine/hooks";
+import { IconGitBranch } from "@tabler/icons-react";
+import { useState } from "react";
+import { Link } from "wouter";
+import { type GraphDraft, useDraft, useDraftOf, withdrawProposal } from "../api/documents/drafts";
+import { useEditorContext } from "../edit-actions/editor-context";
+import { useThrottledLink } from "../sync/use-room";
+import { lazyPart } from "../ui/parts/lazy-part";
+import { OverlayBoundary } from "../ui/parts/part-boundary";
+import { answersWords, apartWords } from "./draft-words";
+import style from "./drafts.module.css";
+import { useDraftStep } from "./use-draft-step";
+
+const MergeDialog = lazyPart(() => import("./merge-dialog").then((part) => part.MergeDialog));
+const CompareDialog = lazyPart(() => import("./compare-dialog").then((part) => part.CompareDialog));
+const ProposeDialog = lazyPart(() => import("./propose-dialog").then((part) => part.ProposeDialog));
+
+/** How far both are apart is asked for when the hands rest. */
+const SETTLED_MS = 800;
+
+type Dialog = "compare" | "merge" | "take-over" | "propose";
+
+function Dialogs({
+  draft,
+  open,
+  onClose,
+}: {
+  draft: GraphDraft;
+  open: Dialog;
+  onClose: () => void;
+}) {
+  return (
+    <OverlayBoundary>
+      {open === "compare" && <CompareDialog draft={draft} onClose={onClose} />}
+      {open === "propose" && <ProposeDialog draft={draft} onClose={onClose} />}
+      {open === "merge" && <MergeDialog draft={draft} into="origin" onClose={onClose} />}
+      {open === "take-over" && <MergeDialog draft={draft} into="draft" onClose={onClose} />}
+    </OverlayBoundary>
+  );
+}
+
+function Proposal({ draft }: { draft: GraphDraft }) {
+  const { busy, wrong, step } = useDraftStep();
+  const { proposal } = draft;
+  if (!proposal) return null;
+  return (
+    <>
+      <span className={style.proposed}>Proposed: {answersWords(proposal, draft.seq)}</span>
+      <Button
+        size="compact-sm"
+        variant="subtle"
+        loading={busy}
+        onClick={() => void step(() => withdrawProposal(draft.id))}
+      >
+        Withdraw
+      </Button>
+      {wrong !== "" && <span role="alert">{wrong}</span>}
+    </>
+  );
+}
+
+interface StepsProps {
+  draft: GraphDraft;
+  onOpen: (dialog: Dialog) => void;
+}
+
+function Steps({ draft, onOpen }: StepsProps) {
+  const { mayEdit } = useEditorContext();
+  const { ahead, behind } = draft;
+  const known = ahead !== null && behind !== null;
+  return (
+    <div className={style.steps}>
+      <Button size="compact-sm" disabled={!known} onClick={() => onOpen("compare")}>
+        Compare
+      </Button>
+      {mayEdit && known && behind > 0 && (
+        <Button size="compact-sm" onClick={() => onOpen("take-over")}>
+          Take over…
+        </Button>
+      )}
+      {mayEdit && known && ahead > 0 && !draft.proposal && (
+        <Button size="compact-sm" onClick={() => onOpen("propose")}>
+          Propose…
+        </Button>
+      )}
+      {mayEdit && (
+        <Button
+          size="compact-sm"
+          variant="filled"
+          disabled={!known || ahead === 0}
+          onClick={() => onOpen("merge")}
+        >
+          Merge…
+        </Button>
+      )}
+    </div>
+  );
+}
+
+function Bar({ id }: { id: string }) {
+  const [seq] = useDebouncedValue(useThrottledLink().seq, SETTLED_MS);
+  const [open, setOpen] = useState<Dialog | null>(null);
+  const draft = useDraft(id, seq).data;
+  if (!draft) return null;
+  return (
+    <section className={style.bar} aria-label="Draft">
+      <IconGitBranch size={16} aria-hidden />
+      <span className={style.words}>
+        <b>
+          Draft “<bdi>{draft.name}</bdi>”
+        </b>{" "}
+        of{" "}
+        <Link to={`/graphs/${draft.origin}`}>
+          <bdi>{draft.origin_name || "Untitled"}</bdi>
+        </Link>
+        <span className={style.apart}>
+          {draft.ahead === null
+            ? "which was deleted"
+            : draft.state === "merged" && draft.behind === 0
+              ? "merged"
+              : apartWords(draft)}
+        </span>
+      </span>
+      <Proposal draft={draft} />
+      <Steps draft={draft} onOpen={setOpen} />
+      {open !== null && <Dialogs draft={draft} open={open} onClose={() => setOpen(null)} />}
+    </section>
+  );
+}
+
+/** Nothing where the graph is no draft. */
+export function DraftBar({ id }: { id: string }) {
+  const of = useDraftOf(id).data;
+  return of ? <Bar id={id} /> : null;
+}

@@ -1,0 +1,148 @@
+/** The drafts of the open graph, above its history: proposals first, and a new one. */
+import { ActionIcon, Button } from "@mantine/core";
+import { notifications } from "@mantine/notifications";
+import { IconCheck, IconGitBranch, IconTrash, IconX } from "@tabler/icons-react";
+import { type QueryClient, useQueryClient } from "@tanstack/react-query";
+import { useState } from "react";
+import { Link } from "wouter";
+import { answerProposal, type GraphDraft, useDrafts } from "../api/documents/drafts";
+import { authorName, deleteGraph, refreshGraphs } from "../api/graphs";
+import { useEditorContext } from "../edit-actions/editor-context";
+import { lazyPart } from "../ui/parts/lazy-part";
+import { OverlayBoundary } from "../ui/parts/part-boundary";
+import { answersWords, apartWords } from "./draft-words";
+import style from "./drafts.module.css";
+import { useDraftStep } from "./use-draft-step";
+
+const NewDraftDialog = lazyPart(() =>
+  import("./new-draft-dialog").then((part) => part.NewDraftDialog),
+);
+const MergeDialog = lazyPart(() => import("./merge-dialog").then((part) => part.MergeDialog));
+
+interface DraftRowProps {
+  draft: GraphDraft;
+  onMerge: () => void;
+}
+
+function ProposalOf({ draft, onMerge }: DraftRowProps) {
+  const { mayEdit } = useEditorContext();
+  const { busy, wrong, step } = useDraftStep();
+  const { proposal } = draft;
+  if (!proposal) return null;
+  const say = (yes: boolean) =>
+    void step(() => answerProposal(draft.id, { yes, seq: draft.seq, note: "" }));
+  return (
+    <div className={style.proposal}>
+      {proposal.note !== "" && (
+        <p>
+          <bdi>{proposal.note}</bdi>
+        </p>
+      )}
+      <p className={style.quiet}>
+        Proposed by <bdi>{authorName(proposal.author)}</bdi>: {answersWords(proposal, draft.seq)}
+      </p>
+      {mayEdit && (
+        <div className={style.steps}>
+          <Button
+            size="compact-sm"
+            loading={busy}
+            leftSection={<IconCheck size={14} aria-hidden />}
+            onClick={() => say(true)}
+          >
+            Yes<span className="visually-hidden"> to {draft.name}</span>
+          </Button>
+          <Button
+            size="compact-sm"
+            loading={busy}
+            leftSection={<IconX size={14} aria-hidden />}
+            onClick={() => say(false)}
+          >
+            No<span className="visually-hidden"> to {draft.name}</span>
+          </Button>
+          <Button size="compact-sm" variant="filled" onClick={onMerge}>
+            Merge…<span className="visually-hidden"> {draft.name}</span>
+          </Button>
+        </div>
+      )}
+      {wrong !== "" && <p role="alert">{wrong}</p>}
+    </div>
+  );
+}
+
+async function deleteDraft({ id, name }: GraphDraft, client: QueryClient): Promise<void> {
+  await deleteGraph(id);
+  await refreshGraphs(client);
+  notifications.show({
+    title: `“${name}” is deleted`,
+    message: "It can be brought back from the list of graphs.",
+  });
+}
+
+function Row(props: DraftRowProps) {
+  const { draft } = props;
+  const { mayEdit } = useEditorContext();
+  const client = useQueryClient();
+  const { busy, wrong, step } = useDraftStep();
+  return (
+    <li className={style.row} data-state={draft.state}>
+      <Link to={`/graphs/${draft.id}`}>
+        <bdi>{draft.name}</bdi>
+      </Link>
+      <span className={style.quiet}>
+        by <bdi>{authorName(draft.made_by)}</bdi>
+        {" · "}
+        {draft.state === "merged" ? "merged" : apartWords(draft)}
+      </span>
+      {mayEdit && (
+        <ActionIcon
+          className={style.remove ?? ""}
+          aria-label={`Delete the draft ${draft.name}`}
+          loading={busy}
+          onClick={() => void step(() => deleteDraft(draft, client))}
+        >
+          <IconTrash size={15} />
+        </ActionIcon>
+      )}
+      <ProposalOf {...props} />
+      {wrong !== "" && <p role="alert">{wrong}</p>}
+    </li>
+  );
+}
+
+/** What waits for an answer comes first, what is merged last. */
+const rank = ({ state }: GraphDraft) => ({ proposed: 0, open: 1, merged: 2 })[state];
+
+export function DraftsHere() {
+  const { id, past, mayEdit } = useEditorContext();
+  const found = useDrafts(id);
+  const [making, setMaking] = useState(false);
+  const [merging, setMerging] = useState<GraphDraft | null>(null);
+  const drafts = [...(found.data ?? [])].sort((a, b) => rank(a) - rank(b));
+  if (drafts.length === 0 && !mayEdit) return null;
+  return (
+    <section className={style.here} aria-label="Drafts">
+      <ul>
+        {drafts.map((draft) => (
+          <Row key={draft.id} draft={draft} onMerge={() => setMerging(draft)} />
+        ))}
+      </ul>
+      {mayEdit && (
+        <Button
+          fullWidth
+          size="compact-sm"
+          variant="light"
+          leftSection={<IconGitBranch size={14} aria-hidden />}
+          onClick={() => setMaking(true)}
+        >
+          {past === null ? "New draft…" : "New draft of this moment…"}
+        </Button>
+      )}
+      <OverlayBoundary>
+        {making && (
+          <NewDraftDialog graph={id} seq={past?.at ?? null} onClose={() => setMaking(false)} />
+        )}
+        {merging && <MergeDialog draft={merging} into="origin" onClose={() => setMerging(null)} />}
+      </OverlayBoundary>
+    </section>
+  );
+}

@@ -1,0 +1,37 @@
+/** Asks for what to say with a proposal. */
+import { Button, Modal, Textarea } from "@mantine/core";
+import { useState } from "react";
+import { type GraphDraft, proposeDraft } from "../api/documents/drafts";
+import style from "./drafts.module.css";
+import { useDraftStep } from "./use-draft-step";
+
+export function ProposeDialog({ draft, onClose }: { draft: GraphDraft; onClose: () => void }) {
+  const [note, setNote] = useState("");
+  const { busy, wrong, step } = useDraftStep();
+  const propose = () =>
+    step(async () => {
+      await proposeDraft(draft.id, note);
+      onClose();
+    });
+  return (
+    <Modal opened onClose={onClose} title={<bdi>Propose “{draft.name}”</bdi>}>
+      <Textarea
+        label="What is it for?"
+        description="Others see it in the history of the graph, look at the draft, and say yes or no."
+        autosize
+        minRows={3}
+        maxLength={2000}
+        data-autofocus
+        value={note}
+        error={wrong || undefined}
+        onChange={(event) => setNote(event.currentTarget.value)}
+      />
+      <div className={style.answers}>
+        <Button onClick={onClose}>Cancel</Button>
+        <Button variant="filled" loading={busy} onClick={() => void propose()}>
+          Propose
+        </Button>
+      </div>
+    </Modal>
+  );
+}

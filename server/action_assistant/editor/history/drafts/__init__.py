@@ -1,0 +1,1 @@
+"""Drafts: graphs that are worked on apart from another one, compared with it, and merged."""

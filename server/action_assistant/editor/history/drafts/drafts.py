@@ -1,0 +1,276 @@
+"""The drafts of graphs: made, told of, proposed, and answered."""
+
+from collections import OrderedDict
+from collections.abc import Sequence
+from datetime import datetime
+from typing import Annotated, Any, Final, Literal, TypeAlias
+
+import msgspec
+from sqlalchemy import Row, select
+
+from action_assistant.editor.catalogue.catalogue import NAME_LIMIT, Catalogue, GraphView
+from action_assistant.editor.catalogue.graph_reader import GraphReader
+from action_assistant.editor.catalogue.people import People
+from action_assistant.editor.documents.contents import GraphAtSeq
+from action_assistant.editor.history.change_index import ChangeIndex
+from action_assistant.editor.history.drafts.told_merges import apart, count
+from action_assistant.editor.history.key_changes import LoggedChange
+from action_assistant.editor.log import graph_events as h
+from action_assistant.errors import BadInput, Conflict, NotFound
+from action_assistant.journal.journal import Journal
+from action_assistant.schema.editor_tables import editor_event
+from action_assistant.schema.editor_tables import graph as graph_table
+from action_assistant.web.auth.keys import PersonRef
+from action_assistant.web.workers.lanes import RunInWorker, run_here
+
+#: `merged`: it holds nothing that its origin has not been given.
+DraftState: TypeAlias = Literal["open", "proposed", "merged"]
+Remark: TypeAlias = Annotated[str, msgspec.Meta(max_length=2000)]
+
+#: A draft, what both sides are compared with, and the last changes of both.
+_Moments: TypeAlias = tuple[Any, ...]
+_REMEMBERED: Final = 500
+
+_ABOUT: Final = (h.PROPOSED, h.WITHDRAWN, h.ANSWERED, h.MERGED)
+
+
+class DraftAnswer(msgspec.Struct, frozen=True):
+    """Somebody's yes or no, having seen the draft after its change `seq`."""
+
+    author: PersonRef
+    at: datetime
+    yes: bool
+    note: str
+    seq: int
+
+
+class DraftProposal(msgspec.Struct, frozen=True, omit_defaults=True):
+    """Somebody would like the draft to be merged. `answers`: the last one of each person, in order of
+    time."""
+
+    author: PersonRef
+    at: datetime
+    note: str
+    seq: int
+    answers: tuple[DraftAnswer, ...] = ()
+
+
+class DraftMoment(msgspec.Struct, frozen=True):
+    """What both sides are compared with: what the graph was after its change `seq`."""
+
+    graph: str
+    seq: int
+
+
+class DraftView(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """A draft. `seq` and `origin_seq` are the last changes of it and of what it is a draft of; `ahead` and
+    `behind`: how many things either changed since they were one, None where that cannot be said."""
+
+    id: str
+    name: str
+    origin: str
+    origin_name: str
+    made_by: PersonRef
+    made_at: datetime
+    updated_at: datetime
+    drafted_seq: int
+    base: DraftMoment
+    seq: int
+    origin_seq: int
+    state: DraftState
+    ahead: int | None
+    behind: int | None
+    proposal: DraftProposal | None = None
+
+
+class NewDraft(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What to call a draft, and of which change of the graph it begins; left out: of the last one."""
+
+    name: str = ""
+    seq: int | None = None
+
+
+class DraftPair(msgspec.Struct, frozen=True):
+    """A draft and what it is one of, as they are, beside what they were when they were last one."""
+
+    row: Any
+    base: list[LoggedChange]
+    origin: GraphAtSeq
+    draft: GraphAtSeq
+
+
+class Drafts:
+    """All drafts. Raises NotFound for what is none, or deleted."""
+
+    def __init__(
+        self,
+        journal: Journal,
+        graph_reader: GraphReader,
+        catalogue: Catalogue,
+        people: People,
+        index: ChangeIndex,
+        run_in_worker: RunInWorker = run_here,
+    ) -> None:
+        self._journal = journal
+        self._graph_reader = graph_reader
+        self._catalogue = catalogue
+        self._people = people
+        self._index = index
+        self._run_in_worker = run_in_worker
+        self._distances: OrderedDict[_Moments, tuple[int, int]] = OrderedDict()
+
+    async def make(self, origin: str, author: str, new: NewDraft) -> DraftView:
+        """A draft of a graph. Raises BadInput, NotFound, Conflict, Unavailable."""
+        await self._catalogue.require(origin, "graph")
+        name = " ".join(new.name.split())
+        if len(name) > NAME_LIMIT:
+            raise BadInput(
+                f"A draft's name has up to {NAME_LIMIT} characters.", where={"path": "/name"}
+            )
+        seq = (await self._graph_reader.now(origin)).seq if new.seq is None else new.seq
+        name = name or f"Draft {len(await self._rows(graph_table.c.draft_of == origin)) + 1}"
+        made = await self._catalogue.add_draft(origin, seq, name, author)
+        return await self.get(made.id)
+
+    async def of(self, origin: str) -> list[DraftView]:
+        """The drafts of a graph, the last changed first."""
+        await self._catalogue.require(origin)
+        there = graph_table.c.deleted_at.is_(None)
+        rows = await self._rows(graph_table.c.draft_of == origin, there)
+        views = [await self._view(row) for row in rows]
+        return sorted(views, key=lambda view: view.updated_at, reverse=True)
+
+    async def get(self, draft: str) -> DraftView:
+        """One draft."""
+        return await self._view(await self._row(draft))
+
+    async def pair(self, draft: str) -> DraftPair:
+        """Both sides of a draft. Raises NotFound, Unavailable."""
+        row = await self._row(draft)
+        await self._catalogue.require(row.draft_of, "graph")
+        await self._index.upto(row.base_graph, row.base_seq)
+        return DraftPair(
+            row,
+            await self._index.at(row.base_graph, row.base_seq),
+            await self._graph_reader.now(row.draft_of),
+            await self._graph_reader.now(draft),
+        )
+
+    # --- proposals --------------------------------------------------------------------------------
+
+    async def propose(self, draft: str, author: str, note: str) -> DraftView:
+        """Say that a draft is ready to be merged."""
+        await self._row(draft)
+        seq = (await self._graph_reader.now(draft)).seq
+        proposed = h.draft(h.PROPOSED, author, h.DraftProposed(note.strip(), seq))
+        await self._journal.append(h.about_stream(draft), [proposed])
+        return await self.get(draft)
+
+    async def withdraw(self, draft: str, author: str) -> DraftView:
+        """Take a proposal back. Raises Conflict where there is none."""
+        await self._proposed(draft)
+        await self._journal.append(h.about_stream(draft), [h.draft(h.WITHDRAWN, author)])
+        return await self.get(draft)
+
+    async def answer(self, draft: str, author: str, body: h.DraftAnswered) -> DraftView:
+        """Say yes or no to a proposal. Raises Conflict where there is none."""
+        await self._proposed(draft)
+        await self._journal.append(h.about_stream(draft), [h.draft(h.ANSWERED, author, body)])
+        return await self.get(draft)
+
+    async def _proposed(self, draft: str) -> None:
+        if await self._proposal(await self._row(draft)) is None:
+            raise Conflict("This draft is not proposed.")
+
+    async def _proposal(self, row: Row[Any]) -> DraftProposal | None:
+        """The proposal that is open."""
+        found: DraftProposal | None = None
+        answers: dict[str, DraftAnswer] = {}
+        for event in await self._about(row):
+            author, at = self._people.person(event.author), h.when(event.at)
+            match event.kind:
+                case h.PROPOSED:
+                    proposed = msgspec.json.decode(event.body, type=h.DraftProposed)
+                    found = DraftProposal(author, at, proposed.note, proposed.seq)
+                    answers = {}
+                case h.ANSWERED:
+                    said = msgspec.json.decode(event.body, type=h.DraftAnswered)
+                    answers.pop(event.author, None)
+                    answers[event.author] = DraftAnswer(author, at, said.yes, said.note, said.seq)
+                case h.MERGED if _ends_proposal(event, row):
+                    found = None
+                case h.WITHDRAWN:
+                    found = None
+        if found is None:
+            return None
+        return msgspec.structs.replace(found, answers=tuple(answers.values()))
+
+    async def _about(self, row: Row[Any]) -> Sequence[Row[Any]]:
+        """What was said of a draft, and what was merged, in order of time."""
+        event = editor_event.c
+        streams = [h.about_stream(row.id), h.about_stream(row.draft_of)]
+        return await self._journal.query(
+            select(event.kind, event.author, event.at, event.body)
+            .where(event.stream.in_(streams), event.kind.in_(_ABOUT))
+            .where((event.stream == streams[0]) | (event.kind == h.MERGED))
+            .order_by(event.position)
+        )
+
+    # --- reading ----------------------------------------------------------------------------------
+
+    async def _view(self, row: Row[Any]) -> DraftView:
+        draft: GraphView = await self._catalogue.get(row.id)
+        (origin,) = await self._rows(graph_table.c.id == row.draft_of)
+        ahead, behind, origin_seq = await self._distance(row, origin)
+        proposal = await self._proposal(row)
+        merged = row.merged_seq == draft.seq
+        return DraftView(
+            id=row.id,
+            name=row.draft_name,
+            origin=row.draft_of,
+            origin_name=origin.name,
+            made_by=self._people.person(row.made_by),
+            made_at=draft.made_at,
+            updated_at=draft.updated_at,
+            drafted_seq=row.drafted_seq,
+            base=DraftMoment(row.base_graph, row.base_seq),
+            seq=draft.seq,
+            origin_seq=origin_seq,
+            state="merged" if merged else "open" if proposal is None else "proposed",
+            ahead=ahead,
+            behind=behind,
+            proposal=None if merged else proposal,
+        )
+
+    async def _distance(
+        self, row: Row[Any], origin: Row[Any]
+    ) -> tuple[int | None, int | None, int]:
+        """How far both sides are apart, and the last change of the origin."""
+        newest = [await self._journal.newest(h.graph_stream(g)) for g in (origin.id, row.id)]
+        if origin.deleted_at is not None:
+            return None, None, newest[0]
+        moments = row.id, row.base_graph, row.base_seq, *newest
+        known = self._distances.get(moments)
+        if known is None:
+            pair = await self.pair(row.id)
+            did = await self._run_in_worker(apart, pair.base, pair.origin, pair.draft)
+            known = self._distances[moments] = count(did["draft"]), count(did["origin"])
+            if len(self._distances) > _REMEMBERED:
+                self._distances.popitem(last=False)
+        return *known, newest[0]
+
+    async def _row(self, draft: str) -> Row[Any]:
+        await self._catalogue.require(draft, "graph")
+        (row,) = await self._rows(graph_table.c.id == draft)
+        if row.draft_of is None:
+            raise NotFound(f"{draft!r} is no draft.")
+        return row
+
+    async def _rows(self, *chosen: Any) -> Sequence[Row[Any]]:
+        return await self._journal.query(select(graph_table).where(*chosen))
+
+
+def _ends_proposal(event: Row[Any], row: Row[Any]) -> bool:
+    """Whether this is the merge of the draft into what it is a draft of."""
+    merged = msgspec.json.decode(event.body, type=h.GraphMerged)
+    return merged.draft == merged.source == str(row.id)

@@ -1,0 +1,232 @@
+"""What a merge would do, told as differences that people know, and the update that does it. For workers."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Final, Literal, TypeAlias
+
+import msgspec
+
+from action_assistant.editor.documents.contents import GraphAtSeq, read
+from action_assistant.editor.documents.document import Maps, is_same, read_maps
+from action_assistant.editor.documents.values import ROOTS, ends_of, is_aid
+from action_assistant.editor.history.drafts.merging import Choices, FoundConflict, merged
+from action_assistant.editor.history.key_changes import LoggedChange, Place, owner_of
+from action_assistant.editor.history.places import by_owner, field_of
+from action_assistant.editor.history.told_changes import Changes, maps_of, shortened, state_of
+from action_assistant.editor.interchange.changes import setting
+from action_assistant.editor.interchange.three_way import Side
+from action_assistant.umrf.check import check_written
+from action_assistant.umrf.difference import (
+    ActionChange,
+    Difference,
+    Field,
+    NoteChange,
+    RelationChange,
+    difference,
+)
+from action_assistant.umrf.model import ENTRY, EXIT, Graph, Problem
+
+#: The two graphs of a merge. What is brought in comes from the one, into the other.
+DraftSide: TypeAlias = Literal["origin", "draft"]
+
+_WORSE: Final = 50  # problems that are told
+
+
+class DraftConflict(msgspec.Struct, frozen=True, kw_only=True):
+    """What both sides changed since they were last one. `place` is what a choice names; `what` says in
+    words what it is about; `removed`: the side that removed it, while the other went on with it.
+    `origin` and `draft`: what each side did to it."""
+
+    place: str
+    what: str
+    removed: DraftSide | None
+    origin: Changes
+    draft: Changes
+
+
+class FoundMerge(msgspec.Struct, frozen=True):
+    """The update that merges, which is of use only when every conflict has a choice. `places`: the keys
+    that it sets. `problems`: those that come with it. `did`: what each side did since they were one."""
+
+    update: bytes
+    places: tuple[Place, ...]
+    conflicts: tuple[DraftConflict, ...]
+    changes: Changes
+    problems: tuple[Problem, ...]
+    did: dict[DraftSide, Changes]
+
+
+def merging(
+    base: Sequence[LoggedChange],
+    origin: GraphAtSeq,
+    draft: GraphAtSeq,
+    into: DraftSide,
+    choices: Mapping[str, DraftSide],
+) -> FoundMerge:
+    """What merging does to the side `into`. `base`: the changes that gave each key the value that it
+    had when both sides were last one."""
+    was = maps_of(state_of(base))
+    sides: dict[DraftSide, GraphAtSeq] = {"origin": origin, "draft": draft}
+    ours, theirs = sides[into], sides[_other(into)]
+    mine = read(ours)
+    chosen: Choices = {place: _side(side, into) for place, side in choices.items()}
+    found = merged(
+        _places(was), _places(mine.moment.maps), _places(read(theirs).moment.maps), chosen
+    )
+    result = _places(mine.moment.maps) | found.targets
+    maps = _maps({place: v for place, v in result.items() if v is not msgspec.UNSET})
+    graph = read_maps(maps)
+    teller = _Teller(was, {side: read(each).moment.maps for side, each in sides.items()}, into)
+    known = {(problem.code, problem.message) for problem in mine.problems}
+    worse = [each for each in check_written(graph) if (each.code, each.message) not in known]
+    return FoundMerge(
+        setting(ours.state, {(root, key): v for (root, key), v in found.targets.items()}),
+        tuple(found.targets),
+        tuple(teller.told(conflict) for conflict in found.conflicts),
+        _changes(mine.moment.graph, graph, {owner_of(*place) for place in found.targets}),
+        tuple(worse[:_WORSE]),
+        teller.did,
+    )
+
+
+def apart(
+    base: Sequence[LoggedChange], origin: GraphAtSeq, draft: GraphAtSeq
+) -> dict[DraftSide, Changes]:
+    """What each side did since they were one."""
+    was = maps_of(state_of(base))
+    maps = {"origin": read(origin).moment.maps, "draft": read(draft).moment.maps}
+    return _did(was, {"origin": maps["origin"], "draft": maps["draft"]})
+
+
+def count(changes: Changes) -> int:
+    """How many things were changed."""
+    kinds = (changes.fields, changes.actions, changes.relations, changes.notes)
+    return sum(map(len, kinds)) + changes.more
+
+
+class _Teller:
+    """Says what conflicts are about."""
+
+    def __init__(self, base: Maps, sides: Mapping[DraftSide, Maps], into: DraftSide) -> None:
+        self._base = _places(base)
+        self._graph = read_maps(base)
+        self._sides = {side: _places(maps) for side, maps in sides.items()}
+        self._graphs = {side: read_maps(maps) for side, maps in sides.items()}
+        self._differences = {
+            side: difference((0, self._graph), (0, graph)) for side, graph in self._graphs.items()
+        }
+        self._into: Final = into
+        shown = [self._graph, self._graphs[_other(into)], self._graphs[into]]
+        self._names = {a.key: a.full_name for graph in shown for a in graph.actions}
+        self.did: Final = _did(base, sides)
+
+    def label(self, owner: str) -> str:
+        """What people call an action, arrow or note."""
+        ends = ends_of(owner)
+        if ends is not None:
+            return f"{self._name(ends.parent)} → {self._name(ends.child)}"
+        return self._name(owner) if is_aid(owner) else "the note" if owner else "the graph"
+
+    def told(self, conflict: FoundConflict) -> DraftConflict:
+        """A conflict in words, with what each side did."""
+        label, key = self.label(conflict.owner), conflict.key
+        if key is None:
+            tell, what = self._thing, label
+        else:
+            tell, what = self._key, f"{_words(*key)} of {label}"
+        removed = None if conflict.removed is None else _named(conflict.removed, self._into)
+        return DraftConflict(
+            place=conflict.place,
+            what=what,
+            removed=removed,
+            origin=tell(conflict, "origin"),
+            draft=tell(conflict, "draft"),
+        )
+
+    def _name(self, key: str) -> str:
+        return self._names.get(key, key if key in {ENTRY, EXIT} else "an action that is gone")
+
+    def _thing(self, conflict: FoundConflict, side: DraftSide) -> Changes:
+        """What a side did to an action and its arrows, or to an arrow."""
+        found = self._differences[side]
+        owner, ends = conflict.owner, ends_of(conflict.owner)
+
+        def belongs(change: RelationChange) -> bool:
+            return owner in change.ends if ends is None else change.ends == tuple(ends[:2])
+
+        actions = tuple(change for change in found.actions if change.aid == owner)
+        relations = tuple(change for change in found.relations if belongs(change))
+        return shortened(Difference(0, 0, (), actions, relations), {owner})
+
+    def _key(self, conflict: FoundConflict, side: DraftSide) -> Changes:
+        """The value that a side gave a key."""
+        place = conflict.key or ("meta", "")
+        owner, ends = conflict.owner, ends_of(conflict.owner)
+        before, after = self._base.get(place), self._sides[side].get(place)
+        field = Field(field_of(*place) or "name", before, after)
+        label = self.label(owner)
+        if ends is not None:
+            parent, child = self._name(ends.parent), self._name(ends.child)
+            arrow = RelationChange("changed", parent, child, (field,), (ends.parent, ends.child))
+            return Changes(relations=(arrow,))
+        if is_aid(owner):
+            return Changes(actions=(ActionChange("changed", owner, label, (field,)),))
+        if owner:
+            notes = self._differences[side].notes
+            mine: tuple[NoteChange, ...] = tuple(n for n in notes if f"g/{n.id}" == owner)
+            return Changes(notes=mine)
+        return Changes(fields=(field,))
+
+
+def _words(root: str, key: str) -> str:
+    """What a key says of its owner, in words."""
+    field = key if root == "meta" else key.partition("|")[2]
+    if root == "positions":
+        return "text"
+    side, slash, path = field.partition("/")
+    if slash and side in {"in", "out"}:
+        return f"{'input' if side == 'in' else 'output'} {path}"
+    return {"": "name", "instance_id": "number"}.get(field, field.replace("_", " "))
+
+
+def _did(base: Maps, sides: Mapping[DraftSide, Maps]) -> dict[DraftSide, Changes]:
+    was, then = _places(base), read_maps(base)
+    found: dict[DraftSide, Changes] = {}
+    for side, maps in sides.items():
+        now = _places(maps)
+        touched = (p for p in {*was, *now} if not is_same(was.get(p), now.get(p)))
+        found[side] = _changes(then, read_maps(maps), by_owner(touched).keys())
+    return found
+
+
+def _changes(before: Graph, after: Graph, owners: Iterable[str]) -> Changes:
+    return shortened(difference((0, before), (0, after)), set(owners))
+
+
+def _other(side: DraftSide) -> DraftSide:
+    return "draft" if side == "origin" else "origin"
+
+
+def _side(side: DraftSide, into: DraftSide) -> Side:
+    return "ours" if side == into else "theirs"
+
+
+def _named(side: Side, into: DraftSide) -> DraftSide:
+    return into if side == "ours" else _other(into)
+
+
+def _places(maps: Maps) -> dict[Place, Any]:
+    """The keys that a merge looks at: what people said is none of them."""
+    return {
+        (root, key): value
+        for root in ROOTS
+        if root != "comments"
+        for key, value in maps[root].items()
+        if value is not None
+    }
+
+
+def _maps(places: Mapping[Place, Any]) -> Maps:
+    maps: Maps = {root: {} for root in ROOTS}
+    for (root, key), value in places.items():
+        maps[root][key] = value
+    return maps

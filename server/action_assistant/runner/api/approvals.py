@@ -1,0 +1,59 @@
+"""Routes of yeses: what a second person says before a graph may start on robots that demand it."""
+
+from datetime import datetime
+from typing import Annotated, Any
+
+import msgspec
+from litestar import Request, get, post
+from litestar.params import Parameter
+from litestar.types import ControllerRouterHandler
+
+from action_assistant.runner.api.caller import author_of
+from action_assistant.runner.api.services import RunnerServices
+from action_assistant.runner.runs import views
+from action_assistant.runner.runs.events import Author
+from action_assistant.runner.start.approvals import ApprovalGiven, ApprovalRequest
+from action_assistant.web.auth.access import Needs
+
+
+class Approval(msgspec.Struct, frozen=True, kw_only=True):
+    """Somebody's yes to exactly the graph with this digest."""
+
+    digest: str
+    author: Author
+    at: datetime
+    graph: str | None
+    version: str
+    note: str
+
+
+def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
+    """Both of them."""
+
+    @get("/api/approvals", summary="Who has said yes to a graph, by its digest")
+    async def approvals(
+        digest: Annotated[str, Parameter(min_length=64, max_length=64)],
+    ) -> list[Approval]:
+        return [_shown(each) for each in await services.control.approvals.of(digest)]
+
+    @post(
+        "/api/approvals",
+        summary="Say yes to exactly one graph, so that somebody else may start it on robots that "
+        "demand a second person",
+        guards=[Needs("operate")],
+    )
+    async def approve(data: ApprovalRequest, request: Request[Any, Any, Any]) -> Approval:
+        return _shown(await services.control.approvals.give(data, author_of(request)))
+
+    return [approvals, approve]
+
+
+def _shown(given: ApprovalGiven) -> Approval:
+    return Approval(
+        digest=given.digest,
+        author=given.author,
+        at=views.time(given.at),
+        graph=given.graph,
+        version=given.version,
+        note=given.note,
+    )

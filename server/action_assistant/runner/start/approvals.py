@@ -1,0 +1,111 @@
+"""Who said yes to which graph, by its digest: what a robot may demand before it takes a start.
+
+A yes is a person's word about exactly one graph. It stands in a stream of its own, is never taken
+back, and says nothing about any other graph.
+"""
+
+from collections import defaultdict
+from typing import Annotated, ClassVar, Final
+
+import anyio
+import msgspec
+
+from action_assistant.errors import BadInput, Conflict
+from action_assistant.journal.events import Draft
+from action_assistant.runner.clock import ClockUs
+from action_assistant.runner.links.port import Registration
+from action_assistant.runner.runs.events import Author
+from action_assistant.runner.runs.history import Ledger
+from action_assistant.runner.start.preflight import Item
+from action_assistant.umrf.facts import SECOND_PERSON
+
+#: The stream of all of them.
+STREAM: Final = "approvals"
+
+_DIGEST: Final = frozenset("0123456789abcdef")
+
+
+class ApprovalGiven(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """Somebody said yes to the graph with this digest. `graph` and `version` say where they saw it."""
+
+    kind: ClassVar[str] = "approval.given.v1"
+
+    at: int
+    digest: str
+    author: Author
+    graph: str | None = None
+    version: str = ""
+    note: str = ""
+
+
+class ApprovalRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A yes to exactly one graph."""
+
+    digest: Annotated[str, msgspec.Meta(min_length=64, max_length=64)]
+    graph: Annotated[str, msgspec.Meta(max_length=100)] | None = None
+    version: Annotated[str, msgspec.Meta(max_length=100)] = ""
+    note: Annotated[str, msgspec.Meta(max_length=500)] = ""
+
+
+class Approvals:
+    """All of them. Raises Unavailable while the journal cannot be read."""
+
+    def __init__(self, ledger: Ledger, clock_us: ClockUs) -> None:
+        self._ledger = ledger
+        self._clock_us = clock_us
+        self._seq = 0
+        self._by_digest: defaultdict[str, list[ApprovalGiven]] = defaultdict(list)
+        self._reading = anyio.Lock()
+
+    async def give(self, asked: ApprovalRequest, author: Author) -> ApprovalGiven:
+        """Somebody says yes. Saying it twice is saying it once. Raises BadInput, Unavailable."""
+        if not _DIGEST.issuperset(asked.digest):
+            raise BadInput("This is no digest of a graph.", where={"path": "/digest"})
+        for known in await self.of(asked.digest):
+            if known.author.id == author.id:
+                return known
+        given = ApprovalGiven(
+            at=self._clock_us(),
+            digest=asked.digest,
+            author=author,
+            graph=asked.graph,
+            version=asked.version,
+            note=asked.note.strip(),
+        )
+        draft = Draft(given.kind, author.id, msgspec.json.encode(given))
+        await self._ledger.append(STREAM, [draft])
+        return given
+
+    async def of(self, digest: str) -> tuple[ApprovalGiven, ...]:
+        """Who said yes to a graph, in order of time."""
+        async with self._reading:
+            while events := await self._ledger.read(STREAM, after=self._seq, limit=500):
+                for event in events:
+                    if event.kind == ApprovalGiven.kind:
+                        given = msgspec.json.decode(event.body, type=ApprovalGiven)
+                        self._by_digest[given.digest].append(given)
+                self._seq = events[-1].seq
+        return tuple(self._by_digest.get(digest, ()))
+
+    async def item(self, robot: Registration, digest: str, starter: str) -> Item | None:
+        """Whether somebody else than the starter, by id, has said yes; None where the robot does not
+        ask."""
+        if robot.profile.get(SECOND_PERSON) is not True:
+            return None
+        others = [each.author for each in await self.of(digest) if each.author.id != starter]
+        if not others:
+            text = (
+                f"{robot.name} takes only what a second person has said yes to, and nobody else has "
+                "said yes to exactly this graph."
+            )
+            return Item(code="approved", verdict="blocked", text=text)
+        names = ", ".join(dict.fromkeys(each.name or "somebody" for each in others[:3]))
+        return Item(
+            code="approved", verdict="passed", text=f"{names} said yes to exactly this graph."
+        )
+
+    async def require(self, robot: Registration, digest: str, starter: str) -> None:
+        """Raises Conflict where the robot asks for a yes that nobody else has given."""
+        item = await self.item(robot, digest, starter)
+        if item is not None and item.verdict == "blocked":
+            raise Conflict(item.text, where={"path": "/engine", "item": item.code})

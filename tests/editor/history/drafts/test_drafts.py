@@ -1,0 +1,375 @@
+"""Drafts on a real journal: merged either way, blamed on those who did it, and taken back."""
+
+import random
+from collections import defaultdict
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+
+from action_assistant.editor.catalogue.catalogue import Catalogue
+from action_assistant.editor.catalogue.graph_reader import GraphReader
+from action_assistant.editor.catalogue.people import People
+from action_assistant.editor.catalogue.versions import Versions
+from action_assistant.editor.documents.document import Maps, maps_of
+from action_assistant.editor.history.blame import Blame, keys_of
+from action_assistant.editor.history.change_index import ChangeIndex
+from action_assistant.editor.history.drafts.draft_merges import (
+    AskedMerge,
+    DraftMerges,
+    MergedDraft,
+    WantedMerge,
+)
+from action_assistant.editor.history.drafts.drafts import Drafts, DraftView, NewDraft
+from action_assistant.editor.history.drafts.told_merges import DraftSide
+from action_assistant.editor.history.going_back import EditsOfOne, GoingBack
+from action_assistant.editor.history.grafts import Grafts
+from action_assistant.editor.history.graph_history import GraphHistory
+from action_assistant.editor.history.key_changes import owner_of
+from action_assistant.editor.history.places import exist
+from action_assistant.editor.interchange.changes import difference
+from action_assistant.editor.log import graph_events as h
+from action_assistant.editor.rooms.open_rooms import Rooms
+from action_assistant.errors import BadInput, Conflict, NotFound
+from action_assistant.journal.journal import Journal
+from editor.history.drafts.random_sides import loose
+from editor.history.random_edits import Person, plain
+from support.doses import examples
+
+DOCK, CHARGE = "Dock" * 3, "Char" * 3
+
+
+class House:
+    """Everything that drafts need, and one graph."""
+
+    def __init__(self, journal: Journal, rooms: Rooms, people: People) -> None:
+        self.journal = journal
+        self.rooms = rooms
+        reader = GraphReader(journal, rooms)
+        index = ChangeIndex(journal)
+        grafts = Grafts(journal, index, people)
+        self.catalogue = Catalogue(journal, rooms, reader)
+        self.drafts = Drafts(journal, reader, self.catalogue, people, index)
+        self.merges = DraftMerges(journal, rooms, self.drafts, index, grafts, people)
+        self.blame = Blame(index, people, grafts)
+        self.going_back = GoingBack(journal, rooms, reader, index)
+        self.history = GraphHistory(journal, people, Versions(journal, reader), index)
+        self.origin = ""
+        self.wrote: dict[tuple[str, str, bytes], set[str]] = defaultdict(set)
+
+    async def now(self, graph: str) -> Maps:
+        async with self.rooms.enter(h.graph_stream(graph)) as room:
+            return await room.look(lambda replica, _: maps_of(replica.doc))
+
+    async def edit(self, graph: str, who: str, dice: random.Random, edits: int = 1) -> None:
+        """Somebody edits at random; what they gave which key is remembered."""
+        for _ in range(edits):
+            before = await self.now(graph)
+            async with self.rooms.enter(h.graph_stream(graph)) as room:
+                me = Person(who, dice)
+                me.hear(await room.look(lambda replica, _: replica.doc.get_update()))
+                for update in me.edit():
+                    await room.submit(update, who)
+            self._remember(who, before, await self.now(graph))
+
+    async def set(self, graph: str, who: str, root: str, **values: object) -> int:
+        """Somebody gives keys these values; None takes them away."""
+
+        def edit(doc: Any) -> None:
+            me = Person(who, random.Random(0))
+            me.doc = doc
+            for name, value in values.items():
+                key = name.replace("__", "|")
+                if value is None:
+                    del me.map(root)[key]
+                else:
+                    me.map(root)[key] = value
+
+        async with self.rooms.enter(h.graph_stream(graph)) as room:
+            state = await room.look(lambda replica, _: replica.doc.get_update())
+            return await room.submit(difference(state, edit), who)
+
+    async def merge(
+        self, draft: str, who: str, dice: random.Random, into: DraftSide = "origin"
+    ) -> MergedDraft:
+        """Somebody merges, with choices at random."""
+        asked = AskedMerge(into)
+        found = await self.merges.preview(draft, asked)
+        sides: tuple[DraftSide, ...] = ("origin", "draft")
+        choices = {conflict.place: dice.choice(sides) for conflict in found.conflicts}
+        wanted = WantedMerge(found.seq, found.draft_seq, into, choices)
+        return await self.merges.merge(draft, who, wanted)
+
+    async def log(self, graph: str) -> list[str]:
+        """The kinds of everything that is stored of a graph."""
+        found = [await self.journal.read(stream(graph)) for stream in _STREAMS]
+        return [event.kind for events in found for event in events]
+
+    def _remember(self, who: str, before: Maps, after: Maps) -> None:
+        for root, fields in after.items():
+            for key, value in fields.items():
+                if before[root].get(key) != value:
+                    self.wrote[root, key, msgspec.msgpack.encode(value)].add(who)
+
+
+_STREAMS = (h.graph_stream, h.about_stream)
+
+
+@pytest.fixture(params=["SQLite", "Postgres"])
+async def house(request: pytest.FixtureRequest, tmp_path: Path) -> AsyncIterator[House]:
+    """On each kind of database that there is."""
+    url = f"sqlite:///{tmp_path / 'editor.db'}"
+    if request.param == "Postgres":
+        url = request.getfixturevalue("postgres").new_database()
+    journal = await Journal.open(url, branch="editor", fold=h.fold)
+    rooms = Rooms(journal, linger=60, window=0)
+    house = House(journal, rooms, await People.known(journal))
+    made, _ = await house.catalogue.create(b'{"name": "valve"}', "ada")
+    house.origin = made.id
+    yield house
+    await rooms.close()
+    await journal.close()
+
+
+async def _draft(house: House, name: str = "gentler grip") -> DraftView:
+    return await house.drafts.make(house.origin, "ben", NewDraft(name))
+
+
+def _silent(maps: Maps) -> bytes:
+    return plain({root: fields for root, fields in maps.items() if root != "comments"})
+
+
+def _loose(maps: Maps) -> set[str]:
+    return loose({(root, k): v for root, fields in maps.items() for k, v in fields.items()})  # type: ignore[misc]
+
+
+async def test_a_draft_begins_as_its_origin_was_and_is_listed_under_it(house: House) -> None:
+    dice = random.Random(1)
+    await house.edit(house.origin, "ada", dice, 12)
+    then = await house.now(house.origin)
+    made = await _draft(house)
+    assert _silent(await house.now(made.id)) == _silent(then)
+    assert (made.name, made.origin, made.ahead, made.behind) == (
+        "gentler grip",
+        house.origin,
+        0,
+        0,
+    )
+    assert [view.id for view in await house.catalogue.all()] == [house.origin]
+    assert [view.id for view in await house.drafts.of(house.origin)] == [made.id]
+    assert (await house.catalogue.get(house.origin)).drafts == 1
+    await house.catalogue.delete(made.id, "ben")
+    assert await house.drafts.of(house.origin) == []
+    assert (await house.catalogue.get(house.origin)).drafts == 0
+    assert [view.id for view in await house.catalogue.all(deleted=True)] == [made.id]
+
+
+async def test_what_was_done_is_rebuilt_from_the_log(house: House) -> None:
+    dice = random.Random(2)
+    await house.edit(house.origin, "ada", dice, 6)
+    made = await _draft(house)
+    await house.edit(made.id, "ben", dice, 6)
+    await house.merge(made.id, "ada", dice)
+    before = await house.drafts.get(made.id)
+    await house.journal.rebuild()
+    assert await house.drafts.get(made.id) == before
+
+
+@pytest.mark.parametrize("seed", range(examples(10)))
+async def test_blame_names_who_did_it_however_often_and_whichever_way_it_was_merged(
+    house: House, seed: int
+) -> None:
+    dice = random.Random(seed)
+    await house.edit(house.origin, "ada", dice, 8)
+    drafts = [(await _draft(house)).id, (await _draft(house)).id]
+    for _ in range(6):
+        draft = dice.choice(drafts)
+        await house.edit(dice.choice([draft, draft, house.origin]), dice.choice(_PEOPLE), dice, 2)
+        if dice.random() < 0.6:
+            before = await house.now(house.origin)
+            await house.merge(draft, "zoe", dice, dice.choice(("origin", "draft")))
+            assert _loose(await house.now(house.origin)) <= _loose(before)
+    for graph in [*drafts, house.origin]:
+        await _blamed(house, graph)
+
+
+_PEOPLE = ("ada", "ben", "mari")
+
+
+async def _blamed(house: House, graph: str) -> None:
+    maps = await house.now(graph)
+    owners = {owner_of(root, k) for root, fields in maps.items() for k in fields}  # type: ignore[arg-type]
+    for owner in owners - {"entry", "exit"}:
+        for each in await house.blame.of(graph, owner, None):
+            value = msgspec.msgpack.encode(each.value)
+            keys = keys_of(owner, each.field)
+            authors = {who for place in keys for who in house.wrote.get((*place, value), ())}
+            if authors:  # else it is what the graph began with
+                assert each.author.id in authors, (owner, each)
+                assert each.merged is None or each.merged.by.id == "zoe"
+
+
+@pytest.mark.parametrize("seed", range(examples(10)))
+async def test_a_merge_that_is_taken_back_leaves_the_origin_as_it_was(
+    house: House, seed: int
+) -> None:
+    dice = random.Random(seed)
+    await house.edit(house.origin, "ada", dice, 10)
+    made = await _draft(house)
+    await house.edit(made.id, "ben", dice, 8)
+    await house.edit(house.origin, "mari", dice, 4)
+    before = await house.now(house.origin)
+    merged = await house.merge(made.id, "zoe", dice)
+    if merged.changed:
+        gone = await house.going_back.revert(
+            house.origin, "ada", EditsOfOne("zoe", merged.seq, merged.seq)
+        )
+        assert gone.left == ()
+    assert plain(await house.now(house.origin)) == plain(before)
+
+
+@pytest.mark.parametrize("seed", range(examples(10)))
+async def test_what_is_merged_either_way_is_the_same(house: House, seed: int) -> None:
+    dice = random.Random(seed)
+    await house.edit(house.origin, "ada", dice, 10)
+    made = await _draft(house)
+    await house.edit(made.id, "ben", dice, 5)
+    await house.edit(house.origin, "mari", dice, 5)
+    await house.merge(made.id, "zoe", dice)
+    assert (await house.drafts.get(made.id)).ahead == 0
+    await house.merge(made.id, "zoe", dice, "draft")
+    assert _things(await house.now(made.id)) == _things(await house.now(house.origin))
+    view = await house.drafts.get(made.id)
+    found = await house.merges.preview(made.id, AskedMerge())
+    assert (view.behind, found.conflicts) == (0, ())
+
+
+def _things(maps: Maps) -> set[str]:
+    places = {(root, key): v for root, fields in maps.items() for key, v in fields.items()}
+    return exist(places) - loose(places)  # type: ignore[arg-type]
+
+
+async def test_where_nothing_was_done_in_a_draft_nothing_is_stored(house: House) -> None:
+    dice = random.Random(3)
+    await house.edit(house.origin, "ada", dice, 5)
+    made = await _draft(house)
+    await house.edit(house.origin, "ada", dice, 5)
+    before = await house.log(house.origin), await house.log(made.id)
+    assert (await house.merge(made.id, "zoe", dice)).changed is False
+    assert (await house.log(house.origin), await house.log(made.id)) == before
+
+
+async def _conflicting(house: House) -> DraftView:
+    await house.set(house.origin, "ada", "actions", **{DOCK: "Dock", f"{DOCK}__in/speed": "1"})
+    made = await _draft(house)
+    await house.set(made.id, "ben", "actions", **{f"{DOCK}__in/speed": "2", CHARGE: "Charge"})
+    await house.set(house.origin, "ada", "actions", **{f"{DOCK}__in/speed": "3"})
+    return made
+
+
+async def test_a_conflict_is_refused_until_it_has_a_choice(house: House) -> None:
+    made = await _conflicting(house)
+    found = await house.merges.preview(made.id, AskedMerge())
+    (conflict,) = found.conflicts
+    assert (conflict.place, conflict.what) == (
+        f"actions/{DOCK}|in/speed",
+        "input speed of Dock_0",
+    )
+    (theirs,) = conflict.draft.actions
+    assert [(f.field, f.before, f.after) for f in theirs.fields] == [("in/speed", "1", "2")]
+    wanted = WantedMerge(found.seq, found.draft_seq)
+    with pytest.raises(Conflict, match=r"input speed of Dock_0") as refused:
+        await house.merges.merge(made.id, "zoe", wanted)
+    assert refused.value.where == {"places": [conflict.place]}
+    choices: dict[str, DraftSide] = {conflict.place: "draft"}
+    chosen = msgspec.structs.replace(wanted, choices=choices)
+    merged = await house.merges.merge(made.id, "zoe", chosen)
+    actions = (await house.now(house.origin))["actions"]
+    assert (actions[f"{DOCK}|in/speed"], actions[CHARGE]) == ("2", "Charge")
+    speed = next(
+        each for each in await house.blame.of(house.origin, DOCK, None) if each.field == "in/speed"
+    )
+    assert (speed.author.id, speed.seq) == ("ben", merged.seq)
+    assert speed.merged is not None
+    assert (speed.merged.graph, speed.merged.by.id, speed.merged.seq) == (made.id, "zoe", 2)
+    entry = (await house.history.of(house.origin, limit=5, before=None))[0]
+    assert entry.kind == "merged"
+    assert entry.merged is not None
+    assert [each.id for each in entry.merged.authors] == ["ben"]
+
+
+async def test_a_conflict_in_which_nothing_changes_is_settled_too(house: House) -> None:
+    await house.set(house.origin, "ada", "actions", **{DOCK: "Dock"})
+    made = await _draft(house)
+    await house.set(made.id, "ben", "actions", **{DOCK: "Berth"})
+    seq = await house.set(house.origin, "ada", "actions", **{DOCK: "Port"})
+    choices: dict[str, DraftSide] = {f"actions/{DOCK}": "origin"}
+    wanted = WantedMerge(seq, 2, choices=choices)
+    assert await house.merges.merge(made.id, "zoe", wanted) == MergedDraft(
+        house.origin, seq, changed=False
+    )
+    assert (await house.merges.preview(made.id, AskedMerge())).conflicts == ()
+    assert (await house.drafts.get(made.id)).state == "merged"
+    entry = (await house.history.of(house.origin, limit=5, before=None))[0]
+    assert entry.kind == "edited"
+    (name,) = await house.blame.of(house.origin, DOCK, None)
+    assert (name.author.id, name.merged) == ("ada", None)
+
+
+async def test_a_merge_of_what_nobody_looked_at_is_refused(house: House) -> None:
+    made = await _conflicting(house)
+    found = await house.merges.preview(made.id, AskedMerge())
+    choices: dict[str, DraftSide] = {each.place: "draft" for each in found.conflicts}
+    wanted = WantedMerge(found.seq, found.draft_seq, choices=choices)
+    await house.set(made.id, "ben", "actions", **{CHARGE: "Load"})
+    with pytest.raises(Conflict, match="draft was changed") as refused:
+        await house.merges.merge(made.id, "zoe", wanted)
+    assert refused.value.where == {"side": "draft"}
+    newer = msgspec.structs.replace(wanted, draft_seq=found.draft_seq + 1)
+    await house.set(house.origin, "ada", "meta", name="valves")
+    with pytest.raises(Conflict, match="graph was changed"):
+        await house.merges.merge(made.id, "zoe", newer)
+
+
+async def test_problems_that_would_come_with_a_merge_are_told(house: House) -> None:
+    await house.set(house.origin, "ada", "actions", **{DOCK: "Dock", f"{DOCK}__type": "sync"})
+    made = await _draft(house)
+    await house.set(made.id, "ben", "actions", **{CHARGE: "not a name"})
+    found = await house.merges.preview(made.id, AskedMerge())
+    assert any("not a name" in problem.message for problem in found.problems)
+    assert not any("Dock" in problem.message for problem in found.problems)
+
+
+async def test_a_proposal_is_answered_and_ends_with_the_merge(house: House) -> None:
+    made = await _conflicting(house)
+    with pytest.raises(Conflict, match="not proposed"):
+        await house.drafts.answer(made.id, "ada", h.DraftAnswered(yes=True, note="", seq=2))
+    proposed = await house.drafts.propose(made.id, "ben", "softer")
+    assert proposed.state == "proposed"
+    for yes in (False, True):
+        answered = await house.drafts.answer(made.id, "ada", h.DraftAnswered(yes, "", 2))
+    assert answered.proposal is not None
+    assert [(each.author.id, each.yes) for each in answered.proposal.answers] == [("ada", True)]
+    await house.merge(made.id, "ada", random.Random(0))
+    merged = await house.drafts.get(made.id)
+    assert (merged.state, merged.proposal) == ("merged", None)
+    await house.set(made.id, "ben", "actions", **{CHARGE: "Load"})
+    again = await house.drafts.get(made.id)
+    assert (again.state, again.ahead) == ("open", 1)
+    await house.drafts.propose(made.id, "ben", "")
+    assert (await house.drafts.withdraw(made.id, "ben")).state == "open"
+
+
+async def test_what_is_no_draft_is_not_found(house: House) -> None:
+    with pytest.raises(NotFound, match="no draft"):
+        await house.drafts.get(house.origin)
+    with pytest.raises(BadInput, match="200 characters"):
+        await _draft(house, "x" * 201)
+    made = await _draft(house, "")
+    assert made.name == "Draft 1"
+    await house.catalogue.delete(house.origin, "ada")
+    with pytest.raises(NotFound):
+        await house.merges.preview(made.id, AskedMerge())
+    assert (await house.drafts.get(made.id)).ahead is None

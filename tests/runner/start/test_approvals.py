@@ -1,0 +1,140 @@
+"""A robot that demands a second person takes only what somebody else has said yes to."""
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from action_assistant.errors import BadInput, Conflict
+from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.links.port import SIMULATOR, Order, Registration
+from action_assistant.runner.runs.events import Author, Override
+from action_assistant.runner.start.approvals import (
+    STREAM,
+    ApprovalGiven,
+    ApprovalRequest,
+    Approvals,
+)
+from action_assistant.umrf.facts import BadProfile, facts_of
+from runner.harness import ANN, BEN, Harness, clock_us, order, sequence, until, virtual
+from runner.registered_robots import NEVER, Open, change, fleet, group, verdicts
+
+CARL = Author("carl", "Carl")
+
+
+@asynccontextmanager
+async def careful(harness: Harness, david: Open) -> AsyncIterator[ExecutionService]:
+    """A runner whose robot demands a second person."""
+    async with fleet(harness, David=david) as control:
+        demanding = Registration(name="David", profile={"second_person": True})
+        await control.register(demanding, ANN)
+        await until(lambda: control.robots.robot("David").heard_at is not None)
+        yield control
+
+
+def yes(digest: str) -> ApprovalRequest:
+    return ApprovalRequest(digest=digest)
+
+
+@virtual
+async def test_nothing_starts_before_somebody_else_has_said_yes() -> None:
+    david, graph = Open(NEVER), sequence()
+    async with careful(Harness(), david) as control:
+        asked = order(graph, engine="David")
+        (look,) = await control.look(group(graph, "David"), "ann")
+        assert (verdicts(look)["approved"], look.never) == ("blocked", True)
+        override = Override(("approved",), "I am careful")
+        for tried in (asked, msgspec.structs.replace(asked, override=override)):
+            with pytest.raises(Conflict, match="second person") as refused:
+                await control.start(tried, ANN)
+            assert (refused.value.where or {})["item"] == "approved"
+        with pytest.raises(Conflict, match="second person"):
+            await control.start_group(group(graph, "David"), ANN)
+        assert david.starts == []
+
+        await control.approvals.give(yes(asked.digest), ANN)  # her own does not count
+        with pytest.raises(Conflict, match="nobody else"):
+            await control.start(asked, ANN)
+        await control.approvals.give(yes(asked.digest), BEN)
+        (look,) = await control.look(group(graph, "David"), "ann")
+        approved = next(item for item in look.items if item.code == "approved")
+        assert (approved.verdict, approved.text) == (
+            "passed",
+            "Ben said yes to exactly this graph.",
+        )
+        assert (await control.start(asked, ANN)).fresh
+        assert len(david.starts) == 1
+        control.stop_all(ANN)
+        await until(lambda: not control.open)
+
+
+@virtual
+async def test_a_yes_is_to_exactly_one_graph() -> None:
+    david = Open()
+    async with careful(Harness(), david) as control:
+        await control.approvals.give(yes(order(sequence(actions=2)).digest), BEN)
+        with pytest.raises(Conflict, match="nobody else"):
+            await control.start(order(sequence(actions=3), engine="David"), ANN)
+    assert david.starts == []
+
+
+@virtual
+async def test_a_change_of_what_runs_is_asked_for_like_a_start() -> None:
+    class Pausing(Open):
+        pauses = True
+        modified: tuple[Order, ...] = ()
+
+        async def modify(self, order: Order, continue_from: str = "") -> None:
+            """Remember it."""
+            self.modified = (*self.modified, order)
+
+    david, first, second = Pausing(NEVER), sequence(), sequence(actions=4)
+    async with careful(Harness(), david) as control:
+        await control.approvals.give(yes(order(first).digest), BEN)
+        run = (await control.start(order(first, engine="David"), ANN)).run
+        await until(lambda: control.open[run.id].run.state == "running")
+        with pytest.raises(Conflict, match="second person"):
+            await control.modify(run.id, change(second), ANN)
+        assert david.modified == ()
+        await control.approvals.give(yes(order(second).digest), CARL)
+        with pytest.raises(Conflict, match="nobody else"):
+            await control.modify(run.id, change(second), CARL)
+        await control.modify(run.id, change(second), ANN)
+        assert len(david.modified) == 1
+        control.stop_all(ANN)
+        await until(lambda: not control.open)
+
+
+@virtual
+async def test_the_simulator_and_other_robots_ask_nobody() -> None:
+    async with fleet(Harness(), David=Open()) as control:
+        for engine in ("David", SIMULATOR):
+            (look,) = await control.look(group(sequence(), engine), "ann")
+            assert "approved" not in verdicts(look)
+
+
+@virtual
+async def test_a_yes_is_kept_once_and_after_a_restart() -> None:
+    harness = Harness()
+    digest = order(sequence()).digest
+    async with fleet(harness, David=Open()) as control:
+        first = await control.approvals.give(yes(digest), BEN)
+        assert await control.approvals.give(yes(digest), BEN) == first
+        await control.approvals.give(yes(digest), CARL)
+        with pytest.raises(BadInput, match="no digest"):
+            await control.approvals.give(yes("x" * 64), BEN)
+    events = await harness.ledger.read(STREAM)
+    assert [event.kind for event in events] == [ApprovalGiven.kind] * 2
+    again = Approvals(harness.ledger, clock_us)
+    assert [each.author for each in await again.of(digest)] == [BEN, CARL]
+
+
+@given(st.sampled_from(["yes", 1, None, []]))
+def test_a_profile_demands_it_or_not(value: object) -> None:
+    facts_of({"second_person": True})
+    with pytest.raises(BadProfile) as wrong:
+        facts_of({"second_person": value})
+    assert wrong.value.path == "/second_person"
