@@ -66,8 +66,8 @@ def played(graph: Graph, ends: tuple[tuple[int, str], ...]) -> tuple[list[Trace]
     for step, (number, result) in enumerate(ends, 1):
         performer.going.pop(number)
         traces += engine.returned(Returned(number=number, result=result), step * 10.0)
-    running = not engine.crashed and engine.graphs[graph.name].state == "RUNNING"
-    return traces, list(performer.going) if running else []
+    is_over = engine.crashed or engine.locked or engine.graphs[graph.name].state != "RUNNING"
+    return traces, [] if is_over else list(performer.going)
 
 
 def every_arrow(graph: Graph, depth: int) -> set[OutcomeArrow]:
