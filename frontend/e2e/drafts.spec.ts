@@ -83,6 +83,11 @@ test.beforeAll(async ({ browser }) => {
     headers: { "content-type": "application/json" },
   });
   graph = made.id;
+  const umrf = await product.ask<object>(`/api/graphs/${graph}/umrf?identities=true`);
+  const course = { name: "it drives", graph, umrf, script: { behaviours: {} } };
+  const headers = { "content-type": "application/json" };
+  const body = JSON.stringify(course);
+  await product.ask("/api/expectations", { method: "POST", body, headers }, product.runnerUrl);
   ada = await product.person(browser, "Ada");
   mari = await product.person(browser, "Mari");
   for (const { page } of [ada, mari]) await page.goto(`${product.url}/graphs/${graph}`);
@@ -139,6 +144,7 @@ test("a merge asks for what both changed, and both see it", async () => {
   await expect(dialog.getByRole("button", { name: "Choose 1 more" })).toBeDisabled();
   const conflict = dialog.getByRole("group", { name: "input speed of Drive_0" });
   await expect(conflict).toContainText("0.4 → 0.9");
+  await expect(dialog.getByText("The expected course is taken.")).toBeVisible();
   expect(await violations(page)).toEqual([]);
   await conflict.getByRole("radio", { name: "“gentler grip”" }).check();
   await expect(dialog.getByRole("region", { name: "What changes" })).toContainText(

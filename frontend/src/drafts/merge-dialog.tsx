@@ -2,7 +2,7 @@
 import { Button, Modal, Skeleton } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { useQueryClient } from "@tanstack/react-query";
-import { type ReactNode, useState } from "react";
+import { useState } from "react";
 import {
   type DraftChoices,
   type DraftSide,
@@ -13,6 +13,7 @@ import {
 } from "../api/documents/drafts";
 import { refreshHistory } from "../api/documents/history";
 import { errorText } from "../api/http";
+import { CoursesOfText } from "../courses/courses-told";
 import { namesWords } from "../history/history-words";
 import style from "./drafts.module.css";
 import { MergeConflicts } from "./merge-conflicts";
@@ -24,8 +25,6 @@ interface Props {
   draft: GraphDraft;
   into: DraftSide;
   onClose: () => void;
-  /** What else is to be seen before a merge, as expected courses that it would break. */
-  also?: (found: MergePreview) => ReactNode;
 }
 
 /** The choices that were made, of conflicts that are still there. */
@@ -63,13 +62,14 @@ function Intro({ found, draft, into }: Props & { found: MergePreview }) {
 }
 
 function Body(props: Props) {
-  const { draft, into, onClose, also } = props;
+  const { draft, into, onClose } = props;
   const { choices, choose } = useChoices();
   const found = useMergePreview(draft.id, into, choices);
   const { busy, wrong, merge } = useMerge(props);
   if (found.isPending) return <Skeleton height={200} />;
   if (found.isError) return <p role="alert">{errorText(found.error)}</p>;
-  const { conflicts, changes, problems } = found.data;
+  const { conflicts, changes, problems, seq, draft_seq } = found.data;
+  const seen = `${seq} ${draft_seq}`;
   const left = conflicts.filter(({ place }) => choices[place] === undefined).length;
   const names = { origin: draft.origin_name || "the graph", draft: `“${draft.name}”` };
   return (
@@ -82,7 +82,9 @@ function Body(props: Props) {
         <ToldChanges changes={changes} nothing="" />
       </section>
       <MergeProblems problems={problems} />
-      {also?.(found.data)}
+      {into === "origin" && (
+        <CoursesOfText graph={draft.origin} umrf={found.data.umrf} of={[draft.id, seen, choices]} />
+      )}
       {wrong !== "" && (
         <p className={style.wrong} role="alert">
           {wrong}

@@ -706,7 +706,7 @@ export interface EditorApi {
      * @description What a merge would do to the side `into`, where everything that has no choice stays as it is there.
      *
      *     `seq`, `draft_seq`: the moments that it is about. `changes`: what would change. `problems`: those that this side has not now.
-     *     `authors`: whose changes they are. `origin_did`, `draft_did`: what each side did since they were one.
+     *     `umrf`: the text of what comes of it. `authors`: whose changes they are. `origin_did`, `draft_did`: what each side did since they were one.
      */
     MergePreview: {
         /** @enum {string} */
@@ -716,6 +716,7 @@ export interface EditorApi {
         changes: EditorApi["Changes"];
         conflicts: EditorApi["DraftConflict"][];
         problems: EditorApi["Problem"][];
+        umrf: string;
         authors: EditorApi["PersonRef"][];
         origin_did: EditorApi["Changes"];
         draft_did: EditorApi["Changes"];

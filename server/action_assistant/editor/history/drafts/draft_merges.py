@@ -50,7 +50,7 @@ class MergePreview(msgspec.Struct, frozen=True, kw_only=True):
     """What a merge would do to the side `into`, where everything that has no choice stays as it is there.
 
     `seq`, `draft_seq`: the moments that it is about. `changes`: what would change. `problems`: those that this side has not now.
-    `authors`: whose changes they are. `origin_did`, `draft_did`: what each side did since they were one.
+    `umrf`: the text of what comes of it. `authors`: whose changes they are. `origin_did`, `draft_did`: what each side did since they were one.
     """
 
     into: DraftSide
@@ -59,6 +59,7 @@ class MergePreview(msgspec.Struct, frozen=True, kw_only=True):
     changes: Changes
     conflicts: tuple[DraftConflict, ...]
     problems: tuple[Problem, ...]
+    umrf: str
     authors: tuple[PersonRef, ...]
     origin_did: Changes
     draft_did: Changes
@@ -105,6 +106,7 @@ class DraftMerges:
             changes=found.changes,
             conflicts=found.conflicts,
             problems=found.problems,
+            umrf=found.umrf,
             authors=tuple(self._people.person(each) for each in authors),
             origin_did=found.did["origin"],
             draft_did=found.did["draft"],

@@ -23,6 +23,7 @@ from action_assistant.umrf.difference import (
     RelationChange,
     difference,
 )
+from action_assistant.umrf.files.writing import Stamp, write
 from action_assistant.umrf.model import ENTRY, EXIT, Graph, Problem
 
 #: The two graphs of a merge. What is brought in comes from the one, into the other.
@@ -45,7 +46,8 @@ class DraftConflict(msgspec.Struct, frozen=True, kw_only=True):
 
 class FoundMerge(msgspec.Struct, frozen=True):
     """The update that merges, which is of use only when every conflict has a choice. `places`: the keys
-    that it sets. `problems`: those that come with it. `did`: what each side did since they were one."""
+    that it sets. `problems`: those that come with it. `did`: what each side did since they were one.
+    `umrf`: the text of what comes of it, with the identities of its actions."""
 
     update: bytes
     places: tuple[Place, ...]
@@ -53,6 +55,7 @@ class FoundMerge(msgspec.Struct, frozen=True):
     changes: Changes
     problems: tuple[Problem, ...]
     did: dict[DraftSide, Changes]
+    umrf: str
 
 
 def merging(
@@ -85,6 +88,7 @@ def merging(
         _changes(mine.moment.graph, graph, {owner_of(*place) for place in found.targets}),
         tuple(worse[:_WORSE]),
         teller.did,
+        write(graph, Stamp(ours.graph)),
     )
 
 
