@@ -20,9 +20,16 @@ export function doneWords({ kind, version, adapted }: Done): string {
   return kind === "published" && version?.label ? `kept version ${version.label}` : DONE[kind];
 }
 
+const EDITS: ReadonlySet<HistoryEntry["kind"]> = new Set([
+  "edited",
+  "restored",
+  "reverted",
+  "adapted",
+]);
+
 /** The moment before it, with which it is compared; null where there was nothing. */
 export function momentBefore({ kind, seq, from_seq }: HistoryEntry): number | null {
-  if (kind !== "edited" && kind !== "restored" && kind !== "adapted") return null;
+  if (!EDITS.has(kind)) return null;
   const before = (from_seq ?? seq) - 1;
   return before >= 1 ? before : null;
 }
