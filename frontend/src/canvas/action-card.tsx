@@ -110,6 +110,7 @@ export const ActionCard = memo(function ActionCard({
         most={says ? CARD_LINES - 1 : CARD_LINES}
         selected={selected}
         old={change?.oldValues}
+        differing={change?.rows}
         inferred={progress?.inferred ?? false}
       />
       {OUTCOMES.map((outcome, i) => (

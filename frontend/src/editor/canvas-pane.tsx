@@ -3,7 +3,6 @@ import { Button, Kbd, Skeleton } from "@mantine/core";
 import { IconFocus2, IconRouteAltLeft } from "@tabler/icons-react";
 import { ReactFlowProvider } from "@xyflow/react";
 import { type ReactNode, useEffect, useMemo, useRef } from "react";
-import { ChangeMarksContext } from "../canvas/changes/change-marks";
 import { NO_PROBLEM_MARKS, type ProblemMarks } from "../canvas/problem-marks";
 import { type EditorContext, useEditorContext } from "../edit-actions/editor-context";
 import { EMPTY_GRAPH, type Key, type Position } from "../graph/model";
@@ -23,6 +22,7 @@ import { useUnfolding } from "./canvas/use-unfolding";
 import { useViewport } from "./canvas/use-viewport";
 import style from "./canvas-pane.module.css";
 import { Toolbar } from "./menus/toolbar";
+import { EarlierSide, LaterSide, useSides } from "./sides";
 import type { EditorState } from "./use-editor";
 import { useGraphLink } from "./use-graph-link";
 import type { Past } from "./use-past";
@@ -104,6 +104,14 @@ function Tools({ compact, hidden }: { compact: boolean; hidden: boolean }) {
   );
 }
 
+function Robots() {
+  return (
+    <div className={style.robots} data-covers="top">
+      <RobotFilter />
+    </div>
+  );
+}
+
 function FollowRun({ onFollow }: { onFollow: () => void }) {
   return (
     <Button size="compact-sm" leftSection={<IconFocus2 size={15} />} onClick={onFollow}>
@@ -129,6 +137,7 @@ function Inside(props: Props) {
     laidOut: first.places,
   });
   const { flow, places, sizes } = canvas;
+  const sides = useSides(past, canvas);
   const frame = useRef<HTMLDivElement>(null);
   const pointer = useRef<Position | null>(null);
   const waiting = !arrived || (first.pending && context.graph.actions.length > 1);
@@ -136,7 +145,7 @@ function Inside(props: Props) {
   const { view, lost, onPanned, onFollow } = useViewport({
     flow,
     frame,
-    places,
+    places: sides.places,
     sizes,
     lines: canvas.lines,
     ...useUnfolding(context, canvas),
@@ -160,38 +169,37 @@ function Inside(props: Props) {
 
   return (
     <div className={style.whole}>
-      <div
-        className={style.stage}
-        ref={frame}
-        aria-busy={first.busy}
-        data-dry={dry}
-        data-then={then}
-      >
-        <ChangeMarksContext value={past.seen?.changes?.marks ?? null}>
-          <EditableCanvas
-            context={context}
-            canvas={canvas}
-            me={me}
-            map={!compact && context.graph.actions.length > 3}
-            onPanned={endFollowing}
-            pointer={pointer}
-            writing={writing}
-          />
-        </ChangeMarksContext>
-        <Emptiness waiting={waiting} context={context} />
-        {!compact && (
-          <div className={style.robots} data-covers="top">
-            <RobotFilter />
+      <div className={style.sides} data-side={sides.side ? true : undefined}>
+        {sides.side && <EarlierSide side={sides.side} {...{ flow, onPanned: endFollowing }} />}
+        <div
+          className={style.stage}
+          ref={frame}
+          aria-busy={first.busy}
+          data-dry={dry}
+          data-then={then}
+        >
+          <LaterSide {...sides}>
+            <EditableCanvas
+              context={context}
+              canvas={canvas}
+              me={me}
+              map={!compact && sides.side === null && context.graph.actions.length > 3}
+              onPanned={endFollowing}
+              pointer={pointer}
+              writing={writing}
+            />
+          </LaterSide>
+          <Emptiness waiting={waiting} context={context} />
+          {!compact && <Robots />}
+          <FollowFrame />
+          <Tools compact={compact} hidden={phone && (dry ?? then) === true} />
+          <div className={style.corner}>
+            {lost && <FollowRun onFollow={onFollow} />}
+            {!context.dryRun && corner}
           </div>
-        )}
-        <FollowFrame />
-        <Tools compact={compact} hidden={phone && (dry ?? then) === true} />
-        <div className={style.corner}>
-          {lost && <FollowRun onFollow={onFollow} />}
-          {!context.dryRun && corner}
         </div>
       </div>
-      <Below context={context} record={props.record} show={past.show} />
+      <Below context={context} record={props.record} seen={past} />
     </div>
   );
 }
@@ -201,22 +209,24 @@ const NOTHING: ReadonlyMap<Key, Progress> = new Map();
 const NOTHING_RUNS = { progress: NOTHING, marks: NO_PROBLEM_MARKS, run: null };
 
 /** The canvas keeps up with the hands of others; what stands beside it comes after. */
-function useDrawnContext({ seen }: Past): EditorContext {
+function useDrawnContext(past: Past): EditorContext {
   const calm = useEditorContext();
   const now = useGraph();
-  // What is gone since then is drawn where it stood.
-  const graph = calm.past === null ? now : (seen?.changes?.shown ?? calm.graph);
+  const changes = past.seen?.changes;
+  // What is gone since then is drawn where it stood, unless the canvas beside it shows that.
+  const then = past.side ? changes?.after : changes?.shown;
+  const graph = calm.past === null ? now : (then ?? calm.graph);
   return useMemo<EditorContext>(() => ({ ...calm, graph }), [calm, graph]);
 }
 
 interface BelowProps {
   context: EditorContext;
   record: ReactNode;
-  show: Past["show"];
+  seen: Past;
 }
 
 /** What plays on the canvas, or which moment of the past it shows. */
-function Below({ context: { past, dryRun, ...context }, record, show }: BelowProps) {
+function Below({ context: { past, dryRun, ...context }, record, seen }: BelowProps) {
   if (dryRun) {
     return (
       <PartBoundary>
@@ -227,7 +237,7 @@ function Below({ context: { past, dryRun, ...context }, record, show }: BelowPro
   if (past === null) return null;
   return (
     <PartBoundary>
-      <PastBar place={past} show={show} />
+      <PastBar place={past} show={seen.show} side={seen.side} onSide={seen.setSide} />
     </PartBoundary>
   );
 }

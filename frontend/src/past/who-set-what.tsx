@@ -14,8 +14,8 @@ import { useEditorContext } from "../edit-actions/editor-context";
 import { usePersonColors, useThrottledLink } from "../sync/use-room";
 import { day, hourMinute, instant, useNow } from "../ui/times";
 import { blamedName, blamedValue, toldFields } from "./blame-words";
-import { useGoingBack } from "./going-back";
 import style from "./past-details.module.css";
+import { useGoingBack } from "./ways/going-back";
 
 function By({ value, color }: { value: Pick<FieldValue, "author" | "at">; color: string }) {
   const now = useNow(60_000);

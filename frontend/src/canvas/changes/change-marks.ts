@@ -9,6 +9,8 @@ export interface ChangeMark {
   readonly oldName: string | null;
   /** What values were, by the name of their row on the card. */
   readonly oldValues: ReadonlyMap<string, string>;
+  /** The rows on the card that say something else than on the other side, where both are shown. */
+  readonly rows?: ReadonlySet<string>;
 }
 
 /** By key of an action or note, and by id of a relation. */

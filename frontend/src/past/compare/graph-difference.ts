@@ -26,6 +26,8 @@ export interface ChangedThing {
 }
 
 export interface GraphChanges {
+  readonly before: Graph;
+  readonly after: Graph;
   /** The later graph, with what is gone where it stood. */
   readonly shown: Graph;
   readonly things: readonly ChangedThing[];
@@ -189,7 +191,7 @@ export function changesBetween(
     const { change } = thing;
     return [[thing.key, { change, by: by(thing.key), oldName: renamed, oldValues: old }]];
   });
-  return { shown, things, marks: new Map(marks) };
+  return { before, after, shown, things, marks: new Map(marks) };
 }
 
 const NO_VALUES: ReadonlyMap<string, string> = new Map();
