@@ -169,7 +169,7 @@ function Inside(props: Props) {
 
   return (
     <div className={style.whole}>
-      <div className={style.sides} data-side={sides.side ? true : undefined}>
+      <div className={style.sides} data-side={sides.small || undefined}>
         {sides.side && <EarlierSide side={sides.side} {...{ flow, onPanned: endFollowing }} />}
         <div
           className={style.stage}
@@ -178,12 +178,12 @@ function Inside(props: Props) {
           data-dry={dry}
           data-then={then}
         >
-          <LaterSide {...sides}>
+          <LaterSide side={sides.side} marks={sides.marks}>
             <EditableCanvas
               context={context}
               canvas={canvas}
               me={me}
-              map={!compact && sides.side === null && context.graph.actions.length > 3}
+              map={!(compact || sides.small) && context.graph.actions.length > 3}
               onPanned={endFollowing}
               pointer={pointer}
               writing={writing}
@@ -192,7 +192,7 @@ function Inside(props: Props) {
           <Emptiness waiting={waiting} context={context} />
           {!compact && <Robots />}
           <FollowFrame />
-          <Tools compact={compact} hidden={phone && (dry ?? then) === true} />
+          <Tools compact={compact || sides.small} hidden={phone && (dry ?? then) === true} />
           <div className={style.corner}>
             {lost && <FollowRun onFollow={onFollow} />}
             {!context.dryRun && corner}

@@ -50,7 +50,8 @@ function useSeenPlaces(places: Positions, sizes: Sizes, side: SideBySide | null)
 /** What the canvas shows of two moments, and where everything stands that is seen of them. */
 export function useSides(past: Past, { places, sizes }: { places: Positions; sizes: Sizes }) {
   const side = useSide(past);
-  return { side, marks: useShownMarks(past, side), places: useSeenPlaces(places, sizes, side) };
+  const marks = useShownMarks(past, side);
+  return { side, small: side !== null, marks, places: useSeenPlaces(places, sizes, side) };
 }
 
 interface LaterProps {

@@ -1,5 +1,5 @@
 /** The history of the open graph beside its canvas: days, what people did in words, versions and runs. */
-import { Button, Skeleton } from "@mantine/core";
+import { Button, Checkbox, Skeleton } from "@mantine/core";
 import { useSessionStorage } from "@mantine/hooks";
 import { type KeyboardEvent, useEffect, useRef, useState } from "react";
 import type { HistoryEntry } from "../api/documents/history";
@@ -13,6 +13,7 @@ import { day, useNow } from "../ui/times";
 import { EntryRow } from "./entry-row";
 import style from "./history-panel.module.css";
 import { RunRow, VersionRow } from "./marks-in-list";
+import { useSinceOn } from "./since/use-since-on";
 import { daysOf, entryAt, entryKey, type TimelineItem } from "./told/timeline";
 import { type Timeline, useTimeline } from "./told/use-timeline";
 import { VersionsList } from "./versions/versions-list";
@@ -111,8 +112,9 @@ function Items({ items, timeline }: { items: readonly TimelineItem[]; timeline: 
 function SinceLastGood({ timeline: { lastGood } }: { timeline: Timeline }) {
   const { past, lookAt } = useEditorContext();
   const { seq } = useThrottledLink();
+  const [marked, setMarked] = useSinceOn();
   if (lastGood === null || lastGood.seq >= seq) return null;
-  const on = past?.at === seq && past.with === lastGood.seq;
+  const on = past?.at === seq && (past.with === "good" || past.with === lastGood.seq);
   return (
     <div className={style.since}>
       <Button
@@ -120,10 +122,17 @@ function SinceLastGood({ timeline: { lastGood } }: { timeline: Timeline }) {
         size="compact-sm"
         variant="light"
         aria-pressed={on}
-        onClick={() => lookAt(on ? null : { at: seq, with: lastGood.seq })}
+        onClick={() => lookAt(on ? null : { at: seq, with: "good" })}
       >
         What changed since run {lastGood.run}, which went well
       </Button>
+      <Checkbox
+        mt={6}
+        size="xs"
+        label="Mark it on the canvas"
+        checked={marked}
+        onChange={(event) => setMarked(event.currentTarget.checked)}
+      />
     </div>
   );
 }
@@ -162,9 +171,9 @@ export function HistoryPanel() {
     {
       value: "versions",
       label: (
-        <>
-          Versions <span className={style.count}>{count}</span>
-        </>
+        <span className={style.counted}>
+          Versions <span>{count}</span>
+        </span>
       ),
     },
   ] as const;

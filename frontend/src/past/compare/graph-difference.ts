@@ -123,6 +123,22 @@ function thingOf<T>(
   return { key, thing, change: changeOf(pair), looks: both && lines.length === 0, name, lines };
 }
 
+/** What two states of an action differ in; null where that is nothing, or only looks. */
+export function changedAction(before: Action, after: Action): FieldChange[] | null {
+  const fields = isEqual(before, after)
+    ? []
+    : changedFields(actionFields(before), actionFields(after));
+  return fields.length === 0 ? null : fields;
+}
+
+/** The same of an arrow. */
+export function changedRelation(before: Relation, after: Relation): FieldChange[] | null {
+  const fields = isEqual(before, after)
+    ? []
+    : changedFields(relationFields(before), relationFields(after));
+  return fields.length === 0 ? null : fields;
+}
+
 function namesOf(...graphs: readonly Graph[]): (key: Key) => string {
   const names = new Map<Key, string>([
     ["entry", "Entry"],

@@ -85,7 +85,9 @@ function Ways(props: Props) {
         leftSection={<IconLink size={14} aria-hidden />}
         onClick={() => void copied(link, "The link")}
       >
-        Copy link
+        <span>
+          <span className="visually-hidden">Copy </span>Link
+        </span>
       </Button>
       {mayEdit && (
         <Button
