@@ -121,6 +121,7 @@ function SinceLastGood({ timeline: { lastGood } }: { timeline: Timeline }) {
         fullWidth
         size="compact-sm"
         variant="light"
+        className={style.question ?? ""}
         aria-pressed={on}
         onClick={() => lookAt(on ? null : { at: seq, with: "good" })}
       >
@@ -168,14 +169,7 @@ export function HistoryPanel() {
   const count = timeline.versions.length;
   const views = [
     { value: "history", label: "History" },
-    {
-      value: "versions",
-      label: (
-        <span className={style.counted}>
-          Versions <span>{count}</span>
-        </span>
-      ),
-    },
+    { value: "versions", label: `Versions\u00a0${count}` },
   ] as const;
   return (
     <section className={style.panel} aria-label="History" data-history onKeyDown={onArrowKeys}>

@@ -1,7 +1,7 @@
 /** What can be made of the moment that is looked at: the graph again, or another one. */
 import { Button } from "@mantine/core";
 import { IconCopyPlus, IconRestore } from "@tabler/icons-react";
-import { type Version, versionName } from "../../api/graphs";
+import type { Version } from "../../api/graphs";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import { useThrottledLink } from "../../sync/use-room";
 import { useGoingBack } from "./going-back";
@@ -16,8 +16,8 @@ export function PastWays({ versions }: { versions: readonly Version[] }) {
   const copies = useCopyAsGraph();
   if (past === null || !mayGoBack) return null;
   const { at } = past;
-  const version = versions.find((each) => each.seq === at);
-  const called = version === undefined ? `change ${at}` : versionName(versions, version.id);
+  const index = versions.findIndex((each) => each.seq === at);
+  const called = index < 0 ? `change ${at}` : `v${versions.length - index}`;
   return (
     <div className={style.ways}>
       {at < seq && (
@@ -38,9 +38,7 @@ export function PastWays({ versions }: { versions: readonly Version[] }) {
         leftSection={<IconCopyPlus size={15} aria-hidden />}
         onClick={() => void copies.copy(at, called)}
       >
-        <span className={style.words}>
-          Copy <bdi>{called}</bdi> as a new graph
-        </span>
+        Copy {called} as a new graph
       </Button>
       <p>To go back is an edit like any other: nothing is lost, and it can be undone.</p>
     </div>
