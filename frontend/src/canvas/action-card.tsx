@@ -14,7 +14,7 @@ import { CardStateContext, useDataRole, useIsDimmed, useOpenThreadCount } from "
 import { CardLines } from "./card-lines";
 import { useChangeMark } from "./changes/change-marks";
 import { ChangeTag } from "./changes/change-tag";
-import { SinceSign } from "./changes/since-sign";
+import { SinceSpot } from "./changes/since-marks";
 import type { CardNode } from "./elements";
 import { CARD_LINES, cardSize } from "./geometry/arrange";
 import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "./outcome";
@@ -89,7 +89,7 @@ export const ActionCard = memo(function ActionCard({
       />
       {action.actor !== "" && <span className={style.robot}>{action.actor}</span>}
       {change && <ChangeTag mark={change} beside={action.actor !== ""} />}
-      <SinceSign of={action.key} on="card" />
+      <SinceSpot of={action.key} on="card" />
       {mark && <ProblemBadge mark={mark} on="card" />}
       {talk > 0 && (
         <span className={style.talk} data-beside={mark ? true : undefined} title="Open comments">

@@ -11,7 +11,7 @@ import type { Point } from "./arrows/scene";
 import type { RoutedLine } from "./arrows/simple-lines";
 import { useChangeMark } from "./changes/change-marks";
 import { ChangeSign } from "./changes/change-tag";
-import { SinceSign } from "./changes/since-sign";
+import { SinceSpot } from "./changes/since-marks";
 import type { Arrow } from "./elements";
 import { type Outcome, OutcomeSign, outcomeColor, outcomeWord } from "./outcome";
 import style from "./outcome-arrow.module.css";
@@ -142,7 +142,7 @@ function Pill({ id, data, pill: [x, y], selected }: BundleProps & { pill: Point 
           style={{ transform: `translate(-50%, -50%) translate(${x}px, ${y}px)` }}
         >
           {change && <ChangeSign mark={change} />}
-          <SinceSign of={data.relation} on="arrow" />
+          <SinceSpot of={data.relation} on="arrow" />
           {data.mark && (
             // biome-ignore lint/a11y/noStaticElementInteractions: chosen by keys like every arrow
             // biome-ignore lint/a11y/useKeyWithClickEvents: the arrow itself is chosen by keys

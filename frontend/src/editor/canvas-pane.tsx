@@ -3,6 +3,7 @@ import { Button, Kbd, Skeleton } from "@mantine/core";
 import { IconFocus2, IconRouteAltLeft } from "@tabler/icons-react";
 import { ReactFlowProvider } from "@xyflow/react";
 import { type ReactNode, useEffect, useMemo, useRef } from "react";
+import { ChangeMarksContext } from "../canvas/changes/change-marks";
 import { NO_PROBLEM_MARKS, type ProblemMarks } from "../canvas/problem-marks";
 import { type EditorContext, useEditorContext } from "../edit-actions/editor-context";
 import { EMPTY_GRAPH, type Key, type Position } from "../graph/model";
@@ -22,7 +23,6 @@ import { useUnfolding } from "./canvas/use-unfolding";
 import { useViewport } from "./canvas/use-viewport";
 import style from "./canvas-pane.module.css";
 import { Toolbar } from "./menus/toolbar";
-import { EarlierSide, LaterSide, useSides } from "./sides";
 import type { EditorState } from "./use-editor";
 import { useGraphLink } from "./use-graph-link";
 import type { Past } from "./use-past";
@@ -137,7 +137,7 @@ function Inside(props: Props) {
     laidOut: first.places,
   });
   const { flow, places, sizes } = canvas;
-  const sides = useSides(past, canvas);
+  const side = past.seen?.side ?? null;
   const frame = useRef<HTMLDivElement>(null);
   const pointer = useRef<Position | null>(null);
   const waiting = !arrived || (first.pending && context.graph.actions.length > 1);
@@ -145,7 +145,7 @@ function Inside(props: Props) {
   const { view, lost, onPanned, onFollow } = useViewport({
     flow,
     frame,
-    places: sides.places,
+    places: side?.placesWith(places) ?? places,
     sizes,
     lines: canvas.lines,
     ...useUnfolding(context, canvas),
@@ -169,8 +169,8 @@ function Inside(props: Props) {
 
   return (
     <div className={style.whole}>
-      <div className={style.sides} data-side={sides.small || undefined}>
-        {sides.side && <EarlierSide side={sides.side} {...{ flow, onPanned: endFollowing }} />}
+      <div className={style.sides} data-side={side !== null || undefined}>
+        {side && <side.Canvas {...{ side, flow, onPanned: endFollowing }} />}
         <div
           className={style.stage}
           ref={frame}
@@ -178,21 +178,21 @@ function Inside(props: Props) {
           data-dry={dry}
           data-then={then}
         >
-          <LaterSide side={sides.side} marks={sides.marks}>
+          <ChangeMarksContext value={past.seen?.marks ?? null}>
             <EditableCanvas
               context={context}
               canvas={canvas}
               me={me}
-              map={!(compact || sides.small) && context.graph.actions.length > 3}
+              map={!compact && side === null && context.graph.actions.length > 3}
               onPanned={endFollowing}
               pointer={pointer}
               writing={writing}
             />
-          </LaterSide>
+          </ChangeMarksContext>
           <Emptiness waiting={waiting} context={context} />
           {!compact && <Robots />}
           <FollowFrame />
-          <Tools compact={compact || sides.small} hidden={phone && (dry ?? then) === true} />
+          <Tools compact={compact || side !== null} hidden={phone && (dry ?? then) === true} />
           <div className={style.corner}>
             {lost && <FollowRun onFollow={onFollow} />}
             {!context.dryRun && corner}
@@ -209,13 +209,10 @@ const NOTHING: ReadonlyMap<Key, Progress> = new Map();
 const NOTHING_RUNS = { progress: NOTHING, marks: NO_PROBLEM_MARKS, run: null };
 
 /** The canvas keeps up with the hands of others; what stands beside it comes after. */
-function useDrawnContext(past: Past): EditorContext {
+function useDrawnContext({ seen }: Past): EditorContext {
   const calm = useEditorContext();
   const now = useGraph();
-  const changes = past.seen?.changes;
-  // What is gone since then is drawn where it stood, unless the canvas beside it shows that.
-  const then = past.side ? changes?.after : changes?.shown;
-  const graph = calm.past === null ? now : (then ?? calm.graph);
+  const graph = calm.past === null ? now : (seen?.drawn ?? calm.graph);
   return useMemo<EditorContext>(() => ({ ...calm, graph }), [calm, graph]);
 }
 

@@ -3,6 +3,7 @@ import { Button } from "@mantine/core";
 import { IconHistory } from "@tabler/icons-react";
 import { useEffect, useLayoutEffect, useMemo } from "react";
 import { errorText } from "../api/http";
+import type { ChangeMarks } from "../canvas/changes/change-marks";
 import {
   type EditorContext,
   type PastPlace,
@@ -19,6 +20,8 @@ import type { GraphChanges } from "./compare/graph-difference";
 import { useCompared } from "./compare/use-compared";
 import style from "./past-bar.module.css";
 import { marksOf, Scrubber } from "./scrubber";
+import { EarlierCanvas } from "./side/earlier-canvas";
+import { type SideBySide, sideBySide } from "./side/side-by-side";
 import { useTimeline } from "./told/use-timeline";
 
 export interface SeenPast {
@@ -26,8 +29,23 @@ export interface SeenPast {
   readonly graph: Graph;
   /** What differs from the moment with which it is compared. */
   readonly changes: GraphChanges | null;
-  /** Which moments these are: the earlier one, and the later one. */
-  readonly words: readonly [earlier: string, later: string];
+  /** What the canvas shows: what is gone since then, too, unless the canvas beside it shows that. */
+  readonly drawn: Graph;
+  readonly marks: ChangeMarks | null;
+  /** What is beside it; null where one canvas shows all. */
+  readonly side: SideBySide | null;
+}
+
+function seenPast(
+  graph: Graph,
+  changes: GraphChanges | null,
+  words: readonly [earlier: string, later: string] | null,
+): SeenPast {
+  const side =
+    changes === null || words === null ? null : sideBySide(changes, words, EarlierCanvas);
+  if (side !== null) return { graph, changes, drawn: graph, marks: side.marks[1], side };
+  const { shown, marks } = changes ?? { shown: graph, marks: null };
+  return { graph, changes, drawn: shown, marks, side };
 }
 
 /** Nothing that was begun on the graph as it is now goes on over the past. */
@@ -67,8 +85,8 @@ export function PastBar({ place, show, side, onSide }: Props) {
     at === null ? "" : at === newest ? "now" : momentWords(entries, at, now);
   const [before, after] = [compared.foreign === null ? words(from) : "as it runs", words(to)];
   useLayoutEffect(() => {
-    if (graph !== null) show({ graph, changes, words: [before, after] });
-  }, [show, graph, changes, before, after]);
+    if (graph !== null) show(seenPast(graph, changes, side ? [before, after] : null));
+  }, [show, graph, changes, side, before, after]);
   const marks = useMemo(() => marksOf(items, versions), [items, versions]);
   const colorOf = usePersonColors(entries.map(({ author }) => author.id));
   const goTo = (at: number) => lookAt({ ...place, at: Math.min(Math.max(1, at), newest) });

@@ -27,7 +27,6 @@ export interface ChangedThing {
 
 export interface GraphChanges {
   readonly before: Graph;
-  readonly after: Graph;
   /** The later graph, with what is gone where it stood. */
   readonly shown: Graph;
   readonly things: readonly ChangedThing[];
@@ -207,7 +206,7 @@ export function changesBetween(
     const { change } = thing;
     return [[thing.key, { change, by: by(thing.key), oldName: renamed, oldValues: old }]];
   });
-  return { before, after, shown, things, marks: new Map(marks) };
+  return { before, shown, things, marks: new Map(marks) };
 }
 
 const NO_VALUES: ReadonlyMap<string, string> = new Map();

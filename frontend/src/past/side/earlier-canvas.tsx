@@ -1,13 +1,12 @@
 /** The earlier of two moments on a canvas of its own, whose view is that of the later one. */
-import { ReactFlowProvider, useReactFlow, useStoreApi, type Viewport } from "@xyflow/react";
-import { useLayoutEffect, useMemo } from "react";
+import { ReactFlowProvider, useReactFlow, useStoreApi } from "@xyflow/react";
+import { useLayoutEffect } from "react";
 import { ChangeMarksContext } from "../../canvas/changes/change-marks";
 import { GraphView } from "../../canvas/graph-view";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import type { Progress } from "../../status/progress";
-import type { GraphChanges } from "../compare/graph-difference";
 import style from "./side.module.css";
-import { sideMarks } from "./side-marks";
+import type { EarlierCanvasProps } from "./side-by-side";
 import { SideTitle } from "./side-title";
 
 const NOTHING: ReadonlyMap<string, Progress> = new Map();
@@ -38,39 +37,35 @@ function LedBy({ store }: { store: Store }) {
   return null;
 }
 
-interface Props {
-  changes: GraphChanges;
-  /** Which moment it is. */
-  words: string;
-  /** Whose view it has. */
-  store: Store;
-  /** The person has moved the view from here. */
-  onPanned: (to: Viewport) => void;
-}
-
-export function EarlierCanvas({ changes, words, store, onPanned }: Props) {
+export function EarlierCanvas({ side, flow, onPanned }: EarlierCanvasProps) {
   const { select, selection } = useEditorContext();
-  const { before, marks } = changes;
-  const mine = useMemo(() => sideMarks(marks, "earlier"), [marks]);
+  const store = useStoreApi();
+  const { before, marks, words } = side;
   return (
-    <section className={style.earlier} aria-label="Earlier" data-earlier>
-      <SideTitle side="Earlier" words={words} />
-      <ReactFlowProvider>
-        <ChangeMarksContext value={mine}>
-          <GraphView
-            id="earlier"
-            graph={before}
-            progress={NOTHING}
-            selected={selection}
-            label="Canvas, earlier"
-            onSelect={(key) => select(key === null ? [] : [key])}
-            led
-            onPanned={onPanned}
-          >
-            <LedBy store={store} />
-          </GraphView>
-        </ChangeMarksContext>
-      </ReactFlowProvider>
-    </section>
+    <>
+      <section className={style.earlier} aria-label="Earlier" data-earlier>
+        <SideTitle side="Earlier" words={words[0]} />
+        <ReactFlowProvider>
+          <ChangeMarksContext value={marks[0]}>
+            <GraphView
+              id="earlier"
+              graph={before}
+              progress={NOTHING}
+              selected={selection}
+              label="Canvas, earlier"
+              onSelect={(key) => select(key === null ? [] : [key])}
+              led
+              onPanned={(to) => {
+                onPanned();
+                void flow.setViewport(to);
+              }}
+            >
+              <LedBy store={store} />
+            </GraphView>
+          </ChangeMarksContext>
+        </ReactFlowProvider>
+      </section>
+      <SideTitle side="Later" words={words[1]} />
+    </>
   );
 }

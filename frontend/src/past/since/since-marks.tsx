@@ -12,6 +12,7 @@ import { readGraph } from "../../graph/read";
 import { useRoom } from "../../sync/use-room";
 import { type GoodRun, goodRuns } from "../told/good-runs";
 import { SinceMarker } from "./since-marker";
+import { SinceSign } from "./since-sign";
 import { useSinceOn } from "./use-since-on";
 
 const NEWEST = 10; // runs among which the last good one is sought
@@ -73,7 +74,7 @@ function useMarks({ run, seq }: GoodRun): void {
       const show = () => {
         const marks = marker.marks(source.graph());
         if (sinceMarks.now()?.marks === marks) return;
-        sinceMarks.set({ graph: id, run, seq, marks });
+        sinceMarks.set({ graph: id, run, seq, marks, Sign: SinceSign });
       };
       const later = quietly(show);
       later.soon();

@@ -1,9 +1,9 @@
 /** At a card or an arrow that changed since a run went well: a quiet sign, which says what on asking. */
 import { useBlame } from "../../api/documents/history";
 import { authorName } from "../../api/graphs";
+import { CHANGE_SIGNS } from "../../canvas/changes/change-marks";
+import type { SinceMark, SinceMarks, SinceSignProps } from "../../canvas/changes/since-marks";
 import { Tooltip } from "../../ui/floating/tooltip";
-import { CHANGE_SIGNS } from "./change-marks";
-import { type SinceMark, type SinceMarks, sinceMarks, useSinceMark } from "./since-marks";
 import style from "./since-sign.module.css";
 
 interface WordsProps {
@@ -28,10 +28,7 @@ function SinceWords({ of, mark, since: { graph, run, seq } }: WordsProps) {
   );
 }
 
-export function SinceSign({ of, on }: { of: string; on: "card" | "arrow" }) {
-  const mark = useSinceMark(of);
-  const since = sinceMarks.now();
-  if (mark === undefined || since === null) return null;
+export function SinceSign({ of, on, mark, since }: SinceSignProps) {
   return (
     <Tooltip label={<SinceWords {...{ of, mark, since }} />} width={260}>
       <span className={style.sign} data-on={on} data-since={mark.change}>

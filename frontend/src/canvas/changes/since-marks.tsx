@@ -1,5 +1,5 @@
 /** What is another thing than when a run last went well, as quiet marks on cards and arrows. */
-import { useSyncExternalStore } from "react";
+import { type ComponentType, useSyncExternalStore } from "react";
 
 export interface SinceMark {
   readonly change: "added" | "changed";
@@ -16,6 +16,15 @@ export interface SinceMarks {
   readonly seq: number;
   /** By key of an action and id of a relation. What is the same again keeps its identity. */
   readonly marks: ReadonlyMap<string, SinceMark>;
+  /** What is drawn at them: loaded with the marks. */
+  readonly Sign: ComponentType<SinceSignProps>;
+}
+
+export interface SinceSignProps {
+  readonly of: string;
+  readonly on: "card" | "arrow";
+  readonly mark: SinceMark;
+  readonly since: SinceMarks;
 }
 
 /** One for the page: there is one canvas. What is drawn listens for itself, so that little draws again. */
@@ -38,7 +47,9 @@ class SinceMarkStore {
 
 export const sinceMarks = new SinceMarkStore();
 
-/** Whether an action or arrow is another thing than when a run last went well. */
-export function useSinceMark(key: string): SinceMark | undefined {
-  return useSyncExternalStore(sinceMarks.subscribe, () => sinceMarks.now()?.marks.get(key));
+/** The sign of an action or arrow that is another thing than when a run last went well. */
+export function SinceSpot({ of, on }: Pick<SinceSignProps, "of" | "on">) {
+  const mark = useSyncExternalStore(sinceMarks.subscribe, () => sinceMarks.now()?.marks.get(of));
+  const since = sinceMarks.now();
+  return mark && since && <since.Sign {...{ of, on, mark, since }} />;
 }
