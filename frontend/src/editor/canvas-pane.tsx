@@ -3,7 +3,7 @@ import { Button, Kbd, Skeleton } from "@mantine/core";
 import { IconFocus2, IconRouteAltLeft } from "@tabler/icons-react";
 import { ReactFlowProvider } from "@xyflow/react";
 import { type ReactNode, useEffect, useMemo, useRef } from "react";
-import { ChangeMarksContext } from "../canvas/changes/change-marks";
+import { ChangeMarked } from "../canvas/changes/change-marks";
 import { NO_PROBLEM_MARKS, type ProblemMarks } from "../canvas/problem-marks";
 import { type EditorContext, useEditorContext } from "../edit-actions/editor-context";
 import { EMPTY_GRAPH, type Key, type Position } from "../graph/model";
@@ -178,7 +178,7 @@ function Inside(props: Props) {
           data-dry={dry}
           data-then={then}
         >
-          <ChangeMarksContext value={past.seen?.marks ?? null}>
+          <ChangeMarked marks={past.seen?.marks ?? null}>
             <EditableCanvas
               context={context}
               canvas={canvas}
@@ -188,7 +188,7 @@ function Inside(props: Props) {
               pointer={pointer}
               writing={writing}
             />
-          </ChangeMarksContext>
+          </ChangeMarked>
           <Emptiness waiting={waiting} context={context} />
           {!compact && <Robots />}
           <FollowFrame />

@@ -1,5 +1,5 @@
 /** The details while somebody looks at the history: who set what of what is selected, or what differs. */
-import { type ReactNode, useEffect, useRef, useState } from "react";
+import { type ReactNode, useDeferredValue, useEffect, useRef, useState } from "react";
 import { useVersions, type Version } from "../api/graphs";
 import { type Panel, useEditorContext } from "../edit-actions/editor-context";
 import { endName } from "../graph/relation-words";
@@ -37,7 +37,9 @@ function PastPart({ changes }: { changes: GraphChanges | null }) {
   return <WhoSetWhat of="" what="the graph" />;
 }
 
-export function PastDetails({ changes, panel, children }: Props) {
+export function PastDetails({ changes: newest, panel, children }: Props) {
+  // What stands beside the canvas follows it.
+  const changes = useDeferredValue(newest);
   const { id, selection } = useEditorContext();
   const { data: versions = NONE } = useVersions(id);
   const [tab, setTab] = useState<"past" | "details">("past");

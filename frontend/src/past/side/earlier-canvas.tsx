@@ -1,7 +1,7 @@
 /** The earlier of two moments on a canvas of its own, whose view is that of the later one. */
 import { ReactFlowProvider, useReactFlow, useStoreApi } from "@xyflow/react";
 import { useLayoutEffect } from "react";
-import { ChangeMarksContext } from "../../canvas/changes/change-marks";
+import { ChangeMarked } from "../../canvas/changes/change-marks";
 import { GraphView } from "../../canvas/graph-view";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import type { Progress } from "../../status/progress";
@@ -46,7 +46,7 @@ export function EarlierCanvas({ side, flow, onPanned }: EarlierCanvasProps) {
       <section className={style.earlier} aria-label="Earlier" data-earlier>
         <SideTitle side="Earlier" words={words[0]} />
         <ReactFlowProvider>
-          <ChangeMarksContext value={marks[0]}>
+          <ChangeMarked marks={marks[0]}>
             <GraphView
               id="earlier"
               graph={before}
@@ -62,7 +62,7 @@ export function EarlierCanvas({ side, flow, onPanned }: EarlierCanvasProps) {
             >
               <LedBy store={store} />
             </GraphView>
-          </ChangeMarksContext>
+          </ChangeMarked>
         </ReactFlowProvider>
       </section>
       <SideTitle side="Later" words={words[1]} />
