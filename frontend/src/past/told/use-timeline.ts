@@ -34,7 +34,7 @@ export interface Timeline {
 }
 
 /** The newest runs of a graph. */
-export function useRunsOf(id: string) {
+function useRunsOf(id: string) {
   const { runner, now } = useLive();
   const newest = newestRun(now, id);
   return useQuery({
