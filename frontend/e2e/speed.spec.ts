@@ -14,12 +14,19 @@ const product = new Product();
 const rows: string[][] = [];
 const frames: string[][] = [];
 const followed: string[][] = [];
+const stepped: string[][] = [];
+const PASTS = [1_000, 10_000, 100_000];
 
 test.skip(process.env.SPEED === undefined, "measures; started by `make performance`");
 // The recorder of failures takes pictures of the page, which cost as much as what is measured.
 test.use({ trace: "off", screenshot: "off" });
 test.describe.configure({ mode: "serial", timeout: 300_000 });
-test.beforeAll(() => product.start());
+test.beforeAll(async () => {
+  const python = resolve(ROOT, ".venv/bin/python");
+  const writes = spawn(python, [resolve(import.meta.dirname, "long_past.py"), product.data]);
+  expect(await new Promise((done) => writes.once("exit", done))).toBe(0);
+  await product.start();
+});
 test.afterAll(() => product.dispose());
 test.afterEach(() => {
   mkdirSync(resolve(ROOT, "frontend/test-results"), { recursive: true });
@@ -27,6 +34,7 @@ test.afterEach(() => {
   const tables = [
     { head, rows },
     { head: ["1,000 actions", "frame (median)", "95 %", "99 %", "longest", "CPU"], rows: frames },
+    { head: ["changes (actions)", "key to paint (median)", "longest"], rows: stepped },
     { head: ["a run of 70 actions", "page's thread", "whole browser"], rows: followed },
   ];
   writeFileSync(resolve(ROOT, "frontend/test-results/speed.json"), JSON.stringify(tables));
@@ -90,10 +98,8 @@ const share = (sorted: number[], part: number): number =>
   sorted[Math.min(sorted.length - 1, Math.floor(sorted.length * part))] ?? Number.NaN;
 const ms = (value: number): string => `${value.toFixed(value < 100 ? 1 : 0)} ms`;
 
-/** From each key to the frame that shows it: the median, as the browser itself tells. */
-async function type(page: Page): Promise<number> {
-  const name = page.getByRole("textbox", { name: "Name", exact: true }).first();
-  await name.click();
+/** From each key to the frame that shows it, as the browser itself tells; none of 16 ms and less. */
+async function keyTimes(page: Page): Promise<() => Promise<number[]>> {
   const seen = await page.evaluateHandle(() => {
     const durations: number[] = [];
     const options = { type: "event", durationThreshold: 16 } as PerformanceObserverInit;
@@ -103,9 +109,18 @@ async function type(page: Page): Promise<number> {
     }).observe(options);
     return durations;
   });
+  return async () => {
+    await pause(500);
+    return (await seen.jsonValue()).sort((a, b) => a - b);
+  };
+}
+
+async function type(page: Page): Promise<number> {
+  const name = page.getByRole("textbox", { name: "Name", exact: true }).first();
+  await name.click();
+  const seen = await keyTimes(page);
   await page.keyboard.type("abcdefghijklmnopqrst", { delay: 60 });
-  await pause(500);
-  const durations = (await seen.jsonValue()).sort((a, b) => a - b);
+  const durations = await seen();
   return durations.length === 0 ? 16 : share(durations, 0.5);
 }
 
@@ -199,6 +214,42 @@ test(`a graph of 1,000 actions while ${OTHERS} people edit it`, async ({ browser
   expect(await ended).toBe(0);
   await context.close();
 });
+
+const STEPS = 24;
+
+for (const changes of PASTS) {
+  test(`steps through a past of ${changes} changes`, async ({ browser }) => {
+    const { page, context } = await product.person(browser, "Ada");
+    const path = `/graphs/past${changes}`;
+    const middle = changes / 2 + 100;
+    await product.ask(`/api${path}/document?at=${middle}`); // the index is made once, by whoever asks first
+    await page.goto(`${product.url}${path}?at=${middle}&with=${middle - 400}`);
+    const moment = page.getByRole("slider", { name: "Moment of the past" });
+    const shownMoment = page.locator("[data-past][data-at]");
+    await expect(shownMoment).toBeVisible({ timeout: 180_000 });
+    await pause(3000); // the steps around it arrive, and what opening leaves to do is done
+    await moment.focus();
+    const seen = await keyTimes(page);
+    const profiled = await profile(page, process.env.PROFILE);
+    for (let step = 0; step < STEPS; step += 1) {
+      const before = await shownMoment.getAttribute("data-at");
+      await page.keyboard.press(step % 3 === 2 ? "ArrowRight" : "ArrowLeft");
+      await expect(shownMoment).not.toHaveAttribute("data-at", before ?? "");
+      await pause(120);
+    }
+    await profiled();
+    const times = await seen();
+    const quick = Array.from({ length: Math.max(0, STEPS - times.length) }, () => 16);
+    const sorted = [...quick, ...times].sort((a, b) => a - b);
+    const cards = (await product.ask<object>(`/api${path}/document?at=${middle}`)) as {
+      actions: Record<string, unknown>;
+    };
+    const actions = Object.keys(cards.actions).filter((key) => !key.includes("|")).length;
+    const what = `${changes.toLocaleString("en")} (${actions.toLocaleString("en")})`;
+    stepped.push([what, ms(share(sorted, 0.5)), ms(share(sorted, 1))]);
+    await context.close();
+  });
+}
 
 /** How long all processes of browsers on this machine have worked, ms of processor. */
 function browserWorked(): number {

@@ -20,6 +20,7 @@ import {
 import { CardLines } from "./card-lines";
 import { useChangeMark } from "./changes/change-marks";
 import { ChangeTag } from "./changes/change-tag";
+import { SinceSpot } from "./changes/since-marks";
 import type { CardNode } from "./elements";
 import { CARD_LINES, cardSize } from "./geometry/arrange";
 import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "./outcome";
@@ -97,6 +98,7 @@ export const ActionCard = memo(function ActionCard({
       {action.actor !== "" && <span className={style.robot}>{action.actor}</span>}
       {change && <ChangeTag mark={change} beside={action.actor !== ""} />}
       {never && <span className={style.never}>never run</span>}
+      <SinceSpot of={action.key} on="card" />
       {mark && <ProblemBadge mark={mark} on="card" />}
       {talk > 0 && (
         <span className={style.talk} data-beside={mark ? true : undefined} title="Open comments">
@@ -119,6 +121,7 @@ export const ActionCard = memo(function ActionCard({
         most={says ? CARD_LINES - 1 : CARD_LINES}
         selected={selected}
         old={change?.oldValues}
+        differing={change?.rows}
         inferred={progress?.inferred ?? false}
       />
       {OUTCOMES.map((outcome, i) => (

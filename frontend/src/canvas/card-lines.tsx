@@ -16,9 +16,11 @@ interface LineProps {
   inferred: boolean;
   /** What it was, where two moments are compared. */
   old: string | undefined;
+  /** It says something else at the other moment. */
+  differs: boolean;
 }
 
-function Line({ row, inferred, old }: LineProps) {
+function Line({ row, inferred, old, differs }: LineProps) {
   const { name, kind, text } = row;
   const doubt = kind === "seen" && inferred;
   return (
@@ -26,6 +28,7 @@ function Line({ row, inferred, old }: LineProps) {
       className={style.line}
       data-kind={kind}
       data-inferred={doubt || undefined}
+      data-differs={differs || undefined}
       title={`${name}: ${text}${TITLES[kind]}${doubt ? ", of a visit that was inferred" : ""}`}
     >
       <span className={style.name}>{name}</span>
@@ -47,14 +50,22 @@ interface Props {
   inferred: boolean;
   /** What rows were, by their name: those come first. */
   old?: ReadonlyMap<string, string> | undefined;
+  /** Rows that differ from those of another moment, by their name: those come first, too. */
+  differing?: ReadonlySet<string> | undefined;
 }
 
-export function CardLines({ rows: all, most, selected, inferred, old }: Props) {
+export function CardLines({ rows: all, most, selected, inferred, old, differing }: Props) {
   const line = (row: CardRow) => (
-    <Line key={row.name} row={row} inferred={inferred} old={old?.get(row.name)} />
+    <Line
+      key={row.name}
+      row={row}
+      inferred={inferred}
+      old={old?.get(row.name)}
+      differs={differing?.has(row.name) === true}
+    />
   );
-  const isOld = (row: CardRow) => old?.has(row.name) === true;
-  const rows = old ? [...all.filter(isOld), ...all.filter((row) => !isOld(row))] : all;
+  const isFirst = ({ name }: CardRow) => old?.has(name) === true || differing?.has(name) === true;
+  const rows = old ? [...all.filter(isFirst), ...all.filter((row) => !isFirst(row))] : all;
   const more = selected ? rows.slice(most) : [];
   return (
     <>

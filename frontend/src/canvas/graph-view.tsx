@@ -5,8 +5,9 @@ import {
   type EdgeTypes,
   type NodeTypes,
   ReactFlow,
+  type Viewport,
 } from "@xyflow/react";
-import { useEffect, useMemo, useState } from "react";
+import { type ReactNode, useEffect, useMemo, useState } from "react";
 import type { Graph, Key } from "../graph/model";
 import type { Progress } from "../status/progress";
 import { ActionCard } from "./action-card";
@@ -33,9 +34,20 @@ interface Props {
   selected?: ReadonlySet<string>;
   label: string;
   onSelect?: (key: Key | null) => void;
+  /** Tells apart what several on one page say of themselves. */
+  id?: string;
+  /** Its view follows another one: it does not fit what it shows by itself. */
+  led?: boolean;
+  /** The person has moved the view. */
+  onPanned?: (to: Viewport) => void;
+  /** What else belongs into it. */
+  children?: ReactNode;
 }
 
-export function GraphView({ graph, progress, selected = NONE, label, onSelect }: Props) {
+const LARGE = 150; // cards, of which those out of sight are not drawn
+
+export function GraphView(props: Props) {
+  const { graph, progress, selected = NONE, label, onSelect, led = false, onPanned } = props;
   const [measured, setMeasured] = useState<ReadonlyMap<Key, object>>(new Map());
   const laidOut = useLaidOut(graph);
   const places = useMemo(
@@ -60,6 +72,7 @@ export function GraphView({ graph, progress, selected = NONE, label, onSelect }:
     <LineContext value={lines}>
       <ReactFlow<CanvasNode>
         key={laidOut.plain ? "plain" : "laid out"}
+        {...(props.id === undefined ? {} : { id: props.id })}
         nodes={nodes}
         edges={edges}
         nodeTypes={nodeTypes}
@@ -80,16 +93,20 @@ export function GraphView({ graph, progress, selected = NONE, label, onSelect }:
         nodesConnectable={false}
         panActivationKeyCode={null} // Space plays the replay
         edgesFocusable={false}
-        fitView
+        fitView={!led}
+        onlyRenderVisibleElements={led && nodes.length > LARGE}
+        // A move without an event is the page's own.
+        onMove={(event, to) => event !== null && onPanned?.(to)}
         fitViewOptions={{ maxZoom: 1, padding: 0.12 }}
-        minZoom={0.1}
-        maxZoom={2}
+        minZoom={led ? 0.08 : 0.1}
+        maxZoom={led ? 2.2 : 2}
         proOptions={{ hideAttribution: true }}
         aria-label={label}
       >
         <ArrowTips />
         <ZoomDetail />
         <Background variant={BackgroundVariant.Dots} gap={20} size={1.4} />
+        {props.children}
       </ReactFlow>
     </LineContext>
   );

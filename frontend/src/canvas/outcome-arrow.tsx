@@ -12,6 +12,7 @@ import type { RoutedLine } from "./arrows/simple-lines";
 import { useUntakenOutcomes } from "./card-highlights";
 import { useChangeMark } from "./changes/change-marks";
 import { ChangeSign } from "./changes/change-tag";
+import { SinceSpot } from "./changes/since-marks";
 import type { Arrow } from "./elements";
 import { type Outcome, OutcomeSign, outcomeColor, outcomeWord } from "./outcome";
 import style from "./outcome-arrow.module.css";
@@ -145,6 +146,7 @@ function Pill({ id, data, pill: [x, y], selected }: BundleProps & { pill: Point 
           style={{ transform: `translate(-50%, -50%) translate(${x}px, ${y}px)` }}
         >
           {change && <ChangeSign mark={change} />}
+          <SinceSpot of={data.relation} on="arrow" />
           {data.mark && (
             // biome-ignore lint/a11y/noStaticElementInteractions: chosen by keys like every arrow
             // biome-ignore lint/a11y/useKeyWithClickEvents: the arrow itself is chosen by keys

@@ -66,8 +66,9 @@ export type Overlay =
 export interface PastPlace {
   /** The change after which the graph was so. */
   readonly at: number;
-  /** `own`: with the beginning of the sitting; else with another moment. */
-  readonly with: "own" | "nothing" | "now" | number;
+  /** `own`: with the beginning of the sitting; `good`: with the last good run before it; else with
+   * another moment, or with what a run was started with. */
+  readonly with: "own" | "good" | "nothing" | "now" | number | `run/${string}`;
 }
 
 /** What a graph can be taken away as. */

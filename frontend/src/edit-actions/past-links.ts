@@ -2,10 +2,13 @@
 import type { PastPlace } from "./editor-context";
 
 const SEQ = /^[1-9]\d{0,14}$/;
+const RUN = /^run\/[\w-]{1,80}$/;
 
 function comparedWith(text: string | null): PastPlace["with"] {
-  if (text === "nothing" || text === "now") return text;
-  return text !== null && SEQ.test(text) ? Number(text) : "own";
+  if (text === "nothing" || text === "now" || text === "good") return text;
+  if (text === null) return "own";
+  if (RUN.test(text)) return text as `run/${string}`;
+  return SEQ.test(text) ? Number(text) : "own";
 }
 
 /** What an address asks for; null where it asks for the graph as it is. */

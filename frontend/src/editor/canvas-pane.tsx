@@ -3,7 +3,7 @@ import { Button, Kbd, Skeleton } from "@mantine/core";
 import { IconFocus2, IconRouteAltLeft } from "@tabler/icons-react";
 import { ReactFlowProvider } from "@xyflow/react";
 import { type ReactNode, useEffect, useMemo, useRef } from "react";
-import { ChangeMarksContext } from "../canvas/changes/change-marks";
+import { ChangeMarked } from "../canvas/changes/change-marks";
 import { NO_PROBLEM_MARKS, type ProblemMarks } from "../canvas/problem-marks";
 import { type EditorContext, useEditorContext } from "../edit-actions/editor-context";
 import { EMPTY_GRAPH, type Key, type Position } from "../graph/model";
@@ -105,6 +105,14 @@ function Tools({ compact, hidden }: { compact: boolean; hidden: boolean }) {
   );
 }
 
+function Robots() {
+  return (
+    <div className={style.robots} data-covers="top">
+      <RobotFilter />
+    </div>
+  );
+}
+
 function FollowRun({ onFollow }: { onFollow: () => void }) {
   return (
     <Button size="compact-sm" leftSection={<IconFocus2 size={15} />} onClick={onFollow}>
@@ -130,6 +138,7 @@ function Inside(props: Props) {
     laidOut: first.places,
   });
   const { flow, places, sizes } = canvas;
+  const side = past.seen?.side ?? null;
   const frame = useRef<HTMLDivElement>(null);
   const pointer = useRef<Position | null>(null);
   const waiting = !arrived || (first.pending && context.graph.actions.length > 1);
@@ -137,7 +146,7 @@ function Inside(props: Props) {
   const { view, lost, onPanned, onFollow } = useViewport({
     flow,
     frame,
-    places,
+    places: side?.placesWith(places) ?? places,
     sizes,
     lines: canvas.lines,
     ...useUnfolding(context, canvas),
@@ -162,38 +171,37 @@ function Inside(props: Props) {
   return (
     <div className={style.whole}>
       <Above id={context.id} />
-      <div
-        className={style.stage}
-        ref={frame}
-        aria-busy={first.busy}
-        data-dry={dry}
-        data-then={then}
-      >
-        <ChangeMarksContext value={past.seen?.changes?.marks ?? null}>
-          <EditableCanvas
-            context={context}
-            canvas={canvas}
-            me={me}
-            map={!compact && context.graph.actions.length > 3}
-            onPanned={endFollowing}
-            pointer={pointer}
-            writing={writing}
-          />
-        </ChangeMarksContext>
-        <Emptiness waiting={waiting} context={context} />
-        {!compact && (
-          <div className={style.robots} data-covers="top">
-            <RobotFilter />
+      <div className={style.sides} data-side={side !== null || undefined}>
+        {side && <side.Canvas {...{ side, flow, onPanned: endFollowing }} />}
+        <div
+          className={style.stage}
+          ref={frame}
+          aria-busy={first.busy}
+          data-dry={dry}
+          data-then={then}
+        >
+          <ChangeMarked marks={past.seen?.marks ?? null}>
+            <EditableCanvas
+              context={context}
+              canvas={canvas}
+              me={me}
+              map={!compact && side === null && context.graph.actions.length > 3}
+              onPanned={endFollowing}
+              pointer={pointer}
+              writing={writing}
+            />
+          </ChangeMarked>
+          <Emptiness waiting={waiting} context={context} />
+          {!compact && <Robots />}
+          <FollowFrame />
+          <Tools compact={compact || side !== null} hidden={phone && (dry ?? then) === true} />
+          <div className={style.corner}>
+            {lost && <FollowRun onFollow={onFollow} />}
+            {!context.dryRun && corner}
           </div>
-        )}
-        <FollowFrame />
-        <Tools compact={compact} hidden={phone && (dry ?? then) === true} />
-        <div className={style.corner}>
-          {lost && <FollowRun onFollow={onFollow} />}
-          {!context.dryRun && corner}
         </div>
       </div>
-      <Below context={context} record={props.record} show={past.show} />
+      <Below context={context} record={props.record} seen={past} />
     </div>
   );
 }
@@ -206,8 +214,7 @@ const NOTHING_RUNS = { progress: NOTHING, marks: NO_PROBLEM_MARKS, run: null };
 function useDrawnContext({ seen }: Past): EditorContext {
   const calm = useEditorContext();
   const now = useGraph();
-  // What is gone since then is drawn where it stood.
-  const graph = calm.past === null ? now : (seen?.changes?.shown ?? calm.graph);
+  const graph = calm.past === null ? now : (seen?.drawn ?? calm.graph);
   return useMemo<EditorContext>(() => ({ ...calm, graph }), [calm, graph]);
 }
 
@@ -223,11 +230,11 @@ function Above({ id }: { id: string }) {
 interface BelowProps {
   context: EditorContext;
   record: ReactNode;
-  show: Past["show"];
+  seen: Past;
 }
 
 /** What plays on the canvas, or which moment of the past it shows. */
-function Below({ context: { past, dryRun, ...context }, record, show }: BelowProps) {
+function Below({ context: { past, dryRun, ...context }, record, seen }: BelowProps) {
   if (dryRun) {
     return (
       <PartBoundary>
@@ -238,7 +245,7 @@ function Below({ context: { past, dryRun, ...context }, record, show }: BelowPro
   if (past === null) return null;
   return (
     <PartBoundary>
-      <PastBar place={past} show={show} />
+      <PastBar place={past} show={seen.show} side={seen.side} onSide={seen.setSide} />
     </PartBoundary>
   );
 }

@@ -1,6 +1,13 @@
 /** The editor of one graph: list, canvas, details and run strip, arranged for the screen at hand. */
 import { useLocalStorage } from "@mantine/hooks";
-import { type ComponentProps, memo, type ReactNode, useEffect, useState } from "react";
+import {
+  type ComponentProps,
+  type ComponentType,
+  memo,
+  type ReactNode,
+  useEffect,
+  useState,
+} from "react";
 import type { Script } from "../api/dry-runs";
 import { useOpenThreadsOnCards, useThreads } from "../comments/use-threads";
 import { scriptOf } from "../dry-run/script";
@@ -267,6 +274,22 @@ function recordOf({ dryRun }: EditorContext, shown: Shown, record: Props["record
 const StillInspector = memo(Inspector);
 const StillPeople = memo(People);
 
+/** Marks what changed since a good run. It comes last, and whoever cannot have it misses nothing else. */
+function QuietMarks() {
+  const [Marks, setMarks] = useState<ComponentType | null>(null);
+  useEffect(() => {
+    let gone = false;
+    import("../past/since/since-marks").then(
+      ({ SinceMarks }) => !gone && setMarks(() => SinceMarks),
+      () => {},
+    );
+    return () => {
+      gone = true;
+    };
+  }, []);
+  return Marks === null ? null : <Marks />;
+}
+
 /** Puts an action where there is room; whether that was allowed. */
 function placeAction(context: EditorContext, template: NewAction): boolean {
   if (!context.mayEdit) return false;
@@ -354,6 +377,7 @@ export function Editor(props: Props) {
         <DeskLayout {...parts} wide={!compact} told={told} list={() => props.list(place)} />
       )}
       <RoomNotices />
+      <QuietMarks />
       <Overlays context={context} known={known} overlay={overlay} onClose={editor.closeOverlay} />
       <AddPane context={context} request={adding} known={known} onClose={editor.closeAdd} />
     </EditorContextProvider>

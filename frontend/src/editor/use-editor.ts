@@ -27,7 +27,10 @@ import { useFoldedFrames } from "./use-folded-frames";
 import type { Past } from "./use-past";
 
 /** Where nothing else than the graph as it is can be shown. */
-const NOW: Past = { place: null, seen: null, lookAt: () => {}, show: () => {} };
+const NOW: Past = {
+  ...{ place: null, seen: null, side: false },
+  ...{ lookAt: () => {}, show: () => {}, setSide: () => {} },
+};
 
 const NONE: ReadonlySet<string> = new Set();
 

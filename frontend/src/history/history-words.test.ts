@@ -13,6 +13,7 @@ const entry = (more: Partial<HistoryEntry>): HistoryEntry => ({
 
 test("an edit is compared with the moment before its first change", () => {
   expect(momentBefore(entry({ from_seq: 3 }))).toBe(2);
+  expect(momentBefore(entry({ kind: "reverted", from_seq: 4 }))).toBe(3);
   expect(momentBefore(entry({ from_seq: 1 }))).toBeNull();
   expect(momentBefore(entry({ kind: "created", seq: 1 }))).toBeNull();
 });

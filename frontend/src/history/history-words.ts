@@ -37,10 +37,17 @@ export function doneWords({ kind, version, adapted, merged }: Done): string {
   return kind === "published" && version?.label ? `kept version ${version.label}` : DONE[kind];
 }
 
+const EDITS: ReadonlySet<HistoryEntry["kind"]> = new Set([
+  "edited",
+  "restored",
+  "reverted",
+  "adapted",
+  "merged",
+]);
+
 /** The moment before it, with which it is compared; null where there was nothing. */
 export function momentBefore({ kind, seq, from_seq }: HistoryEntry): number | null {
-  if (kind !== "edited" && kind !== "restored" && kind !== "adapted" && kind !== "merged")
-    return null;
+  if (!EDITS.has(kind)) return null;
   const before = (from_seq ?? seq) - 1;
   return before >= 1 ? before : null;
 }

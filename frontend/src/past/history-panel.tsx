@@ -1,5 +1,6 @@
 /** The history of the open graph beside its canvas: days, what people did in words, versions and runs. */
-import { Button, Skeleton } from "@mantine/core";
+import { Button, Checkbox, Skeleton } from "@mantine/core";
+import { useSessionStorage } from "@mantine/hooks";
 import { type KeyboardEvent, type ReactNode, useEffect, useRef, useState } from "react";
 import type { HistoryEntry } from "../api/documents/history";
 import { versionName } from "../api/graphs";
@@ -7,13 +8,16 @@ import { errorText } from "../api/http";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { doneWords } from "../history/history-words";
 import { usePersonColors, useThrottledLink } from "../sync/use-room";
+import { Segments } from "../ui/segments";
 import { day, useNow } from "../ui/times";
 import { EntryRow } from "./entry-row";
-import { useGoingBack } from "./going-back";
 import style from "./history-panel.module.css";
 import { RunRow, VersionRow } from "./marks-in-list";
+import { useSinceOn } from "./since/use-since-on";
 import { daysOf, entryAt, entryKey, type TimelineItem } from "./told/timeline";
 import { type Timeline, useTimeline } from "./told/use-timeline";
+import { VersionsList } from "./versions/versions-list";
+import { useGoingBack } from "./ways/going-back";
 
 const sentence = (words: string): string => words.charAt(0).toUpperCase() + words.slice(1);
 
@@ -81,7 +85,7 @@ function Items({ items, timeline }: { items: readonly TimelineItem[]; timeline: 
     const choose = () => {
       if (entry.seq < 1) return;
       setChosen(entryKey(entry));
-      lookAt(shown === entry ? null : { at: entry.seq, with: "own" });
+      lookAt(shown === entry ? null : { at: entry.seq, with: past?.with ?? "good" });
     };
     const common = { entry, chosen: shown === entry, onChoose: choose };
     if (entry.kind === "published") {
@@ -108,34 +112,36 @@ function Items({ items, timeline }: { items: readonly TimelineItem[]; timeline: 
 function SinceLastGood({ timeline: { lastGood } }: { timeline: Timeline }) {
   const { past, lookAt } = useEditorContext();
   const { seq } = useThrottledLink();
+  const [marked, setMarked] = useSinceOn();
   if (lastGood === null || lastGood.seq >= seq) return null;
-  const on = past?.at === seq && past.with === lastGood.seq;
+  const on = past?.at === seq && (past.with === "good" || past.with === lastGood.seq);
   return (
     <div className={style.since}>
       <Button
         fullWidth
         size="compact-sm"
         variant="light"
+        className={style.question ?? ""}
         aria-pressed={on}
-        onClick={() => lookAt(on ? null : { at: seq, with: lastGood.seq })}
+        onClick={() => lookAt(on ? null : { at: seq, with: "good" })}
       >
         What changed since run {lastGood.run}, which went well
       </Button>
+      <Checkbox
+        mt={6}
+        size="xs"
+        label="Mark it on the canvas"
+        checked={marked}
+        onChange={(event) => setMarked(event.currentTarget.checked)}
+      />
     </div>
   );
 }
 
-/** `above`: what else is there of the graph, as its drafts. */
-export function HistoryPanel({ above }: { above?: ReactNode }) {
-  const { id } = useEditorContext();
-  const timeline = useTimeline(id);
+function Days({ timeline }: { timeline: Timeline }) {
   const now = useNow(60_000);
   return (
-    <section className={style.panel} aria-label="History" data-history onKeyDown={onArrowKeys}>
-      <h2 className="visually-hidden">History</h2>
-      {timeline.isPending && <Skeleton height={160} m="sm" />}
-      {timeline.error && <p role="alert">{errorText(timeline.error)}</p>}
-      {above}
+    <>
       <SinceLastGood timeline={timeline} />
       {daysOf(timeline.items).map(({ at, items }) => (
         <section key={new Date(at).toDateString()} className={style.day}>
@@ -146,6 +152,43 @@ export function HistoryPanel({ above }: { above?: ReactNode }) {
         </section>
       ))}
       {timeline.hasOlder && <Older timeline={timeline} />}
+    </>
+  );
+}
+
+type HistoryView = "history" | "versions";
+
+/** `above`: what else is there of the graph, as its drafts. */
+export function HistoryPanel({ above }: { above?: ReactNode }) {
+  const { id } = useEditorContext();
+  const timeline = useTimeline(id);
+  const [view, setView] = useSessionStorage<HistoryView>({
+    key: "aa.history-view",
+    defaultValue: "history",
+    getInitialValueInEffect: false,
+  });
+  const count = timeline.versions.length;
+  const views = [
+    { value: "history", label: "History" },
+    { value: "versions", label: `Versions\u00a0${count}` },
+  ] as const;
+  return (
+    <section className={style.panel} aria-label="History" data-history onKeyDown={onArrowKeys}>
+      <h2 className="visually-hidden">History</h2>
+      <div className={style.views}>
+        <Segments
+          label="What of the history"
+          fullWidth
+          size="xs"
+          data={views}
+          value={view}
+          onChange={setView}
+        />
+      </div>
+      {timeline.isPending && <Skeleton height={160} m="sm" />}
+      {timeline.error && <p role="alert">{errorText(timeline.error)}</p>}
+      {view === "history" && above}
+      {view === "history" ? <Days timeline={timeline} /> : <VersionsList timeline={timeline} />}
     </section>
   );
 }

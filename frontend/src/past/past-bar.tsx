@@ -1,9 +1,9 @@
 /** Below the canvas while it shows the past: what one sees, the line of all moments, and the way back. */
-import { Button, NativeSelect } from "@mantine/core";
+import { Button } from "@mantine/core";
 import { IconHistory } from "@tabler/icons-react";
 import { useEffect, useLayoutEffect, useMemo } from "react";
-import { versionName } from "../api/graphs";
 import { errorText } from "../api/http";
+import type { ChangeMarks } from "../canvas/changes/change-marks";
 import {
   type EditorContext,
   type PastPlace,
@@ -11,41 +11,41 @@ import {
 } from "../edit-actions/editor-context";
 import type { Graph } from "../graph/model";
 import { usePersonColors, useThrottledLink } from "../sync/use-room";
+import { Segments } from "../ui/segments";
 import { useNow } from "../ui/times";
 import { ChangesWalk } from "./compare/changes-walk";
-import { momentsOf, momentWords } from "./compare/compared";
-import { changesBetween, type GraphChanges } from "./compare/graph-difference";
+import { CompareWith, useRunning } from "./compare/compare-with";
+import { momentWords } from "./compare/compared";
+import type { GraphChanges } from "./compare/graph-difference";
+import { useCompared } from "./compare/use-compared";
 import style from "./past-bar.module.css";
 import { marksOf, Scrubber } from "./scrubber";
-import { type Timeline, useTimeline } from "./told/use-timeline";
-import { type PastGraph, usePastGraph } from "./use-walk";
+import { EarlierCanvas } from "./side/earlier-canvas";
+import { type SideBySide, sideBySide } from "./side/side-by-side";
+import { useTimeline } from "./told/use-timeline";
 
 export interface SeenPast {
   /** As it was; without what is drawn of another moment. */
   readonly graph: Graph;
   /** What differs from the moment with which it is compared. */
   readonly changes: GraphChanges | null;
+  /** What the canvas shows: what is gone since then, too, unless the canvas beside it shows that. */
+  readonly drawn: Graph;
+  readonly marks: ChangeMarks | null;
+  /** What is beside it; null where one canvas shows all. */
+  readonly side: SideBySide | null;
 }
 
-/** What differs, with the names of who did it as far as the steps are there. */
-function useChanges(
-  later: PastGraph,
-  earlier: PastGraph,
-  timeline: Timeline,
-  from: number | null,
-  to: number,
-) {
-  const { entries } = timeline;
-  const ready = from !== null && later.here && earlier.here;
-  const { walk } = later;
-  const [before, after] = [earlier.graph, later.graph];
-  const known = walk !== null && from !== null && walk.reaches(from);
-  return useMemo(() => {
-    if (!ready || before === null || after === null) return null;
-    const authors = known ? walk.authors(from, to) : null;
-    const names = new Map(entries.map(({ author }) => [author.id, author.name]));
-    return changesBetween(before, after, (key) => names.get(authors?.get(key) ?? "") ?? null);
-  }, [ready, known, before, after, walk, from, to, entries]);
+function seenPast(
+  graph: Graph,
+  changes: GraphChanges | null,
+  words: readonly [earlier: string, later: string] | null,
+): SeenPast {
+  const side =
+    changes === null || words === null ? null : sideBySide(changes, words, EarlierCanvas);
+  if (side !== null) return { graph, changes, drawn: graph, marks: side.marks[1], side };
+  const { shown, marks } = changes ?? { shown: graph, marks: null };
+  return { graph, changes, drawn: shown, marks, side };
 }
 
 /** Nothing that was begun on the graph as it is now goes on over the past. */
@@ -57,81 +57,47 @@ function useNothingOpen({ openOverlay, dryRun }: EditorContext): void {
   }, []);
 }
 
-interface CompareProps {
-  place: PastPlace;
-  timeline: Timeline;
-  newest: number;
-}
-
-/** With what the moment is compared: any other one that has a name. */
-function CompareWith({ place, timeline, newest }: CompareProps) {
-  const { lookAt } = useEditorContext();
-  const now = useNow(60_000);
-  const { versions, entries, lastGood } = timeline;
-  const marked = typeof place.with === "number" ? place.with : null;
-  const isVersion = lastGood?.seq === marked || versions.some(({ seq }) => seq === marked);
-  const data = [
-    { value: "own", label: "the moment before this sitting" },
-    ...(lastGood === null
-      ? []
-      : [{ value: `${lastGood.seq}`, label: `the last good run, run ${lastGood.run}` }]),
-    { value: "now", label: "now" },
-    ...versions.map((version) => ({
-      value: `${version.seq}`,
-      label: `version ${versionName(versions, version.id)}`,
-    })),
-    ...(marked !== null && !isVersion
-      ? [{ value: `${marked}`, label: momentWords(entries, marked, now) }]
-      : []),
-    { value: "here", label: "this moment, from here on" },
-    { value: "nothing", label: "nothing" },
-  ].filter(({ value }, i, all) => all.findIndex((each) => each.value === value) === i);
-  return (
-    <NativeSelect
-      size="xs"
-      aria-label="Compare with"
-      data={data}
-      value={`${place.with}`}
-      disabled={newest === 0}
-      onChange={(event) => {
-        const { value } = event.currentTarget;
-        const chosen = value === "own" || value === "now" || value === "nothing" ? value : null;
-        const seq = value === "here" ? place.at : Number(value);
-        lookAt({ at: place.at, with: chosen ?? seq });
-      }}
-    />
-  );
-}
+const VIEWS = [
+  { value: "one", label: "One canvas" },
+  { value: "side", label: "Side by side" },
+] as const;
 
 interface Props {
   place: PastPlace;
   show: (seen: SeenPast | null) => void;
+  /** The two moments stand beside each other. */
+  side: boolean;
+  onSide: (side: boolean) => void;
 }
 
-export function PastBar({ place, show }: Props) {
+export function PastBar({ place, show, side, onSide }: Props) {
   const context = useEditorContext();
   const { id, lookAt } = context;
   const { seq } = useThrottledLink();
   const now = useNow(60_000);
   const timeline = useTimeline(id);
+  const running = useRunning(id, timeline);
   const { entries, items, versions } = timeline;
-  const newest = Math.max(seq, place.at);
-  const { from, to } = momentsOf(place, entries, newest);
-  const later = usePastGraph(id, seq === 0 ? null : to, newest);
-  const earlier = usePastGraph(id, seq === 0 ? null : from, newest);
-  const changes = useChanges(later, earlier, timeline, from, to);
+  const compared = useCompared(id, place, timeline, running, seq);
+  const { graph, changes, newest, from, to } = compared;
   useNothingOpen(context);
-  const { graph } = later;
+  const words = (at: number | null) =>
+    at === null ? "" : at === newest ? "now" : momentWords(entries, at, now);
+  const [before, after] = [compared.foreign === null ? words(from) : "as it runs", words(to)];
   useLayoutEffect(() => {
-    if (graph !== null) show({ graph, changes });
-  }, [show, graph, changes]);
+    if (graph !== null) show(seenPast(graph, changes, side ? [before, after] : null));
+  }, [show, graph, changes, side, before, after]);
   const marks = useMemo(() => marksOf(items, versions), [items, versions]);
   const colorOf = usePersonColors(entries.map(({ author }) => author.id));
   const goTo = (at: number) => lookAt({ ...place, at: Math.min(Math.max(1, at), newest) });
-  const walk = to === place.at ? later.walk : earlier.walk;
-  const error = later.error ?? earlier.error;
   return (
-    <section className={style.bar} aria-label="The past" data-past aria-busy={!later.here}>
+    <section
+      className={style.bar}
+      aria-label="The past"
+      data-past
+      data-at={compared.here ? place.at : undefined}
+      aria-busy={!compared.here}
+    >
       <div className={style.row}>
         <p className={style.title}>
           <IconHistory size={16} aria-hidden /> <b>You look at the past.</b>{" "}
@@ -149,17 +115,38 @@ export function PastBar({ place, show }: Props) {
         words={momentWords(entries, place.at, now)}
         {...{ marks, colorOf }}
         onAt={goTo}
-        onStep={(by) => goTo(walk?.neighbour(by) ?? place.at + by)}
+        onStep={(by) => goTo(compared.walk?.neighbour(by) ?? place.at + by)}
         onLeave={() => lookAt(null)}
       />
       <div className={style.row}>
         <span className={style.compare}>
-          Compare with <CompareWith place={place} timeline={timeline} newest={newest} />
+          Compare with <CompareWith {...{ place, timeline, running, newest }} />
         </span>
+        {changes && (
+          <Segments
+            label="How both are shown"
+            size="xs"
+            data={VIEWS}
+            value={side ? "side" : "one"}
+            onChange={(next) => onSide(next === "side")}
+          />
+        )}
         {changes && <ChangesWalk changes={changes} />}
+        {compared.foreign !== null && <Foreign run={compared.foreign} {...{ running }} />}
         {seq === 0 && <p>The past is on the server, which is not there now.</p>}
-        {error && <p role="alert">{errorText(error)}</p>}
+        {compared.error && <p role="alert">{errorText(compared.error)}</p>}
       </div>
     </section>
+  );
+}
+
+/** That what runs is nothing that was ever published here. */
+function Foreign({ run, running }: { run: string; running: ReturnType<typeof useRunning> }) {
+  const words = running.find((each) => each.run === run)?.words ?? "a run that is over";
+  return (
+    <p role="note" className={style.foreign}>
+      <b>What runs is no version of this graph</b> ({words}). It is compared as it was sent; whose
+      the differences are is not known.
+    </p>
   );
 }

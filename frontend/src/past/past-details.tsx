@@ -1,12 +1,16 @@
 /** The details while somebody looks at the history: who set what of what is selected, or what differs. */
-import { type ReactNode, useEffect, useRef, useState } from "react";
+import { type ReactNode, useDeferredValue, useEffect, useRef, useState } from "react";
+import { useVersions, type Version } from "../api/graphs";
 import { type Panel, useEditorContext } from "../edit-actions/editor-context";
 import { endName } from "../graph/relation-words";
 import { Segments } from "../ui/segments";
 import { DifferenceList } from "./compare/difference-list";
 import type { GraphChanges } from "./compare/graph-difference";
 import style from "./past-details.module.css";
+import { PastWays } from "./ways/past-ways";
 import { WhoSetWhat } from "./who-set-what";
+
+const NONE: readonly Version[] = [];
 
 interface Props {
   changes: GraphChanges | null;
@@ -33,8 +37,11 @@ function PastPart({ changes }: { changes: GraphChanges | null }) {
   return <WhoSetWhat of="" what="the graph" />;
 }
 
-export function PastDetails({ changes, panel, children }: Props) {
-  const { selection } = useEditorContext();
+export function PastDetails({ changes: newest, panel, children }: Props) {
+  // What stands beside the canvas follows it.
+  const changes = useDeferredValue(newest);
+  const { id, selection } = useEditorContext();
+  const { data: versions = NONE } = useVersions(id);
   const [tab, setTab] = useState<"past" | "details">("past");
   const asked = useRef(panel);
   useEffect(() => {
@@ -60,6 +67,7 @@ export function PastDetails({ changes, panel, children }: Props) {
       {tab === "past" ? (
         <section className={style.part} aria-label={label}>
           <PastPart changes={changes} />
+          <PastWays versions={versions} />
         </section>
       ) : (
         <div className={style.whole}>{children}</div>

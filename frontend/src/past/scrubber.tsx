@@ -3,7 +3,7 @@ import type { CSSProperties, KeyboardEvent } from "react";
 import type { Version } from "../api/graphs";
 import { authorName, versionName } from "../api/graphs";
 import style from "./scrubber.module.css";
-import type { TimelineItem } from "./told/timeline";
+import { momentAt, type TimelineItem } from "./told/timeline";
 
 interface ScrubberMark {
   readonly key: string;
@@ -14,15 +14,17 @@ interface ScrubberMark {
   readonly author: string | null;
 }
 
-/** The marks of what is loaded; a run stands where its version was kept. */
+/** The marks of what is loaded; a run stands where it was started, as far as that is known, else where its
+ * version is. */
 export function marksOf(
   items: readonly TimelineItem[],
   versions: readonly Version[],
 ): ScrubberMark[] {
   const seqOf = new Map(versions.map(({ id, seq }) => [id, seq]));
+  const entries = items.flatMap((item) => (item.kind === "entry" ? [item.entry] : []));
   return items.flatMap((item): ScrubberMark[] => {
     if (item.kind === "run") {
-      const at = seqOf.get(item.run.version ?? "");
+      const at = momentAt(entries, item.at) ?? seqOf.get(item.run.version ?? "");
       const words = `Run ${item.run.number}`;
       return at === undefined ? [] : [{ key: item.run.id, at, kind: "run", words, author: null }];
     }

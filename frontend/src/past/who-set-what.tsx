@@ -1,81 +1,22 @@
 /** Who gave each field of what is selected its value, when, what it was before, and all its values. */
 import { Button, Skeleton } from "@mantine/core";
 import { IconRestore } from "@tabler/icons-react";
-import { type CSSProperties, useState } from "react";
-import {
-  type FieldBlame,
-  type FieldValue,
-  useBlame,
-  useFieldValues,
-} from "../api/documents/history";
-import { authorName } from "../api/graphs";
-import { errorText } from "../api/http";
+import { useState } from "react";
+import { type FieldBlame, useBlame } from "../api/documents/history";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { usePersonColors, useThrottledLink } from "../sync/use-room";
-import { day, hourMinute, instant, useNow } from "../ui/times";
-import { blamedName, blamedValue, toldFields } from "./blame-words";
-import { useGoingBack } from "./going-back";
 import style from "./past-details.module.css";
-
-interface ByProps {
-  value: Pick<FieldValue, "author" | "at" | "merged">;
-  color: string;
-}
-
-function By({ value, color }: ByProps) {
-  const now = useNow(60_000);
-  const at = instant(value.at);
-  return (
-    <span className={style.by}>
-      <i style={{ "--c": color } as CSSProperties} aria-hidden />
-      <bdi>{authorName(value.author)}</bdi>
-      {at !== null && ` · ${day(at, now)} ${hourMinute(at)}`}
-      {value.merged && (
-        <span>
-          {" · merged by "}
-          <bdi>{authorName(value.merged.by)}</bdi>
-        </span>
-      )}
-    </span>
-  );
-}
-
-interface ValuesProps {
-  of: string;
-  field: string;
-  at: number;
-}
-
-/** All values that it has had; each leads to its moment. */
-function Values({ of, field, at }: ValuesProps) {
-  const { id, lookAt } = useEditorContext();
-  const found = useFieldValues(id, of, field, at);
-  const colorOf = usePersonColors(found.data?.map(({ author }) => author.id));
-  if (found.isPending) return <Skeleton height={40} />;
-  if (found.isError) return <p role="alert">{errorText(found.error)}</p>;
-  return (
-    <ol className={style.values} aria-label={`Values of ${blamedName(field)}`}>
-      {found.data.map((value) => (
-        <li key={value.seq}>
-          <button type="button" onClick={() => lookAt({ at: value.seq, with: "own" })}>
-            <code>{blamedValue(field, value.value)}</code>
-            <By value={value} color={colorOf(value.author.id)} />
-            <span className="visually-hidden">Look at that moment</span>
-          </button>
-        </li>
-      ))}
-    </ol>
-  );
-}
+import { blamedName, blamedValue, toldFields } from "./values/blame-words";
+import { By, ValueHistory } from "./values/value-history";
+import { useGoingBack } from "./ways/going-back";
 
 interface BlameRowProps {
   of: string;
   blame: FieldBlame;
-  at: number;
   color: string;
 }
 
-function BlameRow({ of, blame, at, color }: BlameRowProps) {
+function BlameRow({ of, blame, color }: BlameRowProps) {
   const [open, setOpen] = useState(false);
   const { field, value, before } = blame;
   return (
@@ -90,9 +31,11 @@ function BlameRow({ of, blame, at, color }: BlameRowProps) {
         <code>
           {before !== null && <del>{blamedValue(field, before)}</del>} {blamedValue(field, value)}
         </code>
-        <By value={blame} color={color} />
+        <span className={style.wide}>
+          <By value={blame} color={color} />
+        </span>
       </button>
-      {open && <Values of={of} field={field} at={at} />}
+      {open && <ValueHistory of={of} field={field} />}
     </li>
   );
 }
@@ -112,13 +55,7 @@ export function WhoSetWhat({ of, what }: { of: string; what: string }) {
     <>
       <ul className={style.fields} aria-label="Who set what">
         {toldFields(found.data).map((blame) => (
-          <BlameRow
-            key={blame.field}
-            of={of}
-            blame={blame}
-            at={at}
-            color={colorOf(blame.author.id)}
-          />
+          <BlameRow key={blame.field} of={of} blame={blame} color={colorOf(blame.author.id)} />
         ))}
       </ul>
       {past !== null && past.at < seq && mayGoBack && of !== "" && (

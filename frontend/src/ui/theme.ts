@@ -73,6 +73,7 @@ export const theme = createTheme({
       },
     },
     Popover: { defaultProps: { shadow: "md" } },
+    Notification: { defaultProps: { closeButtonProps: { "aria-label": "Close" } } },
     Modal: {
       defaultProps: { centered: true, radius: "lg", closeButtonProps: { "aria-label": "Close" } },
     },

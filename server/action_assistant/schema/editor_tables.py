@@ -44,6 +44,7 @@ version: Final = Table(
     Column("at", BigInteger, nullable=False),
     Column("stream", Text, nullable=False),
     Column("event_seq", BigInteger, nullable=False),
+    Column("note", Text, nullable=False, server_default=""),
     Index(None, "graph", "at"),
     Index(None, "digest"),
 )

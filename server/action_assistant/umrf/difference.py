@@ -1,7 +1,7 @@
 """What differs between two graphs, action by action and arrow by arrow."""
 
 from collections.abc import Iterable, Mapping
-from typing import Any, Literal, TypeAlias
+from typing import Any, Final, Literal, TypeAlias
 
 import msgspec
 
@@ -9,6 +9,10 @@ from action_assistant.umrf.json.text import parse_small
 from action_assistant.umrf.model import ENTRY, EXIT, Action, Graph, JsonText, Key, Relation
 
 Change: TypeAlias = Literal["added", "removed", "changed"]
+
+
+#: Where a note lies, and how large it is.
+_NOTE_PLACE: Final = {"at", "size"}
 
 
 class Field(msgspec.Struct, frozen=True):
@@ -42,11 +46,13 @@ class RelationChange(msgspec.Struct, frozen=True):
 
 
 class NoteChange(msgspec.Struct, frozen=True):
-    """A note or frame that came, went or changed. `text` is what it says, the newer one."""
+    """A note or frame that came, went or changed. `text` is what it says, the newer one. `moved`: it only
+    lies elsewhere, or is larger or smaller."""
 
     change: Change
     id: str
     text: str
+    moved: bool = False
 
 
 class Difference(msgspec.Struct, frozen=True):
@@ -115,7 +121,8 @@ def _notes(old: Graph, new: Graph) -> Iterable[NoteChange]:
     for note in sorted(was.keys() | now.keys()):
         a, b = was.get(note), now.get(note)
         if a != b:
-            yield NoteChange(_change(a, b), note, _said(b or a or ""))
+            moved = a is not None and b is not None and _but_place(a) == _but_place(b)
+            yield NoteChange(_change(a, b), note, _said(b or a or ""), moved)
 
 
 def _said(note: JsonText) -> str:
@@ -123,6 +130,14 @@ def _said(note: JsonText) -> str:
     found = parse_small(note)
     said = found.get("text") if isinstance(found, dict) else None
     return said if isinstance(said, str) else ""
+
+
+def _but_place(note: JsonText) -> dict[str, Any] | JsonText:
+    """What a note is, wherever it lies."""
+    found = parse_small(note)
+    if not isinstance(found, dict):
+        return note
+    return {name: value for name, value in found.items() if name not in _NOTE_PLACE}
 
 
 def _change(a: object, b: object) -> Change:

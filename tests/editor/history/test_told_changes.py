@@ -5,13 +5,14 @@ import random
 import pytest
 
 from action_assistant.editor.documents.document import read_maps
-from action_assistant.editor.documents.values import ends_of
+from action_assistant.editor.documents.values import ROOTS, ends_of
 from action_assistant.editor.history.change_index import ChangeIndex
 from action_assistant.editor.history.key_changes import LoggedChange, owner_of
 from action_assistant.editor.history.told_changes import Changes, Stretch, told
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.journal.journal import Journal
 from action_assistant.umrf.difference import difference
+from action_assistant.umrf.model import Graph
 from editor.history.random_edits import GRAPH, PEOPLE, edited
 from support.doses import examples
 
@@ -42,6 +43,20 @@ async def test_what_one_person_did_alone_is_the_difference_of_the_whole_graphs(
     assert _by_key(found) == {change.aid: change for change in sought.actions}
     assert set(found.relations) == set(sought.relations)
     assert found.notes == sought.notes
+
+
+def test_a_note_that_only_lies_elsewhere_was_moved() -> None:
+    def graph(note: str) -> Graph:
+        return read_maps({root: {} for root in ROOTS} | {"positions": {"g/n": note}})
+
+    note = '{"kind":"note","at":[0,0],"size":[200,80],"text":"Steam","color":"grey"}'
+    (moved,) = difference((0, graph(note)), (0, graph(note.replace("[0,0]", "[40,0]")))).notes
+    assert (moved.change, moved.text, moved.moved) == ("changed", "Steam", True)
+    for other in (note.replace("Steam", "Smoke"), note.replace("grey", "red"), "[1]"):
+        (changed,) = difference((0, graph(note)), (0, graph(other))).notes
+        assert not changed.moved
+    (added,) = difference((0, graph(note)), (0, read_maps({root: {} for root in ROOTS}))).notes
+    assert (added.change, added.moved) == ("removed", False)
 
 
 def _by_key(changes: Changes) -> dict[str, object]:

@@ -61,15 +61,14 @@ export function useDifference(id: string, from: number | null, to: number) {
 export type FieldBlame = EditorApi["FieldBlame"];
 export type FieldValue = EditorApi["FieldValue"];
 
-/** Who gave each field of an action, arrow or note, or of the graph (""), the value that it had then. */
-export function useBlame(id: string, of: string, at: number) {
+/** Who gave each field of an action, arrow or note, or of the graph (""), the value that it had then;
+ * without `at` now, which is asked each time. */
+export function useBlame(id: string, of: string, at?: number) {
+  const query = new URLSearchParams({ of, ...(at === undefined ? {} : { at: `${at}` }) });
   return useQuery({
-    enabled: at > 0,
-    queryKey: ["history", id, "blame", of, at],
-    queryFn: ({ signal }) =>
-      fetchJson<FieldBlame[]>(`${below(id)}/blame?of=${encodeURIComponent(of)}&at=${at}`, {
-        signal,
-      }),
+    enabled: at !== 0,
+    queryKey: ["history", id, "blame", of, at ?? "now"],
+    queryFn: ({ signal }) => fetchJson<FieldBlame[]>(`${below(id)}/blame?${query}`, { signal }),
     retry: false,
   });
 }

@@ -16,18 +16,17 @@ export interface SinceAnswer {
 
 type Ended = Pick<Run, "number" | "version" | "state" | "result">;
 
+/** Whether a run of a version did what it was for. */
+export function wentWell({ version, state, result }: Ended): boolean {
+  return version !== null && state === "finished" && (result === "on_true" || result === null);
+}
+
 /** The last run, before one, that went well, as far as it is known. */
 export function lastGoodRun<R extends Ended>(
   runs: readonly R[],
   before = Number.POSITIVE_INFINITY,
 ): R | null {
-  const good = runs.filter(
-    (each) =>
-      each.number < before &&
-      each.version !== null &&
-      each.state === "finished" &&
-      (each.result === "on_true" || each.result === null),
-  );
+  const good = runs.filter((each) => each.number < before && wentWell(each));
   return good.reduce<R | null>(
     (last, each) => (last === null || each.number > last.number ? each : last),
     null,

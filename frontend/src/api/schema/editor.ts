@@ -830,13 +830,15 @@ export interface EditorApi {
     };
     /**
      * NoteChange
-     * @description A note or frame that came, went or changed. `text` is what it says, the newer one.
+     * @description A note or frame that came, went or changed. `text` is what it says, the newer one. `moved`: it only
+     *     lies elsewhere, or is larger or smaller.
      */
     NoteChange: {
         /** @enum {string} */
         change: "added" | "changed" | "removed";
         id: string;
         text: string;
+        moved: boolean;
     };
     /**
      * OpenSession
@@ -1011,13 +1013,16 @@ export interface EditorApi {
     };
     /**
      * Publishing
-     * @description Which moment of the graph to publish, and under what label. Left out: as it is now.
+     * @description Which moment of the graph to publish, under what label, and what there is to say of it. Left out:
+     *     as it is now.
      */
     Publishing: {
         /** @default  */
         label?: string;
         /** @default null */
         seq?: number | null;
+        /** @default  */
+        note?: string;
     };
     /**
      * Readiness
@@ -1256,6 +1261,8 @@ export interface EditorApi {
         umrf?: {
             [key: string]: unknown;
         };
+        /** @default  */
+        note?: string;
     };
     /**
      * WantedMerge

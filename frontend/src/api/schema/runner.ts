@@ -617,13 +617,15 @@ export interface RunnerApi {
     };
     /**
      * NoteChange
-     * @description A note or frame that came, went or changed. `text` is what it says, the newer one.
+     * @description A note or frame that came, went or changed. `text` is what it says, the newer one. `moved`: it only
+     *     lies elsewhere, or is larger or smaller.
      */
     NoteChange: {
         /** @enum {string} */
         change: "added" | "changed" | "removed";
         id: string;
         text: string;
+        moved: boolean;
     };
     /**
      * OutcomeArrow

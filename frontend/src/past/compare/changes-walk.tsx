@@ -36,7 +36,8 @@ function useWalkKeys(go: (by: 1 | -1) => void): void {
     if (!singles) return;
     const onKey = (event: KeyboardEvent) => {
       const by = event.key === "n" ? 1 : event.key === "p" ? -1 : null;
-      const typed = "input:not([type=range]), textarea, select, [role=dialog], [role=menu]";
+      const typed =
+        "input:not([type=range], [type=radio], [type=checkbox]), textarea, select, [role=dialog], [role=menu]";
       const taken = event.target instanceof Element && event.target.closest(typed) !== null;
       if (by === null || taken || event.ctrlKey || event.metaKey || event.altKey) return;
       event.preventDefault();

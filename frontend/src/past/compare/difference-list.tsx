@@ -1,4 +1,5 @@
 /** Everything that differs between the two moments, field by field; each leads to its place. */
+import { memo } from "react";
 import { CHANGE_SIGNS } from "../../canvas/changes/change-marks";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import style from "../past-details.module.css";
@@ -27,7 +28,8 @@ function Thing({ thing }: { thing: ChangedThing }) {
   );
 }
 
-export function DifferenceList({ changes }: { changes: GraphChanges }) {
+/** Draws again only for other changes: who steps through moments waits for the canvas, not for the list. */
+export const DifferenceList = memo(function DifferenceList({ changes }: { changes: GraphChanges }) {
   const order = walkOrder(changes.things);
   if (order.length === 0) return <p className={style.quiet}>Nothing differs.</p>;
   const more = order.length - MOST;
@@ -39,4 +41,4 @@ export function DifferenceList({ changes }: { changes: GraphChanges }) {
       {more > 0 && <li className={style.quiet}>and {more} more</li>}
     </ul>
   );
-}
+});

@@ -26,6 +26,7 @@ export interface ChangedThing {
 }
 
 export interface GraphChanges {
+  readonly before: Graph;
   /** The later graph, with what is gone where it stood. */
   readonly shown: Graph;
   readonly things: readonly ChangedThing[];
@@ -83,6 +84,23 @@ function oldValues(before: Action, after: Action): ReadonlyMap<string, string> {
   return new Map(found);
 }
 
+/** By the later of two things, which stays the same object from step to step: what it was compared with. */
+class Remembered<T> {
+  readonly #found = new WeakMap<object, { readonly before: unknown; readonly is: T }>();
+
+  of(before: unknown, after: unknown, compare: () => T): T {
+    if (typeof after !== "object" || after === null) return compare();
+    const known = this.#found.get(after);
+    if (known !== undefined && known.before === before) return known.is;
+    const is = compare();
+    this.#found.set(after, { before, is });
+    return is;
+  }
+}
+
+const equal = new Remembered<boolean>();
+const told = new Remembered<ReturnType<typeof linesOf>>();
+
 interface BeforeAfter<T> {
   readonly key: string;
   readonly before: T | undefined;
@@ -99,7 +117,8 @@ function pairs<T>(
   const is = new Map(after.map((each) => [keyOf(each), each]));
   return [...new Set([...is.keys(), ...was.keys()])].flatMap((key) => {
     const pair = { key, before: was.get(key), after: is.get(key) };
-    return isEqual(pair.before, pair.after) ? [] : [pair];
+    const { before, after } = pair;
+    return equal.of(before, after, () => isEqual(before, after)) ? [] : [pair];
   });
 }
 
@@ -117,8 +136,26 @@ function thingOf<T>(
 ): ChangedThing {
   const { key, before, after } = pair;
   const both = before !== undefined && after !== undefined;
-  const lines = both ? linesOf(changedFields(fieldsOf(before), fieldsOf(after))) : [];
+  const lines = both
+    ? told.of(before, after, () => linesOf(changedFields(fieldsOf(before), fieldsOf(after))))
+    : [];
   return { key, thing, change: changeOf(pair), looks: both && lines.length === 0, name, lines };
+}
+
+/** What two states of an action differ in; null where that is nothing, or only looks. */
+export function changedAction(before: Action, after: Action): FieldChange[] | null {
+  const fields = isEqual(before, after)
+    ? []
+    : changedFields(actionFields(before), actionFields(after));
+  return fields.length === 0 ? null : fields;
+}
+
+/** The same of an arrow. */
+export function changedRelation(before: Relation, after: Relation): FieldChange[] | null {
+  const fields = isEqual(before, after)
+    ? []
+    : changedFields(relationFields(before), relationFields(after));
+  return fields.length === 0 ? null : fields;
 }
 
 function namesOf(...graphs: readonly Graph[]): (key: Key) => string {
@@ -189,7 +226,7 @@ export function changesBetween(
     const { change } = thing;
     return [[thing.key, { change, by: by(thing.key), oldName: renamed, oldValues: old }]];
   });
-  return { shown, things, marks: new Map(marks) };
+  return { before, shown, things, marks: new Map(marks) };
 }
 
 const NO_VALUES: ReadonlyMap<string, string> = new Map();

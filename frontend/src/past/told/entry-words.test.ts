@@ -75,13 +75,20 @@ test("what an arrow says of an outcome", () => {
 });
 
 test("what people wrote", () => {
-  const note = { change: "added" as const, id: "n", text: "Steam at the\nnorth side." };
+  const note = {
+    change: "added" as const,
+    id: "n",
+    text: "Steam at the\nnorth side.",
+    moved: false,
+  };
   const fields = [{ field: "name", before: "task_1", after: "valves" }];
   expect(words({ notes: [note], comments: 1, fields })).toEqual([
     "renamed the graph task_1 → valves",
     "wrote a note “Steam at the north side.”",
     "wrote a comment",
   ]);
+  const moved = { ...note, change: "changed" as const, moved: true };
+  expect(words({ notes: [moved] })).toEqual(["moved 1 note"]);
 });
 
 test("a few are told, of the others how many", () => {

@@ -157,14 +157,20 @@ const counted = (count: number, what: string): string =>
 function looksLine(
   actions: readonly ChangedAction[],
   arrows: readonly ChangedArrow[],
+  notes: readonly ChangedNote[],
 ): EntryLine[] {
   const moved = actions.filter(
     ({ change, fields }) =>
       change === "changed" && fields.some(({ field }) => field === "position"),
   ).length;
   const bent = arrows.filter(({ fields }) => fields.some(isBend)).length;
+  const papers = notes.filter((note) => note.moved).length;
+  const things = [
+    ...(moved > 0 ? [counted(moved, "card")] : []),
+    ...(papers > 0 ? [counted(papers, "note")] : []),
+  ];
   const did = [
-    ...(moved > 0 ? [`moved ${counted(moved, "card")}`] : []),
+    ...(things.length > 0 ? [`moved ${things.join(", ")}`] : []),
     ...(bent > 0 ? [`bent ${counted(bent, "arrow")}`] : []),
   ];
   if (did.length === 0) return [];
@@ -185,8 +191,8 @@ export function entryLines(changes: SittingChanges): EntryLine[] {
     ...actions.flatMap((action) => actionLines(action, arrowsOf(action.aid))),
     ...relations.filter((arrow) => !goesAlong(arrow)).flatMap(arrowLines),
     ...graphLines(fields),
-    ...notes.map(noteLine),
-    ...looksLine(actions, relations),
+    ...notes.filter((note) => !note.moved).map(noteLine),
+    ...looksLine(actions, relations, notes),
   ];
   if (comments > 0) {
     const words = comments === 1 ? "wrote a comment" : `wrote comments in ${comments} threads`;

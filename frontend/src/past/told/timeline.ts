@@ -64,6 +64,19 @@ export function timelineOf(
   return items.sort((a, b) => b.at - a.at);
 }
 
+/** The change after which a graph was at some time; null where that is not known for certain. */
+export function momentAt(entries: readonly HistoryEntry[], time: number): number | null {
+  let found: number | null = null;
+  for (const { at, until, from_seq, seq } of entries) {
+    if (from_seq === undefined) continue;
+    const [begun, ended] = [instant(at), instant(until)];
+    if (begun === null || ended === null || begun > time) continue;
+    if (ended > time) return null;
+    found = Math.max(found ?? 0, seq);
+  }
+  return found;
+}
+
 const dayOf = (at: number): number => new Date(at).setHours(0, 0, 0, 0);
 
 export function daysOf(items: readonly TimelineItem[]): TimelineDay[] {

@@ -2,11 +2,11 @@
 import { useInfiniteQuery, useQuery, useQueryClient } from "@tanstack/react-query";
 import { useEffect, useMemo } from "react";
 import { fetchHistory, type HistoryEntry } from "../../api/documents/history";
-import { lastGoodRun } from "../../api/documents/since";
 import { useVersions, type Version } from "../../api/graphs";
 import { newestRun, useLive } from "../../api/live/use-live";
-import { listRuns, NO_FILTER } from "../../api/review";
+import { type ListedRun, listRuns, NO_FILTER } from "../../api/review";
 import { useThrottledLink } from "../../sync/use-room";
+import { type GoodRun, goodRuns } from "./good-runs";
 import { joined, nextPage, type TimelineItem, timelineOf } from "./timeline";
 
 const PAGE = 40; // entries
@@ -19,8 +19,13 @@ export interface Timeline {
   readonly entries: readonly HistoryEntry[];
   readonly items: readonly TimelineItem[];
   readonly versions: readonly Version[];
-  /** The moment of the last run that went well. */
-  readonly lastGood: { readonly run: number; readonly seq: number } | null;
+  /** Its newest runs, the newest first. */
+  readonly runs: readonly ListedRun[];
+  /** There are more of them. */
+  readonly moreRuns: boolean;
+  /** Those that went well, the last one last. */
+  readonly goods: readonly GoodRun[];
+  readonly lastGood: GoodRun | null;
   readonly isPending: boolean;
   readonly error: Error | null;
   readonly hasOlder: boolean;
@@ -28,6 +33,7 @@ export interface Timeline {
   loadOlder(): void;
 }
 
+/** The newest runs of a graph. */
 function useRunsOf(id: string) {
   const { runner, now } = useLive();
   const newest = newestRun(now, id);
@@ -68,16 +74,15 @@ export function useTimeline(id: string): Timeline {
     () => timelineOf(entries, runs, !hasNextPage),
     [entries, runs, hasNextPage],
   );
-  const lastGood = useMemo(() => {
-    const run = lastGoodRun(runs);
-    const seq = versions.find((version) => version.id === run?.version)?.seq;
-    return run === null || seq === undefined ? null : { run: run.number, seq };
-  }, [runs, versions]);
+  const goods = useMemo(() => goodRuns(runs, versions), [runs, versions]);
   return {
     entries,
     items,
     versions,
-    lastGood,
+    runs,
+    moreRuns: runs.length >= RUNS,
+    goods,
+    lastGood: goods.at(-1) ?? null,
     isPending: pages.isPending,
     error: pages.error,
     hasOlder: hasNextPage,

@@ -13,10 +13,12 @@ from action_assistant.web.server.openapi import answer
 
 
 class Publishing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Which moment of the graph to publish, and under what label. Left out: as it is now."""
+    """Which moment of the graph to publish, under what label, and what there is to say of it. Left out:
+    as it is now."""
 
     label: str = ""
     seq: int | None = None
+    note: str = ""
 
 
 def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
@@ -47,7 +49,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         await services.people.seen(person)
         wanted = data or Publishing()
         version, new = await services.versions.publish(
-            graph_id, person, label=wanted.label, seq=wanted.seq
+            graph_id, person, label=wanted.label, note=wanted.note, seq=wanted.seq
         )
         return Response(
             version,

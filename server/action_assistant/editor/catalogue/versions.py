@@ -18,6 +18,7 @@ from action_assistant.umrf.json.embedded import UmrfGraph
 from action_assistant.web.auth.keys import PersonRef
 
 LABEL_LIMIT: Final = 200  # characters
+NOTE_LIMIT: Final = 4_000  # characters
 
 
 class VersionView(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -31,6 +32,7 @@ class VersionView(msgspec.Struct, frozen=True, omit_defaults=True):
     author: PersonRef
     at: datetime
     umrf: UmrfGraph | None = None
+    note: str = ""
 
 
 class Versions:
@@ -41,18 +43,22 @@ class Versions:
         self._graph_reader = graph_reader
 
     async def publish(
-        self, graph: str, author: PersonRef, *, label: str = "", seq: int | None = None
+        self,
+        graph: str,
+        author: PersonRef,
+        *,
+        label: str = "",
+        note: str = "",
+        seq: int | None = None,
     ) -> tuple[VersionView, bool]:
         """The version of a graph at `seq`, or as it is, and whether it is new.
 
-        Without a label it is the one that was published at that seq before, if there is one.
+        Without label and note it is the one that was published at that seq before, if there is one.
         Raises NotFound, Conflict, BadInput.
         """
-        label = " ".join(label.split())
-        if len(label) > LABEL_LIMIT:
-            raise BadInput(f"A label has up to {LABEL_LIMIT} characters.", where={"path": "/label"})
+        label, note = _within_limits(label, note)
         sight = await self._graph_reader.moment(graph, seq)
-        if not label:
+        if not label and not note:
             for row in await self._rows(graph, sight.seq):
                 return await self.get(row.id), False
         made = random_id()
@@ -65,6 +71,7 @@ class Versions:
             seq=sight.seq,
             author_name=author.name,
             umrf=msgspec.Raw(text),
+            note=note,
         )
         await self._journal.append(
             h.about_stream(graph), [h.draft(h.PUBLISHED, author.id, published)]
@@ -98,6 +105,16 @@ class Versions:
         return await self._journal.query(chosen.order_by(version.event_seq.desc()))
 
 
+def _within_limits(label: str, note: str) -> tuple[str, str]:
+    """Both without spaces around them. Raises BadInput."""
+    label, note = " ".join(label.split()), note.strip()
+    if len(label) > LABEL_LIMIT:
+        raise BadInput(f"A label has up to {LABEL_LIMIT} characters.", where={"path": "/label"})
+    if len(note) > NOTE_LIMIT:
+        raise BadInput(f"A note has up to {NOTE_LIMIT} characters.", where={"path": "/note"})
+    return label, note
+
+
 def _view(row: Row[Any]) -> VersionView:
     return VersionView(
         id=row.id,
@@ -107,4 +124,5 @@ def _view(row: Row[Any]) -> VersionView:
         seq=row.seq,
         author=PersonRef(row.author_id, row.author_name),
         at=h.when(row.at),
+        note=row.note,
     )

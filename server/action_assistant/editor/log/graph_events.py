@@ -153,7 +153,8 @@ class ActionBuilt(msgspec.Struct, frozen=True):
 
 
 class VersionPublished(msgspec.Struct, frozen=True):
-    """A version: what a graph was at `seq`, as UMRF that never changes."""
+    """A version: what a graph was at `seq`, as UMRF that never changes. `note`: what its author says of
+    it."""
 
     id: str
     label: str
@@ -161,6 +162,7 @@ class VersionPublished(msgspec.Struct, frozen=True):
     seq: int
     author_name: str
     umrf: msgspec.Raw
+    note: str = ""
 
 
 class PersonNamed(msgspec.Struct, frozen=True):
@@ -315,6 +317,7 @@ def _version(event: Event, graph: str) -> dict[str, Any]:
         "id": version.id,
         "graph": graph,
         "label": version.label,
+        "note": version.note,
         "digest": version.digest,
         "seq": version.seq,
         "author_id": event.author,

@@ -1,6 +1,6 @@
 /** Fields of actions, arrows and notes as people know them, for who set them. Pure. */
-import type { FieldBlame } from "../api/documents/history";
-import { fieldWords, plainValue } from "../history/difference-words";
+import type { FieldBlame } from "../../api/documents/history";
+import { fieldWords, plainValue } from "../../history/difference-words";
 
 /** Order of things and how a file listed them: changed along with what people change. */
 const SILENT = new Set([

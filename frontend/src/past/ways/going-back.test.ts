@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
-import { EMPTY_GRAPH } from "../graph/model";
-import { anyAction } from "../testing/graphs";
+import { EMPTY_GRAPH } from "../../graph/model";
+import { anyAction } from "../../testing/graphs";
 import { leftWords } from "./going-back";
 
 test("what was left is named, and only the first few", () => {

@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import type { FieldBlame } from "../api/documents/history";
+import type { FieldBlame } from "../../api/documents/history";
 import { blamedName, blamedValue, toldFields } from "./blame-words";
 
 const blame = (field: string): FieldBlame => ({

@@ -2,10 +2,10 @@
  * Goes through the past of a document step by step, without asking anybody: from a document as it was
  * and the steps around it. Pure.
  */
-import type { EditorApi } from "../api/schema/editor";
-import { mapsFrom, type Root, splitKey } from "../graph/document-keys";
-import type { Graph } from "../graph/model";
-import { type SteppedGraph, stepGraph } from "../graph/read";
+import type { EditorApi } from "../../api/schema/editor";
+import { mapsFrom, type Root, splitKey } from "../../graph/document-keys";
+import type { Graph } from "../../graph/model";
+import { type SteppedGraph, stepGraph } from "../../graph/read";
 
 export type PastDocument = EditorApi["PastDocument"];
 export type DocumentStep = EditorApi["DocumentStep"];

@@ -1,8 +1,8 @@
 /** Graphs of the past for React: loads a document and the steps around it, and goes by them. */
 import { type QueryClient, useQueryClient } from "@tanstack/react-query";
 import { useEffect, useReducer, useRef, useState } from "react";
-import { fetchChanges, fetchDocument } from "../api/documents/history";
-import type { Graph } from "../graph/model";
+import { fetchChanges, fetchDocument } from "../../api/documents/history";
+import type { Graph } from "../../graph/model";
 import { PastWalk } from "./walk";
 
 const PIECE = 200; // changes that are loaded together

@@ -7,14 +7,14 @@ import {
   refreshHistory,
   restoreMoment,
   revertEdits,
-} from "../api/documents/history";
-import { authorName } from "../api/graphs";
-import { errorText } from "../api/http";
-import type { EditorContext } from "../edit-actions/editor-context";
-import { endsOf } from "../graph/document-keys";
-import { notesOf } from "../graph/edit/notes";
-import type { Graph } from "../graph/model";
-import { endName } from "../graph/relation-words";
+} from "../../api/documents/history";
+import { authorName } from "../../api/graphs";
+import { errorText } from "../../api/http";
+import type { EditorContext } from "../../edit-actions/editor-context";
+import { endsOf } from "../../graph/document-keys";
+import { notesOf } from "../../graph/edit/notes";
+import type { Graph } from "../../graph/model";
+import { endName } from "../../graph/relation-words";
 
 /** What a key of the document is called: an action, an arrow, a note. */
 function thingName(graph: Graph, key: string): string {

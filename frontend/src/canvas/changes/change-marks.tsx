@@ -1,0 +1,87 @@
+/** What differs between two moments of a graph, as marks on what is drawn: came, went, or is otherwise. */
+import {
+  createContext,
+  type ReactNode,
+  use,
+  useLayoutEffect,
+  useState,
+  useSyncExternalStore,
+} from "react";
+
+export interface ChangeMark {
+  readonly change: "added" | "removed" | "changed";
+  /** Who did that last, where it is known. */
+  readonly by: string | null;
+  /** What the name was; null where it is the same. */
+  readonly oldName: string | null;
+  /** What values were, by the name of their row on the card. */
+  readonly oldValues: ReadonlyMap<string, string>;
+  /** The rows on the card that say something else than on the other side, where both are shown. */
+  readonly rows?: ReadonlySet<string>;
+}
+
+/** By key of an action or note, and by id of a relation. */
+export type ChangeMarks = ReadonlyMap<string, ChangeMark>;
+
+function isSameMap<K, V>(a: ReadonlyMap<K, V>, b: ReadonlyMap<K, V>): boolean {
+  return a.size === b.size && [...a].every(([key, value]) => b.get(key) === value);
+}
+
+function isSameMark(a: ChangeMark, b: ChangeMark): boolean {
+  const [rows, others] = [a.rows ?? NO_ROWS, b.rows ?? NO_ROWS];
+  return (
+    a.change === b.change &&
+    a.by === b.by &&
+    a.oldName === b.oldName &&
+    isSameMap(a.oldValues, b.oldValues) &&
+    rows.size === others.size &&
+    [...rows].every((row) => others.has(row))
+  );
+}
+
+const NO_ROWS: ReadonlySet<string> = new Set();
+
+/** What is drawn listens for its own mark: from one moment to the next most marks stay. */
+class ChangeMarkStore {
+  #marks: ChangeMarks = new Map();
+  #listeners = new Set<() => void>();
+
+  subscribe = (listener: () => void): (() => void) => {
+    this.#listeners.add(listener);
+    return () => this.#listeners.delete(listener);
+  };
+  get = (key: string): ChangeMark | undefined => this.#marks.get(key);
+
+  set(marks: ChangeMarks | null): void {
+    const before = this.#marks;
+    const kept = [...(marks ?? [])].map(([key, mark]): [string, ChangeMark] => {
+      const known = before.get(key);
+      return [key, known !== undefined && isSameMark(known, mark) ? known : mark];
+    });
+    if (kept.length === 0 && before.size === 0) return;
+    this.#marks = new Map(kept);
+    for (const listener of [...this.#listeners]) listener();
+  }
+}
+
+const ChangeMarksContext = createContext<ChangeMarkStore>(new ChangeMarkStore());
+
+interface Props {
+  /** Null: nothing is compared. */
+  marks: ChangeMarks | null;
+  children: ReactNode;
+}
+
+/** A canvas whose cards and arrows have marks. */
+export function ChangeMarked({ marks, children }: Props) {
+  const [store] = useState(() => new ChangeMarkStore());
+  useLayoutEffect(() => store.set(marks), [store, marks]);
+  return <ChangeMarksContext value={store}>{children}</ChangeMarksContext>;
+}
+
+export const CHANGE_SIGNS = { added: "+", removed: "−", changed: "△" } as const;
+
+export function useChangeMark(key: string): ChangeMark | undefined {
+  const { subscribe, get } = use(ChangeMarksContext);
+  return useSyncExternalStore(subscribe, () => get(key));
+}
