@@ -2,7 +2,7 @@
 import { ActionIcon } from "@mantine/core";
 import { IconFlask, IconTrash } from "@tabler/icons-react";
 import { Link } from "wouter";
-import type { CheckedCourse } from "../api/courses";
+import type { CheckedCourse } from "../api/documents/courses";
 import type { Script } from "../api/dry-runs";
 import { authorName } from "../api/graphs";
 import { Tooltip } from "../ui/floating/tooltip";

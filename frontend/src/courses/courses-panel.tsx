@@ -4,7 +4,12 @@ import { notifications } from "@mantine/notifications";
 import { IconFlask } from "@tabler/icons-react";
 import { useQueryClient } from "@tanstack/react-query";
 import { useEffect, useMemo } from "react";
-import { type CheckedCourses, dropCourse, refreshCourses, useCheckedCourses } from "../api/courses";
+import {
+  type CheckedCourses,
+  dropCourse,
+  refreshCourses,
+  useCheckedCourses,
+} from "../api/documents/courses";
 import { errorText } from "../api/http";
 import { useLive } from "../api/live/use-live";
 import { cardHighlights } from "../canvas/card-highlights";

@@ -4,7 +4,7 @@ import { notifications } from "@mantine/notifications";
 import { IconShieldCheck } from "@tabler/icons-react";
 import { useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
-import { expectDryRun, refreshCourses } from "../api/courses";
+import { expectDryRun, refreshCourses } from "../api/documents/courses";
 import { useLive } from "../api/live/use-live";
 import { commandsOf, scriptOf } from "../dry-run/script";
 import type { DryRun } from "../dry-run/use-dry-run";

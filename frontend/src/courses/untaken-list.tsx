@@ -2,7 +2,12 @@
 import { Button } from "@mantine/core";
 import { IconFlask } from "@tabler/icons-react";
 import { useState } from "react";
-import { type ArrowProposal, expectDryRun, type OutcomeArrow, proposeCourse } from "../api/courses";
+import {
+  type ArrowProposal,
+  expectDryRun,
+  type OutcomeArrow,
+  proposeCourse,
+} from "../api/documents/courses";
 import type { Script } from "../api/dry-runs";
 import { errorText } from "../api/http";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../canvas/outcome";
@@ -13,7 +18,7 @@ import style from "./courses.module.css";
 import { NameField } from "./name-field";
 import { arrowWords } from "./untaken-places";
 
-type Found =
+type ProposalSearch =
   | { kind: "searching" }
   | { kind: "found"; proposal: ArrowProposal; seq: number }
   | { kind: "failed"; why: string };
@@ -83,7 +88,7 @@ function Verdict({ runner, found, arrow, onKept }: VerdictProps) {
 
 interface VerdictProps {
   runner: string;
-  found: Extract<Found, { kind: "found" }>;
+  found: Extract<ProposalSearch, { kind: "found" }>;
   arrow: OutcomeArrow;
   onKept: () => Promise<unknown>;
 }
@@ -95,7 +100,7 @@ function UntakenRow({
   onKept,
 }: Omit<Props, "arrows"> & { arrow: OutcomeArrow }) {
   const { id, graph, select, view } = useEditorContext();
-  const [found, setFound] = useState<Found | null>(null);
+  const [found, setFound] = useState<ProposalSearch | null>(null);
   const words = arrowWords(graph, arrow);
   const search = async () => {
     setFound({ kind: "searching" });

@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import type { CheckedCourses } from "../api/courses";
+import type { CheckedCourses } from "../api/documents/courses";
 import type { Graph, Relation } from "../graph/model";
 import { EMPTY_GRAPH } from "../graph/model";
 import { arrowWords, isThere, untakenPlaces } from "./untaken-places";

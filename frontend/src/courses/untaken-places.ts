@@ -1,5 +1,5 @@
 /** What no expected course takes, as marks for cards and arrows, and as rows in words. Pure. */
-import type { CheckedCourses, OutcomeArrow } from "../api/courses";
+import type { CheckedCourses, OutcomeArrow } from "../api/documents/courses";
 import type { UntakenPlaces } from "../canvas/card-highlights";
 import { relationId } from "../graph/document-keys";
 import type { Graph, Precondition } from "../graph/model";

@@ -154,15 +154,36 @@ function useResult(id: string, open: boolean, seq: number, decided: Decisions) {
   return useDryRunResult(id, wanted);
 }
 
-/** Null while no dry-run is open. `seq` is the moment of the graph that the page shows. */
-export function useDryRun(id: string, graph: Graph, seq: number) {
-  const [open, setOpen] = useState(false);
+/** With what it begins, what was decided since, and where in it one is. */
+function useDecisions() {
   const [seed, setSeed] = useState<DryRunSeed | null>(null);
   const [beginning, setBeginning] = useState(NOTHING_DECIDED);
   const [decided, setDecided] = useState(NOTHING_DECIDED);
   const [at, setAt] = useState(0);
-  const [goal, setGoal] = useState<number | null>(null);
   const [playing, play] = useState(false);
+  const from = useCallback((before: Decisions) => {
+    setDecided(before);
+    setAt(0);
+    play(false);
+  }, []);
+  const begin = useCallback(
+    (seeded: DryRunSeed | null = null, script: DryRunSeed["behaviours"] = {}) => {
+      const before = seeded === null ? { ...NOTHING_DECIDED, before: script } : decidedBy(seeded);
+      setSeed(seeded);
+      setBeginning(before);
+      from(before);
+    },
+    [from],
+  );
+  const restart = useCallback(() => from(beginning), [from, beginning]);
+  return { seed, decided, setDecided, at, setAt, playing, play, begin, restart };
+}
+
+/** Null while no dry-run is open. `seq` is the moment of the graph that the page shows. */
+export function useDryRun(id: string, graph: Graph, seq: number) {
+  const [open, setOpen] = useState(false);
+  const { seed, decided, setDecided, at, setAt, playing, play, ...beginnings } = useDecisions();
+  const [goal, setGoal] = useState<number | null>(null);
   const [speed, setSpeed] = useState<number>(1);
   const { data, isPlaceholderData, error: failed } = useResult(id, open, seq, decided);
   const busy = data === undefined || isPlaceholderData;
@@ -176,41 +197,32 @@ export function useDryRun(id: string, graph: Graph, seq: number) {
     if (goal === null || busy) return;
     setAt((moments.find((moment) => moment.at > goal) ?? moments.at(-1))?.at ?? 0);
     setGoal(null);
-  }, [goal, busy, moments]);
+  }, [goal, busy, moments, setAt]);
 
   const go = useCallback(
     (to: number) => setAt(moments[Math.max(0, Math.min(moments.length - 1, to))]?.at ?? 0),
-    [moments],
+    [moments, setAt],
   );
   usePlaying({ on: open && playing && !busy, moments, index, speed, go, play });
 
   const deciding = useDeciding(shown, setDecided, setGoal);
-  const restart = useCallback(() => {
-    setDecided(beginning);
-    setAt(0);
-    play(false);
-  }, [beginning]);
+  const { begin: reset, restart } = beginnings;
   const begin = useCallback(
-    (from: DryRunSeed | null = null, script: DryRunSeed["behaviours"] = {}) => {
-      const before = from === null ? { ...NOTHING_DECIDED, before: script } : decidedBy(from);
-      setSeed(from);
-      setBeginning(before);
-      setDecided(before);
-      setAt(0);
-      play(false);
+    (...from: Parameters<typeof reset>) => {
+      reset(...from);
       setOpen(true);
     },
-    [],
+    [reset],
   );
   const close = useCallback(() => {
-    begin();
+    reset();
     setOpen(false);
-  }, [begin]);
+  }, [reset]);
 
   const cut = data?.cut === true;
   const commands = useMemo(
     () => ({ go, play, setSpeed, ...deciding, restart, close }),
-    [go, deciding, restart, close],
+    [go, deciding, restart, close, play],
   );
   const dryRun = useMemo<DryRun | null>(
     () =>

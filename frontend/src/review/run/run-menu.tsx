@@ -11,7 +11,7 @@ import {
 } from "@tabler/icons-react";
 import { useState } from "react";
 import { useLocation } from "wouter";
-import { expectRun } from "../../api/courses";
+import { expectRun } from "../../api/documents/courses";
 import { graphMoment } from "../../api/documents/texts";
 import { useVersions, versionName } from "../../api/graphs";
 import { errorText } from "../../api/http";

@@ -4,7 +4,7 @@ import { IconPlayerPlayFilled, IconRefresh } from "@tabler/icons-react";
 import { useQuery } from "@tanstack/react-query";
 import { useState } from "react";
 import { Link } from "wouter";
-import { identifiedText } from "../../api/courses";
+import { identifiedText } from "../../api/documents/courses";
 import { errorText } from "../../api/http";
 import { useLive } from "../../api/live/use-live";
 import { type Preflight, type Robot, runPreflight, SIMULATOR } from "../../api/robots";

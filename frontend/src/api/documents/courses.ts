@@ -1,9 +1,9 @@
 /** Expected courses of a graph, what they cover, and tests that would cover more. */
 import { keepPreviousData, type QueryClient, useQuery } from "@tanstack/react-query";
-import type { Script } from "./dry-runs";
-import { fetchJson, fetchText } from "./http";
-import { useLive } from "./live/use-live";
-import type { RunnerApi } from "./schema/runner";
+import type { Script } from "../dry-runs";
+import { fetchJson, fetchText } from "../http";
+import { useLive } from "../live/use-live";
+import type { RunnerApi } from "../schema/runner";
 
 export type CheckedCourses = RunnerApi["CheckedCourses"];
 export type CheckedCourse = RunnerApi["CheckedCourse"];
