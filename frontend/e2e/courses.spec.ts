@@ -83,6 +83,13 @@ test("an edit that goes another way is told in the panel and before a start, and
     page.getByText("It does not go as expected, in 1 of 1 expected course.", { exact: false }),
   ).toBeVisible();
   await page.keyboard.press("Escape");
+  await page.getByRole("radiogroup", { name: "What is listed" }).getByText("History").click();
+  const history = page.getByRole("region", { name: "History" });
+  await history.getByText(/^Versions/).click();
+  await history.getByRole("button", { name: "Publish a version …" }).click();
+  await history.getByRole("button", { name: "Publish", exact: true }).click();
+  await expect(history.getByText("1 of 1 expected courses goes another way:")).toBeVisible();
+  await page.getByRole("tab", { name: "Expected courses" }).focus();
   await page.keyboard.press("Control+z");
   await expect(course).toHaveAttribute("data-verdict", "same");
   await course.getByRole("button", { name: "Play to the end on the canvas" }).click();

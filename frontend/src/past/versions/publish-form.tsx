@@ -7,6 +7,7 @@ import { refreshHistory } from "../../api/documents/history";
 import { publishNamed } from "../../api/documents/versions";
 import { queryKeys } from "../../api/graphs";
 import { errorText } from "../../api/http";
+import { CoursesAt } from "../../courses/courses-told";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import { useThrottledLink } from "../../sync/use-room";
 import style from "./versions.module.css";
@@ -23,7 +24,12 @@ function useObstacle(): string | null {
   return unsaved > 0 ? "Saving what was changed …" : null;
 }
 
-function Fields({ onClose }: { onClose: () => void }) {
+interface FieldsProps {
+  onPublished: (seq: number) => void;
+  onClose: () => void;
+}
+
+function Fields({ onPublished, onClose }: FieldsProps) {
   const { id, past } = useEditorContext();
   const link = useThrottledLink();
   const client = useQueryClient();
@@ -32,14 +38,16 @@ function Fields({ onClose }: { onClose: () => void }) {
   const [busy, setBusy] = useState(false);
   const [refused, setRefused] = useState("");
   const obstacle = useObstacle();
+  const seq = past?.at ?? link.seq;
   const publish = async (event: FormEvent) => {
     event.preventDefault();
     if (obstacle !== null || busy) return;
     setBusy(true);
     try {
-      await publishNamed(id, { label, note, seq: past?.at ?? link.seq });
+      await publishNamed(id, { label, note, seq });
       await client.invalidateQueries({ queryKey: queryKeys.versions(id) });
       void refreshHistory(client, id);
+      onPublished(seq);
       onClose();
     } catch (error) {
       setRefused(errorText(error));
@@ -66,6 +74,7 @@ function Fields({ onClose }: { onClose: () => void }) {
         value={note}
         onChange={(event) => setNote(event.currentTarget.value)}
       />
+      {obstacle === null && <CoursesAt graph={id} seq={seq} />}
       {(refused || obstacle) && <p role={refused ? "alert" : "status"}>{refused || obstacle}</p>}
       <div className={style.buttons}>
         <Button size="compact-sm" variant="default" onClick={onClose}>
@@ -86,10 +95,11 @@ function Fields({ onClose }: { onClose: () => void }) {
 }
 
 export function PublishForm() {
-  const { past, mayGoBack } = useEditorContext();
+  const { id, past, mayGoBack } = useEditorContext();
   const [open, setOpen] = useState(false);
+  const [published, setPublished] = useState<number | null>(null);
   if (!mayGoBack) return null;
-  if (open) return <Fields onClose={() => setOpen(false)} />;
+  if (open) return <Fields onPublished={setPublished} onClose={() => setOpen(false)} />;
   return (
     <div className={style.publish}>
       <Button
@@ -101,6 +111,7 @@ export function PublishForm() {
       >
         {past === null ? "Publish a version …" : "Publish this moment …"}
       </Button>
+      {published !== null && <CoursesAt graph={id} seq={published} />}
     </div>
   );
 }
