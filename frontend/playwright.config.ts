@@ -36,7 +36,7 @@ export default defineConfig({
   fullyParallel: false,
   // Each file starts its own product; two at a time use what one leaves idle while it waits. With three,
   // single tests took up to three times as long.
-  workers: 3,
+  workers: 2,
   // Two browsers and all that they drive share two cores there, which starves one of them now and then.
   // What passed only when it was tried again is told at the end: it is a fault to be found.
   retries: process.env.CI ? 1 : 0,
