@@ -3,7 +3,7 @@
 import os
 from typing import Final
 
-#: A part of the usual dose, or a multiple of it: CI takes half, `make soak` twenty times as much.
+#: A part of the usual dose, or a multiple of it: CI takes a third, `make soak` twenty times as much.
 _SHARE: Final = float(os.environ.get("TEST_EXAMPLES", "1"))
 
 
