@@ -247,8 +247,11 @@ def test_bodies_that_are_too_large_are_refused(runner: RunnerProcess) -> None:
             ("/api/runs/x/script", 2_000_001),
             ("/api/preflight", 2_000_001),
             ("/api/groups", 2_000_001),
+            ("/api/expectations", 2_000_001),
+            ("/api/expectations/check", 2_000_001),
+            ("/api/expectations/proposal", 2_000_001),
             ("/api/robots", 100_001),
-            ("/api/expectations", 100_001),
+            ("/api/approvals", 100_001),
         ]:
             assert client.post(path, content=b" " * size).status_code == 413, path
         assert client.post("/api/stop", content=b"x" * 1_000_000).status_code == 202

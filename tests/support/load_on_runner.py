@@ -94,6 +94,7 @@ def requests() -> list[tuple[str, str, bytes]]:
         head = b'{"version":"v","digest":"%b","request_id":"%b",%b,"umrf":' % (sealed, name, engine)
         return head + umrf + b"}"
 
+    arrow = b'{"parent":"a1","child":"a2","outcome":"on_true"}'
     group = b'"engines":["simulator"]'
     never = b',"script":{"behaviours":{"*":[{"never":true}]}}}'
     quick = b',"script":{"behaviours":{"*":[{"after_s":0}]}}}'
@@ -110,6 +111,12 @@ def requests() -> list[tuple[str, str, bytes]]:
         ("POST", f"/api/runs/{LONG}/modify", start(wide)),
         ("POST", "/api/expectations", msgspec.json.encode({"run": LONG, "name": "n" * 99_000})),
         ("POST", "/api/expectations", msgspec.json.encode({"run": LONG, "name": "long"})),
+        ("POST", "/api/expectations", b'{"name":"wide","graph":"g","umrf":%b}' % wide),
+        ("POST", "/api/expectations", b'{"name":"deep","graph":"g","umrf":%b}' % deep),
+        ("POST", "/api/expectations/check", b'{"graph":"g","umrf":%b}' % wide),
+        ("POST", "/api/expectations/check", b'{"graph":"g","umrf":%b}' % many),
+        ("POST", "/api/expectations/proposal", b'{"umrf":%b,"arrow":%b}' % (wide, arrow)),
+        ("POST", "/api/expectations/proposal", b'{"umrf":%b,"arrow":%b}' % (many, arrow)),
         ("POST", "/api/robots", msgspec.json.encode({"name": "n" * 99_000})),
         ("POST", "/api/session", msgspec.json.encode({"token": "t" * 9_000})),
         ("POST", "/api/stop", b"[" * 1_000_000),

@@ -245,7 +245,13 @@ function Below({ context: { past, dryRun, ...context }, record, seen }: BelowPro
   if (past === null) return null;
   return (
     <PartBoundary>
-      <PastBar place={past} show={seen.show} side={seen.side} onSide={seen.setSide} />
+      <PastBar
+        drawn={past}
+        wanted={seen.wanted}
+        show={seen.show}
+        side={seen.side}
+        onSide={seen.setSide}
+      />
     </PartBoundary>
   );
 }

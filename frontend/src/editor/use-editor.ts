@@ -24,11 +24,11 @@ import {
 } from "../sync/use-room";
 import { exportGraph } from "./export-graph";
 import { useFoldedFrames } from "./use-folded-frames";
-import type { Past } from "./use-past";
+import { type Past, WantedPlace } from "./use-past";
 
 /** Where nothing else than the graph as it is can be shown. */
 const NOW: Past = {
-  ...{ place: null, seen: null, side: false },
+  ...{ place: null, wanted: new WantedPlace(null), seen: null, side: false },
   ...{ lookAt: () => {}, show: () => {}, setSide: () => {} },
 };
 

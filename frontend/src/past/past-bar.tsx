@@ -1,7 +1,7 @@
 /** Below the canvas while it shows the past: what one sees, the line of all moments, and the way back. */
 import { Button } from "@mantine/core";
 import { IconHistory } from "@tabler/icons-react";
-import { useEffect, useLayoutEffect, useMemo } from "react";
+import { useEffect, useLayoutEffect, useMemo, useSyncExternalStore } from "react";
 import { errorText } from "../api/http";
 import type { ChangeMarks } from "../canvas/changes/change-marks";
 import {
@@ -63,14 +63,18 @@ const VIEWS = [
 ] as const;
 
 interface Props {
-  place: PastPlace;
-  show: (seen: SeenPast | null) => void;
+  /** What the canvas shows now. */
+  drawn: PastPlace;
+  /** What was asked for last: a step costs this bar alone until its graph is there. */
+  wanted: { subscribe: (listener: () => void) => () => void; now: () => PastPlace | null };
+  show: (seen: SeenPast, place: PastPlace) => void;
   /** The two moments stand beside each other. */
   side: boolean;
   onSide: (side: boolean) => void;
 }
 
-export function PastBar({ place, show, side, onSide }: Props) {
+export function PastBar({ drawn, wanted, show, side, onSide }: Props) {
+  const place = useSyncExternalStore(wanted.subscribe, wanted.now) ?? drawn;
   const context = useEditorContext();
   const { id, lookAt } = context;
   const { seq } = useThrottledLink();
@@ -84,9 +88,12 @@ export function PastBar({ place, show, side, onSide }: Props) {
   const words = (at: number | null) =>
     at === null ? "" : at === newest ? "now" : momentWords(entries, at, now);
   const [before, after] = [compared.foreign === null ? words(from) : "as it runs", words(to)];
+  const { here } = compared;
   useLayoutEffect(() => {
-    if (graph !== null) show(seenPast(graph, changes, side ? [before, after] : null));
-  }, [show, graph, changes, side, before, after]);
+    if (graph !== null && here) {
+      show(seenPast(graph, changes, side ? [before, after] : null), place);
+    }
+  }, [show, graph, here, changes, side, before, after, place]);
   const marks = useMemo(() => marksOf(items, versions), [items, versions]);
   const colorOf = usePersonColors(entries.map(({ author }) => author.id));
   const goTo = (at: number) => lookAt({ ...place, at: Math.min(Math.max(1, at), newest) });

@@ -32,6 +32,7 @@ from action_assistant.web.workers.lanes import RunInWorker
 #: The simulator as itself: a paused run can be stopped there.
 _ITSELF: Final = msgspec.structs.replace(SIMULATED, pauses_safely=True)
 _PREFLIGHT_S: Final = 2.0
+_COURSES_S: Final = 5.0  # so long a look waits for what is behind others' questions
 _MOST: Final = 20  # engines of one group
 _TOLD: Final = 40  # overridden problems that are kept with a run
 
@@ -241,7 +242,10 @@ class StartChecks:
         if self._courses is None or asked.graph is None:
             return ()
         try:
-            return of_courses(await self._courses(asked.graph, bytes(asked.umrf)))
+            with anyio.fail_after(_COURSES_S):
+                return of_courses(await self._courses(asked.graph, bytes(asked.umrf)))
+        except TimeoutError:
+            return (of_unknown_courses(f"That takes longer than {_COURSES_S:.0f} s."),)
         except Refused as refused:
             return (of_unknown_courses(refused.detail),)
 
