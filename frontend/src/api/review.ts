@@ -1,17 +1,9 @@
-/** What the runner tells of past runs: replays, marks, comparisons, statistics, files. */
+/** What the runner tells of past runs: marks, comparisons, statistics, files. */
 import { useQuery } from "@tanstack/react-query";
 import { fetchAnswer, fetchJson, type RequestOptions } from "./http";
 import { getRun, type Run } from "./runs";
 import type { RunnerApi } from "./schema/runner";
 
-/** What became of an action. From the visit number `first` on, its visits are now `visits`. */
-export type ActionFrame = RunnerApi["ActionFrame"];
-/** One event: the fields of the run and the actions that it changed. */
-export type Frame = Omit<RunnerApi["ReplayFrame"], "head"> & { head?: Partial<Run> };
-/** Something that happened around the actions: a wish, a message sent, a silence, a proof. */
-export type ReplayMark = RunnerApi["MarkShown"];
-/** A page of a run's replay: `base` after `after` events, then the frames of the next ones. */
-export type Replay = Omit<RunnerApi["RunReplay"], "frames"> & { frames: Frame[] };
 export type RunMarks = RunnerApi["RunMarks"];
 /** A run of the list, with what people noted about it and why it did not end well. */
 export type ListedRun = RunnerApi["Listed"];
@@ -93,20 +85,6 @@ export function listRuns(
   query.set("limit", String(limit));
   if (before !== null) query.set("before", before);
   return fetchJson(`${runner}/api/runs?${query}`, signal ? { signal } : {});
-}
-
-export function useReplayData(
-  runner: string | undefined,
-  run: string,
-  after: number,
-  asked: boolean,
-) {
-  return useQuery({
-    queryKey: ["runs", "film", run, after],
-    queryFn: ({ signal }) =>
-      fetchJson<Replay>(`${runner}${path(run)}/film?after=${after}`, { signal, timeoutMs: 60_000 }),
-    enabled: asked && runner !== undefined,
-  });
 }
 
 /** Asked again when the run changes its state. */

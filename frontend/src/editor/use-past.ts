@@ -42,13 +42,13 @@ export interface Past {
   show(seen: SeenPast, place: PastPlace): void;
 }
 
-interface Shown {
+interface ShownPast {
   readonly place: PastPlace | null;
   readonly seen: SeenPast | null;
 }
 
 export function usePast(): Past {
-  const [{ place, seen }, setShown] = useState<Shown>(() => ({
+  const [{ place, seen }, setShown] = useState<ShownPast>(() => ({
     place: pastOf(window.location.search),
     seen: null,
   }));

@@ -1,5 +1,5 @@
 /** What of a replay stands on the time axis, and what its marks say in words. */
-import type { Replay, ReplayMark } from "../../api/review";
+import type { Replay, ReplayMark } from "../../api/documents/replay";
 import type { Run } from "../../api/runs";
 import type { TimeGap, TimeSign } from "../../status/lanes/timeline";
 import { clock, instant } from "../../ui/times";

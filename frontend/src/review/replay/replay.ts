@@ -1,5 +1,5 @@
 /** A run at any moment of its replay: what was known then, and nothing that was learned later. */
-import type { ActionFrame, Frame, Replay } from "../../api/review";
+import type { ActionFrame, Frame, Replay } from "../../api/documents/replay";
 import type { ActionRun, Run } from "../../api/runs";
 import { instant } from "../../ui/times";
 

@@ -10,7 +10,7 @@ import {
   useRef,
   useState,
 } from "react";
-import { useReplayData } from "../../api/review";
+import { useReplayData } from "../../api/documents/replay";
 import type { Run } from "../../api/runs";
 import { instant } from "../../ui/times";
 import { chapterAt, ReplayPlayer } from "./replay";

@@ -2,8 +2,8 @@
 
 import { TextInput } from "@mantine/core";
 import { useMemo, useState } from "react";
+import type { ReplayMark } from "../../api/documents/replay";
 import { authorName } from "../../api/graphs";
-import type { ReplayMark } from "../../api/review";
 import { type Run, runPlace } from "../../api/runs";
 import {
   runEndText,

@@ -2,9 +2,10 @@
 import { Button, Text } from "@mantine/core";
 import { IconUserCheck } from "@tabler/icons-react";
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
+import { type Approval, approve, fetchApprovals } from "../../api/documents/starts";
 import { errorText } from "../../api/http";
 import { useLive } from "../../api/live/use-live";
-import { type Approval, approve, fetchApprovals, type Preflight } from "../../api/robots";
+import type { Preflight } from "../../api/robots";
 import { useMay, usePerson } from "../../api/use-person";
 import style from "./start-dialog.module.css";
 

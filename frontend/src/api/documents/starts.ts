@@ -1,0 +1,31 @@
+/** Before a start: what is looked at, and who has said yes. */
+import { fetchJson } from "../http";
+import type { Preflight } from "../robots";
+import type { RunnerApi } from "../schema/runner";
+
+export type Approval = RunnerApi["Approval"];
+
+/** Who has said yes to exactly the graph with this digest. */
+export function fetchApprovals(
+  runner: string,
+  digest: string,
+  signal: AbortSignal,
+): Promise<Approval[]> {
+  return fetchJson(`${runner}/api/approvals?digest=${encodeURIComponent(digest)}`, { signal });
+}
+
+export function approve(runner: string, body: RunnerApi["ApprovalRequest"]): Promise<Approval> {
+  return fetchJson(`${runner}/api/approvals`, { method: "POST", body });
+}
+
+/** What stands between a graph and its start, engine by engine. Sends nothing but a get. */
+export function runPreflight(
+  runner: string,
+  { graph, umrf }: { graph: string; umrf: string },
+  engines: readonly string[],
+  behaviours: boolean,
+  signal: AbortSignal,
+): Promise<Preflight[]> {
+  const body = { engines, ...(behaviours ? { behaviours } : {}), graph, umrf };
+  return fetchJson(`${runner}/api/preflight`, { method: "POST", body, signal });
+}
