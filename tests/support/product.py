@@ -115,10 +115,12 @@ class Product:
         raise AssertionError(f"no {name} is running")
 
     def kill(self) -> None:
-        """kill -9 of everything at once."""
+        """kill -9 of everything at once. Nothing of it is there any more afterwards, nor holds a port."""
         assert self._process is not None
+        children = psutil.Process(self._process.pid).children(recursive=True)
         os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait()
+        psutil.wait_procs(children, timeout=20)
         self._process = None
 
     def kill_serve(self) -> None:
