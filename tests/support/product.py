@@ -120,7 +120,9 @@ class Product:
         children = psutil.Process(self._process.pid).children(recursive=True)
         os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait()
-        psutil.wait_procs(children, timeout=20)
+        deadline = time.monotonic() + 20
+        while any(map(_is_alive, children)) and time.monotonic() < deadline:
+            time.sleep(0.01)
         self._process = None
 
     def kill_serve(self) -> None:
@@ -164,6 +166,14 @@ def _client(url: str) -> httpx.Client:
     return httpx.Client(
         base_url=url, headers={"authorization": f"Bearer {TOKEN}"}, trust_env=False, timeout=20
     )
+
+
+def _is_alive(process: psutil.Process) -> bool:
+    """Whether it still holds anything; one that nobody has reaped holds nothing."""
+    try:
+        return process.status() != psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return False
 
 
 def _ready(url: str) -> bool:
