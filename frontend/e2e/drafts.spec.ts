@@ -1,13 +1,9 @@
 /** A draft: one works apart, the other goes on, both are merged with a choice, and it can be undone. */
 
-import { readFileSync } from "node:fs";
-import { createRequire } from "node:module";
 import { expect, type Page, test } from "@playwright/test";
-import type { AxeResults } from "axe-core";
 import { add, boxOf, card, saved } from "./canvas";
 import { type Person, Product } from "./product";
-
-const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
+import { violations } from "./valves";
 
 const product = new Product();
 let ada: Person;
@@ -54,20 +50,6 @@ async function setSpeed(page: Page, value: string): Promise<void> {
 
 async function openHistory(page: Page): Promise<void> {
   await page.getByRole("radiogroup", { name: "What is listed" }).getByText("History").click();
-}
-
-/** What axe says of the page, by the rules of WCAG. */
-async function violations(page: Page): Promise<string[]> {
-  await page.evaluate(AXE);
-  const found = await page.evaluate(
-    () =>
-      Reflect.get(window, "axe").run(document, {
-        runOnly: ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa"],
-        // Faces of people show initials and are named in full.
-        rules: { "label-content-name-mismatch": { enabled: false } },
-      }) as Promise<AxeResults>,
-  );
-  return found.violations.map(({ id, nodes }) => `${id}: ${nodes[0]?.html}`);
 }
 
 const bar = (page: Page) => page.getByRole("region", { name: "Draft", exact: true });
