@@ -51,6 +51,9 @@ dev: setup ## like run, and rebuild the page on every change
 .PHONY: check
 check: check-server check-page ## formatting, lint, types, layers and what is unused, both languages
 
+# Bounds of files, folders and functions, names, and what documents refer to: seconds, so before each commit.
+STRUCTURE := tests/test_tree.py tests/test_references.py tests/test_glossary.py
+
 .PHONY: check-server
 check-server: .venv/.done ## the server's half of check
 	@echo "» ruff, mypy, layers, dependencies"
@@ -58,11 +61,13 @@ check-server: .venv/.done ## the server's half of check
 	@$(BIN)/mypy
 	@$(BIN)/lint-imports
 	@$(BIN)/deptry .
+	@$(BARE) $(BIN)/python -m pytest -q $(STRUCTURE)
 
 .PHONY: check-page
 check-page: frontend/node_modules/.done ## the page's half of check
 	@echo "» Biome, tsc, knip"
 	@$(NPM) run --silent check
+	@cd frontend && ../$(NODE) node_modules/.bin/vitest run --reporter=dot src/tree.test.ts
 
 .PHONY: fix
 fix: .venv/.done frontend/node_modules/.done ## mend what the formatters and linters can
@@ -83,7 +88,7 @@ test: setup ros ## every check and every test, also in a real browser
 .PHONY: unit
 unit: setup ## the tests of the server and of the page's pure parts
 	@echo "» pytest"
-	@$(BARE) $(BIN)/pytest -q --numprocesses $(PROCESSES) --dist loadfile $(PYTEST)
+	@$(BARE) $(BIN)/pytest -q --numprocesses $(PROCESSES) --dist loadfile $(STRUCTURE:%=--ignore=%) $(PYTEST)
 	@echo "» vitest"
 	@$(NPM) run --silent test
 

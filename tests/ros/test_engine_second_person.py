@@ -8,7 +8,8 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -62,63 +63,66 @@ def browser(product: Product, name: str) -> httpx.Client:
     return httpx.Client(base_url=product.runner_url, headers=headers, trust_env=False, timeout=30)
 
 
-def version_of(product: Product) -> tuple[str, dict[str, Any]]:
-    with product.editor() as editor:
-        graph = editor.post("/api/graphs", json=GRAPH).json()["id"]
-        found: dict[str, Any] = editor.post(f"/api/graphs/{graph}/versions", json={}).json()
-    return graph, found
-
-
-def test_its_code_moves_only_after_the_yes_and_not_after_the_stop(tmp_path: Path) -> None:
-    truth = tmp_path / "truth"
+@contextmanager
+def real_engine(folder: Path) -> Iterator[Callable[[], list[str]]]:
+    """Yield what the code of the engine's action has done so far, as it wrote it down itself."""
+    truth = folder / "truth"
     command = [sys.executable, str(PROGRAM), "David", str(DOMAIN), "--truth", str(truth)]
 
     def events() -> list[str]:
         lines = truth.read_text().splitlines() if truth.exists() else []
         return [line.split()[2] for line in lines]
 
-    with (tmp_path / "engine.log").open("w") as log:
+    with (folder / "engine.log").open("w") as log:
         engine = subprocess.Popen(command, stdout=log, stderr=log)
     try:
-        with (
-            running(tmp_path / "data") as product,
-            browser(product, "Ada") as ada,
-            browser(product, "Ben") as ben,
-        ):
-            robot = {"name": "David", "domain": DOMAIN, "profile": {"second_person": True}}
-            assert ada.post("/api/robots", json=robot).is_success
-            until("David answers", lambda: _state(ada) == "answering")
-            graph, version = version_of(product)
-            order = {
-                "version": version["id"],
-                "digest": version["digest"],
-                "umrf": version["umrf"],
-                "engine": "David",
-                "graph": graph,
-            }
-
-            def start(who: httpx.Client, number: int) -> httpx.Response:
-                return who.post("/api/runs", json=order | {"request_id": f"second {number}"})
-
-            assert ada.post("/api/approvals", json={"digest": version["digest"]}).is_success
-            refused = start(ada, 1)
-            assert (refused.status_code, refused.json()["where"]["item"]) == (409, "approved")
-            time.sleep(2)
-            assert events() == []
-
-            started = start(ben, 2)
-            assert started.status_code == 201, started.text
-            until("its code begins", lambda: events()[:1] == ["begin"])
-            run = started.json()["id"]
-            assert ben.post(f"/api/runs/{run}/stop", json={"stop_id": "s"}).status_code == 202
-            until("it is stopped", lambda: ben.get(f"/api/runs/{run}").json()["state"] == "stopped")
-            assert events()[-1] == "end"
-            time.sleep(2)
-            assert events().count("begin") == 1
-            sys.stdout.write(f"what its code did: {', '.join(events())}\n")
+        yield events
     finally:
         engine.kill()
         engine.wait()
+
+
+def order_of(product: Product) -> dict[str, Any]:
+    """What a start of a new graph's version carries."""
+    with product.editor() as editor:
+        graph = editor.post("/api/graphs", json=GRAPH).json()["id"]
+        version = editor.post(f"/api/graphs/{graph}/versions", json={}).json()
+    parts = {"digest": version["digest"], "umrf": version["umrf"]}
+    return {"version": version["id"], "engine": "David", "graph": graph, **parts}
+
+
+def start(who: httpx.Client, order: dict[str, Any], number: int) -> httpx.Response:
+    return who.post("/api/runs", json=order | {"request_id": f"second {number}"})
+
+
+def test_its_code_moves_only_after_the_yes_and_not_after_the_stop(tmp_path: Path) -> None:
+    with (
+        real_engine(tmp_path) as events,
+        running(tmp_path / "data") as product,
+        browser(product, "Ada") as ada,
+        browser(product, "Ben") as ben,
+    ):
+        robot = {"name": "David", "domain": DOMAIN, "profile": {"second_person": True}}
+        assert ada.post("/api/robots", json=robot).is_success
+        until("David answers", lambda: _state(ada) == "answering")
+        order = order_of(product)
+
+        assert ada.post("/api/approvals", json={"digest": order["digest"]}).is_success
+        refused = start(ada, order, 1)
+        assert (refused.status_code, refused.json()["where"]["item"]) == (409, "approved")
+        time.sleep(2)
+        assert events() == []
+
+        started = start(ben, order, 2)
+        assert started.status_code == 201, started.text
+        until("its code begins", lambda: events()[:1] == ["begin"])
+        run = started.json()["id"]
+        assert ben.post(f"/api/runs/{run}/stop", json={"stop_id": "s"}).status_code == 202
+        until("it is stopped", lambda: ben.get(f"/api/runs/{run}").json()["state"] == "stopped")
+        assert events()[-1] == "end"
+        time.sleep(2)
+        assert events().count("begin") == 1
+        sys.stdout.write(f"what its code did: {', '.join(events())}\n")
 
 
 def _state(runner: httpx.Client) -> str:
