@@ -1,6 +1,7 @@
 """Looking back: history, moments, blame and the search for a breaking edit, over long logs of one graph."""
 
 import asyncio
+import math
 import random
 import statistics
 import tempfile
@@ -126,13 +127,14 @@ def long_past(dice: random.Random, count: int, size: int) -> tuple[list[bytes], 
     with doc.transaction():
         relations[f"entry>{keys[0]}|on_true"] = "run"
         for n, key in enumerate(keys):
-            actions[key], positions[key] = f"Act{n}", [260.0 * n, 0.0]
+            actions[key], positions[key] = f"Act{n}", _home(n, size)
             actions[f"{key}|order"] = float(n)
             if n:
                 relations[f"{keys[n - 1]}>{key}|on_true"] = "run"
     broken = count * 2 // 3
     while len(made) < count:
-        key = dice.choice(keys)
+        n = dice.randrange(size)
+        key, (x, y) = keys[n], _home(n, size)
         for _ in range(dice.randrange(1, 12)):  # one thing is typed or dragged
             if len(made) == broken:
                 relations[f"{keys[0]}>{keys[1]}|on_true"] = "ignore"
@@ -141,7 +143,13 @@ def long_past(dice: random.Random, count: int, size: int) -> tuple[list[bytes], 
                     value = f'{{"pvf_type":"number","pvf_value":{dice.randrange(10**6)}}}'
                     actions[f"{key}|in/speed"] = value
                 case kind if kind < 0.9:
-                    positions[key] = [float(dice.randrange(1000)), 1.0]
+                    positions[key] = [x + dice.randrange(50), y + dice.randrange(50)]
                 case _:
                     actions[key] = f"Act{dice.randrange(10**6)}"
     return made[:count], keys
+
+
+def _home(n: int, size: int) -> list[float]:
+    """Where the n-th card is tidied to, in a field as wide as it is long."""
+    row, column = divmod(n, math.ceil(math.sqrt(size)))
+    return [260.0 * column, 190.0 * row]

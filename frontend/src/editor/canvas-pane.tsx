@@ -2,12 +2,13 @@
 import { Button, Kbd, Skeleton } from "@mantine/core";
 import { IconFocus2, IconRouteAltLeft } from "@tabler/icons-react";
 import { ReactFlowProvider } from "@xyflow/react";
-import { type ReactNode, useEffect, useMemo, useRef } from "react";
+import { type ReactNode, useEffect, useMemo, useRef, useSyncExternalStore } from "react";
 import { ChangeMarked } from "../canvas/changes/change-marks";
 import { NO_PROBLEM_MARKS, type ProblemMarks } from "../canvas/problem-marks";
 import { type EditorContext, useEditorContext } from "../edit-actions/editor-context";
 import { EMPTY_GRAPH, type Key, type Position } from "../graph/model";
 import { RobotFilter } from "../outline/robot-filter";
+import type { SeenPast } from "../past/past-bar";
 import { FollowFrame } from "../people/people";
 import { useFollowedView } from "../people/use-followed-view";
 import type { Progress } from "../status/progress";
@@ -123,7 +124,8 @@ function FollowRun({ onFollow }: { onFollow: () => void }) {
 
 function Inside(props: Props) {
   const { me, canvasHandle, compact, phone, writing, corner, past } = props;
-  const context = useDrawnContext(past);
+  const seen = useSyncExternalStore(past.drawn.subscribe, past.drawn.now);
+  const context = useDrawnContext(seen);
   const { graph } = context;
   const dry = context.dryRun !== null || undefined;
   const then = context.past !== null || undefined;
@@ -138,7 +140,7 @@ function Inside(props: Props) {
     laidOut: first.places,
   });
   const { flow, places, sizes } = canvas;
-  const side = past.seen?.side ?? null;
+  const side = seen?.side ?? null;
   const frame = useRef<HTMLDivElement>(null);
   const pointer = useRef<Position | null>(null);
   const waiting = !arrived || (first.pending && context.graph.actions.length > 1);
@@ -180,7 +182,7 @@ function Inside(props: Props) {
           data-dry={dry}
           data-then={then}
         >
-          <ChangeMarked marks={past.seen?.marks ?? null}>
+          <ChangeMarked marks={seen?.marks ?? null}>
             <EditableCanvas
               context={context}
               canvas={canvas}
@@ -201,7 +203,7 @@ function Inside(props: Props) {
           </div>
         </div>
       </div>
-      <Below context={context} record={props.record} seen={past} />
+      <Below context={context} record={props.record} {...{ past }} />
     </div>
   );
 }
@@ -211,7 +213,7 @@ const NOTHING: ReadonlyMap<Key, Progress> = new Map();
 const NOTHING_RUNS = { progress: NOTHING, marks: NO_PROBLEM_MARKS, run: null };
 
 /** The canvas keeps up with the hands of others; what stands beside it comes after. */
-function useDrawnContext({ seen }: Past): EditorContext {
+function useDrawnContext(seen: SeenPast | null): EditorContext {
   const calm = useEditorContext();
   const now = useGraph();
   const graph = calm.past === null ? now : (seen?.drawn ?? calm.graph);
@@ -230,27 +232,28 @@ function Above({ id }: { id: string }) {
 interface BelowProps {
   context: EditorContext;
   record: ReactNode;
-  seen: Past;
+  past: Past;
 }
 
 /** What plays on the canvas, or which moment of the past it shows. */
-function Below({ context: { past, dryRun, ...context }, record, seen }: BelowProps) {
+function Below({ context, record, past }: BelowProps) {
+  const { dryRun, past: place } = context;
   if (dryRun) {
     return (
       <PartBoundary>
-        <DryRunBar context={{ ...context, past, dryRun }} run={dryRun} record={record} />
+        <DryRunBar context={{ ...context, dryRun }} run={dryRun} record={record} />
       </PartBoundary>
     );
   }
-  if (past === null) return null;
+  if (place === null) return null;
   return (
     <PartBoundary>
       <PastBar
-        drawn={past}
-        wanted={seen.wanted}
-        show={seen.show}
-        side={seen.side}
-        onSide={seen.setSide}
+        drawn={place}
+        wanted={past.wanted}
+        show={past.show}
+        side={past.side}
+        onSide={past.setSide}
       />
     </PartBoundary>
   );

@@ -24,13 +24,7 @@ import {
 } from "../sync/use-room";
 import { exportGraph } from "./export-graph";
 import { useFoldedFrames } from "./use-folded-frames";
-import { type Past, WantedPlace } from "./use-past";
-
-/** Where nothing else than the graph as it is can be shown. */
-const NOW: Past = {
-  ...{ place: null, wanted: new WantedPlace(null), seen: null, side: false },
-  ...{ lookAt: () => {}, show: () => {}, setSide: () => {} },
-};
+import { NO_PAST, type Past } from "./use-past";
 
 const NONE: ReadonlySet<string> = new Set();
 
@@ -183,7 +177,7 @@ function canvasOf(handle: RefObject<CanvasHandle>) {
 export function useEditor(
   id: string,
   onPanel: (panel: Panel) => void,
-  past: Past = NOW,
+  past: Past = NO_PAST,
 ): EditorState {
   const latest = useRef<EditorContext | null>(null);
   const edited = useEdited(id, past);

@@ -1,18 +1,18 @@
 /** Which moment of the past is shown, also in the address of the page. */
 import { useLocalStorage } from "@mantine/hooks";
-import { useCallback, useEffect, useState } from "react";
+import { startTransition, useCallback, useEffect, useState } from "react";
 import type { PastPlace } from "../edit-actions/editor-context";
 import { pastOf, withPast } from "../edit-actions/past-links";
 import type { SeenPast } from "../past/past-bar";
 
 const WRITTEN = 300; // ms after the last step: browsers take few changes of the address in a row
 
-/** The moment that one has asked for, which is drawn as soon as it is there. For whoever gets it. */
-export class WantedPlace {
-  #now: PastPlace | null;
+/** One value that whoever needs it draws at once, without the page around. */
+class Store<T> {
+  #now: T;
   #listeners = new Set<() => void>();
 
-  constructor(now: PastPlace | null) {
+  constructor(now: T) {
     this.#now = now;
   }
 
@@ -20,9 +20,9 @@ export class WantedPlace {
     this.#listeners.add(listener);
     return () => this.#listeners.delete(listener);
   };
-  now = (): PastPlace | null => this.#now;
+  now = (): T => this.#now;
 
-  set(next: PastPlace | null): void {
+  set(next: T): void {
     this.#now = next;
     for (const listener of [...this.#listeners]) listener();
   }
@@ -32,15 +32,25 @@ export interface Past {
   /** Two moments stand beside each other, instead of over one another. Kept on the device. */
   readonly side: boolean;
   setSide(side: boolean): void;
-  /** The moment that is drawn, or the first one that is waited for. */
+  /** The moment of which the page tells, or the first one that is waited for. */
   readonly place: PastPlace | null;
-  readonly wanted: WantedPlace;
-  /** The graph as it was then, and what differs, once it is there. */
+  /** The graph as it was then, and what differs, once it is there. What stands beside the canvas
+   * follows it, as soon as there is time. */
   readonly seen: SeenPast | null;
+  /** What the canvas shows, which comes first. */
+  readonly drawn: Store<SeenPast | null>;
+  /** The moment that one has asked for last, which is drawn as soon as it is there. */
+  readonly wanted: Store<PastPlace | null>;
   lookAt(place: PastPlace | null): void;
-  /** Draws a moment, in one go with all that depends on where one looks. */
   show(seen: SeenPast, place: PastPlace): void;
 }
+
+/** Where nothing else than the graph as it is can be shown. */
+export const NO_PAST: Past = {
+  ...{ place: null, seen: null, side: false },
+  ...{ drawn: new Store(null), wanted: new Store(null) },
+  ...{ lookAt: () => {}, show: () => {}, setSide: () => {} },
+};
 
 interface ShownPast {
   readonly place: PastPlace | null;
@@ -52,7 +62,8 @@ export function usePast(): Past {
     place: pastOf(window.location.search),
     seen: null,
   }));
-  const [wanted] = useState(() => new WantedPlace(place));
+  const [wanted] = useState(() => new Store(place));
+  const [drawn] = useState(() => new Store<SeenPast | null>(null));
   const [side, setSide] = useLocalStorage({
     key: "aa.compare-side",
     defaultValue: false,
@@ -61,15 +72,21 @@ export function usePast(): Past {
   const lookAt = useCallback(
     (next: PastPlace | null) => {
       wanted.set(next);
-      if (next === null) setShown({ place: null, seen: null });
-      else setShown((now) => (now.seen === null ? { place: next, seen: null } : now));
+      if (next === null) {
+        setShown({ place: null, seen: null });
+        drawn.set(null);
+      } else setShown((now) => (now.seen === null ? { place: next, seen: null } : now));
     },
-    [wanted],
+    [wanted, drawn],
   );
   const show = useCallback(
-    (found: SeenPast, at: PastPlace) =>
-      setShown((now) => (now.place === null ? now : { place: at, seen: found })),
-    [],
+    (found: SeenPast, at: PastPlace) => {
+      drawn.set(found);
+      startTransition(() =>
+        setShown((now) => (now.place === null ? now : { place: at, seen: found })),
+      );
+    },
+    [drawn],
   );
   useEffect(() => {
     const { pathname } = window.location;
@@ -81,5 +98,5 @@ export function usePast(): Past {
     }, WRITTEN);
     return () => clearTimeout(timer);
   }, [place]);
-  return { place, wanted, seen, lookAt, show, side, setSide };
+  return { place, seen, drawn, wanted, lookAt, show, side, setSide };
 }

@@ -6,8 +6,8 @@ import { type Point, type Scene, STEP } from "./scene";
 import { type RoutedLine, simpleLines } from "./simple-lines";
 
 /**
- * More lines than these are drawn anew for this share of the time only: twenty people who move cards
- * of a thousand would have every frame come late.
+ * More lines than these are drawn anew after the cards, and for this share of the time only: twenty
+ * people who move cards of a thousand would have every frame come late.
  */
 const MANY = 300;
 const SHARE = 0.2;
@@ -35,8 +35,10 @@ export class LineStore {
   show(given: Scene): void {
     if (this.led?.settled) this.led = null;
     this.given = given;
-    const rest = this.restsUntil - performance.now();
-    if (rest <= 0) this.draw();
+    const rest = Math.max(0, this.restsUntil - performance.now());
+    // Of many lines the cards come first, and what is drawn for the first time comes at once.
+    const atOnce = this.scene === null || given.lines.length <= MANY;
+    if (rest === 0 && atOnce) this.draw();
     else this.resting ??= setTimeout(() => this.draw(), rest);
   }
 

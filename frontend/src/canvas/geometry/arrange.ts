@@ -36,9 +36,18 @@ const GAP = { along: 108, across: 56 } as const;
 
 export const pillSize = (direction: Direction): Size => (direction === "right" ? SHORT_PILL : PILL);
 
+/** Rows of the inputs that were asked for: of a thousand actions few change at once. */
+const rowCounts = new WeakMap<Action["inputs"], number>();
+
+function rowCount(inputs: Action["inputs"]): number {
+  const known = rowCounts.get(inputs) ?? cardRows(inputs).length;
+  rowCounts.set(inputs, known);
+  return known;
+}
+
 /** How large the card of an action is: the same at rest, in a run and when it is selected. */
 export function cardSize({ inputs }: Pick<Action, "inputs">, direction: Direction): Size {
-  const lines = Math.min(CARD_LINES - 1, cardRows(inputs).length);
+  const lines = Math.min(CARD_LINES - 1, rowCount(inputs));
   const text = lines === 0 ? 0 : HEIGHT.lines + lines * HEIGHT.line;
   const height =
     direction === "right" ? Math.max(HEIGHT.least, HEIGHT.low + text) : HEIGHT.plain + text;
