@@ -50,6 +50,7 @@ const LAYERS: Readonly<Record<string, readonly string[]>> = {
   outline: BELOW_EDITOR,
   packages: BELOW_EDITOR,
   courses: BELOW_EDITOR,
+  levels: BELOW_EDITOR,
   past: [...BELOW_EDITOR, "history", "courses"],
   drafts: [...BELOW_EDITOR, "history", "courses", "past"],
   inspector: [...BELOW_EDITOR, "people", "comments", "courses"],
@@ -59,6 +60,7 @@ const LAYERS: Readonly<Record<string, readonly string[]>> = {
     "courses",
     "past",
     "drafts",
+    "levels",
   ]),
   // Features of their own know neither the editor nor each other.
   runs: ["graph", "ui", "api", "status", "canvas"],

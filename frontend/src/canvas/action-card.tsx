@@ -2,6 +2,7 @@
 import { IconGhost2, IconMessageCircle } from "@tabler/icons-react";
 import { Handle, type NodeProps, Position } from "@xyflow/react";
 import { memo, use, useRef } from "react";
+import type { Action } from "../graph/model";
 import { cardRows } from "../graph/parameters/card-rows";
 import { durationText } from "../status/durations";
 import type { Progress } from "../status/progress";
@@ -23,6 +24,7 @@ import { ChangeTag } from "./changes/change-tag";
 import { SinceSpot } from "./changes/since-marks";
 import type { CardNode } from "./elements";
 import { CARD_LINES, cardSize } from "./geometry/arrange";
+import { InsideSpot } from "./levels/graphs-inside";
 import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "./outcome";
 import { ProblemBadge } from "./problem-badge";
 import { STATE_LETTER } from "./zoom/detail";
@@ -39,6 +41,21 @@ function ProgressLine({ progress }: { progress: Progress }) {
     <div className={style.state} title={progress.inferred ? "Inferred, not seen" : undefined}>
       <StateLabel tone={progress.tone} word={progress.word} {...(more === "" ? {} : { more })} />
       {progress.inferred && <span className={style.inferred}>inferred</span>}
+    </div>
+  );
+}
+
+/** What it is called. */
+function Head({ action, oldName }: { action: Action; oldName: string | null }) {
+  return (
+    <div className={style.head}>
+      <b className={style.name} title={action.name}>
+        {action.missing && <IconGhost2 size={13} aria-hidden />}
+        {oldName && <del>{oldName}</del>}
+        {action.name}
+      </b>
+      {action.instanceId > 0 && <span className={style.instance}>{action.instanceId}</span>}
+      <InsideSpot of={action.key} name={action.name} />
     </div>
   );
 }
@@ -106,14 +123,7 @@ export const ActionCard = memo(function ActionCard({
           <span className="visually-hidden"> open comments</span>
         </span>
       )}
-      <div className={style.head}>
-        <b className={style.name} title={action.name}>
-          {action.missing && <IconGhost2 size={13} aria-hidden />}
-          {change?.oldName && <del>{change.oldName}</del>}
-          {action.name}
-        </b>
-        {action.instanceId > 0 && <span className={style.instance}>{action.instanceId}</span>}
-      </div>
+      <Head action={action} oldName={change?.oldName ?? null} />
       {action.missing && <div className={style.hint}>named by an arrow, but not there</div>}
       {!action.missing && (instead ?? (progress && <ProgressLine progress={progress} />))}
       <CardLines

@@ -55,6 +55,8 @@ export const EDIT_ACTIONS: readonly EditAction[] = [
   folding.fold,
   folding.foldAll,
   folding.unfoldAll,
+  look.enter,
+  look.leave,
   notes.details,
   look.toCanvas,
   look.menu,

@@ -9,12 +9,15 @@ import {
   IconKeyboard,
   IconMarquee2,
   IconMenu2,
+  IconStairsDown,
+  IconStairsUp,
   IconZoomIn,
   IconZoomOut,
 } from "@tabler/icons-react";
+import { graphsInside } from "../canvas/levels/graphs-inside";
 import { ENTRY, type Key } from "../graph/model";
 import type { EditAction } from "./edit-action";
-import { type EditorContext, selectedRelations } from "./editor-context";
+import { type EditorContext, selectedActions, selectedRelations } from "./editor-context";
 
 const always = () => true;
 const look = { group: "Look", changes: false, enabled: always } as const;
@@ -207,3 +210,37 @@ export const WALK: readonly EditAction[] = (["up", "down", "left", "right"] as c
     },
   }),
 );
+
+/** The one action that is chosen, if it stands for a graph. */
+function chosenGraph(context: EditorContext) {
+  const [only, ...others] = selectedActions(context);
+  const stands = only !== undefined && graphsInside.now()?.byName.has(only.name);
+  return stands && others.length === 0 ? only : null;
+}
+
+export const enter: EditAction = {
+  ...look,
+  also: "sub-graph level hierarchy",
+  name: "enter-graph",
+  label: "Open the graph inside",
+  shortcuts: ["]", "Mod+ArrowDown"],
+  icon: IconStairsDown,
+  enabled: (context) => chosenGraph(context) !== null,
+  idle: "Choose an action that stands for a graph first.",
+  run: (context) => {
+    const action = chosenGraph(context);
+    if (action) graphsInside.now()?.enter(action.key);
+  },
+};
+
+export const leave: EditAction = {
+  ...look,
+  also: "sub-graph level hierarchy",
+  name: "leave-graph",
+  label: "Out to the graph around",
+  shortcuts: ["[", "Mod+ArrowUp"],
+  icon: IconStairsUp,
+  enabled: () => (graphsInside.now()?.leave ?? null) !== null,
+  idle: "You came here from no other graph.",
+  run: () => graphsInside.now()?.leave?.(),
+};

@@ -1,13 +1,7 @@
 /** The editor of one graph: list, canvas, details and run strip, arranged for the screen at hand. */
 import { useLocalStorage } from "@mantine/hooks";
-import {
-  type ComponentProps,
-  type ComponentType,
-  memo,
-  type ReactNode,
-  useEffect,
-  useState,
-} from "react";
+import { type ComponentProps, memo, type ReactNode, useEffect, useState } from "react";
+import { useSearch } from "wouter";
 import type { Script } from "../api/dry-runs";
 import { useOpenThreadsOnCards, useThreads } from "../comments/use-threads";
 import { scriptOf } from "../dry-run/script";
@@ -21,11 +15,9 @@ import {
   useEditorContext,
 } from "../edit-actions/editor-context";
 import { useShortcuts } from "../edit-actions/keys/shortcuts";
-import { type NewAction, setGraphName } from "../graph/edit";
+import type { NewAction } from "../graph/edit";
 import type { Graph, Key } from "../graph/model";
 import type { ToldProblem } from "../graph/problems/told-problems";
-import { endName } from "../graph/relation-words";
-import { Inspector } from "../inspector/inspector";
 import { People } from "../people/people";
 import type { Progress } from "../status/progress";
 import type { RoomLink } from "../sync/room-connection";
@@ -36,9 +28,11 @@ import { PartBoundary } from "../ui/parts/part-boundary";
 import type { Crumb } from "../ui/top-bar";
 import { EditorContextProvider } from "./canvas/note-links";
 import { CanvasPane } from "./canvas-pane";
+import { crumbsOf } from "./menus/crumbs";
 import { DryRunButton } from "./menus/dry-run-button";
 import { Overlays } from "./menus/overlays";
 import { DeskLayout, PhoneLayout } from "./panels/layouts";
+import { QuietParts } from "./panels/quiet-parts";
 import { usePanels } from "./panels/use-panels";
 import { blockWords, ProblemCount, useToldProblems } from "./problem-count";
 import { RoomNotices } from "./room-notices";
@@ -53,6 +47,10 @@ const HistoryPanel = lazyPart(() =>
   import("../past/history-panel").then((part) => part.HistoryPanel),
 );
 const DraftsHere = lazyPart(() => import("../drafts/drafts-here").then((part) => part.DraftsHere));
+const Inspector = lazyPart(() => import("../inspector/inspector").then((part) => part.Inspector));
+const LevelStatus = lazyPart(() =>
+  import("../levels/level-status").then((part) => part.LevelStatus),
+);
 const PastDetails = lazyPart(() => import("../past/past-details").then((part) => part.PastDetails));
 const Outline = lazyPart(() => import("../outline/outline").then((part) => part.Outline));
 
@@ -112,24 +110,6 @@ function obstacleOf(context: EditorContext, link: RoomLink, checked: Checked, pl
   if (context.graph.actions.length === 0) return "nothing to run yet";
   const blocks = checked.seq === link.seq ? blockWords(checked.told) : "";
   return blocks === "" ? null : blocks;
-}
-
-/** Where one is: the graphs, this one, and what of it is chosen. */
-function crumbsOf(context: EditorContext): Crumb[] {
-  const [only, ...others] = context.selection;
-  const action = context.graph.actions.find(({ key }) => key === only);
-  return [
-    { label: "Graphs", to: "/" },
-    {
-      label: context.graph.name || "Untitled",
-      ...(context.mayEdit && {
-        rename: (name: string) => setGraphName(context.doc, name),
-      }),
-    },
-    ...(action && others.length === 0
-      ? [{ label: endName(context.graph, action.key), part: true }]
-      : []),
-  ];
 }
 
 function useShown(
@@ -241,11 +221,15 @@ function barParts(
   context: EditorContext,
   shown: Shown,
   told: readonly ToldProblem[],
+  search: string,
 ): EditorBarParts {
   return {
-    crumbs: crumbsOf(context),
+    crumbs: crumbsOf(context, search),
     status: (
       <>
+        <PartBoundary waiting={null}>
+          <LevelStatus />
+        </PartBoundary>
         <SaveStatus />
         <ProblemCount told={told} />
         {!shown.compact && status(shown)}
@@ -274,22 +258,6 @@ function recordOf({ dryRun }: EditorContext, shown: Shown, record: Props["record
 const StillInspector = memo(Inspector);
 const StillPeople = memo(People);
 
-/** Marks what changed since a good run. It comes last, and whoever cannot have it misses nothing else. */
-function QuietMarks() {
-  const [Marks, setMarks] = useState<ComponentType | null>(null);
-  useEffect(() => {
-    let gone = false;
-    import("../past/since/since-marks").then(
-      ({ SinceMarks }) => !gone && setMarks(() => SinceMarks),
-      () => {},
-    );
-    return () => {
-      gone = true;
-    };
-  }, []);
-  return Marks === null ? null : <Marks />;
-}
-
 /** Puts an action where there is room; whether that was allowed. */
 function placeAction(context: EditorContext, template: NewAction): boolean {
   if (!context.mayEdit) return false;
@@ -302,7 +270,7 @@ function placeAction(context: EditorContext, template: NewAction): boolean {
 /** What is typed right after their keys shall find them. */
 function usePreloaded(): void {
   useEffect(() => {
-    for (const part of [QuickAdd, FindBar]) void part.preload();
+    for (const part of [Inspector, QuickAdd, FindBar]) void part.preload();
   }, []);
 }
 
@@ -312,6 +280,7 @@ export function Editor(props: Props) {
   const past = usePast();
   const { context, adding, overlay, ...editor } = useEditor(id, panels.onPanel, past);
   const link = useThrottledLink();
+  const search = useSearch();
   const { problems, told, marks } = useToldProblems(id, link.seq, context.graph);
   const threads = useThreads();
   useOpenThreadsOnCards(threads);
@@ -356,28 +325,30 @@ export function Editor(props: Props) {
     ),
     details: (
       <DetailsPane past={past} panel={editor.panel} beside={!phone && panels.side === "history"}>
-        <StillInspector
-          id={id}
-          seq={context.past?.at ?? link.seq}
-          panel={editor.panel}
-          problems={context.past === null ? problems : undefined}
-          told={context.past === null ? told : NOTHING_TOLD}
-          threads={threads}
-        />
+        <PartBoundary>
+          <StillInspector
+            id={id}
+            seq={context.past?.at ?? link.seq}
+            panel={editor.panel}
+            problems={context.past === null ? problems : undefined}
+            told={context.past === null ? told : NOTHING_TOLD}
+            threads={threads}
+          />
+        </PartBoundary>
       </DetailsPane>
     ),
     status: () => props.status(shown),
   };
   return (
     <EditorContextProvider context={context}>
-      {props.bar(barParts(props, context, shown, told))}
+      {props.bar(barParts(props, context, shown, told, search))}
       {phone ? (
         <PhoneLayout {...parts} onCanvas={aside} start={() => props.start(shown)} />
       ) : (
         <DeskLayout {...parts} wide={!compact} told={told} list={() => props.list(place)} />
       )}
       <RoomNotices />
-      <QuietMarks />
+      <QuietParts />
       <Overlays context={context} known={known} overlay={overlay} onClose={editor.closeOverlay} />
       <AddPane context={context} request={adding} known={known} onClose={editor.closeAdd} />
     </EditorContextProvider>

@@ -8,7 +8,7 @@ import type { SeenPast } from "../past/past-bar";
 const WRITTEN = 300; // ms after the last step: browsers take few changes of the address in a row
 
 /** One value that whoever needs it draws at once, without the page around. */
-class Store<T> {
+class Watched<T> {
   #now: T;
   #listeners = new Set<() => void>();
 
@@ -38,9 +38,9 @@ export interface Past {
    * follows it, as soon as there is time. */
   readonly seen: SeenPast | null;
   /** What the canvas shows, which comes first. */
-  readonly drawn: Store<SeenPast | null>;
+  readonly drawn: Watched<SeenPast | null>;
   /** The moment that one has asked for last, which is drawn as soon as it is there. */
-  readonly wanted: Store<PastPlace | null>;
+  readonly wanted: Watched<PastPlace | null>;
   lookAt(place: PastPlace | null): void;
   show(seen: SeenPast, place: PastPlace): void;
 }
@@ -48,7 +48,7 @@ export interface Past {
 /** Where nothing else than the graph as it is can be shown. */
 export const NO_PAST: Past = {
   ...{ place: null, seen: null, side: false },
-  ...{ drawn: new Store(null), wanted: new Store(null) },
+  ...{ drawn: new Watched(null), wanted: new Watched(null) },
   ...{ lookAt: () => {}, show: () => {}, setSide: () => {} },
 };
 
@@ -62,8 +62,8 @@ export function usePast(): Past {
     place: pastOf(window.location.search),
     seen: null,
   }));
-  const [wanted] = useState(() => new Store(place));
-  const [drawn] = useState(() => new Store<SeenPast | null>(null));
+  const [wanted] = useState(() => new Watched(place));
+  const [drawn] = useState(() => new Watched<SeenPast | null>(null));
   const [side, setSide] = useLocalStorage({
     key: "aa.compare-side",
     defaultValue: false,

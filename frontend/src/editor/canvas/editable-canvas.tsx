@@ -19,6 +19,7 @@ import type { Arrow, CanvasNode } from "../../canvas/elements";
 import { FoldedFrame } from "../../canvas/folding/folded-frame";
 import { CARD } from "../../canvas/geometry/arrange";
 import { edgeTypes, nodeTypes } from "../../canvas/graph-view";
+import { graphsInside } from "../../canvas/levels/graphs-inside";
 import { type NoteEditing, NoteEditingContext } from "../../canvas/notes/note-card";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
 import { ArrowTips } from "../../canvas/outcome-arrow";
@@ -33,7 +34,8 @@ import { Cursors } from "../../people/cursors";
 import { PeopleAtCards } from "../../people/people";
 import { useRoom } from "../../sync/use-room";
 import { useStableCallback } from "../../ui/hooks/use-stable-callback";
-import { GraphMap } from "../map/graph-map";
+import { lazyPart } from "../../ui/parts/lazy-part";
+import { PartBoundary } from "../../ui/parts/part-boundary";
 import style from "./editable-canvas.module.css";
 import { arrowAt } from "./hit-test";
 import type { useCanvasElements } from "./use-canvas-elements";
@@ -41,6 +43,8 @@ import { outcomeOf, type Pending, useConnecting } from "./use-connecting";
 import { useContextMenu } from "./use-context-menu";
 import { useLineEditing } from "./use-line-editing";
 import { usePinch, ZOOM } from "./use-pinch";
+
+const GraphMap = lazyPart(() => import("../map/graph-map").then((part) => part.GraphMap));
 
 // What React Flow gets anew, it hands on to all that is drawn.
 const SNAP_GRID: [number, number] = [GRID, GRID];
@@ -257,7 +261,11 @@ function Drawing({
           />
         </>
       )}
-      {map && <GraphMap nodes={canvas.nodes} flow={canvas.flow} />}
+      {map && (
+        <PartBoundary waiting={null}>
+          <GraphMap nodes={canvas.nodes} flow={canvas.flow} />
+        </PartBoundary>
+      )}
     </ReactFlow>
   );
 }
@@ -279,12 +287,15 @@ export function EditableCanvas({ context, canvas, me, map, onPanned, pointer, wr
   const noteEditing = useNoteEditing(context, writing, canvas.setResized);
   const lineEditing = useLineEditing(context);
   const onDoubleClick = (event: MouseEvent) => {
-    if (!(event.target as Element).classList.contains("react-flow__pane")) return;
+    const target = event.target as Element;
+    const card = target.closest<HTMLElement>(".react-flow__node-action")?.dataset.id;
+    if (card !== undefined) graphsInside.now()?.enter(card);
+    if (!target.classList.contains("react-flow__pane")) return;
     openAddAt([event.clientX, event.clientY], null);
   };
 
   return (
-    // biome-ignore lint/a11y/noStaticElementInteractions: double click repeats what the key A does
+    // biome-ignore lint/a11y/noStaticElementInteractions: a double click repeats what the keys A and ] do
     <div
       ref={frame}
       className={style.frame}

@@ -47,7 +47,13 @@ function offered(context: EditorContext): readonly (readonly EditAction[])[] {
   }
   if (actions === 1) {
     return [
-      [editActions.details, editActions.connectTo, editActions.entry, editActions.exit],
+      [
+        editActions.enter,
+        editActions.details,
+        editActions.connectTo,
+        editActions.entry,
+        editActions.exit,
+      ],
       [copy, cut, duplicate, pasteHere],
       [editActions.frame, editActions.zoomSelection, editActions.copyLink, editActions.packages],
       [remove, heal],

@@ -6,9 +6,14 @@ import { useGraphs } from "../../api/graphs";
 import { errorText } from "../../api/http";
 import { useMay } from "../../api/use-person";
 import { Empty } from "../../ui/empty";
-import { DeletedGraphs } from "../deleted-graphs";
+import { lazyPart } from "../../ui/parts/lazy-part";
+import { PartBoundary } from "../../ui/parts/part-boundary";
 import { GraphCards } from "./graph-cards";
 import style from "./home.module.css";
+
+const DeletedGraphs = lazyPart(() =>
+  import("../deleted-graphs").then((part) => part.DeletedGraphs),
+);
 
 interface Props {
   onNew: () => void;
@@ -92,7 +97,9 @@ export function Home({ onNew, onImport, kept, greeting }: Props) {
         {list.length > 0 && <GraphCards graphs={list} />}
         {graphs.isSuccess && (
           <div className={style.foot}>
-            <DeletedGraphs />
+            <PartBoundary waiting={null}>
+              <DeletedGraphs />
+            </PartBoundary>
           </div>
         )}
       </div>

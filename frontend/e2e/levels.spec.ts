@@ -1,0 +1,100 @@
+/** Tasks in levels: into the graph for which an action stands, out again, by mouse, keys and touch. */
+
+import { expect, type Page, test } from "@playwright/test";
+import { card } from "./canvas";
+import { type Person, Product } from "./product";
+import { post, violations } from "./valves";
+
+const product = new Product();
+let ada: Person;
+let round: string;
+
+const named = (name: string) => ({ name, instance_id: 0 });
+const single = (graph: string, name: string) => ({
+  graph_name: graph,
+  graph_entry: [named(name)],
+  graph_exit: [named(name)],
+  actions: [{ ...named(name), type: "sync" }],
+});
+
+test.describe.configure({ mode: "serial" });
+test.beforeAll(async ({ browser }) => {
+  await product.start();
+  await post(product, "/api/graphs", single("Grip", "CloseFingers"));
+  await post(product, "/api/graphs", single("Fetch", "Grip"));
+  round = (await post<{ id: string }>(product, "/api/graphs", single("Round", "Fetch"))).id;
+  ada = await product.person(browser, "Ada");
+  await ada.page.goto(`${product.url}/graphs/${round}`);
+});
+test.afterAll(async () => {
+  expect(ada.failures).toEqual([]);
+  await product.dispose();
+});
+
+const where = (page: Page) => page.getByRole("navigation", { name: "Where you are" });
+const inside = (page: Page, name: string) =>
+  card(page, name).getByRole("button", { name: `Open the graph inside ${name}` });
+
+test("one goes in by the sign, a double click and ], and out by the line of levels and [", async () => {
+  const { page } = ada;
+  await inside(page, "Fetch").click();
+  await expect(where(page)).toContainText("Graphs/Round/Fetch");
+  await expect(card(page, "Grip")).toBeVisible();
+  await card(page, "Grip").dblclick();
+  await expect(where(page)).toContainText("Graphs/Round/Fetch/Grip");
+  await expect(card(page, "CloseFingers")).toBeVisible();
+  await expect(inside(page, "CloseFingers")).toHaveCount(0);
+  expect(await violations(page)).toEqual([]);
+
+  await page.keyboard.press("[");
+  await expect(card(page, "Grip")).toHaveClass(/\bselected\b/);
+  await expect(where(page)).toContainText("Graphs/Round/Fetch/Grip");
+  await page.keyboard.press("]");
+  await expect(card(page, "CloseFingers")).toBeVisible();
+
+  await where(page).getByRole("link", { name: "Round" }).click();
+  await expect(card(page, "Fetch")).toHaveClass(/\bselected\b/);
+  await expect(page).toHaveURL(new RegExp(`/graphs/${round}\\?action=`));
+});
+
+test("an address names its level: a colleague who opens it stands in it, and finds out", async ({
+  browser,
+}) => {
+  await ada.page.keyboard.press("]");
+  await expect(card(ada.page, "Grip")).toBeVisible();
+  const mari = await product.person(browser, "Mari");
+  await mari.page.goto(ada.page.url());
+  await expect(where(mari.page)).toContainText("Graphs/Round/Fetch");
+  await expect(card(mari.page, "Grip")).toBeVisible();
+  await mari.page.locator(".react-flow__pane").click({ position: { x: 20, y: 20 } });
+  await mari.page.keyboard.press("Control+ArrowUp");
+  await expect(card(mari.page, "Fetch")).toHaveClass(/\bselected\b/);
+  expect(mari.failures).toEqual([]);
+  await mari.context.close();
+});
+
+test("a graph that others run inside says so, and which they are", async () => {
+  const { page } = ada;
+  await page.getByRole("button", { name: "Used in 1 graph" }).click();
+  await expect(page.getByRole("menu")).toContainText("What you change here changes in each");
+  await page.getByRole("menuitem", { name: "Round" }).click();
+  await expect(card(page, "Fetch")).toBeVisible();
+  await expect(where(page)).toContainText("Graphs/Round");
+  await expect(page.getByRole("button", { name: /^Used in/ })).toHaveCount(0);
+});
+
+test("on a phone a tap leads in and another one out", async ({ browser }) => {
+  const { page, context, failures } = await product.person(browser, "Ada", {
+    viewport: { width: 390, height: 780 },
+    hasTouch: true,
+    isMobile: true,
+  });
+  await page.goto(`${product.url}/graphs/${round}`);
+  await page.getByRole("tab", { name: "Canvas" }).or(page.getByText("Canvas")).first().tap();
+  await inside(page, "Fetch").tap();
+  await expect(card(page, "Grip")).toBeVisible();
+  await page.getByRole("button", { name: "Out" }).tap();
+  await expect(card(page, "Fetch")).toHaveClass(/\bselected\b/);
+  expect(failures).toEqual([]);
+  await context.close();
+});

@@ -1,0 +1,57 @@
+/** Which actions stand for graphs of the server, and how one goes into those and out again. */
+import { type ComponentType, useSyncExternalStore } from "react";
+import type { Key } from "../../graph/model";
+
+export interface InsideSignProps {
+  readonly of: Key;
+  readonly name: string;
+}
+
+export interface GraphsInside {
+  /** The names of graphs by their id. */
+  readonly names: ReadonlyMap<string, string>;
+  /** The ids of other graphs by the name of the actions that stand for them. */
+  readonly byName: ReadonlyMap<string, string>;
+  /** Whether actions of others with this graph's name stand for it, and for no older one. */
+  readonly isNamed: boolean;
+  /** Opens the graph for which an action stands. */
+  enter(action: Key): void;
+  /** Back to the action through which one came; null where one came through none. */
+  readonly leave: (() => void) | null;
+  /** What is drawn at such an action. */
+  readonly Sign: ComponentType<InsideSignProps>;
+}
+
+/** One for the page: there is one canvas. Null while nothing is known of other graphs. */
+class GraphsInsideStore {
+  #now: GraphsInside | null = null;
+  #listeners = new Set<() => void>();
+
+  subscribe = (listener: () => void): (() => void) => {
+    this.#listeners.add(listener);
+    return () => this.#listeners.delete(listener);
+  };
+  now = (): GraphsInside | null => this.#now;
+
+  set(next: GraphsInside | null): void {
+    this.#now = next;
+    for (const listener of [...this.#listeners]) listener();
+  }
+}
+
+export const graphsInside = new GraphsInsideStore();
+
+/** The sign of an action that stands for a graph. */
+export function InsideSpot({ of, name }: InsideSignProps) {
+  const { subscribe, now } = graphsInside;
+  const Sign = useSyncExternalStore(subscribe, () =>
+    now()?.byName.has(name) ? now()?.Sign : undefined,
+  );
+  return Sign && <Sign of={of} name={name} />;
+}
+
+/** What a graph is called. */
+export function NameOfGraph({ id }: { id: string }) {
+  const { subscribe, now } = graphsInside;
+  return useSyncExternalStore(subscribe, () => now()?.names.get(id)) ?? "…";
+}

@@ -1,0 +1,71 @@
+/** The graphs around this one: the way out, and all that run it inside them, which each edit here changes. */
+import { Menu } from "@mantine/core";
+import { IconSitemap, IconStairsUp } from "@tabler/icons-react";
+import { useSyncExternalStore } from "react";
+import { Link } from "wouter";
+import { useLibrary } from "../api/documents/library";
+import { graphsInside } from "../canvas/levels/graphs-inside";
+import { useEditorContext } from "../edit-actions/editor-context";
+import style from "./levels.module.css";
+
+/** The graphs with an action that stands for this one, by id. */
+function useUsedIn(): readonly string[] {
+  const { id, graph } = useEditorContext();
+  const { data: actions = [] } = useLibrary();
+  const { subscribe, now } = graphsInside;
+  const stands = useSyncExternalStore(subscribe, () => now()?.isNamed ?? false);
+  const found = actions.find(({ name, document }) => document === null && name === graph.name);
+  return stands ? (found?.used_in ?? []).filter((each) => each !== id) : [];
+}
+
+function UsedIn() {
+  const graphs = useUsedIn();
+  if (graphs.length === 0) return null;
+  const words = graphs.length === 1 ? "in 1 graph" : `in ${graphs.length} graphs`;
+  return (
+    <Menu position="bottom-start" width={300}>
+      <Menu.Target>
+        <button
+          type="button"
+          className={style.used}
+          title="Graphs that run this one inside them"
+          aria-label={`Used ${words}`}
+        >
+          <IconSitemap size={13} aria-hidden /> <span>Used {words}</span>
+        </button>
+      </Menu.Target>
+      <Menu.Dropdown>
+        <p className={style.words}>
+          What you change here changes in each of them. A version that was published keeps what it
+          was published with.
+        </p>
+        {graphs.map((graph) => (
+          <Menu.Item key={graph} component={Link} to={`/graphs/${graph}`}>
+            <bdi className={style.name}>{graphsInside.now()?.names.get(graph) || "Untitled"}</bdi>
+          </Menu.Item>
+        ))}
+      </Menu.Dropdown>
+    </Menu>
+  );
+}
+
+/** Where the line of levels has no room. */
+function Out() {
+  const { subscribe, now } = graphsInside;
+  const leave = useSyncExternalStore(subscribe, () => now()?.leave);
+  if (!leave) return null;
+  return (
+    <button type="button" className={`${style.used} ${style.out}`} onClick={leave}>
+      <IconStairsUp size={13} aria-hidden /> Out
+    </button>
+  );
+}
+
+export function LevelStatus() {
+  return (
+    <>
+      <Out />
+      <UsedIn />
+    </>
+  );
+}
