@@ -64,10 +64,13 @@ async def _asked(
     people, rooms = await People.known(journal), Rooms(journal)
     index = ChangeIndex(journal, workers.graphs)
     reader = GraphReader(journal, rooms, workers.graphs)
-    history = GraphHistory(journal, people, Versions(journal, reader), index, workers.graphs)
+    checks = GraphChecks(journal, rooms, reader)
+    history = GraphHistory(
+        journal, people, Versions(journal, reader, checks), index, workers.graphs
+    )
     blame, search = (
         Blame(index, people),
-        CourseSearch(index, people, reader, GraphChecks(journal, rooms, reader), workers.graphs),
+        CourseSearch(index, people, reader, checks, workers.graphs),
     )
 
     async def moment() -> None:

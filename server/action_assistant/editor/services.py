@@ -53,7 +53,7 @@ class EditorServices:
         self.catalogue = Catalogue(
             journal, self.rooms, self.graph_reader, self.graph_checks, workers.files
         )
-        self.versions = Versions(journal, self.graph_reader)
+        self.versions = Versions(journal, self.graph_reader, self.graph_checks)
         self.library = Library(journal, self.graph_reader)
         self.library_edits = LibraryEdits(
             journal, self.rooms, self.graph_reader, self.catalogue, self.library, workers.files

@@ -37,6 +37,7 @@ run: Final = Table(
     Column("version", Text),
     Column("digest", Text, nullable=False),
     Column("engine", Text, nullable=False),
+    Column("tree_digest", Text),
     Column("author_id", Text, nullable=False),
     Column("author_name", Text, nullable=False),
     Column("state", Text, nullable=False),

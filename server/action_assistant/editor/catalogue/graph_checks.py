@@ -91,6 +91,7 @@ class GraphChecks:
         self._hopeless = Recent[str, tuple[int, Refused]](_COUNTED)
         self._counts = Recent[str, tuple[int, bytes, Counts, ToldCounts]](_COUNTED)
         self._problems = Recent[tuple[str, int, bytes], bytes](_REMEMBERED)
+        self._digests = Recent[tuple[str, int], str](_COUNTED)
         self._uses = Recent[tuple[str, int], tuple[str, tuple[str, ...]]](_REMEMBERED)
 
     async def problems(self, sight: GraphAtSeq) -> bytes:
@@ -117,6 +118,20 @@ class GraphChecks:
         """The graphs inside of a graph of this name with actions of these names."""
         await self.names.refresh()
         return await self._seen(await self._resolved(graph, uses))
+
+    async def digest(self, name: str) -> str | None:
+        """The digest of the graph that an action of this name stands for now; None where there is none, or
+        it cannot be read."""
+        await self.names.refresh()
+        known = await self._standing_for(name)
+        if known is None:
+            return None
+        key = known[0].graph, known[0].seq
+        found = self._digests.get(key)
+        if found is None:
+            sight = await self._sight(*key)
+            found = self._digests.put(key, await self._reader.ask(contents.digest_at, sight))
+        return found
 
     def made(self, graph: str, state: bytes, about: GraphInfo) -> None:
         """A graph has been made of this document, and this is to be said of it by itself."""

@@ -73,8 +73,8 @@ class GraphNames:
         async with self._refreshing:
             position, seqs, abouts = await self._news()
             self._seqs |= seqs
-            changed = (seqs.keys() | self._again) & self._documents.keys()
-            changed |= await self._look_up(abouts)
+            changed = await self._look_up(abouts)
+            changed |= (seqs.keys() | self._again) & self._documents.keys()
             limit = CapacityLimiter(_AT_ONCE)
             async with create_task_group() as reading:
                 for graph in changed & self._seqs.keys():

@@ -16,7 +16,7 @@ from action_assistant.editor.documents.fingerprint import Fingerprint, fingerpri
 from action_assistant.umrf.check import check_written
 from action_assistant.umrf.checks.subgraphs import Resolution
 from action_assistant.umrf.difference import difference
-from action_assistant.umrf.digest import digest
+from action_assistant.umrf.digest import digest, tree_digest
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.json.text import parse_small
 from action_assistant.umrf.model import Action, Graph, Problem
@@ -202,10 +202,47 @@ def umrf(sight: GraphAtSeq, stamp: codec.Stamp | None = None) -> bytes:
     return codec.write(read(sight).moment.graph, stamp).encode()
 
 
-def released(sight: GraphAtSeq, stamp: codec.Stamp) -> tuple[str, bytes]:
-    """The digest and the text of a version."""
+class ReleasedPart(msgspec.Struct, frozen=True):
+    """A graph inside of a version: its name, its id, and what it was."""
+
+    name: str
+    graph: str
+    digest: str
+    umrf: bytes
+
+
+class Released(msgspec.Struct, frozen=True):
+    """What a version is."""
+
+    digest: str
+    umrf: bytes
+    tree_digest: str
+    parts: tuple[ReleasedPart, ...]
+
+
+def released(sight: GraphAtSeq, stamp: codec.Stamp, inside: Inside) -> Released:
+    """The digest and the text of a version, and of the graphs inside of it."""
     graph = read(sight).moment.graph
-    return digest(graph), codec.write(graph, stamp).strip().encode()
+    parts = tuple(_part(name, each) for name, each in inside.graphs)
+    own = digest(graph)
+    tree = tree_digest(own, ((each.name, each.digest) for each in parts))
+    return Released(own, _text(graph, stamp), tree, parts)
+
+
+def _part(name: str, sight: GraphAtSeq) -> ReleasedPart:
+    graph = read(sight).moment.graph
+    return ReleasedPart(
+        name, sight.graph, digest(graph), _text(graph, codec.Stamp(graph=sight.graph))
+    )
+
+
+def _text(graph: Graph, stamp: codec.Stamp) -> bytes:
+    return codec.write(graph, stamp).strip().encode()
+
+
+def digest_at(sight: GraphAtSeq) -> str:
+    """The digest of a graph at a moment."""
+    return digest(read(sight).moment.graph)
 
 
 def differing(before: GraphAtSeq, after: GraphAtSeq) -> bytes:

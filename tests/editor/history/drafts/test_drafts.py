@@ -57,7 +57,7 @@ class House:
         self.merges = DraftMerges(journal, rooms, self.drafts, index, grafts, people, checks)
         self.blame = Blame(index, people, grafts)
         self.going_back = GoingBack(journal, rooms, reader, index)
-        self.history = GraphHistory(journal, people, Versions(journal, reader), index)
+        self.history = GraphHistory(journal, people, Versions(journal, reader, checks), index)
         self.origin = ""
         self.wrote: dict[tuple[str, str, bytes], set[str]] = defaultdict(set)
 
