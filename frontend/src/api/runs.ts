@@ -1,5 +1,6 @@
 /** Runs as the runner tells them. */
 import { useQuery } from "@tanstack/react-query";
+import type { Inside } from "./documents/inside";
 import { fetchJson } from "./http";
 import type { RunnerApi } from "./schema/runner";
 
@@ -79,6 +80,7 @@ export interface StartOrder {
   /** Whether actions do what their Python behaviours say; only in the simulator. */
   behaviours?: boolean;
   override?: RunnerApi["Override"];
+  inside?: Inside;
 }
 
 /** `failed`: robots that nothing was sent to, and why. */
@@ -98,6 +100,7 @@ export async function startRun(order: StartOrder): Promise<Started> {
     ...(order.script === undefined ? {} : { script: order.script }),
     ...(order.behaviours === true ? { behaviours: true } : {}),
     umrf: order.umrf,
+    ...order.inside,
   };
   if (!alone) return fetchJson(`${order.runner}/api/groups`, { method: "POST", body });
   const run = await fetchJson<RunnerApi["RunShown"]>(`${order.runner}/api/runs`, {

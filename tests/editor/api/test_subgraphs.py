@@ -78,8 +78,11 @@ def test_a_graph_inside_is_told_played_and_pinned(client: httpx.Client) -> None:
     inside = [each for each in played if each["graph"] == "Outer__Inner__0"]
     assert [each["node"] for each in inside if each["kind"] == "node_result"] == ["Step_0"]
 
+    inside = client.get(f"/api/graphs/{outer}/subgraphs").json()
+    assert [(each["name"], each["graph"]) for each in inside["subgraphs"]] == [("Inner", inner)]
     answer = published(client, outer)
     assert answer.status_code == 201
+    assert answer.json()["tree_digest"] == inside["tree_digest"]
     version = answer.json()
     (pinned,) = version["subgraphs"]
     reading = codec.read(json.dumps(pinned["umrf"]).encode())

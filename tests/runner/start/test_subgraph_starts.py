@@ -6,14 +6,16 @@ import msgspec
 import pytest
 
 from action_assistant.errors import BadInput, Conflict, TooLarge
+from action_assistant.runner.links.port import Registration
 from action_assistant.runner.runs.events import Override, Requested
 from action_assistant.runner.sent_subgraphs import SentSubgraph
 from action_assistant.runner.start.admission import StartRequest, admit, prepared
+from action_assistant.runner.start.approvals import ApprovalRequest
 from action_assistant.umrf.digest import digest, tree_digest
 from action_assistant.umrf.facts import SIMULATED
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Action, Graph
-from runner.harness import ANN, Harness, ended, order, sequence, virtual
+from runner.harness import ANN, BEN, Harness, ended, order, sequence, virtual
 from runner.registered_robots import Open, fleet, group, verdicts
 
 FAST = {"*": [{"after_s": 0.2}]}
@@ -141,6 +143,7 @@ async def test_a_robot_s_index_is_held_against_what_is_inside() -> None:
     async with fleet(Harness(), David=david) as control:
         (look,) = await control.look(asked)
         assert set(verdicts(look).values()) == {"passed"}
+        assert look.tree_digest == start(sent(pinned)).tree_digest
     index_of(david, sequence("round", 3))
     async with fleet(Harness(), David=david) as control:
         (look,) = await control.look(asked)
@@ -174,6 +177,22 @@ async def test_a_robot_that_lacks_a_graph_deep_inside_is_not_started() -> None:
         (item,) = [each for each in look.items if each.code == "subgraphs"]
         assert (item.verdict, item.codes) == ("blocked", ("unknown-action",))
         assert "David has not indexed leg" in item.text
+
+
+@virtual
+async def test_a_second_person_says_yes_to_what_is_inside_too() -> None:
+    david, pinned = Open(), sequence("round", 2)
+    index_of(david, pinned)
+    async with fleet(Harness(), David=david) as control:
+        await control.register(Registration(name="David", profile={"second_person": True}), ANN)
+        asked = start(sent(pinned), engine="David")
+        await control.approvals.give(ApprovalRequest(digest=asked.digest), BEN)
+        with pytest.raises(Conflict, match="second person"):
+            await control.start(asked, ANN)
+        await control.approvals.give(ApprovalRequest(digest=asked.tree_digest or ""), BEN)
+        run = (await control.start(asked, ANN)).run
+        await control.stop(run.id, ANN)
+        assert await ended(control, run.id) == "stopped"
 
 
 @virtual

@@ -35,6 +35,28 @@ class PinnedGraph(msgspec.Struct, frozen=True):
     current_digest: str | None
 
 
+class InsideGraph(msgspec.Struct, frozen=True):
+    """A graph inside of another, as it is now. `name`: of the actions that stand for it; `graph`: its id."""
+
+    name: str
+    digest: str
+    umrf: UmrfGraph
+    graph: str
+
+
+class InsideView(msgspec.Struct, frozen=True):
+    """All graphs inside of a graph after its change `seq`, as they are now, by name; and what a version of
+    that would have as its digests. `several`: names of more than one graph, of which the oldest is taken;
+    `cut`: there are more than these."""
+
+    seq: int
+    digest: str
+    tree_digest: str
+    subgraphs: tuple[InsideGraph, ...]
+    several: tuple[str, ...]
+    cut: bool
+
+
 class VersionView(msgspec.Struct, frozen=True, omit_defaults=True):
     """A version. `umrf` is the graph as text to be kept as it is, `subgraphs` are all graphs inside of it,
     by name; lists leave both out. `tree_digest`: of the graph together with them, null where that was
@@ -101,6 +123,19 @@ class Versions:
             h.about_stream(graph), [h.draft(h.PUBLISHED, author.id, published)]
         )
         return await self.get(made), True
+
+    async def inside(self, graph: str, seq: int | None) -> InsideView:
+        """What publishing a graph would pin. Raises NotFound, Conflict, Unavailable."""
+        sight = await self._graph_reader.moment(graph, seq)
+        inside = await self._checks.inside(sight)
+        stamp = codec.Stamp(graph=graph)
+        found = await self._graph_reader.ask(contents.released, sight, stamp, inside)
+        graphs = tuple(
+            InsideGraph(each.name, each.digest, msgspec.Raw(each.umrf), each.graph)
+            for each in found.parts
+        )
+        digests = found.digest, found.tree_digest
+        return InsideView(sight.seq, *digests, graphs, inside.several, inside.cut)
 
     async def get(self, version: str) -> VersionView:
         """One version, with its UMRF. Raises NotFound."""

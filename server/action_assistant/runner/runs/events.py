@@ -81,7 +81,7 @@ class Requested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     laps: Laps | None = None  # None: found in `umrf`
     behaviours: bool = False  # whether the simulator had Python behaviours
     subgraphs: tuple[RunSubgraph, ...] = ()  # all graphs inside, by value
-    tree_digest: str | None = None  # of the graph together with them
+    tree_digest: str | None = None  # of the graph together with them; None: nobody told
 
 
 class Published(msgspec.Struct, frozen=True, omit_defaults=True):

@@ -134,7 +134,7 @@ class RunShown(RunSummary, frozen=True, kw_only=True):
 class RunWhole(RunShown, frozen=True, kw_only=True):
     """A run with the graph as it was sent. `sent`: the values of its actions, by full name and flat
     name, written as in `inputs` of visits. `subgraphs`: all graphs inside of it, as they were sent along;
-    `tree_digest`: of it together with them, null where that was not kept yet."""
+    `tree_digest`: of it together with them, null where whoever started it did not tell."""
 
     umrf: UmrfGraph
     override: Override | None

@@ -54,7 +54,7 @@ def booked(
         behaviours=asked.behaviours,
         laps=ready.laps,
         subgraphs=ready.subgraphs,
-        tree_digest=ready.tree_digest,
+        tree_digest=ready.tree_digest if asked.subgraphs or asked.tree_digest else None,
     )
     targets = () if cleared.own else (asked.engine,)
     graph = GraphOutline(ready.name, ready.actions)

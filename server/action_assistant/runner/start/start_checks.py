@@ -164,7 +164,7 @@ class StartChecks:
         if asked.behaviours:
             raise BadInput("Only the simulator runs behaviours.", where={"path": "/behaviours"})
         ready = await self._run_in_worker(prepared, asked, robot.facts, random_id())
-        await self._approvals.require(robot.registration, ready.digest, starter)
+        await self._approvals.require(robot.registration, ready.tree_digest, starter)
         free = preflight.of_taken(asked.engine, self._taken(asked.engine))
         preflight.check_items([free], ())
         if self._robots.foreign_stops.going(asked.engine):
@@ -279,8 +279,8 @@ class StartChecks:
             items.append(preflight.of_taken(asked.engine, self._taken(asked.engine)))
             items += await self._look_at(robot, ready)
             items += await self._said_yes(robot, ready, starter)
-        digest = ready.digest if ready is not None else ""
-        return preflight.summed(asked.engine, items, digest)
+        digests = (ready.digest, ready.tree_digest) if ready is not None else ("", "")
+        return preflight.summed(asked.engine, items, *digests)
 
     async def _look_at(self, robot: KnownEngine, ready: Prepared | None) -> list[Item]:
         try:
@@ -296,7 +296,7 @@ class StartChecks:
     ) -> list[Item]:
         if ready is None:
             return []
-        item = await self._approvals.item(robot.registration, ready.digest, starter)
+        item = await self._approvals.item(robot.registration, ready.tree_digest, starter)
         return [] if item is None else [item]
 
     async def _view(self, robot: KnownEngine) -> EngineView:
