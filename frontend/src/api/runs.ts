@@ -1,6 +1,5 @@
 /** Runs as the runner tells them. */
 import { useQuery } from "@tanstack/react-query";
-import type { Inside } from "./documents/inside";
 import { fetchJson } from "./http";
 import type { RunnerApi } from "./schema/runner";
 
@@ -63,6 +62,12 @@ export function needsRestConfirmation(run: Run): boolean {
 export function confirmRest(runner: string, run: string, how: string): Promise<Run> {
   const path = `/api/runs/${encodeURIComponent(run)}/at_rest`;
   return fetchJson(`${runner}${path}`, { method: "POST", body: { how } });
+}
+
+/** The graphs inside, by value. Nothing where there are none: then nobody needs to know of them. */
+export interface Inside {
+  subgraphs?: readonly object[];
+  tree_digest?: string;
 }
 
 export interface StartOrder {

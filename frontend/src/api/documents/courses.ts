@@ -3,8 +3,9 @@ import { keepPreviousData, type QueryClient, useQuery } from "@tanstack/react-qu
 import type { Script } from "../dry-runs";
 import { fetchJson, fetchText } from "../http";
 import { useLive } from "../live/use-live";
+import type { Inside } from "../runs";
 import type { RunnerApi } from "../schema/runner";
-import { fetchInside, type Inside } from "./inside";
+import { fetchInside } from "./inside";
 
 export type CheckedCourses = RunnerApi["CheckedCourses"];
 export type CheckedCourse = RunnerApi["CheckedCourse"];

@@ -1,20 +1,15 @@
 /** The graphs inside of a graph, by value: what goes along with starts, looks and expected courses. */
 import { fetchJson } from "../http";
+import type { Inside } from "../runs";
 import type { EditorApi } from "../schema/editor";
 
-/** Nothing where there are none: then everything is as if nobody knew of sub-graphs. */
-export interface Inside {
-  subgraphs?: readonly object[];
-  tree_digest?: string;
-}
-
-interface Tree {
+interface Pinned {
   subgraphs?: readonly object[] | null | undefined;
   tree_digest?: string | null | undefined;
 }
 
 /** What a version, a run or a moment has inside, as it is sent. */
-export function insideOf({ subgraphs, tree_digest }: Tree): Inside {
+export function insideOf({ subgraphs, tree_digest }: Pinned): Inside {
   if (!subgraphs?.length || !tree_digest) return {};
   return { subgraphs, tree_digest };
 }

@@ -1,8 +1,8 @@
 /** Before a start: what is looked at, and who has said yes. */
 import { fetchJson } from "../http";
 import type { Preflight } from "../robots";
+import type { Inside } from "../runs";
 import type { RunnerApi } from "../schema/runner";
-import type { Inside } from "./inside";
 
 export type Approval = RunnerApi["Approval"];
 

@@ -1,11 +1,11 @@
 /** A run once more in the simulator: the graph that it ran or the newest one, doing what it did then. */
 
-import { type Inside, insideOf } from "../../api/documents/inside";
+import { insideOf } from "../../api/documents/inside";
 import { graphMoment } from "../../api/documents/texts";
 import { publish, type Version } from "../../api/graphs";
 import { fetchText } from "../../api/http";
 import { type InjectedFault, recordedScriptFor, recordedScriptOf, umrfUrl } from "../../api/review";
-import { getRun, type Run, startRun } from "../../api/runs";
+import { getRun, type Inside, type Run, startRun } from "../../api/runs";
 import { memberText } from "../../graph/json-members";
 
 export type RepeatedVersion = "same" | "newest";

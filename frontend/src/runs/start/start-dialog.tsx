@@ -180,8 +180,7 @@ export function StartDialog(props: Props) {
   const start = useStart(graph);
   const looks = look.data;
   const codes = [...new Set((looks ?? []).flatMap((each) => each.override))];
-  const seen = looks?.find((each) => each.digest !== "");
-  const digest = seen?.digest ?? "";
+  const { digest = "", tree_digest: tree } = looks?.find((each) => each.digest !== "") ?? {};
   const why =
     now.link === "down"
       ? "The runner does not answer"
@@ -200,8 +199,8 @@ export function StartDialog(props: Props) {
       onClose();
       onStarted?.(runs);
     };
-    const tree = seen === undefined ? {} : { tree: seen.tree_digest };
-    start.mutate({ seq, engines, digest, ...tree, behaviours, ...override }, { onSuccess: done });
+    const looked = { digest, ...(tree && { tree }) };
+    start.mutate({ seq, engines, ...looked, behaviours, ...override }, { onSuccess: done });
   };
   const where = engines.map((engine) => (engine === SIMULATOR ? "the simulator" : engine));
   return (
