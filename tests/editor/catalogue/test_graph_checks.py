@@ -17,14 +17,18 @@ from hypothesis import strategies as st
 from action_assistant.editor.app import open_services
 from action_assistant.editor.catalogue.graph_checks import GraphChecks
 from action_assistant.editor.catalogue.graph_reader import GraphReader
+from action_assistant.editor.catalogue.versions import VersionView
 from action_assistant.editor.history.drafts.drafts import NewDraft
 from action_assistant.editor.interchange import changes
 from action_assistant.editor.log.graph_events import graph_stream
 from action_assistant.editor.services import EditorServices
 from action_assistant.errors import NotFound
 from action_assistant.settings import EditorSettings
+from action_assistant.umrf.digest import digest, tree_digest
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
+from action_assistant.web.auth.keys import PersonRef
+from action_assistant.web.workers.lanes import Crashed
 from support.doses import examples
 
 NAMES = ["Alpha", "Beta", "Gamma", "Delta"]
@@ -178,6 +182,16 @@ async def test_there_is_a_bound_on_what_is_looked_at_inside(
         assert await codes(services, outer) == ["not-tried"]
 
 
+def pinned(version: VersionView) -> Any:
+    """What never changes of a version, proven by its own digests."""
+    inside = version.subgraphs or ()
+    for each in inside:
+        assert digest(codec.read(bytes(each.umrf)).graph) == each.digest
+    pairs = [(each.name, each.digest) for each in inside]
+    assert version.tree_digest == tree_digest(version.digest, pairs)
+    return pairs, version.digest, bytes(version.umrf or b"")
+
+
 class Steps:
     """Random edits, renames, deletions and recoveries of a few graphs."""
 
@@ -186,6 +200,7 @@ class Steps:
         self.random = Random(seed)
         self.graphs: list[str] = []
         self.deleted: list[str] = []
+        self.published: list[VersionView] = []
 
     def file(self) -> bytes:
         uses = self.random.sample([*NAMES, "Step"], self.random.randint(1, 3))
@@ -203,6 +218,7 @@ class Steps:
                     graph, "ada", name=random.choice(NAMES), description=None
                 ),
                 lambda: self.delete(graph),
+                lambda: self.publish(graph),
                 lambda: self.services.graph_checks.names.refresh(),
                 catalogue.all,
             ]
@@ -222,6 +238,10 @@ class Steps:
         self.deleted.append(graph)
         await self.services.catalogue.delete(graph, "ada")
 
+    async def publish(self, graph: str) -> None:
+        version, _ = await self.services.versions.publish(graph, PersonRef("ada", "Ada"))
+        self.published.append(version)
+
     async def recover(self) -> None:
         graph = self.deleted.pop()
         self.graphs.append(graph)
@@ -239,6 +259,8 @@ class Steps:
             assert msgspec.json.decode(mine) == msgspec.json.decode(await fresh.problems(sight))
             now = await self.services.graph_checks.summary(graph, sight.seq)
             assert now == await fresh.summary(graph, sight.seq)
+        for version in self.published:
+            assert pinned(await self.services.versions.get(version.id)) == pinned(version)
 
 
 async def raced(seed: int) -> None:
@@ -258,6 +280,36 @@ async def raced(seed: int) -> None:
 @given(st.integers(0, 10_000))
 def test_what_is_remembered_is_what_is_so_after_any_steps(seed: int) -> None:
     asyncio.run(raced(seed))
+
+
+async def test_a_name_that_cannot_be_read_now_is_read_the_next_time(tmp_path: Path) -> None:
+    async with editor(tmp_path) as services:
+        outer = await made(services, "Outer", "Inner")
+        inner = await made(services, "Inner", "Step", exits=False)
+        fresh = GraphChecks(services.journal, services.rooms, services.graph_reader)
+        ask, dies = services.graph_reader._run_in_worker, [inner]
+
+        async def asked(work: Callable[..., Any], /, *values: Any) -> Any:
+            if dies and getattr(values[0], "graph", "") == inner:
+                dies.pop()
+                raise Crashed("It has died.")
+            return await ask(work, *values)
+
+        services.graph_reader._run_in_worker = asked
+        sight = await services.graph_reader.now(outer)
+        found = [json.loads(await fresh.problems(sight)) for _ in range(2)]
+        assert [[each["code"] for each in problems] for problems in found] == [[], ["H8"]]
+
+
+async def test_who_leaves_takes_nothing_from_those_who_stay(tmp_path: Path) -> None:
+    async with editor(tmp_path) as services:
+        outer = await made(services, "Outer", "Inner")
+        await made(services, "Inner", "Step", exits=False)
+        names = services.graph_checks.names
+        leaving = asyncio.create_task(names.refresh())
+        await asyncio.sleep(0)
+        leaving.cancel()
+        assert await codes(services, outer) == ["H8"]
 
 
 def test_names_are_those_of_actions_that_are_there() -> None:

@@ -3,6 +3,7 @@
 See docs/decisions/070-one-truth-for-sub-graphs.md.
 """
 
+import asyncio
 from bisect import insort
 from collections import Counter
 from collections.abc import Awaitable, Callable, Collection
@@ -13,14 +14,17 @@ from anyio import CapacityLimiter, Lock, create_task_group
 from sqlalchemy import Row, func, select
 
 from action_assistant.editor.log.graph_events import DocumentKind
-from action_assistant.errors import Refused
+from action_assistant.errors import NotFound, Refused, TooLarge
 from action_assistant.journal.journal import Journal
 from action_assistant.schema import editor_tables
 from action_assistant.schema.editor_tables import editor_event, editor_head
-from action_assistant.web.workers.lanes import Crashed
+from action_assistant.web.auth.caller import Caller, asked_by
+from action_assistant.web.workers.lanes import GaveUp
 
 _AT_ONCE: Final = 4  # documents that are read
 _ROWS: Final = 400  # that one question names
+#: Who reads names: nobody's own work waits for that, nor the other way round.
+_OURSELVES: Final = Caller("graph names")
 
 #: The name of a document after a change of it, or of a later one.
 ReadName = Callable[[str, int, DocumentKind], Awaitable[str]]
@@ -48,6 +52,7 @@ class GraphNames:
         self._journal = journal
         self._read_name = read_name
         self._refreshing = Lock()
+        self._next: asyncio.Task[None] | None = None  # has not begun yet
         self._position: int | None = None
         self._seqs: dict[str, int] = {}
         self._documents: dict[str, _Document] = {}
@@ -69,8 +74,18 @@ class GraphNames:
         return len(self._graphs.get(name, ())) > 1
 
     async def refresh(self) -> None:
-        """Take in what was stored since the last time. Raises Unavailable."""
+        """Take in what has been stored by now. Raises Unavailable."""
+        if self._next is None:
+            self._next = asyncio.create_task(self._refresh(), name="graph names")
+            self._next.add_done_callback(_heard)
+        await asyncio.shield(self._next)  # others wait for it too
+
+    async def _refresh(self) -> None:
+        asked_by(
+            _OURSELVES
+        )  # it goes on when whoever came first has left, or has others work for them
         async with self._refreshing:
+            self._next = None  # who comes from here on may know of more
             position, seqs, abouts = await self._news()
             self._seqs |= seqs
             changed = await self._look_up(abouts)
@@ -124,12 +139,13 @@ class GraphNames:
         async with limit:
             document = self._documents[graph]
             self._again.discard(graph)
-            name = ""
             try:
                 name = await self._read_name(graph, self._seqs[graph], document.kind)
-            except Refused as error:
-                if isinstance(error, Crashed):  # it may have been in somebody's way
-                    self._again.add(graph)
+            except (GaveUp, TooLarge, NotFound):
+                name = ""
+            except Refused:  # not now
+                self._again.add(graph)
+                return
             self._call(graph, msgspec.structs.replace(document, name=name))
 
     def _call(self, graph: str, document: _Document | None) -> None:
@@ -149,6 +165,12 @@ class GraphNames:
             self._actions[document.name] += 1
         elif document.name:
             insort(self._graphs.setdefault(document.name, []), (document.made_at, graph))
+
+
+def _heard(task: "asyncio.Task[None]") -> None:
+    """Whoever waited may have left: nobody is told of a failure then."""
+    if not task.cancelled():
+        task.exception()
 
 
 def _as_document(row: Row[Any]) -> _Document:
