@@ -219,7 +219,7 @@ class GraphChecks:
             below: list[tuple[str, Iterable[str]]] = []
             for graph, names in level:
                 for name in names:
-                    if name == graph or name in found:
+                    if name == graph or name in found or not self.names.graph(name):
                         continue
                     about = await self._standing_for(name)
                     if about is None:

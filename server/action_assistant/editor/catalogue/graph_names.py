@@ -6,7 +6,8 @@ See docs/decisions/070-one-truth-for-sub-graphs.md.
 import asyncio
 from bisect import insort
 from collections import Counter
-from collections.abc import Awaitable, Callable, Collection
+from collections.abc import AsyncIterator, Awaitable, Callable, Collection
+from contextlib import asynccontextmanager
 from typing import Any, Final
 
 import msgspec
@@ -53,6 +54,7 @@ class GraphNames:
         self._read_name = read_name
         self._refreshing = Lock()
         self._next: asyncio.Task[None] | None = None  # has not begun yet
+        self._tasks: set[asyncio.Task[None]] = set()
         self._position: int | None = None
         self._seqs: dict[str, int] = {}
         self._documents: dict[str, _Document] = {}
@@ -75,10 +77,30 @@ class GraphNames:
 
     async def refresh(self) -> None:
         """Take in what has been stored by now. Raises Unavailable."""
+        await asyncio.shield(self._begun())  # others wait for it too
+
+    @asynccontextmanager
+    async def read_ahead(self) -> AsyncIterator[None]:
+        """While you are inside, names are being read already, so that who asks first seldom waits."""
+        self._begun()
+        try:
+            yield
+        finally:
+            for task in self._tasks:
+                task.cancel()
+
+    def _begun(self) -> "asyncio.Task[None]":
         if self._next is None:
             self._next = asyncio.create_task(self._refresh(), name="graph names")
-            self._next.add_done_callback(_heard)
-        await asyncio.shield(self._next)  # others wait for it too
+            self._tasks.add(self._next)
+            self._next.add_done_callback(self._ended)
+        return self._next
+
+    def _ended(self, task: "asyncio.Task[None]") -> None:
+        """Whoever waited may have left: nobody is told of a failure then."""
+        self._tasks.discard(task)
+        if not task.cancelled():
+            task.exception()
 
     async def _refresh(self) -> None:
         asked_by(
@@ -165,12 +187,6 @@ class GraphNames:
             self._actions[document.name] += 1
         elif document.name:
             insort(self._graphs.setdefault(document.name, []), (document.made_at, graph))
-
-
-def _heard(task: "asyncio.Task[None]") -> None:
-    """Whoever waited may have left: nobody is told of a failure then."""
-    if not task.cancelled():
-        task.exception()
 
 
 def _as_document(row: Row[Any]) -> _Document:
