@@ -14,6 +14,7 @@ from pycrdt import Doc, Map
 from sqlalchemy import text
 from table import Table, seconds
 
+from action_assistant.editor.catalogue.graph_checks import GraphChecks
 from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.catalogue.people import People
 from action_assistant.editor.catalogue.versions import Versions
@@ -64,8 +65,14 @@ async def _asked(
     people, rooms = await People.known(journal), Rooms(journal)
     index = ChangeIndex(journal, workers.graphs)
     reader = GraphReader(journal, rooms, workers.graphs)
-    history = GraphHistory(journal, people, Versions(journal, reader), index, workers.graphs)
-    blame, search = Blame(index, people), CourseSearch(index, people, workers.graphs)
+    checks = GraphChecks(journal, rooms, reader)
+    history = GraphHistory(
+        journal, people, Versions(journal, reader, checks), index, workers.graphs
+    )
+    blame, search = (
+        Blame(index, people),
+        CourseSearch(index, people, reader, checks, workers.graphs),
+    )
 
     async def moment() -> None:
         found = await index.at(GRAPH, dice.randrange(1, changes))

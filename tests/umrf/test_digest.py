@@ -1,9 +1,12 @@
 """What the digest tells apart, and what it does not."""
 
+from random import Random
+
 import msgspec
 from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from action_assistant.umrf.digest import digest
+from action_assistant.umrf.digest import digest, tree_digest
 from action_assistant.umrf.files.codec import Stamp, read, write
 from action_assistant.umrf.model import Graph
 from strategies import graphs
@@ -61,3 +64,21 @@ def test_the_digest_is_lower_case_hexadecimal_sha_256() -> None:
     text = of('{"graph_name":"g","graph_entry":[],"graph_exit":[],"actions":[]}')
     # SHA-256 of {"actions":[],"graph_entry":[],"graph_exit":[],"graph_name":"g"}
     assert text == "9764f09cef28213f7343b9d7578be426c4878ee7e2201f73b2c3b8d402efe6a3"
+
+
+@given(
+    st.dictionaries(st.text("ab", min_size=1, max_size=3), st.text("01", min_size=2, max_size=2)),
+    st.randoms(use_true_random=False),
+)
+def test_a_tree_has_one_digest_in_any_order_and_another_for_anything_else(
+    inside: dict[str, str], random: Random
+) -> None:
+    pairs = list(inside.items())
+    mixed = random.sample(pairs, len(pairs))
+    whole = tree_digest("00", pairs)
+    assert tree_digest("00", mixed) == whole
+    assert (whole == "00") == (not inside)
+    assert tree_digest("11", pairs) != whole
+    for name in inside:
+        assert tree_digest("00", (inside | {name: "other"}).items()) != whole
+        assert tree_digest("00", [pair for pair in pairs if pair[0] != name]) != whole

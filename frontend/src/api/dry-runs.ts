@@ -25,7 +25,7 @@ export function useDryRunResult(graph: string, wanted: DryRunRequest | null) {
       }),
     enabled: wanted !== null && wanted.seq > 0,
     placeholderData: keepPreviousData,
-    staleTime: Number.POSITIVE_INFINITY,
+    staleTime: 5_000, // graphs inside of it may have changed
     gcTime: 60_000,
   });
 }

@@ -83,6 +83,7 @@ export function useProblems(graph: string, seq: number) {
     enabled: seq > 0,
     placeholderData: (before) => before,
     staleTime: Number.POSITIVE_INFINITY,
+    refetchInterval: 8_000, // graphs inside of it may change
   });
 }
 

@@ -64,6 +64,12 @@ export function confirmRest(runner: string, run: string, how: string): Promise<R
   return fetchJson(`${runner}${path}`, { method: "POST", body: { how } });
 }
 
+/** The graphs inside, by value. Nothing where there are none: then nobody needs to know of them. */
+export interface Inside {
+  subgraphs?: readonly object[];
+  tree_digest?: string;
+}
+
 export interface StartOrder {
   runner: string;
   version: string;
@@ -79,6 +85,7 @@ export interface StartOrder {
   /** Whether actions do what their Python behaviours say; only in the simulator. */
   behaviours?: boolean;
   override?: RunnerApi["Override"];
+  inside?: Inside;
 }
 
 /** `failed`: robots that nothing was sent to, and why. */
@@ -98,6 +105,7 @@ export async function startRun(order: StartOrder): Promise<Started> {
     ...(order.script === undefined ? {} : { script: order.script }),
     ...(order.behaviours === true ? { behaviours: true } : {}),
     umrf: order.umrf,
+    ...order.inside,
   };
   if (!alone) return fetchJson(`${order.runner}/api/groups`, { method: "POST", body });
   const run = await fetchJson<RunnerApi["RunShown"]>(`${order.runner}/api/runs`, {

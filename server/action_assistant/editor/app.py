@@ -61,7 +61,11 @@ async def open_services(
             people = await People.known(journal)
             services = EditorServices(settings, journal, people, epoch, revoked, workers)
             try:
-                async with services.invitations.opened(), services.change_index.kept_up():
+                async with (
+                    services.invitations.opened(),
+                    services.change_index.kept_up(),
+                    services.graph_checks.names.read_ahead(),
+                ):
                     if new:
                         await _greet(services, paths.examples())
                     yield services

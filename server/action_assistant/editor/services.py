@@ -1,6 +1,7 @@
 """The services of the editor process, and the state that its routes are given."""
 
 from action_assistant.editor.catalogue.catalogue import Catalogue
+from action_assistant.editor.catalogue.graph_checks import GraphChecks
 from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.catalogue.invitations import Invitations
 from action_assistant.editor.catalogue.library import Library
@@ -48,8 +49,11 @@ class EditorServices:
         self.connection_limits = ConnectionLimits(limits=settings.limits)
         self.rate_limits = ByteRateLimits(limits=settings.limits)
         self.graph_reader = GraphReader(journal, self.rooms, workers.graphs)
-        self.catalogue = Catalogue(journal, self.rooms, self.graph_reader, workers.files)
-        self.versions = Versions(journal, self.graph_reader)
+        self.graph_checks = GraphChecks(journal, self.rooms, self.graph_reader)
+        self.catalogue = Catalogue(
+            journal, self.rooms, self.graph_reader, self.graph_checks, workers.files
+        )
+        self.versions = Versions(journal, self.graph_reader, self.graph_checks)
         self.library = Library(journal, self.graph_reader)
         self.library_edits = LibraryEdits(
             journal, self.rooms, self.graph_reader, self.catalogue, self.library, workers.files
@@ -67,7 +71,9 @@ class EditorServices:
         self.going_back = GoingBack(
             journal, self.rooms, self.graph_reader, self.change_index, workers.graphs
         )
-        self.course_search = CourseSearch(self.change_index, people, workers.graphs)
+        self.course_search = CourseSearch(
+            self.change_index, people, self.graph_reader, self.graph_checks, workers.graphs
+        )
         self.grafts = Grafts(journal, self.change_index, people)
         self.blame = Blame(self.change_index, people, self.grafts)
         self.drafts = Drafts(
@@ -80,6 +86,7 @@ class EditorServices:
             self.change_index,
             self.grafts,
             people,
+            self.graph_checks,
             workers.graphs,
         )
 

@@ -102,6 +102,7 @@ def _run(asked: Requested) -> Executable:
         graph_name=asked.graph_name,
         version=asked.version,
         digest=asked.digest,
+        tree_digest=asked.tree_digest,
         engine=asked.engine,
         author_id=asked.author.id,
         author_name=asked.author.name,

@@ -45,6 +45,7 @@ version: Final = Table(
     Column("stream", Text, nullable=False),
     Column("event_seq", BigInteger, nullable=False),
     Column("note", Text, nullable=False, server_default=""),
+    Column("tree_digest", Text),
     Index(None, "graph", "at"),
     Index(None, "digest"),
 )

@@ -51,6 +51,7 @@ run: Final = Table(
     Column("summary", JSON, nullable=False),
     Column("archived_at", BigInteger),
     Column("archived_as", Text),
+    Column("tree_digest", Text),
     Index(None, "graph", "number"),
     Index(None, "graph_name", "number"),
     Index(None, "engine", "number"),

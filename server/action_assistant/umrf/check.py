@@ -9,7 +9,7 @@ from action_assistant.umrf.checks.flow import check_flow
 from action_assistant.umrf.checks.places import Subject
 from action_assistant.umrf.checks.scenarios import check_scenarios
 from action_assistant.umrf.checks.structure import check_structure
-from action_assistant.umrf.checks.subgraphs import check_subgraphs
+from action_assistant.umrf.checks.subgraphs import CERTAIN, Resolution, check_subgraphs
 from action_assistant.umrf.checks.values import check_static, check_values
 from action_assistant.umrf.codes import REFUSED, STRUCTURAL, rank
 from action_assistant.umrf.facts import PINNED, EngineFacts
@@ -35,17 +35,19 @@ def check(
     library: Mapping[str, Signature] | None = None,
     facts: EngineFacts = PINNED,
     graphs: Mapping[str, Graph] | None = None,
+    resolution: Resolution = CERTAIN,
 ) -> list[Problem]:
     """Every problem of a graph, errors first, then what is worst. Never raises.
 
     `library`: the actions that the engine has, by name; `graphs`: the graphs that it has indexed and
-    so can run as sub-graphs. What is None is not known, and nothing is said of it.
+    so can run as sub-graphs, found by this `resolution`. What is None is not known, and nothing is said
+    of it.
     """
     subject = Subject(graph, facts)
     check_structure(subject)
     check_flow(subject)
     check_values(subject, library, graphs or {})
-    check_subgraphs(subject, graphs or {}, library or {})
+    check_subgraphs(subject, graphs or {}, library or {}, resolution)
     _check_actors(subject)
     check_scenarios(subject)
     return sorted(subject.problems, key=rank)
@@ -64,9 +66,14 @@ def check_reading(
     return sorted(problems, key=rank)
 
 
-def check_written(graph: Graph) -> list[Problem]:
-    """Every problem of a graph, with its place in the graph's canonical text."""
-    found = check(graph)
+def check_written(
+    graph: Graph,
+    graphs: Mapping[str, Graph] | None = None,
+    resolution: Resolution = CERTAIN,
+) -> list[Problem]:
+    """Every problem of a graph, with its place in the graph's canonical text. `graphs`, `resolution`: as
+    in `check`."""
+    found = check(graph, graphs=graphs, resolution=resolution)
     return placed(found, write(graph)) if found else []
 
 

@@ -132,6 +132,10 @@ CODES: Final[dict[str, Code]] = {
         "hazard", _ERROR, "one sub-graph used twice, beside itself or beside one that contains it",
         "the engine cannot resolve the graph",
     ),
+    "subgraph-ambiguous": Code(
+        "other", _WARNING, "a sub-graph with the name of several graphs",
+        "the oldest of them is taken",
+    ),
     "actors": Code(
         "hazard", _ERROR, "several actors, and an engine that cannot synchronise",
         "the engine refuses to start the graph",

@@ -1,6 +1,7 @@
 """The digest of a graph: what it means, whatever its layout, spelling of numbers and run state."""
 
 import hashlib
+from collections.abc import Iterable
 from typing import Any
 
 import rfc8785
@@ -19,6 +20,16 @@ def digest(graph: Graph) -> str:
         if isinstance(action, dict):
             action.pop("gui_attributes", None)
     return hashlib.sha256(rfc8785.dumps(_plain(tree))).hexdigest()
+
+
+def tree_digest(own: str, subgraphs: Iterable[tuple[str, str]]) -> str:
+    """Of a graph with this digest together with its sub-graphs, by name and digest, in any order: SHA-256
+    of `[own, [[name, digest], …]]` (RFC 8785) by name. Without sub-graphs it is the graph's own digest."""
+    parts = sorted(subgraphs)
+    if not parts:
+        return own
+    text = rfc8785.dumps([own, [[name, each] for name, each in parts]])
+    return hashlib.sha256(text).hexdigest()
 
 
 def _plain(value: Json) -> Any:

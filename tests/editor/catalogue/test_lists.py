@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from action_assistant.editor.app import open_services
+from action_assistant.editor.catalogue.graph_checks import GraphChecks
 from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.documents.contents import labels_of
@@ -69,7 +70,8 @@ async def test_a_graph_that_did_not_change_is_not_checked_again(tmp_path: Path) 
     async with open_services(settings) as services:
         made, _ = await services.catalogue.bring(json.dumps(NAV).encode(), "ada")
         reader = GraphReader(services.journal, services.rooms, counting)
-        summaries = [await reader.summary(made.id, made.seq) for _ in range(3)]
+        checks = GraphChecks(services.journal, services.rooms, reader)
+        summaries = [await checks.summary(made.id, made.seq) for _ in range(3)]
     assert asked.count("info") == 1
     assert {summary.told for summary in summaries} == {ToldCounts(made.wrong, made.to_fill_in)}
 

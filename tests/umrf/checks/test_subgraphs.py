@@ -8,6 +8,7 @@ import msgspec
 import pytest
 
 from action_assistant.umrf.check import blocking, check, check_reading
+from action_assistant.umrf.checks.subgraphs import Resolution
 from action_assistant.umrf.files.codec import read
 from action_assistant.umrf.model import Graph, Signature
 from action_assistant.umrf.semantics import Engine, GraphRefused
@@ -178,3 +179,19 @@ def test_of_the_recorded_sub_graphs_the_one_that_halted_is_found() -> None:
         if name != "sub_halt":
             assert blocking(problems) == [], name
     assert halting["sub_halt"]
+
+
+def test_a_name_of_several_graphs_is_told_at_each_action_that_uses_it() -> None:
+    outer = graph("outer", action("Inner"), action("Other"))
+    graphs = {"Inner": graph("Inner", action("A")), "Other": graph("Other", action("A"))}
+    resolution = Resolution(several=frozenset({"Inner"}))
+    (problem,) = check(outer, graphs=graphs, resolution=resolution)
+    assert (problem.code, problem.severity) == ("subgraph-ambiguous", "warning")
+    assert problem.where.path == "/actions/0/name"
+
+
+def test_more_graphs_inside_than_are_looked_at_are_told() -> None:
+    outer = graph("outer", action("Inner"))
+    inner = {"Inner": graph("Inner", action("A"))}
+    found = check(outer, graphs=inner, resolution=Resolution(cut=True))
+    assert [(each.code, each.severity) for each in found] == [("not-tried", "warning")]

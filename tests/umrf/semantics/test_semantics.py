@@ -127,6 +127,23 @@ def test_in_a_sub_graph_whose_pause_hangs_the_last_action_never_ends() -> None:
     assert states(traces, "B") == ["RUNNING", "PAUSE_REQUESTED"]
 
 
+def test_what_hangs_deep_inside_of_a_pause_is_shown_running_at_each_level() -> None:
+    inner = msgspec.structs.replace(graph_of("entry>X", "X>Y", "Y>exit"), name="C")
+    middle = msgspec.structs.replace(graph_of("entry>C", "C>exit"), name="B")
+    traces = list(
+        simulate(
+            graph_of("entry>B", "B>exit"),
+            library={"B": middle, "C": inner},
+            commands=[(500, "pause", None)],
+        )
+    )
+    assert states(traces, "X")[-1] == "FINISHED"
+    assert states(traces, "Y") == ["INITIALIZED", "RUNNING"]
+    assert states(traces, "C") == ["RUNNING"]
+    assert states(traces, "B") == ["RUNNING", "PAUSE_REQUESTED"]
+    assert results(traces) == ["on_true"]  # of the innermost graph alone
+
+
 def test_scripts_reach_into_sub_graphs_and_the_closest_key_wins() -> None:
     inner = msgspec.structs.replace(graph_of("entry>X", "X>exit"), name="B")
     calls = script_from(

@@ -3,7 +3,9 @@ import { keepPreviousData, type QueryClient, useQuery } from "@tanstack/react-qu
 import type { Script } from "../dry-runs";
 import { fetchJson, fetchText } from "../http";
 import { useLive } from "../live/use-live";
+import type { Inside } from "../runs";
 import type { RunnerApi } from "../schema/runner";
+import { fetchInside } from "./inside";
 
 export type CheckedCourses = RunnerApi["CheckedCourses"];
 export type CheckedCourse = RunnerApi["CheckedCourse"];
@@ -26,9 +28,11 @@ function checkCourses(
   graph: string,
   umrf: string,
   signal: AbortSignal,
+  inside: Inside = {},
 ): Promise<CheckedCourses> {
   const url = `${runner}/api/expectations/check`;
-  return fetchJson(url, { method: "POST", body: { graph, umrf }, signal, timeoutMs: LONG });
+  const body = { graph, umrf, ...(inside.subgraphs && { subgraphs: inside.subgraphs }) };
+  return fetchJson(url, { method: "POST", body, signal, timeoutMs: LONG });
 }
 
 /** The same for a text that is no moment of the graph yet; `of` tells it from others. */
@@ -50,7 +54,8 @@ export function useCheckedCourses(graph: string, seq: number) {
     queryKey: [COURSES, graph, seq],
     queryFn: async ({ signal }) => {
       const umrf = await identifiedText(graph, seq, signal);
-      return checkCourses(runner ?? "", graph, umrf, signal);
+      const inside = await fetchInside(graph, seq, signal);
+      return checkCourses(runner ?? "", graph, umrf, signal, inside);
     },
     enabled: runner !== undefined && seq > 0,
     placeholderData: keepPreviousData,
@@ -70,7 +75,8 @@ export async function proposeCourse(
   arrow: OutcomeArrow,
 ): Promise<ArrowProposal> {
   const umrf = await identifiedText(graph, seq);
-  const body = { umrf, arrow };
+  const { subgraphs } = await fetchInside(graph, seq);
+  const body = { umrf, arrow, ...(subgraphs && { subgraphs }) };
   const url = `${runner}/api/expectations/proposal`;
   return fetchJson(url, { method: "POST", body, timeoutMs: LONG });
 }
@@ -83,7 +89,8 @@ export async function expectDryRun(
 ): Promise<void> {
   const { graph, seq, script } = of;
   const umrf = await identifiedText(graph, seq);
-  const body = { name, graph, umrf, script };
+  const { subgraphs } = await fetchInside(graph, seq);
+  const body = { name, graph, umrf, script, ...(subgraphs && { subgraphs }) };
   await fetchJson(`${runner}/api/expectations`, { method: "POST", body, timeoutMs: LONG });
 }
 

@@ -1,6 +1,7 @@
 /** Before a start: what is looked at, and who has said yes. */
 import { fetchJson } from "../http";
 import type { Preflight } from "../robots";
+import type { Inside } from "../runs";
 import type { RunnerApi } from "../schema/runner";
 
 export type Approval = RunnerApi["Approval"];
@@ -21,11 +22,11 @@ export function approve(runner: string, body: RunnerApi["ApprovalRequest"]): Pro
 /** What stands between a graph and its start, engine by engine. Sends nothing but a get. */
 export function runPreflight(
   runner: string,
-  { graph, umrf }: { graph: string; umrf: string },
+  what: { graph: string; umrf: string } & Inside,
   engines: readonly string[],
   behaviours: boolean,
   signal: AbortSignal,
 ): Promise<Preflight[]> {
-  const body = { engines, ...(behaviours ? { behaviours } : {}), graph, umrf };
+  const body = { engines, ...(behaviours ? { behaviours } : {}), ...what };
   return fetchJson(`${runner}/api/preflight`, { method: "POST", body, signal });
 }

@@ -565,6 +565,33 @@ export interface EditorApi {
         remarks: EditorApi["Note"][];
     };
     /**
+     * InsideGraph
+     * @description A graph inside of another, as it is now. `name`: of the actions that stand for it; `graph`: its id.
+     */
+    InsideGraph: {
+        name: string;
+        digest: string;
+        /** @description A UMRF graph. */
+        umrf: {
+            [key: string]: unknown;
+        };
+        graph: string;
+    };
+    /**
+     * InsideView
+     * @description All graphs inside of a graph after its change `seq`, as they are now, by name; and what a version of
+     *     that would have as its digests. `several`: names of more than one graph, of which the oldest is taken;
+     *     `cut`: there are more than these.
+     */
+    InsideView: {
+        seq: number;
+        digest: string;
+        tree_digest: string;
+        subgraphs: EditorApi["InsideGraph"][];
+        several: string[];
+        cut: boolean;
+    };
+    /**
      * Invitation
      * @description A link as its maker sees it. `path` follows the origin of the page; it holds the secret, and
      *     is left out once the link is revoked. `unrecorded`: that it is revoked is not in the log yet.
@@ -952,6 +979,23 @@ export interface EditorApi {
         remarks: EditorApi["Note"][];
     };
     /**
+     * PinnedGraph
+     * @description A graph inside of a version: as it was when that was published. `name`: of the actions that stand for
+     *     it; `version`: of it, the newest with that content, null where there was none; `graph`: its id.
+     *     `current_digest`: of the graph that the name stands for now, null where there is none.
+     */
+    PinnedGraph: {
+        name: string;
+        version: string | null;
+        digest: string;
+        /** @description A UMRF graph. */
+        umrf: {
+            [key: string]: unknown;
+        };
+        graph: string;
+        current_digest: string | null;
+    };
+    /**
      * Preview
      * @description What a file would become. `problems`: those of the file, then those of the graph. `remarks`
      *     are the notes with their places; all places are in the file as it was sent.
@@ -1247,7 +1291,9 @@ export interface EditorApi {
     };
     /**
      * VersionView
-     * @description A version. `umrf` is the graph as text to be kept as it is; lists leave it out.
+     * @description A version. `umrf` is the graph as text to be kept as it is, `subgraphs` are all graphs inside of it,
+     *     by name; lists leave both out. `tree_digest`: of the graph together with them, null where that was
+     *     not kept yet.
      */
     VersionView: {
         id: string;
@@ -1258,11 +1304,13 @@ export interface EditorApi {
         author: EditorApi["PersonRef"];
         /** Format: date-time */
         at: string;
+        tree_digest: string | null;
         umrf?: {
             [key: string]: unknown;
         };
         /** @default  */
         note?: string;
+        subgraphs?: EditorApi["PinnedGraph"][];
     };
     /**
      * WantedMerge

@@ -264,7 +264,8 @@ export interface RunnerApi {
     };
     /**
      * CheckRequest
-     * @description Which expected courses, those of `graph`, and the graph as it is now.
+     * @description Which expected courses, those of `graph`, and the graph as it is now with the graphs inside; where
+     *     none are sent along, those of the expectation count.
      */
     CheckRequest: {
         /** @description The UMRF graph itself, as approved, or a string that holds its JSON text */
@@ -272,6 +273,8 @@ export interface RunnerApi {
             [key: string]: unknown;
         } | string;
         graph: string;
+        /** @default [] */
+        subgraphs?: RunnerApi["SentSubgraph"][];
     };
     /**
      * CheckedCourse
@@ -345,7 +348,7 @@ export interface RunnerApi {
     /**
      * Expect
      * @description What shall be expected from now on, under a name: the course of a `run`, or that of a graph in
-     *     a dry-run, in which actions do what the script says.
+     *     a dry-run, in which actions do what the script says. `subgraphs`: the graphs inside of that one.
      */
     Expect: {
         name: string;
@@ -358,6 +361,8 @@ export interface RunnerApi {
             [key: string]: unknown;
         } | string;
         script?: RunnerApi["Script"];
+        /** @default [] */
+        subgraphs?: RunnerApi["SentSubgraph"][];
     };
     /**
      * Expectation
@@ -437,6 +442,10 @@ export interface RunnerApi {
         like?: string | null;
         /** @default false */
         behaviours?: boolean;
+        /** @default [] */
+        subgraphs?: RunnerApi["SentSubgraph"][];
+        /** @default null */
+        tree_digest?: string | null;
     };
     /**
      * GroupShown
@@ -671,12 +680,13 @@ export interface RunnerApi {
     /**
      * Preflight
      * @description What stands between a graph and its start on one engine. `override`: the codes that a person
-     *     would have to answer for; `never`: something cannot be overridden; `digest`: of the graph that
-     *     was looked at.
+     *     would have to answer for; `never`: something cannot be overridden; `digest`: of the graph that was
+     *     looked at, `tree_digest`: of it together with the graphs inside.
      */
     Preflight: {
         engine: string;
         digest: string;
+        tree_digest: string;
         items: RunnerApi["Item"][];
         override: string[];
         never: boolean;
@@ -722,6 +732,8 @@ export interface RunnerApi {
             [key: string]: unknown;
         } | string;
         arrow: RunnerApi["OutcomeArrow"];
+        /** @default [] */
+        subgraphs?: RunnerApi["SentSubgraph"][];
     };
     /**
      * RawHour
@@ -1097,7 +1109,8 @@ export interface RunnerApi {
     /**
      * RunWhole
      * @description A run with the graph as it was sent. `sent`: the values of its actions, by full name and flat
-     *     name, written as in `inputs` of visits.
+     *     name, written as in `inputs` of visits. `subgraphs`: all graphs inside of it, as they were sent along;
+     *     `tree_digest`: of it together with them, null where whoever started it did not tell.
      */
     RunWhole: {
         id: string;
@@ -1147,6 +1160,8 @@ export interface RunnerApi {
         };
         despite: RunnerApi["Overridden"][];
         archived: RunnerApi["ArchivedShown"] | null;
+        subgraphs: RunnerApi["SubgraphShown"][];
+        tree_digest: string | null;
     };
     RunnerMessage: RunnerApi["Hello"] | RunnerApi["RunMessage"] | RunnerApi["EnginesMessage"] | RunnerApi["Beat"] | RunnerApi["Stopping"] | RunnerApi["RefusedMessage"];
     /**
@@ -1158,6 +1173,24 @@ export interface RunnerApi {
         behaviours?: {
             [key: string]: RunnerApi["Behaviour"][];
         };
+    };
+    /**
+     * SentSubgraph
+     * @description A graph inside of the one that is sent, by the name of the actions that stand for it. `version`
+     *     and `graph`: where it comes from.
+     */
+    SentSubgraph: {
+        name: string;
+        /** @default  */
+        digest?: string;
+        /** @description The UMRF graph itself, as approved, or a string that holds its JSON text */
+        umrf: {
+            [key: string]: unknown;
+        } | string;
+        /** @default null */
+        version?: string | null;
+        /** @default null */
+        graph?: string | null;
     };
     /**
      * ServerProof
@@ -1184,7 +1217,8 @@ export interface RunnerApi {
      *
      *     `digest` is what the person saw; `request_id` is made by the asker, once per intended start.
      *     `like`: the robot whose engine the simulator plays, with its hazards. `behaviours`: actions that
-     *     have a Python behaviour on the runner do what it does, before what the script says.
+     *     have a Python behaviour on the runner do what it does, before what the script says. `subgraphs`: all
+     *     graphs inside, by value, as the version has them; `tree_digest`: of the graph together with them.
      */
     StartRequest: {
         version: string;
@@ -1204,6 +1238,10 @@ export interface RunnerApi {
         like?: string | null;
         /** @default false */
         behaviours?: boolean;
+        /** @default [] */
+        subgraphs?: RunnerApi["SentSubgraph"][];
+        /** @default null */
+        tree_digest?: string | null;
     };
     /**
      * StartShown
@@ -1258,6 +1296,21 @@ export interface RunnerApi {
         type: "stopping";
         stop_id: string;
         runs: string[];
+    };
+    /**
+     * SubgraphShown
+     * @description A graph inside of the one that was started, as it was sent along, by the name of the actions that
+     *     stand for it. `graph`: its id; `version`: of it, where there was one.
+     */
+    SubgraphShown: {
+        name: string;
+        version: string | null;
+        digest: string;
+        /** @description A UMRF graph. */
+        umrf: {
+            [key: string]: unknown;
+        };
+        graph: string | null;
     };
     /**
      * Sweep

@@ -1,9 +1,11 @@
 /** A run once more in the simulator: the graph that it ran or the newest one, doing what it did then. */
+
+import { insideOf } from "../../api/documents/inside";
 import { graphMoment } from "../../api/documents/texts";
 import { publish, type Version } from "../../api/graphs";
 import { fetchText } from "../../api/http";
 import { type InjectedFault, recordedScriptFor, recordedScriptOf, umrfUrl } from "../../api/review";
-import { type Run, startRun } from "../../api/runs";
+import { getRun, type Inside, type Run, startRun } from "../../api/runs";
 import { memberText } from "../../graph/json-members";
 
 export type RepeatedVersion = "same" | "newest";
@@ -23,6 +25,7 @@ interface SentGraph {
   version: string;
   digest: string;
   umrf: string;
+  inside: Inside;
 }
 
 /** The graph as it is now, published as exactly that. */
@@ -32,7 +35,7 @@ async function newestOf(graph: string): Promise<SentGraph> {
   const version = JSON.parse(text) as Version;
   const umrf = memberText(text, "umrf");
   if (umrf === null) throw new Error("The editor gave no graph with the version.");
-  return { version: version.id, digest: version.digest, umrf };
+  return { version: version.id, digest: version.digest, umrf, inside: insideOf(version) };
 }
 
 /** Starts it; whatever was not seen is chosen, and told. */
@@ -49,6 +52,7 @@ export async function repeatRun(
           version: run.version ?? "",
           digest: run.digest,
           umrf: await fetchText(umrfUrl(runner, run.id)),
+          inside: insideOf(run.subgraphs === undefined ? await getRun(runner, run.id) : run),
         };
   const script =
     which === "newest"

@@ -38,7 +38,7 @@ export function SecondPerson({ graph, label, looks }: Props) {
   const { person } = usePerson();
   const may = useMay("operate");
   const client = useQueryClient();
-  const digest = demands(looks)?.digest ?? "";
+  const digest = demands(looks)?.tree_digest ?? "";
   const key = ["approvals", digest];
   const given = useQuery({
     queryKey: key,

@@ -5,6 +5,7 @@ import { useQuery } from "@tanstack/react-query";
 import { useState } from "react";
 import { Link } from "wouter";
 import { identifiedText } from "../../api/documents/courses";
+import { fetchInside } from "../../api/documents/inside";
 import { runPreflight } from "../../api/documents/starts";
 import { errorText } from "../../api/http";
 import { useLive } from "../../api/live/use-live";
@@ -43,8 +44,11 @@ function useLook(graph: string, seq: number, engines: readonly string[], behavio
   });
   const look = useQuery({
     queryKey: ["preflight", graph, seq, behaviours, ...engines],
-    queryFn: ({ signal }) =>
-      runPreflight(runner ?? "", { graph, umrf: umrf.data ?? "" }, engines, behaviours, signal),
+    queryFn: async ({ signal }) => {
+      const inside = await fetchInside(graph, seq, signal);
+      const what = { graph, umrf: umrf.data ?? "", ...inside };
+      return runPreflight(runner ?? "", what, engines, behaviours, signal);
+    },
     enabled: umrf.data !== undefined && runner !== undefined && engines.length > 0,
     refetchInterval: LOOK_AGAIN,
     gcTime: 0,
@@ -176,7 +180,7 @@ export function StartDialog(props: Props) {
   const start = useStart(graph);
   const looks = look.data;
   const codes = [...new Set((looks ?? []).flatMap((each) => each.override))];
-  const digest = looks?.find((each) => each.digest !== "")?.digest ?? "";
+  const { digest = "", tree_digest: tree } = looks?.find((each) => each.digest !== "") ?? {};
   const why =
     now.link === "down"
       ? "The runner does not answer"
@@ -195,7 +199,8 @@ export function StartDialog(props: Props) {
       onClose();
       onStarted?.(runs);
     };
-    start.mutate({ seq, engines, digest, behaviours, ...override }, { onSuccess: done });
+    const looked = { digest, ...(tree && { tree }) };
+    start.mutate({ seq, engines, ...looked, behaviours, ...override }, { onSuccess: done });
   };
   const where = engines.map((engine) => (engine === SIMULATOR ? "the simulator" : engine));
   return (

@@ -1,6 +1,7 @@
 /** A start: publishes what is on screen and sends exactly that to the runner, once. */
 import { notifications } from "@mantine/notifications";
 import { useMutation, useQueryClient } from "@tanstack/react-query";
+import { insideOf } from "../../api/documents/inside";
 import type { Script } from "../../api/dry-runs";
 import { publish, queryKeys, type Version, versionName } from "../../api/graphs";
 import { errorPlace, errorText, isOutcomeUnknown } from "../../api/http";
@@ -16,6 +17,8 @@ export interface StartInput {
   engines: readonly string[];
   /** Of the graph that was looked at; null when nobody looked. */
   digest: string | null;
+  /** The same with the graphs inside of it; left out when nobody looked. */
+  tree?: string;
   /** What actions do in the simulator. */
   script?: Script;
   /** Whether they do what their Python behaviours say, there too. */
@@ -48,11 +51,14 @@ export function useStart(graph: string) {
   const { live, runner } = useLive();
   const client = useQueryClient();
   return useMutation({
-    mutationFn: async ({ seq, engines, digest, script, behaviours, override }: StartInput) => {
+    mutationFn: async (wanted: StartInput) => {
+      const { seq, engines, digest, tree, script, behaviours, override } = wanted;
       if (runner === undefined) throw new Error("The runner is not known yet.");
       const { version, umrf } = await publishedVersion(graph, await seq);
       void client.invalidateQueries({ queryKey: queryKeys.versions(graph) });
-      if (digest !== null && digest !== version.digest) {
+      const same =
+        digest === version.digest && (tree ?? version.tree_digest) === version.tree_digest;
+      if (digest !== null && !same) {
         throw new Error("The graph is not the one that was looked at. Nothing was sent.");
       }
       const versions = client.getQueryData<Version[]>(queryKeys.versions(graph)) ?? [];
@@ -62,6 +68,7 @@ export function useStart(graph: string) {
         version: version.id,
         digest: version.digest,
         umrf,
+        inside: insideOf(version),
         graph,
         engines,
         request: newAid(),

@@ -50,7 +50,9 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         services = app_state.services
         await services.catalogue.require(graph_id)
         sight = await services.graph_reader.moment(graph_id, data.seq)
-        played: Rehearsal = encoded(await services.workers.files(rehearsed, sight, data))
+        inside = await services.graph_checks.inside(sight)
+        found = await services.workers.files(rehearsed, sight, data, inside)
+        played: Rehearsal = encoded(found)
         return played
 
     return [read_pieces, rehearse]

@@ -9,12 +9,13 @@ from litestar.types import ControllerRouterHandler
 
 from action_assistant.editor.catalogue.catalogue import GraphView
 from action_assistant.editor.documents import contents
+from action_assistant.editor.documents.contents import GraphAtSeq, Inside
 from action_assistant.editor.interchange import importing
 from action_assistant.editor.interchange.edited_text import TextEdit, edited_text
 from action_assistant.editor.interchange.importing import ImportReport, Preview
 from action_assistant.editor.interchange.text_merging import merging
 from action_assistant.editor.log.graph_events import graph_stream
-from action_assistant.editor.services import EditorState
+from action_assistant.editor.services import EditorServices, EditorState
 from action_assistant.editor.workers import encoded
 from action_assistant.errors import Conflict
 from action_assistant.umrf.files import codec
@@ -64,6 +65,19 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
     return [*_catalogue(app_state), *_contents(app_state)]
 
 
+async def _previewed(services: EditorServices, body: bytes) -> bytes:
+    """JSON of a `Preview`, with the graphs that are here inside."""
+    name, uses = await services.workers.files(importing.names, body)
+    inside = await services.graph_checks.inside_of(name, uses)
+    return await services.workers.files(importing.preview, body, inside)
+
+
+async def _inside_with(services: EditorServices, then: GraphAtSeq, text: bytes) -> Inside:
+    """The graphs inside of one that an edited text may change."""
+    _, uses = await services.workers.files(importing.names, text)
+    return await services.graph_checks.inside(then, more=uses)
+
+
 def _catalogue(app_state: EditorState) -> list[ControllerRouterHandler]:
     @get("/api/graphs", summary="All graphs, the last changed first", operation_id="listGraphs")
     async def list_graphs(deleted: bool = False) -> list[GraphView]:
@@ -86,7 +100,7 @@ def _catalogue(app_state: EditorState) -> list[ControllerRouterHandler]:
         request: Asking, preview: bool = False
     ) -> Response[MadeGraph] | Response[Preview]:
         if preview:
-            found = await app_state.services.workers.files(importing.preview, await request.body())
+            found = await _previewed(app_state.services, await request.body())
             return Response(encoded(found), status_code=200)
         services, person = app_state.services, person_of(request)
         await services.people.seen(person)
@@ -164,7 +178,7 @@ def _contents(app_state: EditorState) -> list[ControllerRouterHandler]:
         services = app_state.services
         await services.catalogue.require(graph_id)
         sight = await services.graph_reader.moment(graph_id, seq)
-        return Problems(sight.seq, encoded(await services.graph_reader.problems(sight)))
+        return Problems(sight.seq, encoded(await services.graph_checks.problems(sight)))
 
     @post(
         "/api/graphs/{graph_id:str}/rewriting",
@@ -180,7 +194,8 @@ def _contents(app_state: EditorState) -> list[ControllerRouterHandler]:
         text = await request.body()
         await services.catalogue.require(graph_id)
         then = await services.graph_reader.at(graph_id, seq)
-        answer: TextEdit = encoded(await services.workers.files(edited_text, then, text))
+        inside = await _inside_with(services, then, text)
+        answer: TextEdit = encoded(await services.workers.files(edited_text, then, text, inside))
         return answer
 
     @put(
@@ -198,9 +213,10 @@ def _contents(app_state: EditorState) -> list[ControllerRouterHandler]:
         await services.catalogue.require(graph_id, "graph")
         await services.people.seen(person)
         then = await services.graph_reader.at(graph_id, seq)
+        inside = await _inside_with(services, then, text)
         async with services.rooms.enter(graph_stream(graph_id)) as room:
             now, state = await room.look(lambda replica, at: (at, replica.doc.get_update()))
-            found = await services.workers.files(merging, then, state, text)
+            found = await services.workers.files(merging, then, state, text, inside)
             if found.conflicts:
                 raise Conflict(
                     f"Since change {seq} others have changed {len(found.conflicts)} of the fields that "

@@ -6,7 +6,8 @@ import msgspec
 from litestar import Request, Response, get, post
 from litestar.types import ControllerRouterHandler
 
-from action_assistant.editor.catalogue.versions import VersionView
+from action_assistant.editor.api.graphs import Seq
+from action_assistant.editor.catalogue.versions import InsideView, VersionView
 from action_assistant.editor.services import EditorState
 from action_assistant.web.auth.access import Needs, person_of
 from action_assistant.web.server.openapi import answer
@@ -58,6 +59,16 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         )
 
     @get(
+        "/api/graphs/{graph_id:str}/subgraphs",
+        summary="The graphs inside of a graph, as they are now, at all levels",
+        operation_id="getSubgraphs",
+    )
+    async def get_subgraphs(graph_id: str, at: Seq | None = None) -> InsideView:
+        services = app_state.services
+        await services.catalogue.require(graph_id)
+        return await services.versions.inside(graph_id, at)
+
+    @get(
         "/api/versions/{version_id:str}",
         summary="One version with its UMRF",
         operation_id="getVersion",
@@ -65,4 +76,4 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
     async def get_version(version_id: str) -> VersionView:
         return await app_state.services.versions.get(version_id)
 
-    return [list_versions, publish_version, get_version]
+    return [list_versions, publish_version, get_subgraphs, get_version]

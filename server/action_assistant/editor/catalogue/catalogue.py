@@ -7,6 +7,7 @@ import msgspec
 from sqlalchemy import Row, Select, func, select
 
 from action_assistant.editor.catalogue import server_edits
+from action_assistant.editor.catalogue.graph_checks import GraphChecks
 from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.documents.contents import Counts, GraphInfo, info_of
 from action_assistant.editor.interchange import changes, importing
@@ -80,10 +81,12 @@ class Catalogue:
         journal: Journal,
         rooms: Rooms,
         graph_reader: GraphReader,
+        checks: GraphChecks,
         run_in_worker: RunInWorker = run_here,
     ) -> None:
         self._journal = journal
         self._run_in_worker = run_in_worker
+        self._checks = checks
         self._rooms = rooms
         self._graph_reader = graph_reader
 
@@ -94,6 +97,7 @@ class Catalogue:
 
     async def get(self, graph: str) -> GraphView:
         """One graph."""
+        await self._checks.names.refresh()
         return await self._view(await self._row(graph))
 
     async def all(
@@ -106,6 +110,7 @@ class Catalogue:
         chosen = _rows().where(
             graph.kind == kind, *([graph.deleted_at.is_not(None)] if deleted else shown)
         )
+        await self._checks.names.refresh()
         rows = await self._journal.query(chosen)
         views = [await self._view(row) for row in rows]
         return sorted(views, key=lambda view: view.updated_at, reverse=True)
@@ -206,7 +211,7 @@ class Catalogue:
                 Addition(h.graph_stream(made), (document,)),
             ]
         )
-        self._graph_reader.made(made, update, of)
+        self._checks.made(made, update, of)
         return await self.get(made)
 
     async def _row(
@@ -220,7 +225,7 @@ class Catalogue:
         return rows[0]
 
     async def _view(self, row: Row[Any]) -> GraphView:
-        summary = await self._graph_reader.summary(row.id, row.seq)
+        summary = await self._checks.summary(row.id, row.seq)
         its_name, its_description = summary.called(row.kind)
         name = row.name if its_name is None else its_name
         description = row.description if its_description is None else its_description

@@ -6,6 +6,7 @@ from typing import Any, Final
 import msgspec
 from sqlalchemy import Row, select
 
+from action_assistant.editor.catalogue.graph_checks import GraphChecks
 from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.documents import contents
 from action_assistant.editor.log import graph_events as h
@@ -21,8 +22,45 @@ LABEL_LIMIT: Final = 200  # characters
 NOTE_LIMIT: Final = 4_000  # characters
 
 
+class PinnedGraph(msgspec.Struct, frozen=True):
+    """A graph inside of a version: as it was when that was published. `name`: of the actions that stand for
+    it; `version`: of it, the newest with that content, null where there was none; `graph`: its id.
+    `current_digest`: of the graph that the name stands for now, null where there is none."""
+
+    name: str
+    version: str | None
+    digest: str
+    umrf: UmrfGraph
+    graph: str
+    current_digest: str | None
+
+
+class InsideGraph(msgspec.Struct, frozen=True):
+    """A graph inside of another, as it is now. `name`: of the actions that stand for it; `graph`: its id."""
+
+    name: str
+    digest: str
+    umrf: UmrfGraph
+    graph: str
+
+
+class InsideView(msgspec.Struct, frozen=True):
+    """All graphs inside of a graph after its change `seq`, as they are now, by name; and what a version of
+    that would have as its digests. `several`: names of more than one graph, of which the oldest is taken;
+    `cut`: there are more than these."""
+
+    seq: int
+    digest: str
+    tree_digest: str
+    subgraphs: tuple[InsideGraph, ...]
+    several: tuple[str, ...]
+    cut: bool
+
+
 class VersionView(msgspec.Struct, frozen=True, omit_defaults=True):
-    """A version. `umrf` is the graph as text to be kept as it is; lists leave it out."""
+    """A version. `umrf` is the graph as text to be kept as it is, `subgraphs` are all graphs inside of it,
+    by name; lists leave both out. `tree_digest`: of the graph together with them, null where that was
+    not kept yet."""
 
     id: str
     graph: str
@@ -31,16 +69,19 @@ class VersionView(msgspec.Struct, frozen=True, omit_defaults=True):
     seq: int
     author: PersonRef
     at: datetime
+    tree_digest: str | None
     umrf: UmrfGraph | None = None
     note: str = ""
+    subgraphs: tuple[PinnedGraph, ...] | None = None
 
 
 class Versions:
     """All versions of all graphs."""
 
-    def __init__(self, journal: Journal, graph_reader: GraphReader) -> None:
+    def __init__(self, journal: Journal, graph_reader: GraphReader, checks: GraphChecks) -> None:
         self._journal = journal
         self._graph_reader = graph_reader
+        self._checks = checks
 
     async def publish(
         self,
@@ -51,32 +92,50 @@ class Versions:
         note: str = "",
         seq: int | None = None,
     ) -> tuple[VersionView, bool]:
-        """The version of a graph at `seq`, or as it is, and whether it is new.
+        """The version of a graph at `seq`, or as it is, and whether it is new. The graphs inside of it are
+        pinned as they are now.
 
-        Without label and note it is the one that was published at that seq before, if there is one.
-        Raises NotFound, Conflict, BadInput.
+        Without label and note it is the one that was published at that seq before, with the same graphs
+        inside, if there is one. Raises NotFound, Conflict, BadInput.
         """
         label, note = _within_limits(label, note)
         sight = await self._graph_reader.moment(graph, seq)
-        if not label and not note:
-            for row in await self._rows(graph, sight.seq):
-                return await self.get(row.id), False
         made = random_id()
         stamp = codec.Stamp(graph=graph, version=made, run=None)
-        digest, text = await self._graph_reader.ask(contents.released, sight, stamp)
+        inside = await self._checks.inside(sight)
+        found = await self._graph_reader.ask(contents.released, sight, stamp, inside)
+        if not label and not note:
+            for row in await self._rows(graph, sight.seq):
+                if (row.tree_digest or row.digest) == found.tree_digest:
+                    return await self.get(row.id), False
         published = h.VersionPublished(
             id=made,
             label=label,
-            digest=digest,
+            digest=found.digest,
             seq=sight.seq,
             author_name=author.name,
-            umrf=msgspec.Raw(text),
+            umrf=msgspec.Raw(found.umrf),
             note=note,
+            subgraphs=tuple([await self._pinned(part) for part in found.parts]),
+            tree_digest=found.tree_digest,
         )
         await self._journal.append(
             h.about_stream(graph), [h.draft(h.PUBLISHED, author.id, published)]
         )
         return await self.get(made), True
+
+    async def inside(self, graph: str, seq: int | None) -> InsideView:
+        """What publishing a graph would pin. Raises NotFound, Conflict, Unavailable."""
+        sight = await self._graph_reader.moment(graph, seq)
+        inside = await self._checks.inside(sight)
+        stamp = codec.Stamp(graph=graph)
+        found = await self._graph_reader.ask(contents.released, sight, stamp, inside)
+        graphs = tuple(
+            InsideGraph(each.name, each.digest, msgspec.Raw(each.umrf), each.graph)
+            for each in found.parts
+        )
+        digests = found.digest, found.tree_digest
+        return InsideView(sight.seq, *digests, graphs, inside.several, inside.cut)
 
     async def get(self, version: str) -> VersionView:
         """One version, with its UMRF. Raises NotFound."""
@@ -87,7 +146,8 @@ class Versions:
         row = rows[0]
         (event,) = await self._journal.read(row.stream, after=row.event_seq - 1, upto=row.event_seq)
         published = msgspec.json.decode(event.body, type=h.VersionPublished)
-        return msgspec.structs.replace(_view(row), umrf=published.umrf)
+        subgraphs = tuple([await self._shown(each) for each in published.subgraphs])
+        return msgspec.structs.replace(_view(row), umrf=published.umrf, subgraphs=subgraphs)
 
     async def of(self, graph: str) -> list[VersionView]:
         """The versions of a graph, newest first, without their UMRF."""
@@ -96,6 +156,18 @@ class Versions:
     async def by_event(self, graph: str) -> dict[int, VersionView]:
         """The versions of a graph, by the seq of the event that published them."""
         return {row.event_seq: _view(row) for row in await self._rows(graph)}
+
+    async def _pinned(self, part: contents.ReleasedPart) -> h.PinnedSubgraph:
+        version = editor_tables.version.c
+        same = (version.graph == part.graph, version.digest == part.digest)
+        newest = select(version.id).where(*same).order_by(version.event_seq.desc()).limit(1)
+        found = await self._journal.query(newest)
+        kept = found[0].id if found else None
+        return h.PinnedSubgraph(part.name, kept, part.digest, msgspec.Raw(part.umrf), part.graph)
+
+    async def _shown(self, pinned: h.PinnedSubgraph) -> PinnedGraph:
+        fields = msgspec.structs.asdict(pinned)
+        return PinnedGraph(**fields, current_digest=await self._checks.digest(pinned.name))
 
     async def _rows(self, graph: str, seq: int | None = None) -> list[Row[Any]]:
         version = editor_tables.version.c
@@ -124,5 +196,6 @@ def _view(row: Row[Any]) -> VersionView:
         seq=row.seq,
         author=PersonRef(row.author_id, row.author_name),
         at=h.when(row.at),
+        tree_digest=row.tree_digest,
         note=row.note,
     )

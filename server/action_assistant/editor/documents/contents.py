@@ -5,7 +5,6 @@ a worker, which remembers the graphs that it read last.
 """
 
 from collections import OrderedDict
-from functools import cached_property
 from typing import Any, Final
 
 import msgspec
@@ -15,14 +14,16 @@ from action_assistant.editor.documents import document
 from action_assistant.editor.documents.document import Maps
 from action_assistant.editor.documents.fingerprint import Fingerprint, fingerprint
 from action_assistant.umrf.check import check_written
+from action_assistant.umrf.checks.subgraphs import Resolution
 from action_assistant.umrf.difference import difference
-from action_assistant.umrf.digest import digest
+from action_assistant.umrf.digest import digest, tree_digest
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.json.text import parse_small
 from action_assistant.umrf.model import Action, Graph, Problem
 from action_assistant.umrf.problem_kinds import ToldCounts, told_counts
 
-_REMEMBERED: Final = 4  # moments of graphs
+_REMEMBERED: Final = 32  # moments of graphs
+_ACTIONS: Final = 20_000  # of them together, besides the newest
 _LABELS: Final = 20  # of one graph
 _LABEL: Final = 60  # characters
 
@@ -33,6 +34,30 @@ class GraphAtSeq(msgspec.Struct, frozen=True):
     graph: str
     seq: int
     state: bytes
+
+
+class Inside(msgspec.Struct, frozen=True):
+    """The graphs that are inside of one, by the names of the actions that stand for them, at one seq each
+    (docs/decisions/070-one-truth-for-sub-graphs.md). `several`: names of more than one graph; `cut`: there
+    are more than these."""
+
+    graphs: tuple[tuple[str, GraphAtSeq], ...] = ()
+    several: tuple[str, ...] = ()
+    cut: bool = False
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        """The same for the same graphs at the same moments."""
+        moments = tuple((name, each.graph, each.seq) for name, each in self.graphs)
+        return moments, self.several, self.cut
+
+    @property
+    def resolution(self) -> Resolution:
+        """How names were resolved."""
+        return Resolution(frozenset(self.several), self.cut)
+
+
+NOTHING_INSIDE: Final = Inside()
 
 
 class ReadGraph(msgspec.Struct, frozen=True):
@@ -52,7 +77,8 @@ class Counts(msgspec.Struct, frozen=True):
 
 class GraphInfo(msgspec.Struct, frozen=True):
     """What lists say of a graph. `told`: of its problems, those that people are told to mend or to
-    fill in, one thing once. `first`: name and description of its first action."""
+    fill in, one thing once; both as if no action of it were a graph. `first`: name and description of its
+    first action. `uses`: the names of its actions."""
 
     name: str
     description: str
@@ -62,6 +88,7 @@ class GraphInfo(msgspec.Struct, frozen=True):
     robots: tuple[str, ...]
     labels: tuple[str, ...]
     first: tuple[str, str] | None = None
+    uses: tuple[str, ...] = ()
 
 
 class Read:
@@ -69,11 +96,15 @@ class Read:
 
     def __init__(self, moment: ReadGraph) -> None:
         self.moment: Final = moment
+        self._found: tuple[object, list[Problem]] | None = None
 
-    @cached_property
-    def problems(self) -> list[Problem]:
-        """What is wrong with the graph."""
-        return check_written(self.moment.graph)
+    def problems(self, inside: Inside = NOTHING_INSIDE) -> list[Problem]:
+        """What is wrong with the graph, with these graphs inside."""
+        if self._found is None or self._found[0] != inside.key:
+            graph = self.moment.graph
+            found = check_written(graph, graphs_of(inside), inside.resolution)
+            self._found = inside.key, found
+        return self._found[1]
 
 
 _recent: "Final[OrderedDict[tuple[str, int], Read]]" = OrderedDict()
@@ -86,10 +117,22 @@ def read(sight: GraphAtSeq) -> Read:
     if found is None:
         maps = maps_of(sight.state)
         found = _recent[key] = Read(ReadGraph(sight.seq, maps, document.read_maps(maps)))
-        if len(_recent) > _REMEMBERED:
-            _recent.popitem(last=False)
+        _forget()
     _recent.move_to_end(key)
     return found
+
+
+def _forget() -> None:
+    """Keep what was read last, as far as it is not too much."""
+    actions = sum(len(each.moment.graph.actions) for each in _recent.values())
+    while len(_recent) > 1 and (len(_recent) > _REMEMBERED or actions > _ACTIONS):
+        _, oldest = _recent.popitem(last=False)
+        actions -= len(oldest.moment.graph.actions)
+
+
+def graphs_of(inside: Inside) -> dict[str, Graph]:
+    """The graphs themselves, by name."""
+    return {name: read(sight).moment.graph for name, sight in inside.graphs}
 
 
 def maps_of(state: bytes) -> Maps:
@@ -102,22 +145,45 @@ def maps_of(state: bytes) -> Maps:
 def info(sight: GraphAtSeq) -> GraphInfo:
     """What a list shows."""
     found = read(sight)
-    return info_of(found.moment.graph, found.problems)
+    return info_of(found.moment.graph, found.problems())
+
+
+def counted(sight: GraphAtSeq, inside: Inside) -> tuple[Counts, ToldCounts]:
+    """What a list counts, with the graphs inside."""
+    found = read(sight)
+    problems = found.problems(inside)
+    return _counts(problems), told_counts(problems, found.moment.graph)
+
+
+def names(sight: GraphAtSeq) -> tuple[str, tuple[str, ...]]:
+    """The name of a graph, and those of its actions."""
+    graph = read(sight).moment.graph
+    return graph.name, uses_of(graph)
+
+
+def uses_of(graph: Graph) -> tuple[str, ...]:
+    """The names of a graph's actions."""
+    return tuple(sorted({action.name for action in graph.actions if not action.missing} - {""}))
 
 
 def info_of(graph: Graph, problems: list[Problem]) -> GraphInfo:
     """As `info`, of a graph that was read already."""
-    errors = sum(problem.severity == "error" for problem in problems)
     return GraphInfo(
         graph.name,
         graph.description,
         sum(not action.missing for action in graph.actions),
-        Counts(errors, len(problems) - errors),
+        _counts(problems),
         told_counts(problems, graph),
         tuple(sorted({action.actor for action in graph.actions} - {""})),
         labels_of(graph),
         None if (action := first_action(graph)) is None else (action.name, action.description),
+        uses_of(graph),
     )
+
+
+def _counts(problems: list[Problem]) -> Counts:
+    errors = sum(problem.severity == "error" for problem in problems)
+    return Counts(errors, len(problems) - errors)
 
 
 def first_action(graph: Graph) -> Action | None:
@@ -126,9 +192,9 @@ def first_action(graph: Graph) -> Action | None:
     return next((action for action in graph.actions if not action.missing), None)
 
 
-def problems(sight: GraphAtSeq) -> bytes:
+def problems(sight: GraphAtSeq, inside: Inside = NOTHING_INSIDE) -> bytes:
     """What is wrong, as JSON."""
-    return msgspec.json.encode(read(sight).problems)
+    return msgspec.json.encode(read(sight).problems(inside))
 
 
 def umrf(sight: GraphAtSeq, stamp: codec.Stamp | None = None) -> bytes:
@@ -136,10 +202,47 @@ def umrf(sight: GraphAtSeq, stamp: codec.Stamp | None = None) -> bytes:
     return codec.write(read(sight).moment.graph, stamp).encode()
 
 
-def released(sight: GraphAtSeq, stamp: codec.Stamp) -> tuple[str, bytes]:
-    """The digest and the text of a version."""
+class ReleasedPart(msgspec.Struct, frozen=True):
+    """A graph inside of a version: its name, its id, and what it was."""
+
+    name: str
+    graph: str
+    digest: str
+    umrf: bytes
+
+
+class Released(msgspec.Struct, frozen=True):
+    """What a version is."""
+
+    digest: str
+    umrf: bytes
+    tree_digest: str
+    parts: tuple[ReleasedPart, ...]
+
+
+def released(sight: GraphAtSeq, stamp: codec.Stamp, inside: Inside) -> Released:
+    """The digest and the text of a version, and of the graphs inside of it."""
     graph = read(sight).moment.graph
-    return digest(graph), codec.write(graph, stamp).strip().encode()
+    parts = tuple(_part(name, each) for name, each in inside.graphs)
+    own = digest(graph)
+    tree = tree_digest(own, ((each.name, each.digest) for each in parts))
+    return Released(own, _text(graph, stamp), tree, parts)
+
+
+def _part(name: str, sight: GraphAtSeq) -> ReleasedPart:
+    graph = read(sight).moment.graph
+    return ReleasedPart(
+        name, sight.graph, digest(graph), _text(graph, codec.Stamp(graph=sight.graph))
+    )
+
+
+def _text(graph: Graph, stamp: codec.Stamp) -> bytes:
+    return codec.write(graph, stamp).strip().encode()
+
+
+def digest_at(sight: GraphAtSeq) -> str:
+    """The digest of a graph at a moment."""
+    return digest(read(sight).moment.graph)
 
 
 def differing(before: GraphAtSeq, after: GraphAtSeq) -> bytes:

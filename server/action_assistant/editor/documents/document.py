@@ -37,6 +37,7 @@ __all__ = [
     "flatten",
     "is_same",
     "maps_of",
+    "name_of",
     "new_aid",
     "read",
     "read_maps",
@@ -67,6 +68,12 @@ def maps_of(doc: Doc) -> Maps:  # type: ignore[type-arg]
         root: {key: value for key, value in _root(doc, root).items() if isinstance(value, PLAIN)}
         for root in ROOTS
     }
+
+
+def name_of(doc: Doc) -> str:  # type: ignore[type-arg]
+    """The name of the graph that a document shows, whatever else is in it."""
+    name = _root(doc, "meta").get("name")
+    return name if isinstance(name, str) else ""
 
 
 def fill(doc: Doc, graph: Graph) -> None:  # type: ignore[type-arg]

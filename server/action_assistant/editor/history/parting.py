@@ -7,6 +7,7 @@ from typing import Final
 import msgspec
 from msgspec.structs import replace
 
+from action_assistant.editor.documents.contents import NOTHING_INSIDE, Inside, graphs_of
 from action_assistant.editor.history.key_changes import LoggedChange, owner_of
 from action_assistant.editor.history.told_changes import (
     Changes,
@@ -68,10 +69,12 @@ def followed(
     script: Script,
     named_at: int,
     budget_s: float = _BUDGET_S,
+    inside: Inside = NOTHING_INSIDE,
 ) -> Followed:
     """Where the course parts from the one that the graph takes before the `changes`, which are in order
-    of time. `base`: what each key held then. The script's names are those of the moment `named_at`."""
-    past = _Past(base, changes, script, named_at)
+    of time. `base`: what each key held then. The script's names are those of the moment `named_at`.
+    `inside`: the graphs inside, the same at every moment."""
+    past = _Past(base, changes, script, named_at, graphs_of(inside))
     if not past.moments:
         return Followed(True, True, 1, ())
     flips, exact = _flips(past, budget_s)
@@ -121,7 +124,9 @@ class _Past:
         changes: Sequence[LoggedChange],
         script: Script,
         named_at: int,
+        inside: Mapping[str, Graph],
     ) -> None:
+        self._inside = inside
         self._base = state_of(base)
         self._changes = changes
         self.moments: list[LoggedChange] = list(_noticed(changes))
@@ -160,7 +165,8 @@ class _Past:
         if found is None:
             graph = self._graph(moment)
             keys = {a.full_name: a.key for a in graph.actions}
-            steps = unnamed(course(graph, scripted_by_name(self._script, graph), _EVENTS))
+            played = scripted_by_name(self._script, graph)
+            steps = unnamed(course(graph, played, _EVENTS, self._inside))
             found = keyed(steps, keys)
             self._courses[moment] = found
         return found

@@ -1,10 +1,13 @@
 """Since when a graph goes another way: a question to the index, answered by simulating past moments."""
 
 from datetime import datetime
+from functools import partial
 from typing import Annotated, Any, Final
 
 import msgspec
 
+from action_assistant.editor.catalogue.graph_checks import GraphChecks
+from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.catalogue.people import People
 from action_assistant.editor.history.change_index import ChangeIndex
 from action_assistant.editor.history.parting import followed
@@ -61,8 +64,15 @@ class CourseSearch:
     """Answers it."""
 
     def __init__(
-        self, index: ChangeIndex, people: People, run_in_worker: RunInWorker = run_here
+        self,
+        index: ChangeIndex,
+        people: People,
+        reader: GraphReader,
+        checks: GraphChecks,
+        run_in_worker: RunInWorker = run_here,
     ) -> None:
+        self._reader = reader
+        self._checks = checks
         self._index = index
         self._people = people
         self._run_in_worker = run_in_worker
@@ -86,7 +96,9 @@ class CourseSearch:
         if len(changes) > _MOST:
             raise TooLarge("That is too long ago; name a later moment that was good.")
         base = await self._index.at(graph, asked.good)
-        found = await self._run_in_worker(followed, base, changes, script, named_at)
+        ends = [await self._reader.at(graph, seq) for seq in dict.fromkeys((bad, asked.good))]
+        follow = partial(followed, inside=await self._checks.inside(*ends))
+        found = await self._run_in_worker(follow, base, changes, script, named_at)
         partings = tuple(
             CourseChange(
                 each.seq,

@@ -15,7 +15,14 @@ from msgspec import UNSET, UnsetType
 from msgspec.structs import replace
 
 from action_assistant.editor.documents import document
-from action_assistant.editor.documents.contents import GraphAtSeq, ReadGraph, read
+from action_assistant.editor.documents.contents import (
+    NOTHING_INSIDE,
+    GraphAtSeq,
+    Inside,
+    ReadGraph,
+    graphs_of,
+    read,
+)
 from action_assistant.editor.documents.document import Maps
 from action_assistant.editor.documents.values import ends_of, is_aid, number
 from action_assistant.editor.interchange import importing
@@ -48,15 +55,20 @@ class TextEdit(msgspec.Struct, frozen=True):
     problems: tuple[Problem, ...]
 
 
-def edited_text(sight: GraphAtSeq, text: bytes) -> bytes:
+def edited_text(sight: GraphAtSeq, text: bytes, inside: Inside) -> bytes:
     """What an edited text changes, as JSON of a `TextEdit`. For workers. Raises as `text_edit`."""
     found = read(sight)
-    return msgspec.json.encode(text_edit(found.moment, text, found.problems))
+    return msgspec.json.encode(text_edit(found.moment, text, found.problems(inside), inside))
 
 
-def text_edit(moment: ReadGraph, text: bytes, known: Iterable[Problem] = ()) -> TextEdit:
+def text_edit(
+    moment: ReadGraph,
+    text: bytes,
+    known: Iterable[Problem] = (),
+    inside: Inside = NOTHING_INSIDE,
+) -> TextEdit:
     """What `text`, edited from the canonical text of `moment`, changes. `known`: the problems that
-    the graph has already.
+    the graph has already, with these graphs `inside`.
 
     Raises BadInput, NotUmrf, TooLarge with the place; nothing is stored either way.
     """
@@ -67,7 +79,7 @@ def text_edit(moment: ReadGraph, text: bytes, known: Iterable[Problem] = ()) -> 
     new = _under_keys(wanted.graph, _aligned(old, wanted.graph))
     _refuse_ghosts(old, new, wanted.text)
     changes = tuple(_changes(moment.maps, old, new))
-    worse = wanted.placed(_worse(known, new)) if changes else []
+    worse = wanted.placed(_worse(known, new, inside)) if changes else []
     return TextEdit(moment.seq, changes, tuple(worse))
 
 
@@ -84,11 +96,12 @@ def _refuse(shown: codec.Reading, wanted: codec.Reading) -> None:
             raise NotUmrf(problem.message, where=_place(wanted.text, problem.where.path))
 
 
-def _worse(known: Iterable[Problem], new: Graph) -> tuple[Problem, ...]:
+def _worse(known: Iterable[Problem], new: Graph, inside: Inside) -> tuple[Problem, ...]:
     """Errors that come with the edit."""
     old = {(problem.code, problem.message) for problem in known}
-    found = [problem for problem in check(new) if problem.severity == "error"]
-    return tuple(p for p in found if (p.code, p.message) not in old)[:_WORSE]
+    found = check(new, graphs=graphs_of(inside), resolution=inside.resolution)
+    errors = [problem for problem in found if problem.severity == "error"]
+    return tuple(p for p in errors if (p.code, p.message) not in old)[:_WORSE]
 
 
 # Which action is which

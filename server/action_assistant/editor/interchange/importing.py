@@ -11,7 +11,14 @@ from action_assistant.editor.crdt.document_quota import (
     refuse_too_wide,
 )
 from action_assistant.editor.documents import document
-from action_assistant.editor.documents.contents import GraphInfo, info_of
+from action_assistant.editor.documents.contents import (
+    NOTHING_INSIDE,
+    GraphInfo,
+    Inside,
+    graphs_of,
+    info_of,
+    uses_of,
+)
 from action_assistant.editor.interchange import changes
 from action_assistant.errors import BadInput, NotUmrf, TooLarge
 from action_assistant.umrf.check import check
@@ -78,11 +85,18 @@ def imported(body: bytes) -> ImportedFile:
     return ImportedFile(found.dialect, found.notes, msgspec.json.encode(told), update, about)
 
 
-def preview(body: bytes) -> bytes:
+def names(body: bytes) -> tuple[str, tuple[str, ...]]:
+    """The name of the graph in a file, and those of its actions. Raises BadInput, NotUmrf, TooLarge."""
+    graph = read(body).graph
+    return graph.name, uses_of(graph)
+
+
+def preview(body: bytes, inside: Inside = NOTHING_INSIDE) -> bytes:
     """What importing a file would make, as JSON of a `Preview`. Raises as `imported` does."""
     found = fitting(read_graph(body))
     graph = found.graph
-    problems = (*found.problems, *found.placed(check(graph)))
+    own = check(graph, graphs=graphs_of(inside), resolution=inside.resolution)
+    problems = (*found.problems, *found.placed(own))
     actions = sum(not action.missing for action in graph.actions)
     return msgspec.json.encode(
         Preview(found.dialect, found.notes, problems, graph.name, actions, found.remarks)

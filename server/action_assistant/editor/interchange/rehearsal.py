@@ -1,10 +1,17 @@
 """Rehearsals: what a graph would do, played by the engine's rules, and recorded nowhere."""
 
+from collections.abc import Mapping
 from typing import Annotated, Any, Final, Literal
 
 import msgspec
 
-from action_assistant.editor.documents.contents import GraphAtSeq, read
+from action_assistant.editor.documents.contents import (
+    NOTHING_INSIDE,
+    GraphAtSeq,
+    Inside,
+    graphs_of,
+    read,
+)
 from action_assistant.errors import BadInput, Conflict
 from action_assistant.umrf import semantics
 from action_assistant.umrf.check import refused_by_parser
@@ -41,8 +48,9 @@ class Rehearsal(msgspec.Struct, frozen=True):
     cut: bool
 
 
-def rehearsed(sight: GraphAtSeq, wanted: Rehearsing) -> bytes:
-    """Play a graph to its end, or as far as limits let it: JSON of a `Rehearsal`. For workers.
+def rehearsed(sight: GraphAtSeq, wanted: Rehearsing, inside: Inside = NOTHING_INSIDE) -> bytes:
+    """Play a graph, with these graphs inside, to its end or as far as limits let it: JSON of a
+    `Rehearsal`. For workers.
 
     Raises BadInput, Conflict.
     """
@@ -51,7 +59,8 @@ def rehearsed(sight: GraphAtSeq, wanted: Rehearsing) -> bytes:
         raise BadInput("A rehearsal lasts up to a day.", where={"path": "/for_ms"})
     if len(wanted.commands) > 100:
         raise BadInput("A rehearsal takes up to 100 commands.", where={"path": "/commands"})
-    return msgspec.json.encode(_played(sight.seq, read(sight).moment.graph, script, wanted))
+    graph = read(sight).moment.graph
+    return msgspec.json.encode(_played(sight.seq, graph, graphs_of(inside), script, wanted))
 
 
 def _script(value: Any) -> semantics.Script:
@@ -76,12 +85,19 @@ def _refuse_unreadable(graph: Graph) -> None:
         raise Conflict(f"The engine would refuse this graph: {refusals[0].message}")
 
 
-def _played(seq: int, graph: Graph, script: semantics.Script, wanted: Rehearsing) -> Rehearsal:
+def _played(
+    seq: int,
+    graph: Graph,
+    inside: Mapping[str, Graph],
+    script: semantics.Script,
+    wanted: Rehearsing,
+) -> Rehearsal:
     _refuse_unreadable(graph)
     trace = tuple(
         semantics.simulate(
             graph,
             script=script,
+            library=inside,
             commands=[(command.at_ms, command.verb, None) for command in wanted.commands],
             until_ms=wanted.for_ms,
             max_events=EVENTS + 1,

@@ -3,7 +3,7 @@
 import msgspec
 from msgspec import UNSET
 
-from action_assistant.editor.documents.contents import GraphAtSeq, maps_of, read
+from action_assistant.editor.documents.contents import GraphAtSeq, Inside, maps_of, read
 from action_assistant.editor.documents.document import Maps
 from action_assistant.editor.interchange.changes import setting
 from action_assistant.editor.interchange.edited_text import KeyChange, text_edit
@@ -20,13 +20,14 @@ class MergingOutcome(msgspec.Struct, frozen=True):
     problems: tuple[Problem, ...]
 
 
-def merging(then: GraphAtSeq, state: bytes, text: bytes) -> MergingOutcome:
-    """What `text`, edited from that of the moment `then`, makes of the graph as it is now.
+def merging(then: GraphAtSeq, state: bytes, text: bytes, inside: Inside) -> MergingOutcome:
+    """What `text`, edited from that of the moment `then`, makes of the graph as it is now, with these
+    graphs inside.
 
     Raises BadInput, NotUmrf, TooLarge with the place.
     """
     found = read(then)
-    edit = text_edit(found.moment, text, found.problems)
+    edit = text_edit(found.moment, text, found.problems(inside), inside)
     now = maps_of(state)
     conflicts = tuple(each.key for each in edit.changes if _is_other(now, each))
     if conflicts:

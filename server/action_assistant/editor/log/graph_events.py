@@ -152,9 +152,20 @@ class ActionBuilt(msgspec.Struct, frozen=True):
     errors: tuple[BuildFault, ...]
 
 
+class PinnedSubgraph(msgspec.Struct, frozen=True):
+    """A graph inside of a version, as it was then: by the name of the actions that stand for it. `graph`:
+    its id; `version`: of it, the newest with that content."""
+
+    name: str
+    version: str | None
+    digest: str
+    umrf: msgspec.Raw
+    graph: str
+
+
 class VersionPublished(msgspec.Struct, frozen=True):
     """A version: what a graph was at `seq`, as UMRF that never changes. `note`: what its author says of
-    it."""
+    it. `subgraphs`: all graphs inside of it, by name; `tree_digest`: of it together with them."""
 
     id: str
     label: str
@@ -163,6 +174,8 @@ class VersionPublished(msgspec.Struct, frozen=True):
     author_name: str
     umrf: msgspec.Raw
     note: str = ""
+    subgraphs: tuple[PinnedSubgraph, ...] = ()
+    tree_digest: str | None = None
 
 
 class PersonNamed(msgspec.Struct, frozen=True):
@@ -319,6 +332,7 @@ def _version(event: Event, graph: str) -> dict[str, Any]:
         "label": version.label,
         "note": version.note,
         "digest": version.digest,
+        "tree_digest": version.tree_digest,
         "seq": version.seq,
         "author_id": event.author,
         "author_name": version.author_name,

@@ -1,7 +1,7 @@
 """Expected courses against a graph as it is now: which it still takes, and what they cover. For workers."""
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Final
 
 import msgspec
@@ -10,6 +10,7 @@ from action_assistant.errors import BadInput
 from action_assistant.runner.analysis.expected_runs import Expected
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.sent_graph import SentGraph, read_sent
+from action_assistant.runner.sent_subgraphs import Inner, SentSubgraph, graphs_in, read_inside
 from action_assistant.umrf.courses.coverage import (
     ArrowCoverage,
     OutcomeArrow,
@@ -29,10 +30,12 @@ BUDGET_S: Final = 10.0
 
 
 class CheckRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Which expected courses, those of `graph`, and the graph as it is now."""
+    """Which expected courses, those of `graph`, and the graph as it is now with the graphs inside; where
+    none are sent along, those of the expectation count."""
 
     umrf: SentGraph
     graph: str
+    subgraphs: tuple[SentSubgraph, ...] = ()
 
 
 class ProposalRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -40,6 +43,7 @@ class ProposalRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     umrf: SentGraph
     arrow: OutcomeArrow
+    subgraphs: tuple[SentSubgraph, ...] = ()
 
 
 class CheckedCourse(msgspec.Struct, frozen=True, kw_only=True):
@@ -74,15 +78,19 @@ class ArrowProposal(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def check_courses(
-    saved: Iterable[Expected], umrf: bytes, budget_s: float = BUDGET_S
+    saved: Iterable[Expected],
+    umrf: bytes,
+    budget_s: float = BUDGET_S,
+    subgraphs: Sequence[SentSubgraph] = (),
 ) -> CheckedCourses:
     """Simulate the expected courses with this graph. Raises BadInput, NotUmrf, TooLarge."""
     _, reading = read_sent(umrf)
+    _, inside = read_inside(subgraphs, "", None, approved=False)
     until = time.thread_time() + budget_s
     found: list[CheckedCourse] = []
     kept: list[TakenArrows] = []
     for each in saved:
-        course, took = _checked(each, reading.graph, looks=time.thread_time() < until)
+        course, took = _checked(each, reading.graph, inside, looks=time.thread_time() < until)
         found.append(course)
         if took is not None:
             kept.append(took)
@@ -90,7 +98,7 @@ def check_courses(
 
 
 def _checked(
-    saved: Expected, now: Graph, *, looks: bool
+    saved: Expected, now: Graph, inside: Inner, *, looks: bool
 ) -> tuple[CheckedCourse, TakenArrows | None]:
     """One of them, and what it took if that is what was expected."""
     told = CheckedCourse(
@@ -105,22 +113,25 @@ def _checked(
         return told, None
     was = codec.read(saved.umrf.encode()).graph
     script = script_from(msgspec.json.decode(saved.script))
-    check = checked(was, saved.course, script, now)
+    check = checked(was, saved.course, script, now, inside or graphs_in(saved.subgraphs))
     same = check.apart is None
     arrows = tuple(sorted(check.taken.arrows))
     told = msgspec.structs.replace(told, same=same, why=check.why, taken=arrows)
     return told, check.taken if same else None
 
 
-def propose(umrf: bytes, arrow: OutcomeArrow) -> ArrowProposal:
+def propose(
+    umrf: bytes, arrow: OutcomeArrow, subgraphs: Sequence[SentSubgraph] = ()
+) -> ArrowProposal:
     """Search for a script under which the arrow is taken. Raises BadInput, NotUmrf, TooLarge."""
     _, reading = read_sent(umrf)
+    _, inside = read_inside(subgraphs, "", None, approved=False)
     graph = reading.graph
     if not any(
         (each.parent, each.child) == (arrow.parent, arrow.child) for each in graph.relations
     ):
         raise BadInput("The graph has no such arrow.", where={"path": "/arrow"})
-    found: Reaching = reaching(graph, arrow)
+    found: Reaching = reaching(graph, arrow, inside=inside)
     if isinstance(found, ArrowReached):
         script = msgspec.json.encode(script_json(found.script))
         return ArrowProposal(verdict="reached", script=msgspec.Raw(script))

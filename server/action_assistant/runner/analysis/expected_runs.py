@@ -15,10 +15,11 @@ from sqlalchemy.dialects.sqlite import insert as upsert
 from action_assistant.errors import BadInput, Conflict
 from action_assistant.journal.events import Event
 from action_assistant.runner.runs.durations import of_visit
-from action_assistant.runner.runs.events import Author
+from action_assistant.runner.runs.events import Author, RunSubgraph
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.visits import ActionRun, Visit
 from action_assistant.runner.sent_graph import SentGraph, read_sent
+from action_assistant.runner.sent_subgraphs import SentSubgraph, graphs_in, read_inside
 from action_assistant.schema.runner_tables import expectation
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.json.embedded import JsonObject, UmrfGraph
@@ -35,13 +36,14 @@ Fault: TypeAlias = Literal["error", "false", "hang", "init_error"]
 
 class Expect(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """What shall be expected from now on, under a name: the course of a `run`, or that of a graph in
-    a dry-run, in which actions do what the script says."""
+    a dry-run, in which actions do what the script says. `subgraphs`: the graphs inside of that one."""
 
     name: str
     run: str = ""
     graph: str = ""
     umrf: SentGraph = msgspec.field(default_factory=msgspec.Raw)
     script: Annotated[msgspec.Raw, SCRIPT] = msgspec.field(default_factory=msgspec.Raw)
+    subgraphs: tuple[SentSubgraph, ...] = ()
 
 
 class Expectation(msgspec.Struct, frozen=True, kw_only=True):
@@ -85,6 +87,7 @@ class Expected(msgspec.Struct, frozen=True, kw_only=True):
     umrf: str
     script: str
     course: tuple[ExpectedStep, ...]
+    subgraphs: tuple[RunSubgraph, ...] = ()
 
 
 class Retired(msgspec.Struct, frozen=True):
@@ -213,10 +216,18 @@ def name_of(given: str) -> str:
     return name
 
 
-def of_run(found: Run, umrf: str, name: str, author: Author, now: int) -> Expected:
+def of_run(
+    found: Run,
+    umrf: str,
+    name: str,
+    author: Author,
+    now: int,
+    subgraphs: tuple[RunSubgraph, ...] = (),
+) -> Expected:
     """The course of a run that is over. Raises Conflict where the simulator does not repeat it."""
     script = {"behaviours": recorded(found).behaviours}
-    course = steps.course(codec.read(umrf.encode()).graph, script_from(script))
+    graph, inside = codec.read(umrf.encode()).graph, graphs_in(subgraphs)
+    course = steps.course(graph, script_from(script), inside=inside)
     check_alike(found, course)
     return Expected(
         at=now,
@@ -228,6 +239,7 @@ def of_run(found: Run, umrf: str, name: str, author: Author, now: int) -> Expect
         umrf=umrf,
         script=msgspec.json.encode(script).decode(),
         course=course,
+        subgraphs=subgraphs,
     )
 
 
@@ -240,7 +252,8 @@ def of_dry_run(wanted: Expect, name: str, author: Author, now: int) -> Expected:
         script = script_from(msgspec.json.decode(bytes(wanted.script) or b"{}"))
     except ValueError as wrong:
         raise BadInput(str(wrong), where={"path": "/script"}) from wrong
-    course = steps.course(reading.graph, script)
+    subgraphs, inside = read_inside(wanted.subgraphs, "", None, approved=False)
+    course = steps.course(reading.graph, script, inside=inside)
     if not any(step.node for step in course):
         raise BadInput("No action runs in it, so nothing can be expected.", where={"path": "/umrf"})
     return Expected(
@@ -253,6 +266,7 @@ def of_dry_run(wanted: Expect, name: str, author: Author, now: int) -> Expected:
         umrf=text.decode(),
         script=msgspec.json.encode(script_json(script)).decode(),
         course=course,
+        subgraphs=subgraphs,
     )
 
 

@@ -77,7 +77,7 @@ def _checking(services: CourseServices) -> list[ControllerRouterHandler]:
         async with body_of(request, services.body_limit) as body:
             asked = decoded(body, CheckRequest)
             text = await services.asked.text(
-                ReviewService.checked_courses, asked.graph, bytes(asked.umrf)
+                ReviewService.checked_courses, asked.graph, bytes(asked.umrf), asked.subgraphs
             )
         return json_of(text, CheckedCourses)
 
@@ -92,6 +92,8 @@ def _checking(services: CourseServices) -> list[ControllerRouterHandler]:
     async def proposal(request: _Asking) -> ArrowProposal:
         async with body_of(request, services.body_limit) as body:
             asked = decoded(body, ProposalRequest)
-            return await services.run_in_worker(propose, bytes(asked.umrf), asked.arrow)
+            return await services.run_in_worker(
+                propose, bytes(asked.umrf), asked.arrow, asked.subgraphs
+            )
 
     return [check, proposal]

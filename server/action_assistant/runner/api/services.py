@@ -11,7 +11,7 @@ from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.behaviours.folder import BehaviourFolder
 from action_assistant.runner.review.service import ReviewService
 from action_assistant.runner.review.worker_queries import WorkerQueries
-from action_assistant.runner.runs import views
+from action_assistant.runner.runs.sent_views import Sent
 from action_assistant.web.network.connection_limits import ConcurrencyLimit, ConnectionLimits
 from action_assistant.web.workers.lanes import RunInWorker
 
@@ -31,7 +31,7 @@ class RunnerServices:
     body_limit: ConcurrencyLimit
     run_in_worker: RunInWorker
     behaviours: BehaviourFolder | None
-    sent: WeakKeyDictionary[OpenRun, views.Sent]
+    sent: WeakKeyDictionary[OpenRun, Sent]
 
     def __init__(self) -> None:
         self.behaviours = None

@@ -57,12 +57,14 @@ def graph_outline(graph: Graph | GraphOutline) -> GraphOutline:
 
 class Order(msgspec.Struct, frozen=True, kw_only=True):
     """One start: the text that carries the run's identity, and what it is of. Whoever needs the
-    graph reads the text, beside the runner; where it is at hand it may be given along."""
+    graph reads the text, beside the runner; where it is at hand it may be given along. `inside`: the
+    texts of all graphs inside, for an engine that has no index of its own."""
 
     run: str
     graph: Graph | GraphOutline
     umrf: str
     targets: tuple[str, ...] = ()
+    inside: tuple[str, ...] = ()
 
 
 class Answer(msgspec.Struct, frozen=True, kw_only=True):

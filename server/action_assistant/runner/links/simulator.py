@@ -131,6 +131,7 @@ class SimulatorLink:
         graph = _whole(order)
         before = self._runs.get(order.graph.name)
         self._runs[order.graph.name] = order.run
+        self._engine.library = {**self._engine.library, **_inside(order)}
         try:
             self._tell(self._engine.start(graph, self._now()))
         except semantics.GraphRefused as refused:
@@ -293,6 +294,12 @@ class SimulatorLink:
 
 def _whole(order: Order) -> Graph:
     return order.graph if isinstance(order.graph, Graph) else codec.read(order.umrf).graph
+
+
+def _inside(order: Order) -> dict[str, Graph]:
+    """What the engine has indexed for this run."""
+    graphs = [codec.read(text).graph for text in order.inside]
+    return {graph.name: graph for graph in graphs}
 
 
 def _seen(trace: semantics.Trace, at: int, begun: Mapping[int, Values]) -> Exact | None:

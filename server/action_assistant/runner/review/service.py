@@ -28,7 +28,9 @@ from action_assistant.runner.runs import views
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runs.sent_views import Sent, sent_of
 from action_assistant.runner.sent_graph import read_sent
+from action_assistant.runner.sent_subgraphs import SentSubgraph
 from action_assistant.schema.runner_tables import expectation, review, run_label
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
@@ -119,9 +121,9 @@ class ReviewService:
 
     async def whole(self, run_id: str) -> views.RunWhole:
         """A run that is over, and the graph as it was sent. Raises NotFound."""
-        umrf = await self._control.history.umrf(run_id)
+        sent = await self.sent(run_id)
         found, place = await self.known(run_id), await self.place(run_id)
-        return views.whole(found, views.sent_of(umrf), place=place)
+        return views.whole(found, sent, place=place)
 
     async def followed(self, run_id: str, robots_too: bool) -> tuple[Run, int]:
         """A run and the seq of its last event; with few visits unless it has to go on exactly.
@@ -168,9 +170,9 @@ class ReviewService:
         """Stored events of a run. Raises Unavailable."""
         return await self._control.history.events(run_id, after, limit)
 
-    async def sent(self, run_id: str) -> views.Sent:
+    async def sent(self, run_id: str) -> Sent:
         """The graph as it was sent, and the values of its actions. Raises NotFound."""
-        return views.sent_of(await self._control.history.umrf(run_id))
+        return sent_of(await self._control.history.requested(run_id))
 
     async def place(self, run_id: str) -> Row[Any] | None:
         """Where the events of a run are, when they are in an archive."""
@@ -323,17 +325,19 @@ class ReviewService:
         found = await self.known(wanted.run)
         if found.end is None:
             raise Conflict("The run is not over yet.")
-        umrf = await self._control.history.umrf(wanted.run)
-        return expected_runs.of_run(found, umrf, name, author, now)
+        sent = await self._control.history.requested(wanted.run)
+        return expected_runs.of_run(found, sent.umrf, name, author, now, sent.subgraphs)
 
     async def expectations(self) -> list[expected_runs.Expectation]:
         """All of them, by name."""
         return [expected_runs.shown(saved) for saved in await self._all_saved()]
 
-    async def checked_courses(self, graph: str, umrf: bytes) -> CheckedCourses:
+    async def checked_courses(
+        self, graph: str, umrf: bytes, subgraphs: Sequence[SentSubgraph] = ()
+    ) -> CheckedCourses:
         """The expected courses of a graph against it as it is now. Raises BadInput, NotUmrf, TooLarge."""
         saved = await self._all_saved(expectation.c.graph == graph)
-        return await self._run_in_worker(lambda: check_courses(saved, umrf))
+        return await self._run_in_worker(lambda: check_courses(saved, umrf, subgraphs=subgraphs))
 
     async def _all_saved(self, *where: ColumnElement[bool]) -> list[expected_runs.Expected]:
         asked = select(expectation).where(*where).order_by(expectation.c.name)

@@ -44,6 +44,17 @@ class Overridden(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     path: str = ""
 
 
+class RunSubgraph(msgspec.Struct, frozen=True, omit_defaults=True):
+    """A graph inside of the one that was started, as it was sent with it, by the name of the actions that
+    stand for it."""
+
+    name: str
+    version: str | None
+    digest: str
+    umrf: str
+    graph: str | None = None
+
+
 class Requested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """Somebody asked for a start and nothing stood in its way. Stored before anything is sent."""
 
@@ -69,6 +80,8 @@ class Requested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     like: str | None = None  # the robot whose engine the simulator played
     laps: Laps | None = None  # None: found in `umrf`
     behaviours: bool = False  # whether the simulator had Python behaviours
+    subgraphs: tuple[RunSubgraph, ...] = ()  # all graphs inside, by value
+    tree_digest: str | None = None  # of the graph together with them; None: nobody told
 
 
 class Published(msgspec.Struct, frozen=True, omit_defaults=True):

@@ -66,11 +66,15 @@ class RunHistory:
 
     async def umrf(self, run: str) -> str:
         """The graph as it was sent. Raises NotFound."""
+        return (await self.requested(run)).umrf
+
+    async def requested(self, run: str) -> Requested:
+        """The start, as it was asked for. Raises NotFound."""
         first = await self._ledger.read(stream_of(run), limit=1)
         event = decode(first[0].kind, first[0].body) if first else None
         if not isinstance(event, Requested):
             raise NotFound("There is no such run.")
-        return event.umrf
+        return event
 
     async def events(self, run: str, after: int, limit: int) -> Sequence[Event]:
         """Stored events of a run with `seq > after`."""

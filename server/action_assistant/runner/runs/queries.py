@@ -42,8 +42,9 @@ def of_run(run_id: str) -> Select[Any]:
 
 
 def by_request(request_id: str) -> Select[Any]:
-    """The run that a request has become: id, digest, engine."""
-    return select(run.c.id, run.c.digest, run.c.engine).where(run.c.request_id == request_id)
+    """The run that a request has become: id, digest, engine, tree_digest."""
+    fields = (run.c.id, run.c.digest, run.c.engine, run.c.tree_digest)
+    return select(*fields).where(run.c.request_id == request_id)
 
 
 def of_start(request_id: str) -> Select[Any]:

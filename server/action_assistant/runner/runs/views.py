@@ -8,10 +8,10 @@ import msgspec
 from msgspec.structs import replace
 from sqlalchemy import Row
 
-from action_assistant.runner.links.parameter_texts import sent
 from action_assistant.runner.runs.durations import Took, of_run
 from action_assistant.runner.runs.events import AtRest, Author, Overridden, Override
 from action_assistant.runner.runs.run import Desired, Result, Run, State
+from action_assistant.runner.runs.sent_views import Sent, SubgraphShown, subgraphs_shown
 from action_assistant.runner.runs.visits import ActionRun, How, Outcome, Visit
 from action_assistant.umrf.json.embedded import UmrfGraph
 
@@ -133,13 +133,16 @@ class RunShown(RunSummary, frozen=True, kw_only=True):
 
 class RunWhole(RunShown, frozen=True, kw_only=True):
     """A run with the graph as it was sent. `sent`: the values of its actions, by full name and flat
-    name, written as in `inputs` of visits."""
+    name, written as in `inputs` of visits. `subgraphs`: all graphs inside of it, as they were sent along;
+    `tree_digest`: of it together with them, null where whoever started it did not tell."""
 
     umrf: UmrfGraph
     override: Override | None
     sent: dict[str, dict[str, str]]
     despite: list[Overridden]
     archived: ArchivedShown | None
+    subgraphs: list[SubgraphShown]
+    tree_digest: str | None
 
 
 class StartShown(msgspec.Struct, frozen=True, kw_only=True):
@@ -199,18 +202,6 @@ def shown(run: Run, *, recorded: bool = True, memo: Memo | None = None) -> RunSh
     )
 
 
-class Sent(msgspec.Struct, frozen=True):
-    """A graph as it was sent, and the values of its actions."""
-
-    umrf: str
-    values: dict[str, dict[str, str]]
-
-
-def sent_of(umrf: str) -> Sent:
-    """For workers: reads the graph."""
-    return Sent(umrf, sent(umrf))
-
-
 def whole(
     run: Run,
     graph: Sent,
@@ -221,18 +212,19 @@ def whole(
 ) -> RunWhole:
     """All there is; with a `memo` no more visits than `shown` shows."""
     actions = _actions(run, _WHOLE if memo is None else _LIVE, memo)
-    raw = msgspec.Raw(graph.umrf.encode())
     return RunWhole(
         **_fields(run, recorded),
         like=run.like,
         behaviours=run.behaviours,
         actions=actions,
         log=_log(run, len(run.log)),
-        umrf=raw,
+        umrf=msgspec.Raw(graph.umrf.encode()),
         override=run.override,
         despite=list(run.despite),
         sent=graph.values,
         archived=archived(place),
+        subgraphs=subgraphs_shown(graph),
+        tree_digest=graph.tree_digest,
     )
 
 

@@ -9,8 +9,9 @@ import msgspec
 from action_assistant.errors import BadInput, Conflict, TooLarge
 from action_assistant.runner.links.port import SIMULATOR
 from action_assistant.runner.links.simulator import slowed
-from action_assistant.runner.runs.events import Override
+from action_assistant.runner.runs.events import Override, RunSubgraph
 from action_assistant.runner.sent_graph import SentGraph, read_sent
+from action_assistant.runner.sent_subgraphs import SentSubgraph, read_inside, tree_of
 from action_assistant.umrf.check import STRUCTURAL, blocking, check
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.facts import EngineFacts
@@ -35,7 +36,8 @@ class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
 
     `digest` is what the person saw; `request_id` is made by the asker, once per intended start.
     `like`: the robot whose engine the simulator plays, with its hazards. `behaviours`: actions that
-    have a Python behaviour on the runner do what it does, before what the script says.
+    have a Python behaviour on the runner do what it does, before what the script says. `subgraphs`: all
+    graphs inside, by value, as the version has them; `tree_digest`: of the graph together with them.
     """
 
     version: str
@@ -48,6 +50,8 @@ class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     override: Override | None = None
     like: str | None = None
     behaviours: bool = False
+    subgraphs: tuple[SentSubgraph, ...] = ()
+    tree_digest: str | None = None
 
 
 class Admitted(msgspec.Struct, frozen=True, kw_only=True):
@@ -60,12 +64,14 @@ class Admitted(msgspec.Struct, frozen=True, kw_only=True):
     script_text: str
     digest: str
     problems: tuple[Problem, ...] = ()
+    subgraphs: tuple[RunSubgraph, ...] = ()
+    inside: dict[str, Graph] = {}
 
 
 class Prepared(msgspec.Struct, frozen=True, kw_only=True):
     """An admitted start without its graph, which only workers read: its name, the aid of each action
     by full name, and the text that will be sent, with the identity of the run in it. `problems`: as
-    many as anybody is shown."""
+    many as anybody is shown. `inner`: the names of actions inside of `subgraphs`."""
 
     run: str
     name: str
@@ -76,6 +82,9 @@ class Prepared(msgspec.Struct, frozen=True, kw_only=True):
     digest: str
     laps: Laps
     problems: tuple[Problem, ...] = ()
+    subgraphs: tuple[RunSubgraph, ...] = ()
+    inner: tuple[str, ...] = ()
+    tree_digest: str
 
 
 def read_request(body: bytes) -> StartRequest:
@@ -104,8 +113,11 @@ def admit(asked: StartRequest, facts: EngineFacts, *, approved: bool = True) -> 
             f"{found[:12]}…, not {asked.digest[:12]}…. Nothing was started.",
             where={"path": "/digest"},
         )
-    _check_names(reading.graph, simulated=asked.engine == SIMULATOR)
-    problems = [*reading.problems, *reading.placed(check(reading.graph, None, facts))]
+    subgraphs, inside = read_inside(asked.subgraphs, found, asked.tree_digest, approved=approved)
+    for graph in (reading.graph, *inside.values()):
+        _check_names(graph, simulated=asked.engine == SIMULATOR)
+    found_in_it = check(reading.graph, None, facts, inside)
+    problems = [*reading.problems, *reading.placed(found_in_it)]
     _check_problems(problems, asked.override)
     script, script_text = _script(asked)
     return Admitted(
@@ -115,6 +127,8 @@ def admit(asked: StartRequest, facts: EngineFacts, *, approved: bool = True) -> 
         script_text=script_text,
         digest=found,
         problems=tuple(problems),
+        subgraphs=subgraphs,
+        inside=inside,
     )
 
 
@@ -124,7 +138,8 @@ def prepared(
     """As `admit`, for a start that becomes this run. For workers: takes its time with large graphs."""
     admitted = admit(asked, facts, approved=approved)
     graph = admitted.graph
-    if len(graph.actions) > _ACTIONS:
+    inside = [action for each in admitted.inside.values() for action in each.actions]
+    if len(graph.actions) + len(inside) > _ACTIONS:
         raise TooLarge(f"A graph that is started has at most {_ACTIONS:,} actions.")
     errors = [each for each in admitted.problems if each.severity == "error"]
     warnings = [each for each in admitted.problems if each.severity != "error"]
@@ -138,6 +153,9 @@ def prepared(
         digest=admitted.digest,
         laps=laps(graph),
         problems=(*errors[:_KEPT], *warnings[:_KEPT]),
+        subgraphs=admitted.subgraphs,
+        inner=tuple(sorted({each.name for each in inside if not each.missing})),
+        tree_digest=tree_of(admitted.digest, admitted.subgraphs),
     )
 
 

@@ -53,10 +53,14 @@ def booked(
         like=asked.like,
         behaviours=asked.behaviours,
         laps=ready.laps,
+        subgraphs=ready.subgraphs,
+        tree_digest=ready.tree_digest if asked.subgraphs or asked.tree_digest else None,
     )
     targets = () if cleared.own else (asked.engine,)
     graph = GraphOutline(ready.name, ready.actions)
-    return requested, Order(run=ready.run, graph=graph, umrf=ready.umrf, targets=targets)
+    inside = tuple(each.umrf for each in ready.subgraphs)
+    order = Order(run=ready.run, graph=graph, umrf=ready.umrf, targets=targets, inside=inside)
+    return requested, order
 
 
 class StopOrder:
@@ -107,7 +111,8 @@ class IdempotentStarts:
         if not rows:
             return None
         row = rows[0]
-        if (row.digest, row.engine) != (asked.digest, asked.engine):
+        other_tree = asked.tree_digest and row.tree_digest not in {None, asked.tree_digest}
+        if (row.digest, row.engine) != (asked.digest, asked.engine) or other_tree:
             raise Conflict(
                 "This request_id belongs to another start.", where={"path": "/request_id"}
             )

@@ -46,13 +46,14 @@ class Item(msgspec.Struct, frozen=True, kw_only=True):
     problems: tuple[Problem, ...] = ()
 
 
-class Preflight(msgspec.Struct, frozen=True, kw_only=True):
+class Preflight(msgspec.Struct, frozen=True):
     """What stands between a graph and its start on one engine. `override`: the codes that a person
-    would have to answer for; `never`: something cannot be overridden; `digest`: of the graph that
-    was looked at."""
+    would have to answer for; `never`: something cannot be overridden; `digest`: of the graph that was
+    looked at, `tree_digest`: of it together with the graphs inside."""
 
     engine: str
     digest: str
+    tree_digest: str
     items: tuple[Item, ...]
     override: tuple[str, ...]
     never: bool
@@ -82,14 +83,12 @@ class EngineView(msgspec.Struct, frozen=True, kw_only=True):
     settled: tuple[Settled, ...] = ()
 
 
-def summed(engine: str, items: Sequence[Item], digest: str = "") -> Preflight:
+def summed(engine: str, items: Sequence[Item], digest: str = "", tree: str = "") -> Preflight:
     """The items of one engine with what follows from them."""
     blocked = [item for item in items if item.verdict == "blocked"]
     codes = sorted({code for item in blocked if item.overridable for code in item.codes})
     never = any(not item.overridable for item in blocked)
-    return Preflight(
-        engine=engine, digest=digest, items=tuple(items), override=tuple(codes), never=never
-    )
+    return Preflight(engine, digest, tree, tuple(items), tuple(codes), never)
 
 
 def with_items(look: Preflight, more: Sequence[Item]) -> Preflight:

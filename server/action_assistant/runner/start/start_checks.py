@@ -21,11 +21,13 @@ from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import Overridden, Override
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.sent_graph import SentGraph
+from action_assistant.runner.sent_subgraphs import SentSubgraph
 from action_assistant.runner.start import preflight
 from action_assistant.runner.start.admission import Prepared, StartRequest, decoded, prepared
 from action_assistant.runner.start.approvals import Approvals
 from action_assistant.runner.start.course_items import of_courses, of_unknown_courses
 from action_assistant.runner.start.preflight import EngineView, Item, Preflight, Settled
+from action_assistant.runner.start.subgraph_items import looked_at
 from action_assistant.umrf.facts import SIMULATED, EngineFacts, facts_of
 from action_assistant.web.workers.lanes import RunInWorker
 
@@ -36,8 +38,8 @@ _COURSES_S: Final = 5.0  # so long a look waits for what is behind others' quest
 _MOST: Final = 20  # engines of one group
 _TOLD: Final = 40  # overridden problems that are kept with a run
 
-#: The expected courses of a graph (its id), held against its text.
-CoursesOf: TypeAlias = Callable[[str, bytes], Awaitable[CheckedCourses]]
+#: The expected courses of a graph (its id), held against its text and those of the graphs inside.
+CoursesOf: TypeAlias = Callable[[str, bytes, Sequence[SentSubgraph]], Awaitable[CheckedCourses]]
 
 _Name = Annotated[str, msgspec.Meta(min_length=1, max_length=100)]
 
@@ -55,6 +57,8 @@ class GroupRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     override: Override | None = None
     like: str | None = None
     behaviours: bool = False
+    subgraphs: tuple[SentSubgraph, ...] = ()
+    tree_digest: str | None = None
 
     def of(self, engine: str) -> StartRequest:
         """The start on one of them."""
@@ -68,6 +72,8 @@ class GroupRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
             override=self.override,
             like=self.like if engine == SIMULATOR else None,
             behaviours=self.behaviours and engine == SIMULATOR,
+            subgraphs=self.subgraphs,
+            tree_digest=self.tree_digest,
         )
 
 
@@ -158,7 +164,7 @@ class StartChecks:
         if asked.behaviours:
             raise BadInput("Only the simulator runs behaviours.", where={"path": "/behaviours"})
         ready = await self._run_in_worker(prepared, asked, robot.facts, random_id())
-        await self._approvals.require(robot.registration, ready.digest, starter)
+        await self._approvals.require(robot.registration, ready.tree_digest, starter)
         free = preflight.of_taken(asked.engine, self._taken(asked.engine))
         preflight.check_items([free], ())
         if self._robots.foreign_stops.going(asked.engine):
@@ -173,7 +179,7 @@ class StartChecks:
             raise Unavailable(silence.text, where={"path": "/engine", "item": "answers"}) from (
                 nothing
             )
-        items = await self._run_in_worker(preflight.of_text, view, ready.umrf, self._prefixes)
+        items = await self._run_in_worker(looked_at, view, ready, self._prefixes)
         preflight.check_items([preflight.of_taken(asked.engine, self._taken(asked.engine))], ())
         preflight.check_items(items, asked.override.codes if asked.override else ())
         return Cleared(
@@ -243,7 +249,8 @@ class StartChecks:
             return ()
         try:
             with anyio.fail_after(_COURSES_S):
-                return of_courses(await self._courses(asked.graph, bytes(asked.umrf)))
+                found = await self._courses(asked.graph, bytes(asked.umrf), asked.subgraphs)
+                return of_courses(found)
         except TimeoutError:
             return (of_unknown_courses(f"That takes longer than {_COURSES_S:.0f} s."),)
         except Refused as refused:
@@ -272,8 +279,8 @@ class StartChecks:
             items.append(preflight.of_taken(asked.engine, self._taken(asked.engine)))
             items += await self._look_at(robot, ready)
             items += await self._said_yes(robot, ready, starter)
-        digest = ready.digest if ready is not None else ""
-        return preflight.summed(asked.engine, items, digest)
+        digests = (ready.digest, ready.tree_digest) if ready is not None else ("", "")
+        return preflight.summed(asked.engine, items, *digests)
 
     async def _look_at(self, robot: KnownEngine, ready: Prepared | None) -> list[Item]:
         try:
@@ -282,14 +289,14 @@ class StartChecks:
             return [preflight.of_silence(robot.registration.name, str(nothing))]
         if ready is None:
             return [preflight.of_answer(view)]
-        return list(await self._run_in_worker(preflight.of_text, view, ready.umrf, self._prefixes))
+        return list(await self._run_in_worker(looked_at, view, ready, self._prefixes))
 
     async def _said_yes(
         self, robot: KnownEngine, ready: Prepared | None, starter: str
     ) -> list[Item]:
         if ready is None:
             return []
-        item = await self._approvals.item(robot.registration, ready.digest, starter)
+        item = await self._approvals.item(robot.registration, ready.tree_digest, starter)
         return [] if item is None else [item]
 
     async def _view(self, robot: KnownEngine) -> EngineView:
@@ -322,7 +329,8 @@ class StartChecks:
             raise Conflict(
                 "This runner has no behaviours: whoever starts it names their folder.", where=where
             )
-        names = sorted({each.rpartition("_")[0] for each in ready.actions})
+        own = {each.rpartition("_")[0] for each in ready.actions}
+        names = sorted(own | set(ready.inner))
         found = await self._run_in_worker(self._behaviours.listed, names)
         if found.problem or found.refused:
             told = " ".join([found.problem, *found.refused.values()]).strip()

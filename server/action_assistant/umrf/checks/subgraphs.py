@@ -5,6 +5,7 @@ See docs/umrf-and-the-engine.md 2.6.
 
 from collections.abc import Container, Mapping
 from dataclasses import dataclass
+from typing import Final
 
 from action_assistant.umrf.checks.flow import check_flow
 from action_assistant.umrf.checks.places import Subject
@@ -34,15 +35,50 @@ class _Inner:
     problems: tuple[tuple[str, Severity, str], ...]
 
 
+@dataclass(frozen=True)
+class Resolution:
+    """How names were resolved to graphs. `several`: names of more than one graph, of which the oldest
+    was taken; `cut`: there are more graphs inside than were looked at."""
+
+    several: Container[str] = frozenset()
+    cut: bool = False
+
+
+#: Each name is that of one graph, and all were looked at.
+CERTAIN: Final = Resolution()
+
+
 def check_subgraphs(
-    subject: Subject, graphs: Mapping[str, Graph], known: Container[str] = frozenset()
+    subject: Subject,
+    graphs: Mapping[str, Graph],
+    known: Container[str] = frozenset(),
+    resolution: Resolution = CERTAIN,
 ) -> None:
     """Reports all of it. `known`: names of actions, which come before graphs of the same name."""
+    if resolution.cut:
+        message = (
+            "There are more graphs inside this one than are looked at. What lies deeper was not checked, "
+            "and a dry-run plays it as one action."
+        )
+        subject.report("not-tried", "warning", message)
+    _check_each(subject, graphs, known, resolution)
+    _check_again(subject, graphs, known)
+
+
+def _check_each(
+    subject: Subject, graphs: Mapping[str, Graph], known: Container[str], resolution: Resolution
+) -> None:
     inner: dict[str, _Inner | None] = {}
     for action in subject.real:
         graph = graphs.get(action.name)
         if graph is None or action.name in known:
             continue
+        if action.name in resolution.several:
+            message = (
+                f"Several graphs are called “{graph.name}”: the oldest of them is taken. Rename the "
+                "others, so that nobody is mistaken."
+            )
+            subject.report("subgraph-ambiguous", "warning", message, action=action, member="/name")
         if action.name not in inner:
             contains = _contains(graph, {subject.graph.name, graph.name}, graphs, known)
             inner[action.name] = None if contains else _inner(subject, graph)
@@ -59,7 +95,6 @@ def check_subgraphs(
         for code, severity, message in found.problems:
             subject.report(code, severity, message, action=action, member="/name")
         _check_pauses(subject, action)
-    _check_again(subject, graphs, known)
 
 
 def _check_again(subject: Subject, graphs: Mapping[str, Graph], known: Container[str]) -> None:

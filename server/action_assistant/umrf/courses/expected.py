@@ -39,14 +39,30 @@ class CourseCheck(msgspec.Struct, frozen=True):
         return f"Step {self.apart.place + 1}: expected {expected}, found {found}."
 
 
-def checked(was: Graph, course: Sequence[ExpectedStep], script: Script, now: Graph) -> CourseCheck:
-    """Simulate a graph as it is now under the script of a course that an earlier one took."""
+def checked(
+    was: Graph,
+    course: Sequence[ExpectedStep],
+    script: Script,
+    now: Graph,
+    inside: Mapping[str, Graph] | None = None,
+) -> CourseCheck:
+    """Simulate a graph as it is now, with these graphs inside, under the script of a course that an
+    earlier one took."""
     old = {action.full_name: action.key for action in was.actions}
     new = _identities(was, now)
     names = {key: name for name, key in new.items()}
     by_key = scripted_by_key(script, was).behaviours
     played = Script({names.get(key, key): calls for key, calls in by_key.items()})
-    traces = list(simulate(now, script=played, facts=SIMULATED, until_ms=DAY_MS, max_events=MOST))
+    traces = list(
+        simulate(
+            now,
+            script=played,
+            library=inside,
+            facts=SIMULATED,
+            until_ms=DAY_MS,
+            max_events=MOST,
+        )
+    )
     apart = departure(keyed(unnamed(course), old), keyed(unnamed(steps_of(traces)), new))
     names = {key: name for name, key in old.items()} | names
     return CourseCheck(None if apart is None else _named(apart, names), taken(now, traces))

@@ -6,7 +6,7 @@ search that runs out of states proves that no results and no order of ends take 
 actions give their outputs and stop when they are told to.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from heapq import heappop, heappush
 from typing import Final, NamedTuple, TypeAlias
 
@@ -91,8 +91,14 @@ class _Asked(Instant):
         return _GraphState(tuple(states), self.running, self.active)
 
 
-def reaching(graph: Graph, wanted: OutcomeArrow, budget: int = BUDGET) -> Reaching:
-    """Search for a script under which an arrow is taken."""
+def reaching(
+    graph: Graph,
+    wanted: OutcomeArrow,
+    budget: int = BUDGET,
+    inside: Mapping[str, Graph] | None = None,
+) -> Reaching:
+    """Search for a script under which an arrow is taken, with these graphs inside. What ends how inside
+    is not searched: it is taken as if any end were possible, and proven by the simulator."""
     net = Network(graph)
     places = {action.key: net.place.get(action.full_name, -2) for action in graph.actions}
     places |= {ENTRY: -1, EXIT: net.exit}
@@ -108,7 +114,14 @@ def reaching(graph: Graph, wanted: OutcomeArrow, budget: int = BUDGET) -> Reachi
             return ArrowUndecided(search.looked, "Spontaneous actions end whenever they like.")
         return ArrowUnreachable(search.looked)
     script = search.script(ends)
-    traces = simulate(graph, script=script, facts=SIMULATED, until_ms=DAY_MS, max_events=MOST)
+    traces = simulate(
+        graph,
+        script=script,
+        library=inside,
+        facts=SIMULATED,
+        until_ms=DAY_MS,
+        max_events=MOST,
+    )
     if wanted in taken(graph, traces).arrows:
         return ArrowReached(script)
     return ArrowUndecided(search.looked, "The simulator does not go the way that was found.")

@@ -1,6 +1,6 @@
 """The course of a run as steps without times, and where two courses part. Pure."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Final, Literal
 
 import msgspec
@@ -38,10 +38,17 @@ class Departure(msgspec.Struct, frozen=True):
     found: ExpectedStep | None
 
 
-def course(graph: Graph, script: Script, most: int = MOST) -> tuple[ExpectedStep, ...]:
-    """What happens when this graph runs under this script, without times, as far as `most` events go.
-    Deterministic."""
-    traces = simulate(graph, script=script, facts=SIMULATED, until_ms=DAY_MS, max_events=most)
+def course(
+    graph: Graph,
+    script: Script,
+    most: int = MOST,
+    inside: Mapping[str, Graph] | None = None,
+) -> tuple[ExpectedStep, ...]:
+    """What happens when this graph, with these graphs inside, runs under this script, without times, as
+    far as `most` events go. Deterministic."""
+    traces = simulate(
+        graph, script=script, library=inside, facts=SIMULATED, until_ms=DAY_MS, max_events=most
+    )
     return steps_of(traces)
 
 

@@ -10,6 +10,7 @@ import msgspec
 import pytest
 
 from action_assistant.editor.catalogue.catalogue import Catalogue
+from action_assistant.editor.catalogue.graph_checks import GraphChecks
 from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.catalogue.people import People
 from action_assistant.editor.catalogue.versions import Versions
@@ -50,12 +51,13 @@ class House:
         reader = GraphReader(journal, rooms)
         index = ChangeIndex(journal)
         grafts = Grafts(journal, index, people)
-        self.catalogue = Catalogue(journal, rooms, reader)
+        checks = GraphChecks(journal, rooms, reader)
+        self.catalogue = Catalogue(journal, rooms, reader, checks)
         self.drafts = Drafts(journal, reader, self.catalogue, people, index)
-        self.merges = DraftMerges(journal, rooms, self.drafts, index, grafts, people)
+        self.merges = DraftMerges(journal, rooms, self.drafts, index, grafts, people, checks)
         self.blame = Blame(index, people, grafts)
         self.going_back = GoingBack(journal, rooms, reader, index)
-        self.history = GraphHistory(journal, people, Versions(journal, reader), index)
+        self.history = GraphHistory(journal, people, Versions(journal, reader, checks), index)
         self.origin = ""
         self.wrote: dict[tuple[str, str, bytes], set[str]] = defaultdict(set)
 

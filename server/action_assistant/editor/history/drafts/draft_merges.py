@@ -5,6 +5,7 @@ from typing import Final
 
 import msgspec
 
+from action_assistant.editor.catalogue.graph_checks import GraphChecks
 from action_assistant.editor.catalogue.people import People
 from action_assistant.editor.history.change_index import ChangeIndex
 from action_assistant.editor.history.drafts.drafts import DraftPair, Drafts
@@ -84,6 +85,7 @@ class DraftMerges:
         index: ChangeIndex,
         grafts: Grafts,
         people: People,
+        checks: GraphChecks,
         run_in_worker: RunInWorker = run_here,
     ) -> None:
         self._journal = journal
@@ -92,6 +94,7 @@ class DraftMerges:
         self._index = index
         self._grafts = grafts
         self._people = people
+        self._checks = checks
         self._run_in_worker = run_in_worker
 
     async def preview(self, draft: str, asked: AskedMerge) -> MergePreview:
@@ -145,8 +148,10 @@ class DraftMerges:
     async def _found(
         self, pair: DraftPair, into: DraftSide, choices: Mapping[str, DraftSide]
     ) -> FoundMerge:
+        sides = (pair.origin, pair.draft) if into == "origin" else (pair.draft, pair.origin)
+        inside = await self._checks.inside(*sides)
         return await self._run_in_worker(
-            merging, pair.base, pair.origin, pair.draft, into, dict(choices)
+            merging, pair.base, pair.origin, pair.draft, into, dict(choices), inside
         )
 
     async def _authors(

@@ -5,7 +5,13 @@ from typing import Any, Final, Literal, TypeAlias
 
 import msgspec
 
-from action_assistant.editor.documents.contents import GraphAtSeq, read
+from action_assistant.editor.documents.contents import (
+    NOTHING_INSIDE,
+    GraphAtSeq,
+    Inside,
+    graphs_of,
+    read,
+)
 from action_assistant.editor.documents.document import Maps, is_same, read_maps
 from action_assistant.editor.documents.values import ROOTS, ends_of, is_aid
 from action_assistant.editor.history.drafts.merging import Choices, FoundConflict, merged
@@ -64,9 +70,10 @@ def merging(
     draft: GraphAtSeq,
     into: DraftSide,
     choices: Mapping[str, DraftSide],
+    inside: Inside = NOTHING_INSIDE,
 ) -> FoundMerge:
     """What merging does to the side `into`. `base`: the changes that gave each key the value that it
-    had when both sides were last one."""
+    had when both sides were last one. `inside`: the graphs inside of either side."""
     was = maps_of(state_of(base))
     sides: dict[DraftSide, GraphAtSeq] = {"origin": origin, "draft": draft}
     ours, theirs = sides[into], sides[_other(into)]
@@ -79,8 +86,9 @@ def merging(
     maps = _maps({place: v for place, v in result.items() if v is not msgspec.UNSET})
     graph = read_maps(maps)
     teller = _Teller(was, {side: read(each).moment.maps for side, each in sides.items()}, into)
-    known = {(problem.code, problem.message) for problem in mine.problems}
-    worse = [each for each in check_written(graph) if (each.code, each.message) not in known]
+    known = {(problem.code, problem.message) for problem in mine.problems(inside)}
+    problems = check_written(graph, graphs_of(inside), inside.resolution)
+    worse = [each for each in problems if (each.code, each.message) not in known]
     return FoundMerge(
         setting(ours.state, {(root, key): v for (root, key), v in found.targets.items()}),
         tuple(found.targets),

@@ -1,0 +1,259 @@
+"""What is wrong with graphs, and what lists say of them: with the graphs that their actions stand for."""
+
+import logging
+import sys
+from collections.abc import Iterable
+from hashlib import sha256
+from typing import Final
+
+import msgspec
+
+from action_assistant.editor.catalogue.graph_names import GraphNames
+from action_assistant.editor.catalogue.graph_reader import GraphReader
+from action_assistant.editor.catalogue.recent import Recent
+from action_assistant.editor.documents import contents, document
+from action_assistant.editor.documents.contents import Counts, GraphAtSeq, GraphInfo, Inside
+from action_assistant.editor.log.graph_events import DocumentKind, graph_stream
+from action_assistant.editor.rooms.open_rooms import Rooms
+from action_assistant.errors import NotFound, Refused
+from action_assistant.journal.journal import Journal
+from action_assistant.umrf.problem_kinds import ToldCounts
+from action_assistant.umrf.semantics.matching import BUDGET
+from action_assistant.web.workers.lanes import HOPELESS, Crashed
+
+log: Final = logging.getLogger(__name__)
+
+_REMEMBERED: Final = 32  # moments of graphs
+_COUNTED: Final = 5000
+_NAMES: Final = 500_000  # of actions, over all graphs that are remembered
+#: Graphs inside of one. More than that is told, and not looked at.
+_INSIDE: Final = 200
+
+
+class GraphSummary(msgspec.Struct, frozen=True):
+    """What a list shows of a graph. `damaged`: the first change that cannot be read. `first`: name and
+    description of its first action. What is None is not known, since finding it out takes more than it
+    may."""
+
+    seq: int
+    name: str | None = None
+    description: str | None = None
+    actions: int | None = None
+    problems: Counts | None = None
+    told: ToldCounts | None = None
+    robots: tuple[str, ...] = ()
+    labels: tuple[str, ...] = ()
+    damaged: int | None = None
+    first: tuple[str, str] | None = None
+
+    def called(self, kind: DocumentKind) -> tuple[str | None, str | None]:
+        """Name and description; of an action they are those of the action itself."""
+        return (self.name, self.description) if kind == "graph" or not self.first else self.first
+
+
+class _About(msgspec.Struct, frozen=True):
+    """What is known of a graph by itself after its change `seq`, asked for when `newest` was its last."""
+
+    seq: int
+    newest: int
+    info: GraphInfo
+
+
+class _Member(msgspec.Struct, frozen=True):
+    """A graph inside of another, by the name of the actions that stand for it."""
+
+    name: str
+    graph: str
+    seq: int
+
+
+class NamedInside(msgspec.Struct, frozen=True):
+    """What is inside of a graph, by name: what a result depends on besides the graph itself. `several`:
+    names of more than one graph; `cut`: there are more than these."""
+
+    members: tuple[_Member, ...] = ()
+    several: tuple[str, ...] = ()
+    cut: bool = False
+
+    def key(self) -> bytes:
+        """The same for the same graphs at the same moments."""
+        return sha256(msgspec.msgpack.encode(self)).digest() if self.members else b""
+
+
+class GraphChecks:
+    """Checks graphs. Nothing that it remembers is needed; it only saves checking again."""
+
+    def __init__(self, journal: Journal, rooms: Rooms, reader: GraphReader) -> None:
+        self._rooms = rooms
+        self._reader = reader
+        self.names: Final = GraphNames(journal, self._name)
+        self._abouts = Recent[str, _About](_COUNTED, _NAMES)
+        self._hopeless = Recent[str, tuple[int, Refused]](_COUNTED)
+        self._counts = Recent[str, tuple[int, bytes, Counts, ToldCounts]](_COUNTED)
+        self._problems = Recent[tuple[str, int, bytes], bytes](_REMEMBERED)
+        self._digests = Recent[tuple[str, int], str](_COUNTED)
+        self._uses = Recent[tuple[str, int], tuple[str, tuple[str, ...]]](_REMEMBERED)
+
+    async def problems(self, sight: GraphAtSeq) -> bytes:
+        """What is wrong with a graph at a moment, as JSON, with the graphs inside as they are now."""
+        await self.names.refresh()
+        named = await self._resolved(*await self._names_at(sight))
+        key = sight.graph, sight.seq, named.key()
+        found = self._problems.get(key)
+        if found is None:
+            inside = await self._seen(named)
+            found = await self._reader.ask(contents.problems, sight, inside)
+            self._problems.put(key, found)
+        return found
+
+    async def inside(self, *moments: GraphAtSeq, more: Iterable[str] = ()) -> Inside:
+        """The graphs inside of a graph, as they are now: by the names of its actions at these moments, and
+        by `more` names."""
+        await self.names.refresh()
+        known = [await self._names_at(each) for each in moments]
+        uses = [name for _, each in known for name in each]
+        return await self._seen(await self._resolved(known[0][0], (*uses, *more)))
+
+    async def inside_of(self, graph: str, uses: Iterable[str]) -> Inside:
+        """The graphs inside of a graph of this name with actions of these names."""
+        await self.names.refresh()
+        return await self._seen(await self._resolved(graph, uses))
+
+    async def digest(self, name: str) -> str | None:
+        """The digest of the graph that an action of this name stands for now; None where there is none, or
+        it cannot be read."""
+        await self.names.refresh()
+        known = await self._standing_for(name)
+        if known is None:
+            return None
+        key = known[0].graph, known[0].seq
+        found = self._digests.get(key)
+        if found is None:
+            sight = await self._sight(*key)
+            found = self._digests.put(key, await self._reader.ask(contents.digest_at, sight))
+        return found
+
+    def made(self, graph: str, state: bytes, about: GraphInfo) -> None:
+        """A graph has been made of this document, and this is to be said of it by itself."""
+        self._reader.made(graph, state)
+        self._remember(graph, _About(1, 1, about))
+
+    async def summary(self, graph: str, newest: int) -> GraphSummary:
+        """What a list shows of a graph whose last change is `newest`, as of the last refresh of names."""
+        try:
+            about = await self._about(graph, newest)
+            named = await self._resolved(about.info.name, about.info.uses)
+            counts, told = about.info.problems, about.info.told
+            if named.members:
+                counts, told = await self._counted(graph, about.seq, named)
+        except HOPELESS as error:  # others are in the list too
+            log.error("%s: nothing can be said of change %d: %s", graph, newest, error.detail)
+            return GraphSummary(newest)
+        info = about.info
+        return GraphSummary(
+            about.seq,
+            info.name,
+            info.description,
+            info.actions,
+            counts,
+            told,
+            info.robots,
+            info.labels,
+            about.seq + 1 if about.seq < newest else None,
+            info.first,
+        )
+
+    async def _counted(self, graph: str, seq: int, named: NamedInside) -> tuple[Counts, ToldCounts]:
+        key, known = named.key(), self._counts.get(graph)
+        if known is None or known[:2] != (seq, key):
+            sight, inside = await self._sight(graph, seq), await self._seen(named)
+            found = await self._reader.ask(contents.counted, sight, inside)
+            known = self._counts.put(graph, (seq, key, *found))
+        return known[2:]
+
+    async def _about(self, graph: str, newest: int) -> _About:
+        """What is known of a graph by itself. Raises Unavailable, TooLarge."""
+        known = self._abouts.get(graph)
+        if known is not None and known.newest >= newest:
+            return known
+        hopeless = self._hopeless.get(graph)
+        if hopeless is not None and hopeless[0] >= newest:
+            raise hopeless[1]
+        sight = await self._reader.now(graph)
+        try:
+            info = await self._reader.ask(contents.info, sight)
+        except HOPELESS as error:
+            if not isinstance(error, Crashed):  # what has died may have been in somebody's way
+                self._hopeless.put(graph, (newest, error))
+            raise
+        return self._remember(graph, _About(sight.seq, max(newest, sight.seq), info))
+
+    def _remember(self, graph: str, about: _About) -> _About:
+        uses = tuple(map(sys.intern, about.info.uses))  # most graphs use the same actions
+        info = msgspec.structs.replace(about.info, uses=uses)
+        about = msgspec.structs.replace(about, info=info)
+        return self._abouts.put(graph, about, len(uses))
+
+    async def _name(self, graph: str, newest: int, kind: DocumentKind) -> str:
+        """The name of a document. Raises Unavailable, TooLarge."""
+        room = self._rooms.open_room(graph_stream(graph))
+        if room is not None and kind == "graph":
+            return await room.look(lambda replica, _: document.name_of(replica.doc))
+        info = (await self._about(graph, newest)).info
+        if kind == "graph":
+            return info.name
+        return info.first[0] if info.first is not None else ""
+
+    async def _names_at(self, sight: GraphAtSeq) -> tuple[str, tuple[str, ...]]:
+        """The name of a graph at a moment, and those of its actions."""
+        key = sight.graph, sight.seq
+        found = self._uses.get(key)
+        return found or self._uses.put(key, await self._reader.ask(contents.names, sight))
+
+    async def _resolved(self, own: str, uses: Iterable[str]) -> NamedInside:
+        """What is inside, level by level. An action with the name of the graph that it is in is an
+        action: no engine runs a graph inside itself."""
+        found: dict[str, _Member] = {}
+        level, actions, cut = [(own, uses)], 0, False
+        while level:
+            below: list[tuple[str, Iterable[str]]] = []
+            for graph, names in level:
+                for name in names:
+                    if name == graph or name in found or not self.names.graph(name):
+                        continue
+                    about = await self._standing_for(name)
+                    if about is None:
+                        continue
+                    if len(found) >= _INSIDE or actions + about[1].actions > BUDGET:
+                        cut = True
+                        continue
+                    found[name], info = about
+                    actions += info.actions
+                    below.append((name, info.uses))
+            level = below
+        members = tuple(found[name] for name in sorted(found))
+        several = tuple(each.name for each in members if self.names.is_ambiguous(each.name))
+        return NamedInside(members, several, cut)
+
+    async def _standing_for(self, name: str) -> tuple[_Member, GraphInfo] | None:
+        known = self.names.graph(name)
+        if known is None:
+            return None
+        try:
+            about = await self._about(known.graph, known.seq)
+        except (*HOPELESS, NotFound):
+            return None
+        if about.info.name != name:  # renamed at this moment; whoever asks next has it
+            return None
+        return _Member(name, known.graph, about.seq), about.info
+
+    async def _seen(self, named: NamedInside) -> Inside:
+        graphs = [(each.name, await self._sight(each.graph, each.seq)) for each in named.members]
+        return Inside(tuple(graphs), named.several, named.cut)
+
+    async def _sight(self, graph: str, seq: int) -> GraphAtSeq:
+        """A graph at a moment. Raises Unavailable."""
+        try:
+            return await self._reader.at(graph, seq)
+        except Refused:  # its history is damaged after that
+            return await self._reader.now(graph)

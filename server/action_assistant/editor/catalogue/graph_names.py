@@ -1,0 +1,193 @@
+"""Which graph of this server an action's name stands for: names as documents have them, kept up with the log.
+
+See docs/decisions/070-one-truth-for-sub-graphs.md.
+"""
+
+import asyncio
+from bisect import insort
+from collections import Counter
+from collections.abc import AsyncIterator, Awaitable, Callable, Collection
+from contextlib import asynccontextmanager
+from typing import Any, Final
+
+import msgspec
+from anyio import CapacityLimiter, Lock, create_task_group
+from sqlalchemy import Row, func, select
+
+from action_assistant.editor.log.graph_events import DocumentKind
+from action_assistant.errors import NotFound, Refused, TooLarge
+from action_assistant.journal.journal import Journal
+from action_assistant.schema import editor_tables
+from action_assistant.schema.editor_tables import editor_event, editor_head
+from action_assistant.web.auth.caller import Caller, asked_by
+from action_assistant.web.workers.lanes import GaveUp
+
+_AT_ONCE: Final = 4  # documents that are read
+_ROWS: Final = 400  # that one question names
+#: Who reads names: nobody's own work waits for that, nor the other way round.
+_OURSELVES: Final = Caller("graph names")
+
+#: The name of a document after a change of it, or of a later one.
+ReadName = Callable[[str, int, DocumentKind], Awaitable[str]]
+
+
+class NamedGraph(msgspec.Struct, frozen=True):
+    """A graph, and the change of it that is known."""
+
+    graph: str
+    seq: int
+
+
+class _Document(msgspec.Struct, frozen=True):
+    """A document that counts: neither a draft nor deleted. `name`: "" where it cannot be read."""
+
+    kind: DocumentKind
+    made_at: int
+    name: str = ""
+
+
+class GraphNames:
+    """Knows the names of all graphs and of all actions of the library. Looks only at what has changed."""
+
+    def __init__(self, journal: Journal, read_name: ReadName) -> None:
+        self._journal = journal
+        self._read_name = read_name
+        self._refreshing = Lock()
+        self._next: asyncio.Task[None] | None = None  # has not begun yet
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._position: int | None = None
+        self._seqs: dict[str, int] = {}
+        self._documents: dict[str, _Document] = {}
+        self._again: set[str] = set()  # whose reading died
+        self._graphs: dict[str, list[tuple[int, str]]] = {}  # by name, the oldest first
+        self._actions: Counter[str] = Counter()
+
+    def graph(self, name: str) -> NamedGraph | None:
+        """The graph that an action of this name stands for, as of the last `refresh`: none where the
+        library has such an action, and of several the oldest."""
+        found = self._graphs.get(name)
+        if not found or self._actions[name]:
+            return None
+        graph = found[0][1]
+        return NamedGraph(graph, self._seqs[graph])
+
+    def is_ambiguous(self, name: str) -> bool:
+        """Whether several graphs have the name."""
+        return len(self._graphs.get(name, ())) > 1
+
+    async def refresh(self) -> None:
+        """Take in what has been stored by now. Raises Unavailable."""
+        await asyncio.shield(self._begun())  # others wait for it too
+
+    @asynccontextmanager
+    async def read_ahead(self) -> AsyncIterator[None]:
+        """While you are inside, names are being read already, so that who asks first seldom waits."""
+        self._begun()
+        try:
+            yield
+        finally:
+            for task in self._tasks:
+                task.cancel()
+
+    def _begun(self) -> "asyncio.Task[None]":
+        if self._next is None:
+            self._next = asyncio.create_task(self._refresh(), name="graph names")
+            self._tasks.add(self._next)
+            self._next.add_done_callback(self._ended)
+        return self._next
+
+    def _ended(self, task: "asyncio.Task[None]") -> None:
+        """Whoever waited may have left: nobody is told of a failure then."""
+        self._tasks.discard(task)
+        if not task.cancelled():
+            task.exception()
+
+    async def _refresh(self) -> None:
+        asked_by(
+            _OURSELVES
+        )  # it goes on when whoever came first has left, or has others work for them
+        async with self._refreshing:
+            self._next = None  # who comes from here on may know of more
+            position, seqs, abouts = await self._news()
+            self._seqs |= seqs
+            changed = await self._look_up(abouts)
+            changed |= (seqs.keys() | self._again) & self._documents.keys()
+            limit = CapacityLimiter(_AT_ONCE)
+            async with create_task_group() as reading:
+                for graph in changed & self._seqs.keys():
+                    reading.start_soon(self._read, graph, limit)
+            self._position = position
+
+    async def _news(self) -> tuple[int, dict[str, int], set[str]]:
+        """Up to where the log goes, the newest changes of documents, and of what more was told."""
+        if self._position is None:
+            position = await self._journal.position()
+            rows = await self._journal.query(select(editor_head.c.stream, editor_head.c.seq))
+        else:
+            event = editor_event.c
+            newest = select(
+                event.stream, func.max(event.seq).label("seq"), func.max(event.position).label("at")
+            )
+            chosen = newest.where(event.position > self._position).group_by(event.stream)
+            rows = await self._journal.query(chosen)
+            position = max((row.at for row in rows), default=self._position)
+        seqs: dict[str, int] = {}
+        abouts: set[str] = set()
+        for row in rows:
+            kind, _, graph = row.stream.partition("/")
+            if kind == "graph":
+                seqs[graph] = row.seq
+            elif kind == "about":
+                abouts.add(graph)
+        return position, seqs, abouts
+
+    async def _look_up(self, abouts: Collection[str]) -> set[str]:
+        """Documents that count from now on, and did not."""
+        ids = sorted(abouts)
+        fresh: set[str] = set()
+        graph = editor_tables.graph.c
+        fields = (graph.id, graph.kind, graph.made_at, graph.deleted_at, graph.draft_of)
+        for start in range(0, len(ids), _ROWS):
+            chosen = select(*fields).where(graph.id.in_(ids[start : start + _ROWS]))
+            for row in await self._journal.query(chosen):
+                if row.deleted_at is not None or row.draft_of is not None:
+                    self._call(row.id, None)
+                elif row.id not in self._documents:
+                    self._call(row.id, _as_document(row))
+                    fresh.add(row.id)
+        return fresh
+
+    async def _read(self, graph: str, limit: CapacityLimiter) -> None:
+        async with limit:
+            document = self._documents[graph]
+            self._again.discard(graph)
+            try:
+                name = await self._read_name(graph, self._seqs[graph], document.kind)
+            except (GaveUp, TooLarge, NotFound):
+                name = ""
+            except Refused:  # not now
+                self._again.add(graph)
+                return
+            self._call(graph, msgspec.structs.replace(document, name=name))
+
+    def _call(self, graph: str, document: _Document | None) -> None:
+        """From now on a document is this one; None: it does not count."""
+        before = self._documents.pop(graph, None)
+        if before is not None and before.name:
+            if before.kind == "action":
+                self._actions -= Counter((before.name,))
+            else:
+                self._graphs[before.name].remove((before.made_at, graph))
+                if not self._graphs[before.name]:
+                    del self._graphs[before.name]
+        if document is None:
+            return
+        self._documents[graph] = document
+        if document.name and document.kind == "action":
+            self._actions[document.name] += 1
+        elif document.name:
+            insort(self._graphs.setdefault(document.name, []), (document.made_at, graph))
+
+
+def _as_document(row: Row[Any]) -> _Document:
+    return _Document(row.kind, row.made_at)

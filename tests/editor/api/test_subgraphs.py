@@ -1,0 +1,124 @@
+"""Graphs inside of graphs over HTTP: told, played, and pinned by versions."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from action_assistant.umrf.digest import digest, tree_digest
+from action_assistant.umrf.files import codec
+from editor.process import running
+from journal.servers import Server
+
+
+@pytest.fixture(params=["sqlite", "postgres"])
+def client(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[httpx.Client]:
+    """A program at an editor of its own, on either database."""
+    server: Server | None = None
+    if request.param == "postgres":
+        server = request.getfixturevalue("postgres")
+    database = server.new_database() if server is not None else None
+    with running(tmp_path / "data", database) as editor, editor.client() as client:
+        yield client
+
+
+def graph_file(name: str, *actions: str, exits: bool = True) -> dict[str, Any]:
+    """Actions that stand beside each other."""
+    ends = [{"name": each, "instance_id": 0} for each in actions]
+    return {
+        "graph_name": name,
+        "graph_entry": ends,
+        "graph_exit": ends if exits else [],
+        "actions": [{"name": each, "type": "sync", "instance_id": 0} for each in actions],
+    }
+
+
+def made(http: httpx.Client, *names: str, **more: Any) -> str:
+    answer = http.post("/api/graphs", json=graph_file(*names, **more))
+    assert answer.status_code == 201, answer.text
+    found: str = answer.json()["id"]
+    return found
+
+
+def codes(http: httpx.Client, graph: str) -> list[str]:
+    found = http.get(f"/api/graphs/{graph}/problems").json()["problems"]
+    return sorted(each["code"] for each in found)
+
+
+def published(http: httpx.Client, graph: str, **body: Any) -> httpx.Response:
+    return http.post(f"/api/graphs/{graph}/versions", json=body)
+
+
+def rewritten(http: httpx.Client, graph: str, text: dict[str, Any]) -> httpx.Response:
+    seq = http.get(f"/api/graphs/{graph}").json()["seq"]
+    return http.put(f"/api/graphs/{graph}/umrf", params={"seq": seq}, json=text)
+
+
+def test_a_graph_inside_is_told_played_and_pinned(client: httpx.Client) -> None:
+    inner = made(client, "Inner", "Step", exits=False)
+    outer = made(client, "Outer", "Inner")
+    assert codes(client, outer) == ["H8"]
+    listed = {each["id"]: each for each in client.get("/api/graphs").json()}
+    assert (listed[outer]["problems"], listed[outer]["wrong"]) == ({"error": 1, "warning": 0}, 1)
+    preview = client.post(
+        "/api/graphs", params={"preview": True}, json=graph_file("Other", "Inner")
+    ).json()
+    assert [each["code"] for each in preview["problems"]] == ["H8"]
+
+    changed = rewritten(client, inner, graph_file("Inner", "Step"))
+    assert (changed.status_code, changed.json()["problems"]) == (200, [])
+    assert codes(client, outer) == []
+    listed = {each["id"]: each for each in client.get("/api/graphs").json()}
+    assert listed[outer]["problems"] == {"error": 0, "warning": 0}
+
+    played = client.post(f"/api/graphs/{outer}/rehearsal", json={}).json()["trace"]
+    inside = [each for each in played if each["graph"] == "Outer__Inner__0"]
+    assert [each["node"] for each in inside if each["kind"] == "node_result"] == ["Step_0"]
+
+    inside = client.get(f"/api/graphs/{outer}/subgraphs").json()
+    assert [(each["name"], each["graph"]) for each in inside["subgraphs"]] == [("Inner", inner)]
+    answer = published(client, outer)
+    assert answer.status_code == 201
+    assert answer.json()["tree_digest"] == inside["tree_digest"]
+    version = answer.json()
+    (pinned,) = version["subgraphs"]
+    reading = codec.read(json.dumps(pinned["umrf"]).encode())
+    assert (pinned["name"], pinned["graph"], pinned["version"]) == ("Inner", inner, None)
+    assert pinned["digest"] == pinned["current_digest"] == digest(reading.graph)
+    assert version["tree_digest"] == tree_digest(version["digest"], [("Inner", pinned["digest"])])
+    assert client.get(f"/api/versions/{version['id']}").json() == version
+    (shown,) = client.get(f"/api/graphs/{outer}/versions").json()
+    assert (shown["tree_digest"], "subgraphs" in shown) == (version["tree_digest"], False)
+    assert published(client, outer).status_code == 200
+
+
+def test_a_version_stays_and_tells_that_a_graph_inside_has_moved_on(client: httpx.Client) -> None:
+    inner = made(client, "Inner", "Step")
+    outer = made(client, "Outer", "Inner")
+    of_inner = published(client, inner).json()
+    assert (of_inner["subgraphs"], of_inner["tree_digest"]) == ([], of_inner["digest"])
+    first = published(client, outer).json()
+    assert [each["version"] for each in first["subgraphs"]] == [of_inner["id"]]
+    rewritten(client, inner, graph_file("Inner", "Step", "Turn"))
+    again = client.get(f"/api/versions/{first['id']}").json()
+    (before,), (now,) = first["subgraphs"], again["subgraphs"]
+    assert now["current_digest"] != now["digest"] == before["digest"]
+    assert now["umrf"] == before["umrf"]
+    second = published(client, outer)
+    assert second.status_code == 201  # the outer graph is as it was, what is inside of it is not
+    assert second.json()["digest"] == first["digest"]
+    assert second.json()["tree_digest"] != first["tree_digest"]
+    client.delete(f"/api/graphs/{inner}")
+    (gone,) = client.get(f"/api/versions/{first['id']}").json()["subgraphs"]
+    assert (gone["umrf"], gone["current_digest"]) == (before["umrf"], None)
+
+
+def test_all_levels_are_pinned(client: httpx.Client) -> None:
+    made(client, "Grip", "Close")
+    made(client, "Fetch", "Grip", "Lift")
+    outer = made(client, "Task", "Fetch")
+    version = published(client, outer).json()
+    assert [each["name"] for each in version["subgraphs"]] == ["Fetch", "Grip"]
