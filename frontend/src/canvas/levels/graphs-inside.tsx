@@ -7,7 +7,7 @@ export interface InsideSignProps {
   readonly name: string;
 }
 
-export interface GraphsInside {
+interface GraphsInside {
   /** The names of graphs by their id. */
   readonly names: ReadonlyMap<string, string>;
   /** The ids of other graphs by the name of the actions that stand for them. */

@@ -119,7 +119,9 @@ def merged(sources: list[tuple[ActionSource, bytes]]) -> bytes:
 
 
 def as_actions(sources: list[tuple[ActionSource, bytes]]) -> bytes:
-    """JSON of a list of `GraphAsAction`, by name."""
+    """JSON of a list of `GraphAsAction`, by name; of several of one name the oldest first, which is the
+    one that actions of that name stand for."""
+    aged = sorted(sources, key=lambda each: (each[0].made_at, each[0].document))
     listed = [
         GraphAsAction(
             source.document,
@@ -128,10 +130,10 @@ def as_actions(sources: list[tuple[ActionSource, bytes]]) -> bytes:
             tuple(map(_described, whole.inputs)),
             tuple(map(_described, whole.outputs)),
         )
-        for source, text in sources
+        for source, text in aged
         if (whole := msgspec.msgpack.decode(text, type=FoundActions).whole) is not None
     ]
-    return msgspec.json.encode(sorted(listed, key=lambda each: (each.name, each.graph)))
+    return msgspec.json.encode(sorted(listed, key=lambda each: each.name))
 
 
 def _by_age(uses: list[tuple[ActionSource, Action]]) -> tuple[str, ...]:

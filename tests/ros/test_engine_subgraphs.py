@@ -1,0 +1,84 @@
+"""The real engine runs a graph inside of another: the look before the start tells whether it has just that one.
+
+`TEST_SUBGRAPHS_DOMAIN` is the domain (default 150).
+"""
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+pytest.importorskip(
+    "rclpy", reason="rclpy is not here; `make ros-test` brings it", exc_type=ImportError
+)
+
+from support.product import Product, running
+from support.real_engine import answers, browser, needs_engine, real_engine, until
+
+DOMAIN = int(os.environ.get("TEST_SUBGRAPHS_DOMAIN", "150"))
+INDEXED = Path(os.environ.get("ENGINE_LAB", "/nonexistent")) / "actions" / "subgraphs"
+INNER = "SubSeq"
+OUTER = {
+    "graph_name": "around",
+    "graph_entry": [{"name": INNER}],
+    "graph_exit": [{"name": INNER}],
+    "actions": [{"name": INNER, "type": "sync"}],
+}
+
+pytestmark = [needs_engine, pytest.mark.timeout(240)]
+
+
+def order_of(product: Product, graph: str) -> dict[str, Any]:
+    """What a start of a new version of the graph carries."""
+    with product.editor() as editor:
+        version = editor.post(f"/api/graphs/{graph}/versions", json={}).json()
+    keys = ("digest", "umrf", "subgraphs", "tree_digest")
+    parts = {key: version[key] for key in keys}
+    parts["subgraphs"] = [
+        {key: each[key] for key in ("name", "digest", "umrf")} for each in parts["subgraphs"]
+    ]
+    return {"version": version["id"], "engine": "David", "graph": graph, **parts}
+
+
+def item_of(runner: httpx.Client, order: dict[str, Any]) -> dict[str, Any]:
+    """What the look before a start says of the graphs inside."""
+    answer = runner.post("/api/runs/preflight", json=order)
+    assert answer.is_success, answer.text
+    found: dict[str, Any] = next(
+        each for each in answer.json()["items"] if each["code"] == "subgraphs"
+    )
+    return found
+
+
+def test_what_it_has_indexed_is_compared_and_its_code_runs_inside(tmp_path: Path) -> None:
+    inner = json.loads((INDEXED / f"{INNER}.graph.json").read_text())
+    with (
+        real_engine(tmp_path, DOMAIN) as events,
+        running(tmp_path / "data") as product,
+        browser(product, "Ada") as ada,
+    ):
+        assert ada.post("/api/robots", json={"name": "David", "domain": DOMAIN}).is_success
+        until("David answers", lambda: answers(ada, "David"))
+        with product.editor() as editor:
+            inside = editor.post("/api/graphs", json=inner).json()["id"]
+            graph = editor.post("/api/graphs", json=OUTER).json()["id"]
+        same = order_of(product, graph)
+        assert item_of(ada, same)["verdict"] == "passed"
+
+        run = ada.post("/api/runs", json=same | {"request_id": "nested 1"})
+        assert run.status_code == 201, run.text
+        path = f"/api/runs/{run.json()['id']}"
+        until("it has ended", lambda: ada.get(path).json()["state"] == "finished")
+        actions = len(inner["actions"])
+        assert [events().count(each) for each in ("begin", "end")] == [actions, actions]
+
+        with product.editor() as editor:
+            first = inner["actions"][0]["input_parameters"]["delay"]
+            first["pvf_value"] += 1
+            changed = editor.put(f"/api/graphs/{inside}/umrf", json=inner)
+            assert changed.is_success, changed.text
+        other = item_of(ada, order_of(product, graph))
+        assert (other["verdict"], other["codes"]) == ("blocked", ["subgraph-differs"])

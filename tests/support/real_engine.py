@@ -1,0 +1,68 @@
+"""The real engine behind the whole product: what its actions' code did, as that wrote it down itself.
+
+Needs ENGINE_LAB, the folder of a built engine, and UMRF_SHARED, which has the program that starts it.
+"""
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from support.product import TOKEN, Product
+
+PROGRAM = Path(os.environ.get("UMRF_SHARED", "/nonexistent")) / "engine-lab" / "engine"
+IS_HERE = bool(os.environ.get("ENGINE_LAB")) and PROGRAM.exists()
+needs_engine = pytest.mark.skipif(
+    not IS_HERE, reason="the real engine is not here (ENGINE_LAB, UMRF_SHARED)"
+)
+
+
+def until(what: str, true: Callable[[], Any], seconds: float = 40) -> None:
+    deadline = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < deadline, what
+        time.sleep(0.1)
+
+
+def browser(product: Product, name: str) -> httpx.Client:
+    """Somebody's session, at the runner."""
+    body = {"token": TOKEN, "name": name}
+    answer = httpx.post(
+        f"{product.url}/api/session", json=body, headers={"origin": product.url}, trust_env=False
+    )
+    assert answer.is_success, answer.text
+    cookie = answer.headers["set-cookie"].partition(";")[0]
+    headers = {"cookie": cookie, "origin": product.url}
+    return httpx.Client(base_url=product.runner_url, headers=headers, trust_env=False, timeout=30)
+
+
+@contextmanager
+def real_engine(folder: Path, domain: int) -> Iterator[Callable[[], list[str]]]:
+    """Yield what the code of the engine's action has done so far, as it wrote it down itself."""
+    truth = folder / "truth"
+    command = [sys.executable, str(PROGRAM), "David", str(domain), "--truth", str(truth)]
+
+    def events() -> list[str]:
+        lines = truth.read_text().splitlines() if truth.exists() else []
+        return [line.split()[2] for line in lines]
+
+    with (folder / "engine.log").open("w") as log:
+        engine = subprocess.Popen(command, stdout=log, stderr=log)
+    try:
+        yield events
+    finally:
+        engine.kill()
+        engine.wait()
+
+
+def answers(runner: httpx.Client, name: str) -> bool:
+    """Whether the robot of that name answers the runner."""
+    robots = {each["name"]: each for each in runner.get("/api/robots").json()}
+    return robots.get(name, {}).get("state") == "answering"
