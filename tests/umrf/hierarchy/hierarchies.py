@@ -37,7 +37,7 @@ from action_assistant.umrf.semantics.parts import Node, Running
 from action_assistant.umrf.signatures import action_of_graph
 
 RUN = Conditions("run", "run", "run", "ignore")
-USUAL = [RUN, RUN, RUN, ENGINE_DEFAULTS, ENGINE_DEFAULTS, Conditions("run", "run")]
+USUAL = [*[RUN] * 5, *[ENGINE_DEFAULTS] * 3, Conditions("run", "run")]
 TRUE, OTHER = Conditions("run"), Conditions("ignore", "run", "run")
 TOP = "g"
 
@@ -52,16 +52,23 @@ class Hierarchy(NamedTuple):
 # Graphs
 
 
-def leaf(kind: str, value: str | None = None, *, required: bool = True) -> str:
-    fields = f'"pvf_type":"{kind}"' + (f',"pvf_value":{value}' if value else "")
-    return f"{{{fields}{'' if required else ',"pvf_required":false'}}}"
+def leaf(kind: str, value: str = "", extra: str = "") -> str:
+    given = f',"pvf_value":{value}' if value else ""
+    return f'{{"pvf_type":"{kind}"{given}{extra}}}'
 
 
 LEAF = st.sampled_from(
-    [leaf("string"), leaf("string"), leaf("string"), leaf("string", '"x"'), leaf("number"),
-     leaf("string", required=False), '{"pvf_type":"string","pvf_updatable":false}',
-     '{"pvf_type":"string","pvf_allowed_values":["a"]}']
-)  # fmt: skip
+    [
+        leaf("string"),
+        leaf("string"),
+        leaf("string"),
+        leaf("string", '"x"'),
+        leaf("number"),
+        leaf("string", extra=',"pvf_required":false'),
+        leaf("string", extra=',"pvf_updatable":false'),
+        leaf("string", extra=',"pvf_allowed_values":["a"]'),
+    ]
+)
 SIDE = st.dictionaries(st.sampled_from("pqr"), LEAF, max_size=2).map(
     lambda d: tuple(Parameter(*each) for each in d.items())
 )
@@ -124,8 +131,9 @@ class _Drawn:
             remap = (Remap(outputs[0].path, draw(st.sampled_from("pqr"))),)
         if parent == ENTRY:
             said = ENTRY_CONDITIONS
-            if self.name != TOP and not draw(st.integers(0, 7)):
-                remap = (Remap("p", "q"),)
+            inputs = by_key[child].inputs
+            if self.name != TOP and inputs and not draw(st.integers(0, 3)):
+                remap = (Remap(inputs[0].path, draw(st.sampled_from("pqr"))),)
         place = float(len(self.relations))
         self.relations[parent, child] = Relation(
             parent=parent, child=child, conditions=said, required=required, remap=remap,

@@ -177,8 +177,8 @@ class _Hierarchy:
             if size > MOST:
                 message = f"One graph would have more than {MOST:,} actions."
                 return _Found(None, (*reasons, FlatteningReason("too-large", message, (at,))))
-            lacks = key in seen.lacking
-            place = joined(Place(flat.graph, action, inner.graph, given, lacks))
+            lacks, bypassed = key in seen.lacking, seen.bypassed.get(key, frozenset())
+            place = joined(Place(flat.graph, action, inner.graph, given, lacks, bypassed))
             if isinstance(place, JoinedPlace):
                 flat = _put(flat, at, inner, place, kept)
             else:

@@ -58,13 +58,15 @@ class JoinedArrow(NamedTuple):
 class Place(NamedTuple):
     """A sub-graph in its place. `around`: the graph, with other sub-graphs in their places already;
     `given`: inputs that `around` takes from the graph around it; `lacks`: whether inputs can be
-    missing when all that the action waits for otherwise is there."""
+    missing when all that the action waits for otherwise is there; `bypassed`: by which outcomes it can
+    be bypassed."""
 
     around: Graph
     action: Action
     inside: Graph
     given: frozenset[str]
     lacks: bool
+    bypassed: frozenset[Precondition]
 
 
 class JoinedPlace(NamedTuple):
@@ -84,7 +86,15 @@ def joined(place: Place) -> JoinedPlace | tuple[Unjoined, ...]:
         return (Unjoined("loop", "It leads to itself."),)
     into = in_order([r for r in relations if r.child == own], by_parent=False)
     out = in_order([r for r in relations if r.parent == own], by_parent=True)
-    against: list[Unjoined] = []
+    against = [
+        Unjoined(
+            "bypass",
+            f"It can be bypassed with {outcome}, which goes on without any of its actions; no chain of "
+            "bypasses from its entry to its exit would do the same.",
+        )
+        for outcome in sorted(place.bypassed)
+        if not _lets_through(place.inside, outcome)
+    ]
     found = JoinedPlace(
         tuple(_got(_into(place, into), against)),
         tuple(_got(_out(place, out), against)),
@@ -111,6 +121,30 @@ def ends_of(graph: Graph) -> tuple[list[Relation], list[Relation]]:
     entries = [r for r in graph.relations if r.parent == ENTRY]
     exits = [r for r in graph.relations if r.child == EXIT]
     return in_order(entries, by_parent=True), in_order(exits, by_parent=False)
+
+
+def _lets_through(inside: Graph, outcome: Precondition) -> bool:
+    """Whether a bypass of the entry goes to the exit by bypasses, one by one, and nowhere else."""
+    entries, exits = ends_of(inside)
+    if len(entries) != 1 or (len(exits) > 1 and any(r.required for r in exits)):
+        return False
+    seen: set[Key] = set()
+    key = entries[0].child
+    while key not in seen:
+        seen.add(key)
+        asked = [
+            relation
+            for relation in inside.relations
+            if relation.parent == key and relation.conditions.answer(outcome) != "ignore"
+        ]
+        if len(asked) != 1:
+            return False
+        if asked[0].child == EXIT:
+            return True
+        if asked[0].conditions.answer(outcome) != "bypass":
+            return False
+        key = asked[0].child
+    return False
 
 
 # Into the sub-graph

@@ -17,11 +17,12 @@ BUDGET: Final = 2_000_000
 _RESULTS: Final[tuple[Precondition, ...]] = ("on_true", "on_false", "on_error")
 
 #: `halts`, `waits`: the graph does not reach its exit. `unready`: the exit lacks outputs. `early`: something runs when it does, `beside`:
-#: who reaches it asks others as well. `ends`: it reaches it while this sub-graph runs. `again`,
-#: `bypass`, `response`: what a sub-graph is told besides `run`, once. `crash`: of the engine.
+#: who reaches it asks others as well. `ends`: it reaches it while this sub-graph runs. `again`:
+#: this sub-graph is told something a second time. `crossing`: it is bypassed together with others.
+#: `response`: it is told to do something else. `crash`: of the engine.
 TroubleKind: TypeAlias = Literal[
-    "halts", "waits", "unready", "early", "beside", "ends", "again", "bypass", "response", "crash",
-    "undecided",
+    "halts", "waits", "unready", "early", "beside", "ends", "again", "crossing", "response",
+    "crash", "undecided",
 ]  # fmt: skip
 
 
@@ -37,11 +38,13 @@ class Trouble(NamedTuple):
 
 class LevelCourses(NamedTuple):
     """What all courses of a graph have in common. `lacking`: sub-graphs that wait for an input when
-    all that they wait for otherwise is there."""
+    all that they wait for otherwise is there. `bypassed`: those that are bypassed, by which
+    outcomes."""
 
     results: frozenset[Precondition] = frozenset()
     troubles: tuple[Trouble, ...] = ()
     lacking: frozenset[Key] = frozenset()
+    bypassed: Mapping[Key, frozenset[Precondition]] = {}
     spent: int = 0
 
 
@@ -57,7 +60,16 @@ class _Moment(NamedTuple):
 class _Watched(Instant):
     """An instant that notes what is asked of sub-graphs, and how the exit is reached."""
 
-    __slots__ = ("_watched", "begun", "beside", "finished", "lacking", "told")
+    __slots__ = (
+        "_watched",
+        "begun",
+        "beside",
+        "bypassed",
+        "crossing",
+        "finished",
+        "lacking",
+        "told",
+    )
 
     def __init__(self, net: Network, moment: _Moment, watched: int) -> None:
         super().__init__(net, moment.states.__getitem__, 0.0, moment.running, moment.active)
@@ -66,6 +78,8 @@ class _Watched(Instant):
         self.told: list[tuple[TroubleKind, int]] = []
         self.lacking = 0
         self.beside = False
+        self.bypassed: list[tuple[int, Precondition]] = []
+        self.crossing = False
         self.finished: Precondition | None = None
 
     def _only_ends(self) -> bool:
@@ -90,17 +104,22 @@ class _Watched(Instant):
         if not self._watched >> child & 1:
             return ignored
         bit = 1 << child
-        if response == "bypass":
-            self.told.append(("bypass", child))
+        if self.begun & bit:
+            self.told.append(("again", child))
+        elif response == "bypass":
+            self.begun |= bit
+            self.bypassed.append((child, result))
         elif response != "run":
             self.told.append(("response", child))
-        elif self.begun & bit:
-            self.told.append(("again", child))
         elif self._state(child).does == RUNS:
             self.begun |= bit
         elif not self._net.needs[child] & ~self._state(child).links:
             self.lacking |= bit
         return ignored
+
+    def _bypass(self, place: int, child: int, result: Precondition) -> None:
+        super()._bypass(place, child, result)
+        self.crossing = self.crossing or len(self._tasks) > 1
 
     def after(self, before: _Moment) -> _Moment:
         """The state that follows. Times do not matter: any order of ends is looked at."""
@@ -120,6 +139,7 @@ def level_courses(
         frozenset(search.results),
         tuple(search.troubles.values()),
         frozenset(search.key[place] for place in _places(search.lacking)),
+        {key: frozenset(outcomes) for key, outcomes in search.bypassed.items()},
         search.spent,
     )
 
@@ -140,6 +160,7 @@ class _Courses:
         self.results: set[Precondition] = set()
         self.troubles: dict[tuple[TroubleKind, Key | None], Trouble] = {}
         self.lacking = 0
+        self.bypassed: dict[Key, set[Precondition]] = {}
         self.spent = 0
 
     def _telling(self, row: list[EdgeQuestion | None]) -> list[Precondition]:
@@ -189,6 +210,10 @@ class _Courses:
         by = self.net.names[place] if place >= 0 else ""
         for kind, child in instant.told:
             self._tell(Trouble(kind, self.key.get(child), by, result))
+        for child, outcome in instant.bypassed:
+            self.bypassed.setdefault(self.key[child], set()).add(outcome)
+            if instant.crossing:
+                self._tell(Trouble("crossing", self.key[child], by, result))
         self.lacking |= instant.lacking
         then = instant.after(before)
         match instant.end:

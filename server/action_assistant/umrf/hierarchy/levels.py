@@ -83,7 +83,8 @@ def inputs_of(graph: Graph) -> frozenset[str]:
 
 
 def courses_graph(graph: Graph, given: Collection[str]) -> Graph:
-    """The graph as if its entry actions had the values that it is given."""
+    """The graph as if its entry actions had the values that it is given, and nothing were renamed on
+    the way to them."""
     taken: dict[str, set[str]] = {}
     inputs = {action.key: slots_of(action.inputs) for action in graph.actions}
     for entry in ends_of(graph)[0]:
@@ -98,7 +99,10 @@ def courses_graph(graph: Graph, given: Collection[str]) -> Graph:
         else a
         for a in graph.actions
     )
-    return replace(graph, actions=actions)
+    relations = (
+        replace(r, remap=()) if r.parent == ENTRY and given else r for r in graph.relations
+    )
+    return replace(graph, actions=actions, relations=tuple(relations))
 
 
 def _filled(parameter: Parameter, taken: Collection[str]) -> Parameter:
