@@ -2,12 +2,14 @@
 
 from collections import Counter
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from action_assistant.umrf.facts import SIMULATED
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.hierarchy.flattening import Flattened
 from action_assistant.umrf.model import (
     ENGINE_DEFAULTS,
@@ -59,10 +61,8 @@ def leaf(kind: str, value: str = "", extra: str = "") -> str:
 
 LEAF = st.sampled_from(
     [
-        leaf("string"),
-        leaf("string"),
-        leaf("string"),
-        leaf("string", '"x"'),
+        *[leaf("string")] * 8,
+        *[leaf("string", '"x"')] * 3,
         leaf("number"),
         leaf("string", extra=',"pvf_required":false'),
         leaf("string", extra=',"pvf_updatable":false'),
@@ -75,17 +75,23 @@ SIDE = st.dictionaries(st.sampled_from("pqr"), LEAF, max_size=2).map(
 OUT = st.dictionaries(st.sampled_from("pqr"), st.just(leaf("string")), max_size=2).map(
     lambda d: tuple(Parameter(*each) for each in d.items())
 )
+WIRES = st.sets(st.sampled_from("pq"), min_size=1).map(
+    lambda names: tuple(Parameter(name, leaf("string")) for name in sorted(names))
+)
 ANY = st.builds(Conditions, *[st.sampled_from(RESPONSES)] * 4)
 
 
 class _Drawn:
     """One graph while it is drawn."""
 
-    def __init__(self, draw: st.DrawFn, name: str, subs: list[Graph], most: int) -> None:
+    def __init__(
+        self, draw: st.DrawFn, name: str, subs: list[Graph], most: int, *, wired: bool
+    ) -> None:
         self.draw = draw
         self.name = name
-        self.values = draw(st.integers(0, 2)) == 0
-        self.wild = draw(st.integers(0, 7)) == 0
+        self.wired = wired
+        self.values = wired or draw(st.booleans())
+        self.wild = draw(st.integers(0, 31 if wired else 7)) == 0
         self.relations: dict[tuple[Key, Key], Relation] = {}
         count = draw(st.integers(1, most))
         places = draw(st.sets(st.integers(0, count - 1), min_size=min(1, len(subs)), max_size=2))
@@ -99,20 +105,32 @@ class _Drawn:
                 self.actions.append(self._leaf(number))
 
     def _sub(self, sub: Graph, number: int) -> Action:
-        action = replace(
-            action_of_graph(sub), key=f"k{number}", instance_id=self.draw(st.integers(0, 1))
+        action = action_of_graph(sub)
+        given = {p.path for p in self.actions[-1].outputs} if self.actions else set[str]()
+        inputs = tuple(
+            Parameter(p.path, p.text[:-1] + ',"pvf_value":"s"}')
+            if "string" in p.text
+            and "pvf_value" not in p.text
+            and self.draw(st.integers(0, 9)) < (1 if p.path in given else 7)
+            else p
+            for p in action.inputs
         )
-        if not self.draw(st.integers(0, 2)):
-            inputs = tuple(
-                Parameter(p.path, p.text[:-1] + ',"pvf_value":"s"}') for p in action.inputs
-            )
-            action = replace(action, inputs=inputs)
-        return action
+        return replace(
+            action, key=f"k{number}", instance_id=self.draw(st.integers(0, 1)), inputs=inputs
+        )
 
     def _leaf(self, number: int) -> Action:
         draw = self.draw
-        inputs = draw(SIDE) if self.values and draw(st.booleans()) else ()
-        outputs = draw(OUT if draw(st.integers(0, 3)) else SIDE) if self.values else ()
+        inputs: tuple[Parameter, ...] = ()
+        outputs: tuple[Parameter, ...] = ()
+        if self.wired:
+            outputs = draw(WIRES)
+            inputs = draw(WIRES) if number == 0 and self.name != TOP else ()
+        elif self.values:
+            outputs = draw(OUT if draw(st.integers(0, 7)) else SIDE)
+            inputs = draw(SIDE) if number == 0 or not draw(st.integers(0, 7)) else ()
+        if self.values and number and not inputs and (before := self.actions[-1].outputs):
+            inputs = (draw(st.sampled_from(before)),)
         return Action(
             key=f"k{number}", name=draw(st.sampled_from("AB")), instance_id=number,
             inputs=inputs, outputs=outputs,
@@ -127,8 +145,9 @@ class _Drawn:
         by_key = {a.key: a for a in self.actions}
         outputs = by_key[parent].outputs if parent in by_key else ()
         remap = ()
-        if outputs and child in by_key and not draw(st.integers(0, 2)):
-            remap = (Remap(outputs[0].path, draw(st.sampled_from("pqr"))),)
+        if outputs and child in by_key and not draw(st.integers(0, 3)):
+            targets = [p.path for p in by_key[child].inputs] or ["p", "q"]
+            remap = (Remap(draw(st.sampled_from(outputs)).path, draw(st.sampled_from(targets))),)
         if parent == ENTRY:
             said = ENTRY_CONDITIONS
             inputs = by_key[child].inputs
@@ -141,10 +160,13 @@ class _Drawn:
         )  # fmt: skip
 
     def usual(self) -> Conditions:
-        return self.draw(st.sampled_from(USUAL))
+        usual = [ENGINE_DEFAULTS] * 5 + [RUN] if self.values else USUAL
+        return self.draw(st.sampled_from(usual))
 
     def graph(self) -> Graph:
-        shape = self.draw(st.sampled_from(["chain", "chain", "fork", "choice", "wild"]))
+        shapes = ["chain", "chain", "fork", "choice", "wild"]
+        likely = 30 if self.wired else 6 if self.values else 0
+        shape = self.draw(st.sampled_from([*["chain"] * likely, *shapes]))
         keys = [a.key for a in self.actions]
         getattr(self, f"_{shape if len(keys) > 1 else 'chain'}")(keys)
         return Graph(
@@ -153,10 +175,10 @@ class _Drawn:
 
     def _chain(self, keys: list[Key]) -> None:
         self.arrow(ENTRY, keys[0], RUN)
-        for first, second in zip(keys, keys[1:], strict=False):
+        for first, second in pairwise(keys):
             self.arrow(first, second, self.usual())
         self.arrow(keys[-1], EXIT, self.usual())
-        if len(keys) > 1 and not self.draw(st.integers(0, 4)):
+        if len(keys) > 1 and not self.wired and not self.draw(st.integers(0, 4)):
             self.arrow(keys[-1], keys[0], OTHER, required=False)
             self.arrow(keys[-1], EXIT, TRUE)
 
@@ -200,17 +222,17 @@ class _Drawn:
 
 
 @st.composite
-def hierarchies(draw: st.DrawFn) -> Hierarchy:
-    """One to three levels of small graphs."""
+def hierarchies(draw: st.DrawFn, *, wired: bool = False) -> Hierarchy:
+    """One to three levels of small graphs. `wired`: chains of actions that hand on values."""
     levels = draw(st.integers(1, 3))
     graphs: dict[str, Graph] = {}
     below: list[Graph] = []
     for level in range(levels):
         names = [f"H{level}", f"I{level}"][: draw(st.integers(1, 2 if level == 0 else 1))]
-        made = [_Drawn(draw, name, below, 3).graph() for name in names]
+        made = [_Drawn(draw, name, below, 3, wired=wired).graph() for name in names]
         graphs |= {graph.name: graph for graph in made}
         below = made
-    return Hierarchy(_Drawn(draw, TOP, below, 4).graph(), graphs)
+    return Hierarchy(_Drawn(draw, TOP, below, 4, wired=wired).graph(), graphs)
 
 
 # Courses
@@ -309,11 +331,12 @@ def both(
     places = nested_names(found)
     deep = Script({f"{run}/{name}": behaviours[flat] for flat, (run, name) in places.items()})
     wide = Script({f"{found.graph.name}/{flat}": calls for flat, calls in behaviours.items()})
+    read = codec.read(codec.write(found.graph)).graph  # what an engine would be given
     above = {place: flat for flat, place in places.items()}
     alike = {(found.graph.name, flat): flat for flat in places}
     return (
         course(hierarchy.graph, hierarchy.graphs, deep, above, stop_ms),
-        course(found.graph, {}, wide, alike, stop_ms),
+        course(read, {}, wide, alike, stop_ms),
     )
 
 

@@ -4,9 +4,12 @@ from collections import Counter
 from itertools import product
 from random import Random
 
+import pytest
 from hypothesis import HealthCheck, event, given, settings
 from hypothesis import strategies as st
 
+from action_assistant.umrf.check import STRUCTURAL, check
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.hierarchy.flattening import Flattened, Unflattenable, flattened
 from action_assistant.umrf.semantics import Behaviour
 from support.doses import examples
@@ -50,20 +53,52 @@ def agree(hierarchy: Hierarchy, found: Flattened, random: Random, stop: bool) ->
     return compared
 
 
-@settings(
-    max_examples=examples(300), deadline=None,
-    suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
-)  # fmt: skip
-@given(hierarchy=hierarchies(), seed=st.integers(0, 2**32), stop=st.booleans())
-def test_a_flat_graph_does_what_its_hierarchy_does(
-    hierarchy: Hierarchy, seed: int, stop: bool
-) -> None:
-    found = flattened(hierarchy.graph, hierarchy.graphs)
-    if isinstance(found, Unflattenable):
-        for code in Counter(reason.code for reason in found.reasons):
-            event(f"refused: {code}")
-        event("refused")
-        return
-    event("accepted")
-    event(f"accepted, levels: {max(len(origin.levels) for origin in found.origins)}")
-    agree(hierarchy, found, Random(seed), stop)
+@pytest.mark.parametrize("wired", [False, True], ids=["any", "handing on values"])
+def test_a_flat_graph_does_what_its_hierarchy_does(wired: bool) -> None:
+    told = Counter[str]()
+
+    @settings(
+        max_examples=examples(300), deadline=None,
+        suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
+    )  # fmt: skip
+    @given(hierarchy=hierarchies(wired=wired), seed=st.integers(0, 2**32), stop=st.booleans())
+    def play(hierarchy: Hierarchy, seed: int, stop: bool) -> None:
+        told["hierarchies"] += 1
+        found = flattened(hierarchy.graph, hierarchy.graphs)
+        if isinstance(found, Unflattenable):
+            for code in {reason.code for reason in found.reasons}:
+                event(f"refused: {code}")
+            return
+        told["accepted"] += 1
+        event(f"accepted, levels: {max(len(origin.levels) for origin in found.origins)}")
+        told["courses"] += agree(hierarchy, found, Random(seed), stop)
+
+    play()
+    assert told["accepted"] > told["hierarchies"] / 10
+    assert told["courses"] > told["accepted"]
+
+
+def test_a_flat_graph_is_the_same_each_time_and_after_it_was_written() -> None:
+    told = Counter[str]()
+
+    @settings(max_examples=examples(100), deadline=None)
+    @given(hierarchy=hierarchies())
+    def write(hierarchy: Hierarchy) -> None:
+        found = flattened(hierarchy.graph, hierarchy.graphs)
+        if isinstance(found, Unflattenable):
+            assert len(set(found.reasons)) == len(found.reasons)
+            return
+        told["accepted"] += 1
+        text = codec.write(found.graph)
+        again = flattened(hierarchy.graph, dict(reversed(hierarchy.graphs.items())))
+        assert again == found
+        back = codec.read(text).graph
+        assert codec.write(back) == text
+        names = [action.full_name for action in back.actions]
+        assert len(set(names)) == len(names)
+        assert names == [origin.action for origin in found.origins]
+        assert not {action.name for action in back.actions} & hierarchy.graphs.keys()
+        assert [p for p in check(back) if p.severity == "error" and p.code in STRUCTURAL] == []
+
+    write()
+    assert told["accepted"] > 0
