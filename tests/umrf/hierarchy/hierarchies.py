@@ -284,6 +284,12 @@ def course(
         traces += engine.advance(engine.due)
         if len(traces) > 20_000:
             break
+    return _told(engine, graph.name, traces, names)
+
+
+def _told(
+    engine: Watched, top_name: str, traces: list[Trace], names: Mapping[tuple[str, str], str]
+) -> Course:
     seen = list(engine.values)
     top, ends = [], Counter[float]()
     for trace in traces:
@@ -293,7 +299,7 @@ def course(
             case NodeResultEvent():
                 seen.append((trace.t_ms, trace.graph, trace.node, f"ends {trace.result}"))
                 ends[trace.t_ms] += (trace.graph, trace.node) in names
-            case GraphStateEvent() if trace.graph == graph.name:
+            case GraphStateEvent() if trace.graph == top_name:
                 top.append((trace.t_ms, trace.state))
             case _:
                 pass
@@ -303,10 +309,9 @@ def course(
         if (name := names.get((running, node))) is not None:
             instants.setdefault(round(at, 3), Counter())[name, what] += 1
             own.setdefault(name, []).append((round(at, 3), what))
-    result = engine.graphs[graph.name].result
     tied = any(count > 1 for count in ends.values())
     crashed = frozenset({engine.crashed} if engine.crashed else ())
-    return Course(instants, own, top, result, tied, crashed)
+    return Course(instants, own, top, engine.graphs[top_name].result, tied, crashed)
 
 
 def nested_names(found: Flattened) -> dict[str, tuple[str, str]]:

@@ -14,7 +14,8 @@ import msgspec
 from msgspec.structs import replace
 
 from action_assistant.umrf.hierarchy.inlining import identity, inlined
-from action_assistant.umrf.hierarchy.joints import JoinedPlace, Place, joined
+from action_assistant.umrf.hierarchy.joint_parts import JoinedPlace, SubGraphPlace
+from action_assistant.umrf.hierarchy.joints import joined
 from action_assistant.umrf.hierarchy.level_courses import BUDGET, LevelCourses, level_courses
 from action_assistant.umrf.hierarchy.levels import courses_graph, faults, inputs_of
 from action_assistant.umrf.hierarchy.reasons import (
@@ -178,7 +179,7 @@ class _Hierarchy:
                 message = f"One graph would have more than {MOST:,} actions."
                 return _Found(None, (*reasons, FlatteningReason("too-large", message, (at,))))
             lacks, bypassed = key in seen.lacking, seen.bypassed.get(key, frozenset())
-            place = joined(Place(flat.graph, action, inner.graph, given, lacks, bypassed))
+            place = joined(SubGraphPlace(flat.graph, action, inner.graph, given, lacks, bypassed))
             if isinstance(place, JoinedPlace):
                 flat = _put(flat, at, inner, place, kept)
             else:

@@ -7,8 +7,8 @@ from typing import NamedTuple, TypeAlias
 from msgspec.structs import replace
 
 from action_assistant.umrf.files.writing import name_order
-from action_assistant.umrf.hierarchy.joints import JoinedArrow, JoinedPlace
-from action_assistant.umrf.hierarchy.room import Room
+from action_assistant.umrf.hierarchy.drawing import Drawing
+from action_assistant.umrf.hierarchy.joint_parts import JoinedArrow, JoinedPlace
 from action_assistant.umrf.model import ENTRY, EXIT, Action, Graph, Key, Relation
 
 #: What decides where a relation stands among those of its parent, or of its child.
@@ -33,28 +33,28 @@ def inlined(around: Graph, own: Key, inside: Graph, found: JoinedPlace, kept: se
     action = next(a for a in around.actions if a.key == own)
     there = {a.key for a in around.actions}
     keys = {a.key: _fresh(there, f"{own}/{a.key}") for a in inside.actions}
-    room = Room(around, action, inside)
+    drawing = Drawing(around, action, inside)
     actions = [found.entries.get(a.key, a) for a in inside.actions]
     moved = [
         replace(
             a,
             key=keys[a.key],
             instance_id=_free(a, kept),
-            position=room.inner(a),
+            position=drawing.inner(a),
         )
         for a in actions
     ]
-    outer = [replace(a, position=room.outer(a.position)) for a in around.actions]
+    outer = [replace(a, position=drawing.outer(a.position)) for a in around.actions]
     listed = [each for a in outer for each in (moved if a.key == own else [a])]
     graph = replace(
         around,
         actions=tuple(listed),
-        relations=tuple(_ranked(_arrows(around, own, inside, found, keys, room))),
-        entry_position=room.outer(around.entry_position),
-        exit_position=room.outer(around.exit_position),
+        relations=tuple(_ranked(_arrows(around, own, inside, found, keys, drawing))),
+        entry_position=drawing.outer(around.entry_position),
+        exit_position=drawing.outer(around.exit_position),
         notes=(
-            *((name, room.outer_note(text)) for name, text in around.notes),
-            *_notes(around, inside, own, room),
+            *((name, drawing.outer_note(text)) for name, text in around.notes),
+            *_notes(around, inside, own, drawing),
         ),
     )
     return Inlined(graph, keys)
@@ -85,12 +85,12 @@ def _free(action: Action, kept: set[str]) -> int:
     return number
 
 
-def _notes(around: Graph, inside: Graph, own: Key, room: Room) -> Iterator[tuple[str, str]]:
+def _notes(around: Graph, inside: Graph, own: Key, drawing: Drawing) -> Iterator[tuple[str, str]]:
     taken = {name for name, _ in around.notes}
     for name, text in inside.notes:
         fresh = name if name not in taken else identity((own, name), taken)
         taken.add(fresh)
-        yield fresh, room.inner_note(text)
+        yield fresh, drawing.inner_note(text)
 
 
 def _arrows(
@@ -99,11 +99,11 @@ def _arrows(
     inside: Graph,
     found: JoinedPlace,
     keys: Mapping[Key, Key],
-    room: Room,
+    drawing: Drawing,
 ) -> Iterator[_Arrow]:
     for relation in around.relations:
         if own not in (relation.parent, relation.child):
-            moved = replace(relation, waypoints=room.outer_ways(relation.waypoints))
+            moved = replace(relation, waypoints=drawing.outer_ways(relation.waypoints))
             yield _Arrow(moved, _of_parent(relation), _of_child(relation))
     for relation in inside.relations:
         if relation.parent != ENTRY and relation.child != EXIT:
@@ -111,7 +111,7 @@ def _arrows(
                 relation,
                 parent=keys[relation.parent],
                 child=keys[relation.child],
-                waypoints=room.inner_ways(relation.waypoints),
+                waypoints=drawing.inner_ways(relation.waypoints),
             )
             # Who leads in comes first among the parents, who follows last among the children.
             yield _Arrow(moved, (0, *_of_parent(relation)), (1, *_of_child(relation)))

@@ -4,80 +4,43 @@ stand in its place, and why there are none that say the same.
 See docs/umrf-and-the-engine.md 2.3, 2.6 and 2.7, and docs/decisions/069-flatten.md.
 """
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from typing import Final, NamedTuple, TypeVar
+from collections.abc import Collection, Iterator, Sequence
+from typing import TypeVar
 
 from msgspec.structs import replace
 
-from action_assistant.umrf.files.writing import name_order
-from action_assistant.umrf.hierarchy.reasons import FlatteningCode
+from action_assistant.umrf.hierarchy.joint_parts import (
+    JoinedArrow,
+    JoinedPlace,
+    SubGraphPlace,
+    Unjoined,
+    ends_of,
+    in_order,
+    merged_extra,
+    names_of,
+    outputs_within,
+    renamed_or_refused,
+    renaming,
+)
+from action_assistant.umrf.hierarchy.ways_out import ways_out
 from action_assistant.umrf.json.text import dump, parse_small
 from action_assistant.umrf.model import (
     ENTRY,
     EXIT,
-    PRECONDITIONS,
     Action,
-    Conditions,
     Graph,
     Key,
     Parameter,
     Precondition,
     Relation,
-    Remap,
 )
 from action_assistant.umrf.parameters import flat_name
-from action_assistant.umrf.semantics.parts import exit_inputs
-from action_assistant.umrf.semantics.values import RemapUnknown, Slot, renamed, slots_of
-
-#: How an action ends that nobody stops.
-_ENDS: Final[tuple[Precondition, ...]] = ("on_true", "on_false", "on_error")
-_TO_EXIT: Final = frozenset({"run", "stop", "pause", "restart", "ignore"})
-
+from action_assistant.umrf.semantics.values import Slot, slots_of
 
 _Part = TypeVar("_Part")
 
 
-class Unjoined(Exception):
-    """There is no such arrow."""
-
-    def __init__(self, code: FlatteningCode, message: str) -> None:
-        super().__init__(message)
-        self.code = code
-        self.message = message
-
-
-class JoinedArrow(NamedTuple):
-    """An arrow into or out of a sub-graph. `instead`: the one of the graph around it; `place`: among
-    those that stand for it."""
-
-    relation: Relation
-    instead: Relation
-    place: int
-
-
-class Place(NamedTuple):
-    """A sub-graph in its place. `around`: the graph, with other sub-graphs in their places already;
-    `given`: inputs that `around` takes from the graph around it; `lacks`: whether inputs can be
-    missing when all that the action waits for otherwise is there; `bypassed`: by which outcomes it can
-    be bypassed."""
-
-    around: Graph
-    action: Action
-    inside: Graph
-    given: frozenset[str]
-    lacks: bool
-    bypassed: frozenset[Precondition]
-
-
-class JoinedPlace(NamedTuple):
-    """`entries`: the entry actions of the sub-graph with the values that they get."""
-
-    into: tuple[JoinedArrow, ...]
-    out: tuple[JoinedArrow, ...]
-    entries: Mapping[Key, Action]
-
-
-def joined(place: Place) -> JoinedPlace | tuple[Unjoined, ...]:
+def joined(place: SubGraphPlace) -> JoinedPlace | tuple[Unjoined, ...]:
     """The arrows into and out of a sub-graph's actions; all that speaks against it, if anything
     does."""
     relations = place.around.relations
@@ -97,7 +60,7 @@ def joined(place: Place) -> JoinedPlace | tuple[Unjoined, ...]:
     ]
     found = JoinedPlace(
         tuple(_got(_into(place, into), against)),
-        tuple(_got(_out(place, out), against)),
+        tuple(_got(ways_out(place, out), against)),
         dict(_got(_entry_actions(place), against)),
     )
     return tuple(against) or found
@@ -108,19 +71,6 @@ def _got(parts: Iterator[_Part], against: list[Unjoined]) -> Iterator[_Part]:
         yield from parts
     except Unjoined as none:
         against.append(none)
-
-
-def in_order(relations: Collection[Relation], *, by_parent: bool) -> list[Relation]:
-    """Relations as the parent lists its children, or the child its parents."""
-    ordered = sorted(relations, key=name_order)
-    return sorted(ordered, key=lambda r: r.parent_order if by_parent else r.child_order)
-
-
-def ends_of(graph: Graph) -> tuple[list[Relation], list[Relation]]:
-    """The relations at the entry and at the exit, in order."""
-    entries = [r for r in graph.relations if r.parent == ENTRY]
-    exits = [r for r in graph.relations if r.child == EXIT]
-    return in_order(entries, by_parent=True), in_order(exits, by_parent=False)
 
 
 def _lets_through(inside: Graph, outcome: Precondition) -> bool:
@@ -150,28 +100,28 @@ def _lets_through(inside: Graph, outcome: Precondition) -> bool:
 # Into the sub-graph
 
 
-def _into(place: Place, relations: Sequence[Relation]) -> Iterator[JoinedArrow]:
+def _into(place: SubGraphPlace, relations: Sequence[Relation]) -> Iterator[JoinedArrow]:
     actions = {action.key: action for action in place.inside.actions}
     entries, _ = ends_of(place.inside)
     for relation in relations:
         outputs = _outputs_of(place, relation.parent)
-        to_sub = _renamed(outputs, relation.remap, _names(place.action.inputs))
+        to_sub = renamed_or_refused(outputs, relation.remap, names_of(place.action.inputs))
         for number, entry in enumerate(entries):
             inputs = slots_of(actions[entry.child].inputs)
-            taken = _renamed(_names(place.action.inputs), entry.remap, inputs)
+            taken = renamed_or_refused(names_of(place.action.inputs), entry.remap, inputs)
             wanted = {name: to_sub[own] for name, own in taken.items() if own in to_sub}
-            remap = _remap(outputs, inputs, wanted, relation.remap)
+            remap = renaming(outputs, inputs, wanted, relation.remap)
             arrow = replace(
                 relation,
                 child=entry.child,
                 remap=remap,
-                children_extra=_extra(relation.children_extra, entry.children_extra),
+                children_extra=merged_extra(relation.children_extra, entry.children_extra),
                 waypoints=(),
             )
             yield JoinedArrow(arrow, relation, number)
 
 
-def _entry_actions(place: Place) -> Iterator[tuple[Key, Action]]:
+def _entry_actions(place: SubGraphPlace) -> Iterator[tuple[Key, Action]]:
     """The entry actions of the sub-graph, with the values that the file gives to its action."""
     actions = {action.key: action for action in place.inside.actions}
     own = slots_of(place.action.inputs)
@@ -180,7 +130,7 @@ def _entry_actions(place: Place) -> Iterator[tuple[Key, Action]]:
     for entry in ends_of(place.inside)[0]:
         action = actions[entry.child]
         slots = slots_of(action.inputs)
-        taken = _renamed(own, entry.remap, slots)
+        taken = renamed_or_refused(own, entry.remap, slots)
         if place.lacks and not needed <= set(taken.values()):
             raise Unjoined(
                 "entries",
@@ -224,201 +174,5 @@ def _with_value(parameter: Parameter, given: Parameter | None) -> Parameter:
     return Parameter(parameter.path, dump({**leaf, "pvf_value": value["pvf_value"]}))
 
 
-# Out of it
-
-
-def _out(place: Place, relations: Sequence[Relation]) -> Iterator[JoinedArrow]:
-    _, exits = ends_of(place.inside)
-    kind = _kind(exits)
-    _check_outputs(place, exits, kind)
-    for relation in relations:
-        incoming = [r for r in place.around.relations if r.child == relation.child]
-        required = _required(relation, exits, kind, is_only=len(incoming) == 1)
-        for number, end in enumerate(exits):
-            arrow = replace(
-                relation,
-                parent=end.parent,
-                conditions=_composed(end.conditions, relation.conditions),
-                required=required,
-                remap=_out_remap(place, end, relation),
-                parents_extra=_extra(relation.parents_extra, end.parents_extra),
-                waypoints=(),
-            )
-            yield JoinedArrow(arrow, relation, number)
-
-
-def _kind(exits: Sequence[Relation]) -> str:
-    """`one` way out, `all` of several, or `any` of them."""
-    if len(exits) < 2:
-        return "one"
-    required = {relation.required for relation in exits}
-    if len(required) > 1:
-        raise Unjoined("exits", "Some of its ways to the exit are required and others are not.")
-    if True not in required:
-        return "any"
-    if any(r.conditions.answer(end) == "bypass" for r in exits for end in _ENDS):
-        raise Unjoined(
-            "exits", "Its exit waits for several actions, and a bypass ends it without the others."
-        )
-    return "all"
-
-
-def _required(relation: Relation, exits: Sequence[Relation], kind: str, *, is_only: bool) -> bool:
-    """Whether the child of a sub-graph waits for each of those that stand for it."""
-    told = {relation.conditions.answer(end) for end in _ENDS}
-    if kind == "any":
-        if relation.required and not is_only:
-            raise Unjoined(
-                "exits", "What follows waits for it and for others, and it has several ways out."
-            )
-        return False
-    if relation.required and not is_only and _may_go_on(exits):
-        raise Unjoined(
-            "exits", "What follows waits for others too, and an end inside may be no end of it."
-        )
-    if kind == "one":
-        return relation.required
-    if not relation.required and not is_only:
-        raise Unjoined("exits", "Its exit waits for several actions; what follows does not for it.")
-    if not told <= (_TO_EXIT if relation.child == EXIT else {"run", "ignore"}):
-        raise Unjoined("exits", "Its exit waits for several actions, and what follows is not run.")
-    return True
-
-
-def _may_go_on(exits: Sequence[Relation]) -> bool:
-    """Whether an action at the exit can end without that it ends the sub-graph."""
-    return any(r.conditions.answer(end) == "ignore" for r in exits for end in _ENDS)
-
-
-def _composed(end: Conditions, following: Conditions) -> Conditions:
-    """What follows the sub-graph, as an answer to the action that ends it."""
-    answers = {
-        outcome: following.answer(outcome) if end.answer(outcome) != "ignore" else "ignore"
-        for outcome in PRECONDITIONS
-    }
-    return Conditions(**answers)
-
-
-def _check_outputs(place: Place, exits: Sequence[Relation], kind: str) -> None:
-    given = exit_inputs(place.inside)
-    own = slots_of(place.action.outputs)
-    if not given:
-        return
-    if kind == "all":
-        raise Unjoined("outputs", "It gives values, and its exit waits for several actions.")
-    actions = {action.key: action for action in place.inside.actions}
-    for end in exits:
-        action = actions[end.parent]
-        _check_end(place.inside, end)
-        for name, slot in slots_of(action.outputs).items():
-            if name not in given:
-                continue
-            pair = given[name], own[name]
-            plain = all(s.updatable and not s.allowed for s in (slot, *pair))
-            if slot.has_value() or own[name].has_value() or not plain:
-                raise Unjoined(
-                    "outputs", f"The output “{name}” of {action.full_name} is restricted by files."
-                )
-            if any((s.type, s.required) != (slot.type, slot.required) for s in pair):
-                raise Unjoined(
-                    "outputs", f"The output “{name}” of {action.full_name} has two types."
-                )
-
-
-def _check_end(inside: Graph, end: Relation) -> None:
-    """Whoever ends the sub-graph hands over what the exit waits for, or ends it with an error."""
-    said = end.conditions
-    if "bypass" in (said.on_true, said.on_false) or said.on_error not in ("bypass", "ignore"):
-        raise Unjoined(
-            "outputs", "It gives values, and can end without them: by a bypass, or with an error."
-        )
-    if leads_to(inside, end.parent, end.parent):
-        raise Unjoined("loop", "Who ends it, and gives its values, is part of a loop.")
-
-
-def _out_remap(place: Place, end: Relation, relation: Relation) -> tuple[Remap, ...]:
-    given = exit_inputs(place.inside)
-    outputs = _outputs_within(place.inside, end.parent)
-    own = _names(place.action.outputs)
-    to_exit = _renamed(outputs, (), given)
-    if relation.child == EXIT:
-        inputs: Collection[str] = exit_inputs(place.around)
-        taken = _renamed(own, (), inputs)
-    else:
-        child = next(a for a in place.around.actions if a.key == relation.child)
-        inputs = _names(child.inputs)
-        taken = _renamed(own, relation.remap, inputs)
-    wanted = {name: to_exit[source] for name, source in taken.items() if source in to_exit}
-    if relation.child == EXIT and _renamed(outputs, (), inputs) == wanted:
-        return ()
-    if relation.child == EXIT:
-        raise Unjoined("renaming", "Who ends it gives values that the graph around it would take.")
-    return _remap(outputs, inputs, wanted, relation.remap)
-
-
-# Values
-
-
-def _remap(
-    outputs: Collection[str],
-    inputs: Collection[str],
-    wanted: Mapping[str, str],
-    usual: tuple[Remap, ...],
-) -> tuple[Remap, ...]:
-    """Renamings by which exactly these inputs get exactly these outputs. The engine renames inside
-    a sorted tree, so each is tried (docs/umrf-and-the-engine.md 2.7)."""
-    least = tuple(Remap(source, name) for name, source in sorted(wanted.items()) if source != name)
-    for remap in ((), usual, least):
-        sources = {each.source for each in remap}
-        fits = len(sources) == len(remap) and sources <= set(outputs)
-        if fits and renamed(outputs, remap, inputs) == wanted:
-            return remap
-    raise Unjoined(
-        "renaming", "No renaming hands over exactly the values that go through the sub-graph."
-    )
-
-
-def _renamed(
-    outputs: Collection[str], remap: tuple[Remap, ...], inputs: Collection[str]
-) -> dict[str, str]:
-    try:
-        return renamed(outputs, remap, inputs)
-    except RemapUnknown as unknown:
-        message = f"An output is renamed that does not exist: “{unknown}”."
-        raise Unjoined("renaming", message) from None
-
-
-def _outputs_of(place: Place, parent: Key) -> Collection[str]:
-    return place.given if parent == ENTRY else _outputs_within(place.around, parent)
-
-
-def _outputs_within(graph: Graph, parent: Key) -> Collection[str]:
-    return _names(next(a for a in graph.actions if a.key == parent).outputs)
-
-
-def _names(parameters: Sequence[Parameter]) -> Collection[str]:
-    return slots_of(parameters).keys()
-
-
-def _extra(
-    outer: tuple[tuple[str, str], ...], inner: tuple[tuple[str, str], ...]
-) -> tuple[tuple[str, str], ...]:
-    known = {field for field, _ in outer}
-    return (*outer, *(each for each in inner if each[0] not in known))
-
-
-def leads_to(graph: Graph, start: Key, goal: Key) -> bool:
-    """Whether a way of arrows leads from one action to another; to itself only by a loop."""
-    children: dict[Key, list[Key]] = {}
-    for relation in graph.relations:
-        children.setdefault(relation.parent, []).append(relation.child)
-    seen: set[Key] = set()
-    stack = list(children.get(start, ()))
-    while stack:
-        key = stack.pop()
-        if key == goal:
-            return True
-        if key not in seen:
-            seen.add(key)
-            stack += children.get(key, ())
-    return False
+def _outputs_of(place: SubGraphPlace, parent: Key) -> Collection[str]:
+    return place.given if parent == ENTRY else outputs_within(place.around, parent)

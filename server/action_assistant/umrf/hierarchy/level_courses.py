@@ -48,7 +48,7 @@ class LevelCourses(NamedTuple):
     spent: int = 0
 
 
-class _Moment(NamedTuple):
+class _LevelState(NamedTuple):
     """A state of the graph. `begun`: sub-graphs that have begun, as a mask."""
 
     states: tuple[State, ...]
@@ -71,7 +71,7 @@ class _Watched(Instant):
         "told",
     )
 
-    def __init__(self, net: Network, moment: _Moment, watched: int) -> None:
+    def __init__(self, net: Network, moment: _LevelState, watched: int) -> None:
         super().__init__(net, moment.states.__getitem__, 0.0, moment.running, moment.active)
         self._watched = watched
         self.begun = moment.begun
@@ -121,12 +121,12 @@ class _Watched(Instant):
         super()._bypass(place, child, result)
         self.crossing = self.crossing or len(self._tasks) > 1
 
-    def after(self, before: _Moment) -> _Moment:
+    def after(self, before: _LevelState) -> _LevelState:
         """The state that follows. Times do not matter: any order of ends is looked at."""
         states = list(before.states)
         for place, state in self.states.items():
             states[place] = state._replace(due=0.0)
-        return _Moment(tuple(states), self.running, self.active, self.begun)
+        return _LevelState(tuple(states), self.running, self.active, self.begun)
 
 
 def level_courses(
@@ -178,7 +178,7 @@ class _Courses:
     def look(self, budget: int) -> None:
         """Goes through all of them."""
         net = self.net
-        first = _Moment(tuple(State(has=has) for has in net.has), 0, 0, 0)
+        first = _LevelState(tuple(State(has=has) for has in net.has), 0, 0, 0)
         instant = _Watched(net, first, self.watched)
         instant.begin()
         open_ = [then] if (then := self._seen(instant, first, -1, "")) is not None else []
@@ -197,7 +197,7 @@ class _Courses:
                     known.add(then)
                     open_.append(then)
 
-    def _ends(self, moment: _Moment) -> Iterator[tuple[int, Precondition]]:
+    def _ends(self, moment: _LevelState) -> Iterator[tuple[int, Precondition]]:
         for place, state in enumerate(moment.states[:-1]):
             if state.does == RUNS:
                 yield from ((place, result) for result in self.ends[place])
@@ -205,7 +205,9 @@ class _Courses:
     def _tell(self, trouble: Trouble) -> None:
         self.troubles.setdefault((trouble.kind, trouble.action), trouble)
 
-    def _seen(self, instant: _Watched, before: _Moment, place: int, result: str) -> _Moment | None:
+    def _seen(
+        self, instant: _Watched, before: _LevelState, place: int, result: str
+    ) -> _LevelState | None:
         """Notes what came of an instant. The state after it, if the graph goes on."""
         by = self.net.names[place] if place >= 0 else ""
         for kind, child in instant.told:
@@ -232,7 +234,9 @@ class _Courses:
             case _:
                 return then
 
-    def _finished(self, instant: _Watched, then: _Moment, by: str, result: str, place: int) -> None:
+    def _finished(
+        self, instant: _Watched, then: _LevelState, by: str, result: str, place: int
+    ) -> None:
         if instant.finished is not None:
             self.results.add(instant.finished)
         if instant.early:

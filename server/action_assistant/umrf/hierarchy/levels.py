@@ -9,7 +9,7 @@ from msgspec.structs import replace
 from action_assistant.umrf.checks.places import Subject
 from action_assistant.umrf.checks.structure import check_structure
 from action_assistant.umrf.facts import PINNED
-from action_assistant.umrf.hierarchy.joints import ends_of
+from action_assistant.umrf.hierarchy.joint_parts import ends_of
 from action_assistant.umrf.hierarchy.reasons import FlatteningReason, HierarchyLevel
 from action_assistant.umrf.json.text import Json, dump, parse_small
 from action_assistant.umrf.model import ENTRY, EXIT, Action, Graph, Parameter, Relation

@@ -1,7 +1,7 @@
 """Where everything is drawn when a sub-graph's actions stand where its action stood.
 
 The sub-graph keeps its own drawing, with its middle where the action was; what lay beyond the action on
-one side is moved away by as much as the drawing needs there.
+one side is moved away by as much as that needs there.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,8 +18,8 @@ _Ways: TypeAlias = tuple[tuple[Response, JsonText], ...]
 _Moved: TypeAlias = Callable[[Json], Json]
 
 
-class Room:
-    """Makes room for the actions of one sub-graph."""
+class Drawing:
+    """Puts the actions of one sub-graph where its action stands, and makes room for them."""
 
     def __init__(self, around: Graph, action: Action, inside: Graph) -> None:
         self._at = action.position
