@@ -41,6 +41,8 @@ from action_assistant.umrf.signatures import action_of_graph
 RUN = Conditions("run", "run", "run", "ignore")
 USUAL = [*[RUN] * 5, *[ENGINE_DEFAULTS] * 3, Conditions("run", "run")]
 TRUE, OTHER = Conditions("run"), Conditions("ignore", "run", "run")
+BYPASS, FAILED = Conditions("run", "bypass", "bypass"), Conditions("ignore", "ignore", "run")
+TWEAKS = [TRUE, OTHER, RUN, ENGINE_DEFAULTS, FAILED, Conditions()]
 TOP = "g"
 
 
@@ -169,9 +171,34 @@ class _Drawn:
         shape = self.draw(st.sampled_from([*["chain"] * likely, *shapes]))
         keys = [a.key for a in self.actions]
         getattr(self, f"_{shape if len(keys) > 1 else 'chain'}")(keys)
+        for _ in range(self.draw(st.sampled_from([0, 0, 0, 1, 1, 2]))):
+            self._tweak(keys)
         return Graph(
             name=self.name, actions=tuple(self.actions), relations=tuple(self.relations.values())
         )
+
+    def _tweak(self, keys: list[Key]) -> None:
+        """Something a little otherwise: much of it can still be made flat, and little is sound."""
+        draw = self.draw
+        pair = draw(st.sampled_from(sorted(self.relations)))
+        relation = self.relations[pair]
+        match draw(st.sampled_from(["required", "said", "said", "arrow", "exit", "entry"])):
+            case "required":
+                self.relations[pair] = replace(relation, required=not relation.required)
+            case "said" if relation.parent != ENTRY:
+                said = draw(st.sampled_from([TRUE, OTHER, RUN, ENGINE_DEFAULTS, BYPASS, FAILED]))
+                self.relations[pair] = replace(relation, conditions=said)
+            case "arrow":
+                both = draw(st.sampled_from(keys)), draw(st.sampled_from(keys))
+                if both not in self.relations and both[0] != both[1]:
+                    self.arrow(*both, draw(st.sampled_from(TWEAKS)), required=draw(st.booleans()))
+            case "exit" if (keys[0], EXIT) not in self.relations:
+                said = draw(st.sampled_from(TWEAKS))
+                self.arrow(keys[0], EXIT, said, required=draw(st.booleans()))
+            case "entry" if (ENTRY, keys[-1]) not in self.relations:
+                self.arrow(ENTRY, keys[-1], RUN)
+            case _:
+                pass
 
     def _chain(self, keys: list[Key]) -> None:
         self.arrow(ENTRY, keys[0], RUN)
