@@ -217,10 +217,12 @@ class _Drawn:
         else:
             self.arrow(ENTRY, first, RUN)
         join = others[-1] if len(others) > 2 and self.draw(st.booleans()) else EXIT
+        required = self.draw(st.integers(0, 3)) > 0
         for key in others:
             if key != join:
                 self.arrow(ENTRY if others is keys else first, key, self.usual())
-                self.arrow(key, join, self.draw(st.sampled_from([RUN, RUN, ENGINE_DEFAULTS])))
+                said = self.draw(st.sampled_from([RUN, RUN, ENGINE_DEFAULTS]))
+                self.arrow(key, join, said, required=required)
         if join != EXIT:
             self.arrow(join, EXIT, self.usual())
 

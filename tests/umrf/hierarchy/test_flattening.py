@@ -30,14 +30,14 @@ def agree(hierarchy: Hierarchy, found: Flattened, random: Random, stop: bool) ->
         places = random.sample(range(len(names)), len(names))
         behaviours = {}
         for name, result, place in zip(names, results, places, strict=True):
-            after_s = 1 + 2.0**place / 64
+            after_s = random.choice((0.2, 1, 3, 7)) + 2.0**place / 1024
             behaviours[name] = tuple(
                 Behaviour(after_s=after_s, result=each, outputs=outputs_of(found.graph, name, call))
                 for call, each in enumerate(
                     (result, random.choice(RESULTS), random.choice(RESULTS))
                 )
             )
-        stop_ms = random.uniform(1, 8_000) if stop else None
+        stop_ms = random.uniform(1, 20_000) if stop else None
         nested, flat = both(hierarchy, found, behaviours, stop_ms)
         if nested.tied:
             continue

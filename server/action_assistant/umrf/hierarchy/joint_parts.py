@@ -31,6 +31,11 @@ class Unjoined(Exception):
         self.message = message
 
 
+def refuse(code: FlatteningCode, message: str) -> None:
+    """Says that one graph would not do the same."""
+    raise Unjoined(code, message)
+
+
 class JoinedArrow(NamedTuple):
     """An arrow into or out of a sub-graph. `instead`: the one of the graph around it; `place`: among
     those that stand for it."""

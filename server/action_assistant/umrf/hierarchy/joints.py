@@ -19,6 +19,7 @@ from action_assistant.umrf.hierarchy.joint_parts import (
     merged_extra,
     names_of,
     outputs_within,
+    refuse,
     renamed_or_refused,
     renaming,
 )
@@ -132,20 +133,20 @@ def _entry_actions(place: SubGraphPlace) -> Iterator[tuple[Key, Action]]:
         slots = slots_of(action.inputs)
         taken = renamed_or_refused(own, entry.remap, slots)
         if place.lacks and not needed <= set(taken.values()):
-            raise Unjoined(
+            refuse(
                 "entries",
                 f"It can lack an input when all else is there; {action.full_name} in it needs none "
                 "of that and would begin.",
             )
         for name, slot in slots.items():
             if slot.required and not slot.has_value() and name not in taken:
-                raise Unjoined("inputs", f"Nothing gives “{name}” of {action.full_name} a value.")
+                refuse("inputs", f"Nothing gives “{name}” of {action.full_name} a value.")
         for name, source in taken.items():
             _check_same(own[source], slots[name], action)
         if taken and any(
             r.child == action.key != r.parent != ENTRY for r in place.inside.relations
         ):
-            raise Unjoined(
+            refuse(
                 "loop",
                 f"{action.full_name} begins with values from outside, and arrows lead to it in the "
                 "sub-graph as well: these values are gone after its first run.",
@@ -159,11 +160,11 @@ def _check_same(outer: Slot, inner: Slot, action: Action) -> None:
     """A value that goes through both is taken by both or by neither."""
     place = f"“{outer.name}” and “{inner.name}” of {action.full_name}"
     if inner.has_value():
-        raise Unjoined("inputs", f"{place}: both have a value in their files.")
+        refuse("inputs", f"{place}: both have a value in their files.")
     if outer.type != inner.type or outer.required != inner.required:
-        raise Unjoined("inputs", f"{place} differ in type, or in whether they are required.")
+        refuse("inputs", f"{place} differ in type, or in whether they are required.")
     if not (outer.updatable and inner.updatable) or outer.allowed or inner.allowed:
-        raise Unjoined("inputs", f"{place} do not take every value.")
+        refuse("inputs", f"{place} do not take every value.")
 
 
 def _with_value(parameter: Parameter, given: Parameter | None) -> Parameter:

@@ -11,12 +11,12 @@ from msgspec.structs import replace
 from action_assistant.umrf.hierarchy.joint_parts import (
     JoinedArrow,
     SubGraphPlace,
-    Unjoined,
     ends_of,
     leads_to,
     merged_extra,
     names_of,
     outputs_within,
+    refuse,
     renamed_or_refused,
     renaming,
 )
@@ -63,11 +63,11 @@ def _kind(exits: Sequence[Relation]) -> str:
         return "one"
     required = {relation.required for relation in exits}
     if len(required) > 1:
-        raise Unjoined("exits", "Some of its ways to the exit are required and others are not.")
+        refuse("exits", "Some of its ways to the exit are required and others are not.")
     if True not in required:
         return "any"
     if any(r.conditions.answer(end) == "bypass" for r in exits for end in _ENDS):
-        raise Unjoined(
+        refuse(
             "exits", "Its exit waits for several actions, and a bypass ends it without the others."
         )
     return "all"
@@ -78,20 +78,18 @@ def _required(relation: Relation, exits: Sequence[Relation], kind: str, *, is_on
     told = {relation.conditions.answer(end) for end in _ENDS}
     if kind == "any":
         if relation.required and not is_only:
-            raise Unjoined(
+            refuse(
                 "exits", "What follows waits for it and for others, and it has several ways out."
             )
         return False
     if relation.required and not is_only and _may_go_on(exits):
-        raise Unjoined(
-            "exits", "What follows waits for others too, and an end inside may be no end of it."
-        )
+        refuse("exits", "What follows waits for others too, and an end inside may be no end of it.")
     if kind == "one":
         return relation.required
     if not relation.required and not is_only:
-        raise Unjoined("exits", "Its exit waits for several actions; what follows does not for it.")
+        refuse("exits", "Its exit waits for several actions; what follows does not for it.")
     if not told <= (_TO_EXIT if relation.child == EXIT else {"run", "ignore"}):
-        raise Unjoined("exits", "Its exit waits for several actions, and what follows is not run.")
+        refuse("exits", "Its exit waits for several actions, and what follows is not run.")
     return True
 
 
@@ -115,7 +113,7 @@ def _check_outputs(place: SubGraphPlace, exits: Sequence[Relation], kind: str) -
     if not given:
         return
     if kind == "all":
-        raise Unjoined("outputs", "It gives values, and its exit waits for several actions.")
+        refuse("outputs", "It gives values, and its exit waits for several actions.")
     actions = {action.key: action for action in place.inside.actions}
     for end in exits:
         action = actions[end.parent]
@@ -126,24 +124,22 @@ def _check_outputs(place: SubGraphPlace, exits: Sequence[Relation], kind: str) -
             pair = given[name], own[name]
             plain = all(s.updatable and not s.allowed for s in (slot, *pair))
             if slot.has_value() or own[name].has_value() or not plain:
-                raise Unjoined(
+                refuse(
                     "outputs", f"The output “{name}” of {action.full_name} is restricted by files."
                 )
             if any((s.type, s.required) != (slot.type, slot.required) for s in pair):
-                raise Unjoined(
-                    "outputs", f"The output “{name}” of {action.full_name} has two types."
-                )
+                refuse("outputs", f"The output “{name}” of {action.full_name} has two types.")
 
 
 def _check_end(inside: Graph, end: Relation) -> None:
     """Whoever ends the sub-graph hands over what the exit waits for, or ends it with an error."""
     said = end.conditions
     if "bypass" in (said.on_true, said.on_false) or said.on_error not in ("bypass", "ignore"):
-        raise Unjoined(
+        refuse(
             "outputs", "It gives values, and can end without them: by a bypass, or with an error."
         )
     if leads_to(inside, end.parent, end.parent):
-        raise Unjoined("loop", "Who ends it, and gives its values, is part of a loop.")
+        refuse("loop", "Who ends it, and gives its values, is part of a loop.")
 
 
 def _out_remap(place: SubGraphPlace, end: Relation, relation: Relation) -> tuple[Remap, ...]:
@@ -162,5 +158,5 @@ def _out_remap(place: SubGraphPlace, end: Relation, relation: Relation) -> tuple
     if relation.child == EXIT and renamed_or_refused(outputs, (), inputs) == wanted:
         return ()
     if relation.child == EXIT:
-        raise Unjoined("renaming", "Who ends it gives values that the graph around it would take.")
+        refuse("renaming", "Who ends it gives values that the graph around it would take.")
     return renaming(outputs, inputs, wanted, relation.remap)
