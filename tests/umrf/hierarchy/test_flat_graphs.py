@@ -1,6 +1,7 @@
 """What a flat graph looks like: names, origins, places, unknown fields; and real files."""
 
 import json
+from itertools import pairwise
 from random import Random
 
 import msgspec
@@ -145,3 +146,11 @@ def test_real_files_become_flat_or_say_why() -> None:
         if found.graph is not graph:
             agree(Hierarchy(graph, graphs), found, Random(5), stop=False)
     assert hierarchical > 0
+
+
+def test_long_chains_and_several_branches_are_looked_at_whole() -> None:
+    names = [f"A{n}" for n in range(400)]
+    arrows = [f"{one}>{other}" for one, other in pairwise(["entry", *names, "S", "exit"])]
+    assert isinstance(flattened(graph_of(*arrows), {"S": TWO}), Flattened)
+    branches = [arrow for n in range(6) for arrow in (f"S>A{n}", f"A{n}>B{n}", f"B{n}>exit")]
+    assert isinstance(flattened(graph_of("entry>S", *branches), {"S": TWO}), Flattened)

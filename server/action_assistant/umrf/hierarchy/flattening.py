@@ -136,6 +136,7 @@ class _Hierarchy:
             courses_graph(graph, given),
             {key: flat.results for key, flat in flats.items()},
             self.budget,
+            is_top=not above,
         )
         self.budget -= seen.spent
         reasons += _troubles(graph, seen, is_top=not above)

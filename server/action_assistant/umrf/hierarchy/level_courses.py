@@ -122,18 +122,30 @@ class _Watched(Instant):
         self.crossing = self.crossing or len(self._tasks) > 1
 
     def after(self, before: _LevelState) -> _LevelState:
-        """The state that follows. Times do not matter: any order of ends is looked at."""
+        """The state that follows. Times do not matter, since any order of ends is looked at; nor does
+        what has become of actions to which nothing that goes on leads any more."""
         states = list(before.states)
         for place, state in self.states.items():
-            states[place] = state._replace(due=0.0)
-        return _LevelState(tuple(states), self.running, self.active, self.begun)
+            states[place] = state._replace(due=0.0, waiting=False)
+        ahead = 0
+        for place, state in enumerate(states[:-1]):
+            if state.does == RUNS:
+                ahead |= self._net.behind[place] | 1 << place
+        nothing = State()
+        kept = tuple(state if ahead >> place & 1 else nothing for place, state in enumerate(states))
+        return _LevelState(kept, self.running, self.active, self.begun & ahead)
 
 
 def level_courses(
-    graph: Graph, inside: Mapping[Key, frozenset[Precondition]], budget: int = BUDGET
+    graph: Graph,
+    inside: Mapping[Key, frozenset[Precondition]],
+    budget: int = BUDGET,
+    *,
+    is_top: bool = False,
 ) -> LevelCourses:
-    """All courses of a graph in which these actions are sub-graphs, with what those end with."""
-    search = _Courses(graph, inside)
+    """All courses of a graph in which these actions are sub-graphs, with what those end with. What the
+    top graph itself ends with need not be known."""
+    search = _Courses(graph, inside, is_top=is_top)
     search.look(budget)
     return LevelCourses(
         frozenset(search.results),
@@ -147,15 +159,15 @@ def level_courses(
 class _Courses:
     """The search through all states. The first trouble of a kind is kept for each sub-graph."""
 
-    def __init__(self, graph: Graph, inside: Mapping[Key, frozenset[Precondition]]) -> None:
+    def __init__(
+        self, graph: Graph, inside: Mapping[Key, frozenset[Precondition]], *, is_top: bool
+    ) -> None:
         self.net = net = Network(graph)
         self.key = {net.place[action.full_name]: action.key for action in graph.actions}
         self.watched = sum(1 << place for place, key in self.key.items() if key in inside)
         self.ends = [
-            [r for r in _RESULTS if r in inside[self.key[place]]]
-            if self.key[place] in inside
-            else self._telling(row)
-            for place, row in enumerate(net.edges)
+            self._telling(place, inside.get(self.key[place], frozenset(_RESULTS)), is_top=is_top)
+            for place in range(len(net.nodes))
         ]
         self.results: set[Precondition] = set()
         self.troubles: dict[tuple[TroubleKind, Key | None], Trouble] = {}
@@ -163,16 +175,21 @@ class _Courses:
         self.bypassed: dict[Key, set[Precondition]] = {}
         self.spent = 0
 
-    def _telling(self, row: list[EdgeQuestion | None]) -> list[Precondition]:
-        """The results of an action that can make a difference: a failed one gives nothing, and what
-        a bypass hands on, or the exit, is the result itself."""
-        exit_, told = self.net.exit, [edge for edge in row if edge is not None]
-        if any(e.child == exit_ or "bypass" in e.responses.values() for e in told):
-            return list(_RESULTS)
+    def _telling(
+        self, place: int, results: frozenset[Precondition], *, is_top: bool
+    ) -> list[Precondition]:
+        """The results of an action that can make a difference: a failed one gives nothing and may
+        begin anew, and what a bypass hands on, or an inner exit, is the result itself."""
+        told = [edge for edge in self.net.edges[place] if edge is not None]
+        ending = any(edge.child == self.net.exit for edge in told) and not is_top
+        if ending or any("bypass" in edge.responses.values() for edge in told):
+            return [result for result in _RESULTS if result in results]
+        gives = bool(self.net.nodes[place].outputs) or any(e.child == place for e in told)
         found: dict[tuple[object, ...], Precondition] = {}
         for result in _RESULTS:
-            answers = tuple(edge.responses[result] for edge in told)
-            found.setdefault((result == "on_error", *answers), result)
+            if result in results:
+                answers = tuple(edge.responses[result] for edge in told)
+                found.setdefault((gives and result == "on_error", *answers), result)
         return list(found.values())
 
     def look(self, budget: int) -> None:
