@@ -7,7 +7,7 @@ its courses (`level_courses`), and per place, from the arrows there (`joints`).
 See docs/decisions/069-flatten.md.
 """
 
-from collections.abc import Container, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from typing import Final, NamedTuple, TypeAlias
 
 import msgspec
@@ -81,10 +81,13 @@ def flattened(
     actors = {*whole.actors, *(action.actor for action in graph.actions)} - {""}
     if len(actors) > 1:
         message = f"Its actions belong to several actors ({', '.join(sorted(actors))})."
-        return Unflattenable((*found.reasons, FlatteningReason("actors", message)))
-    if found.flat is None:
-        return Unflattenable(found.reasons)
-    return _named(found.flat)
+        return _unflattenable((*found.reasons, FlatteningReason("actors", message)))
+    return _unflattenable(found.reasons) if found.flat is None else _named(found.flat)
+
+
+def _unflattenable(reasons: Iterable[FlatteningReason]) -> Unflattenable:
+    """Each reason once."""
+    return Unflattenable(tuple(dict.fromkeys(reasons)))
 
 
 class _Flat(NamedTuple):
