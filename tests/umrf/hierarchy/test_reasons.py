@@ -157,6 +157,18 @@ REFUSED = {
         with_values(CHAIN, S=({}, {"q": leaf("string", extra=',"pvf_required":false')})),
         with_values(ONE, X=({}, {"q": leaf("string", extra=',"pvf_required":false')})),
     ),
+    "outputs, and a bypass that ends it": (
+        "outputs",
+        with_values(
+            CHAIN,
+            S=({}, {"q": TEXT}),
+            B=({"q": leaf("string", extra=',"pvf_required":false')}, {}),
+        ),
+        with_values(
+            inner("entry>X", "X>exit", Xexit=Conditions("bypass", "run", "bypass")),
+            X=({}, {"q": TEXT}),
+        ),
+    ),
     "choosy": (
         "allowed-values",
         with_values(graph_of("entry>A", "A>B", "B>S", "S>exit"), A=({}, {"p": TEXT}),
@@ -234,7 +246,7 @@ FORCED = [
     "a bypass that nothing lets through", "what follows waits for others",
     "an end inside that is none, and others wait", "all have to end, and one is bypassed",
     "an input that one entry needs and another does not", "other types",
-    "values that are gone in a loop",
+    "outputs, and a bypass that ends it", "values that are gone in a loop",
 ]  # fmt: skip
 
 
