@@ -60,7 +60,11 @@ def test_unknown_fields_survive_and_what_has_no_place_is_told() -> None:
         replace(r, parents_extra=(("why", '"x"'),)) if r.child == "S" else r
         for r in outer.relations
     )
-    sub = changed(replace(TWO, extra=(("license", '"MIT"'),)), "Y", extra=(("deep", "[2]"),))
+    sub = changed(
+        replace(TWO, description="two", extra=(("license", '"MIT"'),)),
+        "Y",
+        extra=(("deep", "[2]"),),
+    )
     found = flattened(replace(outer, relations=tuple(relations)), {"S": sub})
     assert isinstance(found, Flattened)
     actions = {a["name"]: a for a in json.loads(codec.write(found.graph))["actions"]}
@@ -68,7 +72,7 @@ def test_unknown_fields_survive_and_what_has_no_place_is_told() -> None:
     assert actions["Y"]["deep"] == [2]
     assert actions["X"]["parents"][0]["why"] == "x"
     (left,) = found.left_out
-    assert (left.levels[-1].action, left.fields) == ("S_0", ("team", "license"))
+    assert (left.levels[-1].action, left.fields) == ("S_0", ("description", "team", "license"))
 
 
 def test_a_sub_graph_is_drawn_where_its_action_stood_and_room_is_made() -> None:

@@ -45,7 +45,8 @@ class FlatOrigin(msgspec.Struct, frozen=True):
 
 
 class LeftOut(msgspec.Struct, frozen=True):
-    """Unknown fields of an action that was a sub-graph, or of the sub-graph: nothing has them now."""
+    """The description and unknown fields of an action that was a sub-graph, or of the sub-graph:
+    nothing has them now."""
 
     levels: LevelPath
     fields: tuple[str, ...]
@@ -228,7 +229,8 @@ def _unknown(graph: Graph, flats: Mapping[Key, _Flat]) -> tuple[LeftOut, ...]:
     found = []
     for action in graph.actions:
         if (flat := flats.get(action.key)) is not None:
-            fields = [field for field, _ in (*action.extra, *flat.graph.extra)]
+            fields = ["description"] if action.description or flat.graph.description else []
+            fields += [field for field, _ in (*action.extra, *flat.graph.extra)]
             at = (HierarchyLevel(graph.name, action.key, action.full_name),)
             found += [LeftOut(at, tuple(dict.fromkeys(fields)))] if fields else []
     return tuple(found)
