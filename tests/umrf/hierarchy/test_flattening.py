@@ -18,6 +18,8 @@ from umrf.hierarchy.hierarchies import Hierarchy, both, hierarchies, outputs_of
 RESULTS = ("on_true", "on_false", "on_error")
 #: Scripts that one flat graph is tried with: all combinations of results where there are no more.
 MOST = 27
+#: How likely a call cannot be loaded, or never ends.
+RARELY = 0.03
 
 
 def agree(hierarchy: Hierarchy, found: Flattened, random: Random, stop: bool) -> int:
@@ -31,11 +33,16 @@ def agree(hierarchy: Hierarchy, found: Flattened, random: Random, stop: bool) ->
         behaviours = {}
         for name, result, place in zip(names, results, places, strict=True):
             after_s = random.choice((0.2, 1, 3, 7)) + 2.0**place / 1024
+            calls = (result, random.choice(RESULTS), random.choice(RESULTS))
             behaviours[name] = tuple(
-                Behaviour(after_s=after_s, result=each, outputs=outputs_of(found.graph, name, call))
-                for call, each in enumerate(
-                    (result, random.choice(RESULTS), random.choice(RESULTS))
+                Behaviour(
+                    after_s=after_s,
+                    result=each,
+                    outputs=outputs_of(found.graph, name, call),
+                    init_error=random.random() < RARELY,
+                    never=random.random() < RARELY,
                 )
+                for call, each in enumerate(calls)
             )
         stop_ms = random.uniform(1, 20_000) if stop else None
         nested, flat = both(hierarchy, found, behaviours, stop_ms)
