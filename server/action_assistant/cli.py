@@ -34,6 +34,11 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
     "check": CommandEntry("files", "say what is wrong with UMRF files; exit 1 if any has an error"),
     "convert": CommandEntry("files", "print a file of any dialect as canonical UMRF"),
     "simulate": CommandEntry("files", "run a file in the simulator, without a server or a robot"),
+    "flatten": CommandEntry(
+        "hierarchy.flatten",
+        "make one graph of a graph and its sub-graphs; exit 1 if it would not do the same",
+        described=True,
+    ),
     "package": CommandEntry(
         "packages.package", "write C++ packages of actions, as the engine loads them"
     ),

@@ -45,7 +45,7 @@ def order_of(product: Product, graph: str) -> dict[str, Any]:
 
 def item_of(runner: httpx.Client, order: dict[str, Any]) -> dict[str, Any]:
     """What the look before a start says of the graphs inside."""
-    answer = runner.post("/api/runs/preflight", json=order)
+    answer = runner.post("/api/preflight", json=order)
     assert answer.is_success, answer.text
     found: dict[str, Any] = next(
         each for each in answer.json()["items"] if each["code"] == "subgraphs"

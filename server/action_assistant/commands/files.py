@@ -124,7 +124,7 @@ def _at(where: Where) -> str:
 
 def _check(options: argparse.Namespace) -> int:
     facts = facts_for(options.facts) if options.facts else PINNED
-    actions = _actions(options.actions) if options.actions else None
+    actions = actions_below(options.actions) if options.actions else None
     graphs = _library(options.graphs) if options.graphs else None
     if len(options.files) > 1:
         graphs = {**_given(options.files), **(graphs or {})}
@@ -307,7 +307,7 @@ def _library(folder: Path | None) -> Mapping[str, Graph]:
     return found
 
 
-def _actions(folder: Path) -> Mapping[str, Signature]:
+def actions_below(folder: Path) -> Mapping[str, Signature]:
     """What the actions of a folder take and give, by name; the engine indexes `*umrf.json`."""
     found: dict[str, Signature] = {}
     for path in sorted(folder.rglob("*umrf.json")):

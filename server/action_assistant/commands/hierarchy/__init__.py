@@ -1,0 +1,1 @@
+"""Commands on files of graphs that have sub-graphs."""

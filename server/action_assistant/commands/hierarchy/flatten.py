@@ -1,0 +1,125 @@
+"""The command `flatten`: one graph made of a graph and its sub-graphs."""
+
+import argparse
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+from action_assistant.commands.files import actions_below
+from action_assistant.commands.hierarchy.given_graphs import GivenGraph, given_graph, given_graphs
+from action_assistant.errors import CannotStart
+from action_assistant.safe_text import one_line
+from action_assistant.umrf.files import codec
+from action_assistant.umrf.hierarchy.flattening import (
+    FlatOrigin,
+    Flattened,
+    LeftOut,
+    Unflattenable,
+    flattened,
+)
+from action_assistant.umrf.hierarchy.reasons import FlatteningReason, LevelPath
+from action_assistant.umrf.json.text import pointer
+from action_assistant.umrf.model import Problem, Where
+
+
+class FlattenedFile(msgspec.Struct, frozen=True, tag="flattened", tag_field="kind"):
+    """What `flatten --json` prints of a graph that could be made flat."""
+
+    umrf: msgspec.Raw
+    origins: tuple[FlatOrigin, ...]
+    left_out: tuple[LeftOut, ...]
+
+
+def _add_flatten(flatten: argparse.ArgumentParser) -> None:
+    flatten.epilog = (
+        "example: action-assistant flatten patrol.graph.json --with graphs/ > flat.json"
+    )
+    flatten.add_argument("file", type=Path, metavar="FILE")
+    flatten.add_argument(
+        "--with",
+        type=Path,
+        nargs="+",
+        default=[],
+        dest="graphs",
+        metavar="PATH",
+        help="files of sub-graphs, or folders of them: *graph.json",
+    )
+    flatten.add_argument(
+        "--actions",
+        type=Path,
+        metavar="DIR",
+        help="of action packages, which come before sub-graphs",
+    )
+    flatten.add_argument("--output", type=Path, metavar="FILE", help="write it there")
+    flatten.add_argument("--json", action="store_true", help="with where each action comes from")
+    flatten.set_defaults(handler=_flatten)
+
+
+COMMANDS: Final = {"flatten": _add_flatten}
+
+
+def _flatten(options: argparse.Namespace) -> int:
+    """Exit code 1: one graph would not do the same."""
+    top = given_graph(options.file)
+    given = given_graphs(options.graphs)
+    known = actions_below(options.actions).keys() if options.actions else frozenset[str]()
+    graphs = {name: each.reading.graph for name, each in given.items()}
+    found = flattened(top.reading.graph, graphs, known)
+    match found:
+        case Unflattenable(reasons=reasons):
+            for reason in reasons:
+                print(one_line(_told(reason, top, given)), file=sys.stderr)
+            if options.json:
+                _print_json(found)
+            return 1
+        case Flattened(graph=graph, origins=origins, left_out=left_out):
+            text = codec.write(graph)
+            for each in left_out:
+                what = f"{', '.join(each.fields)} of {_path(each.levels)} left out"
+                print(one_line(f"{options.file}: {what}"), file=sys.stderr)
+            if options.output:
+                _write(options.output, text)
+            if options.json:
+                _print_json(FlattenedFile(msgspec.Raw(text.encode()), origins, left_out))
+            elif not options.output:
+                sys.stdout.write(text)
+            return 0
+
+
+def _told(reason: FlatteningReason, top: GivenGraph, given: Mapping[str, GivenGraph]) -> str:
+    """A reason with the place of its action in the file of the graph that has it."""
+    if not reason.at:
+        return f"{top.path}: {reason.message} ({reason.code})"
+    last = reason.at[-1]
+    file = top if len(reason.at) == 1 else given[_name_of(reason.at[-2].action)]
+    actions = [action for action in file.reading.graph.actions if not action.missing]
+    number = next((n for n, action in enumerate(actions) if action.key == last.key), None)
+    place = str(file.path)
+    if number is not None:
+        where = Where(path=pointer("actions", number, "name"), aid=last.key)
+        problem = Problem(code=reason.code, severity="error", where=where, message="")
+        (placed,) = file.reading.placed([problem])
+        place += f":{placed.where.line}:{placed.where.column}"
+    return f"{place}: {_path(reason.at)}: {reason.message} ({reason.code})"
+
+
+def _name_of(full_name: str) -> str:
+    return full_name.rpartition("_")[0]
+
+
+def _path(levels: LevelPath) -> str:
+    return " > ".join(level.action for level in levels)
+
+
+def _print_json(found: FlattenedFile | Unflattenable) -> None:
+    sys.stdout.write(msgspec.json.format(msgspec.json.encode(found)).decode() + "\n")
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise CannotStart(f"Cannot write {path}: {error.strerror}.") from error

@@ -1,0 +1,1 @@
+"""Hierarchical tasks: graphs with sub-graphs, made into one (docs/umrf.md, Flattening)."""

@@ -1,0 +1,259 @@
+"""One graph that does what a hierarchy of graphs does, or why there is none.
+
+`flattened` puts the actions of sub-graphs in the place of the action that is the sub-graph, from the
+innermost outwards. What has to be so for the course to stay the same is decided per graph, from all of
+its courses (`level_courses`), and per place, from the arrows there (`joints`).
+
+See docs/decisions/069-flatten.md.
+"""
+
+from collections.abc import Container, Iterable, Iterator, Mapping
+from typing import Final, NamedTuple, TypeAlias
+
+import msgspec
+from msgspec.structs import replace
+
+from action_assistant.umrf.hierarchy.inlining import identity, inlined
+from action_assistant.umrf.hierarchy.joint_parts import JoinedPlace, SubGraphPlace
+from action_assistant.umrf.hierarchy.joints import joined
+from action_assistant.umrf.hierarchy.level_courses import BUDGET, LevelCourses, level_courses
+from action_assistant.umrf.hierarchy.levels import courses_graph, faults, inputs_of
+from action_assistant.umrf.hierarchy.reasons import (
+    FlatteningCode,
+    FlatteningReason,
+    HierarchyLevel,
+    LevelPath,
+    of_trouble,
+)
+from action_assistant.umrf.model import Action, Graph, Key, Precondition
+from action_assistant.umrf.semantics.matching import IndexedGraphs
+from action_assistant.umrf.semantics.values import slots_of
+
+#: What a top graph does itself it does flat, too.
+OF_INNER: Final = frozenset({"halts", "waits", "unready", "early", "beside"})
+#: Actions of one graph, as many as the editor takes (decision 20), and levels below each other.
+MOST: Final = 5_000
+DEEPEST: Final = 32
+
+
+class FlatOrigin(msgspec.Struct, frozen=True):
+    """Where an action of the flat graph comes from: from the top graph down to the action itself."""
+
+    key: Key
+    action: str
+    levels: LevelPath
+
+
+class LeftOut(msgspec.Struct, frozen=True):
+    """The description and unknown fields of an action that was a sub-graph, or of the sub-graph:
+    nothing has them now."""
+
+    levels: LevelPath
+    fields: tuple[str, ...]
+
+
+class Flattened(msgspec.Struct, frozen=True, tag="flattened", tag_field="kind"):
+    """One graph with the same course. `origins`: in the order of its actions."""
+
+    graph: Graph
+    origins: tuple[FlatOrigin, ...]
+    left_out: tuple[LeftOut, ...] = ()
+
+
+class Unflattenable(msgspec.Struct, frozen=True, tag="unflattenable", tag_field="kind"):
+    """Why no graph is known to have the same course: everything that was found."""
+
+    reasons: tuple[FlatteningReason, ...]
+
+
+Flattening: TypeAlias = Flattened | Unflattenable
+
+
+def flattened(
+    graph: Graph, graphs: Mapping[str, Graph], known: Container[str] = frozenset()
+) -> Flattening:
+    """One graph without sub-graphs that runs the same actions, in the same order, with the same
+    values, and ends alike. `graphs`: those that the engine has indexed, by name. `known`: names of
+    actions, which come before graphs of the same name."""
+    whole = _Hierarchy(graphs, known)
+    if not any(whole.is_sub(action) for action in graph.actions):
+        return Flattened(graph, tuple(_plain(graph)))
+    found = whole.level(graph, ())
+    actors = {*whole.actors, *(action.actor for action in graph.actions)} - {""}
+    if len(actors) > 1:
+        message = f"Its actions belong to several actors ({', '.join(sorted(actors))})."
+        return _unflattenable((*found.reasons, FlatteningReason("actors", message)))
+    return _unflattenable(found.reasons) if found.flat is None else _named(found.flat)
+
+
+def _unflattenable(reasons: Iterable[FlatteningReason]) -> Unflattenable:
+    """Each reason once."""
+    return Unflattenable(tuple(dict.fromkeys(reasons)))
+
+
+class _Flat(NamedTuple):
+    """One graph of the hierarchy, flat. `origins`: by key, from this graph down."""
+
+    graph: Graph
+    origins: Mapping[Key, LevelPath]
+    results: frozenset[Precondition]
+    left_out: tuple[LeftOut, ...]
+
+
+class _Found(NamedTuple):
+    """`flat` is None where there are reasons."""
+
+    flat: _Flat | None
+    reasons: tuple[FlatteningReason, ...]
+
+
+class _Hierarchy:
+    """What was found of each graph: once, wherever it stands."""
+
+    def __init__(self, graphs: Mapping[str, Graph], known: Container[str]) -> None:
+        self.graphs = graphs
+        self.known = known
+        self.actors: set[str] = set()
+        self.budget = BUDGET
+        self._indexed = IndexedGraphs(graphs)
+        self._found: dict[str, _Found] = {}
+
+    def is_sub(self, action: Action) -> bool:
+        """Whether an action is called like an indexed graph, and like no action."""
+        return not action.missing and action.name in self.graphs and action.name not in self.known
+
+    def level(self, graph: Graph, above: tuple[str, ...]) -> _Found:
+        """One graph and all that is in it. `above`: the graphs around it."""
+        reasons = list(faults(graph))
+        inside: dict[Key, _Found] = {}
+        for action in graph.actions:
+            if not self.is_sub(action):
+                continue
+            at = (HierarchyLevel(graph.name, action.key, action.full_name),)
+            inside[action.key] = found = self._sub(action, (*above, graph.name))
+            reasons += [replace(reason, at=at + reason.at) for reason in found.reasons]
+        if reasons:
+            return _Found(None, tuple(reasons))
+        flats = {key: found.flat for key, found in inside.items() if found.flat is not None}
+        given = inputs_of(graph) if above else frozenset[str]()
+        seen = level_courses(
+            courses_graph(graph, given),
+            {key: flat.results for key, flat in flats.items()},
+            self.budget,
+            is_top=not above,
+        )
+        self.budget -= seen.spent
+        reasons += _troubles(graph, seen, is_top=not above)
+        return self._together(graph, flats, seen, given, reasons)
+
+    def _sub(self, action: Action, above: tuple[str, ...]) -> _Found:
+        """The sub-graph that an action is."""
+        graph = self.graphs[action.name]
+        self.actors |= {action.actor, *(each.actor for each in graph.actions)}
+        if graph.name in above or action.name in above:
+            return _refused("recursion", "The sub-graph contains itself, or the graph it is in.")
+        if len(above) > DEEPEST:
+            return _refused("too-large", f"There are more than {DEEPEST} levels.")
+        names = slots_of(action.inputs).keys(), slots_of(action.outputs).keys()
+        if self._indexed.fitting(action.name, *names) is None:
+            return _refused(
+                "signature",
+                f"The graph “{action.name}” takes or gives other parameters than this action: the "
+                "engine takes it for something else, or for nothing.",
+            )
+        if action.name not in self._found:
+            self._found[action.name] = self.level(graph, above)
+        return self._found[action.name]
+
+    def _together(
+        self,
+        graph: Graph,
+        flats: Mapping[Key, _Flat],
+        seen: LevelCourses,
+        given: frozenset[str],
+        reasons: list[FlatteningReason],
+    ) -> _Found:
+        """The graph with all its sub-graphs in their places, if nothing speaks against it."""
+        kept = {a.full_name for a in graph.actions if a.key not in flats}
+        flat = _Flat(graph, dict(_origins(graph, flats)), seen.results, _unknown(graph, flats))
+        for key, inner in flats.items():
+            action = next(a for a in graph.actions if a.key == key)
+            at = HierarchyLevel(graph.name, key, action.full_name)
+            size = len(flat.graph.actions) + len(inner.graph.actions)
+            if size > MOST:
+                message = f"One graph would have more than {MOST:,} actions."
+                return _Found(None, (*reasons, FlatteningReason("too-large", message, (at,))))
+            lacks, bypassed = key in seen.lacking, seen.bypassed.get(key, frozenset())
+            place = joined(SubGraphPlace(flat.graph, action, inner.graph, given, lacks, bypassed))
+            if isinstance(place, JoinedPlace):
+                flat = _put(flat, at, inner, place, kept)
+            else:
+                reasons += [FlatteningReason(each.code, each.message, (at,)) for each in place]
+        return _Found(None if reasons else flat, tuple(reasons))
+
+
+def _refused(code: FlatteningCode, message: str) -> _Found:
+    return _Found(None, (FlatteningReason(code, message),))
+
+
+def _troubles(graph: Graph, seen: LevelCourses, *, is_top: bool) -> Iterator[FlatteningReason]:
+    """What the courses of a graph come to that one graph would not."""
+    names = {action.key: action.full_name for action in graph.actions}
+    for trouble in seen.troubles:
+        if is_top and trouble.kind in OF_INNER:
+            continue
+        key = trouble.action
+        at = (HierarchyLevel(graph.name, key, names[key]),) if key is not None else ()
+        yield of_trouble(trouble, at)
+
+
+def _put(
+    flat: _Flat, at: HierarchyLevel, inner: _Flat, place: JoinedPlace, kept: set[str]
+) -> _Flat:
+    found = inlined(flat.graph, at.key, inner.graph, place, kept)
+    below = {found.keys[key]: (at, *levels) for key, levels in inner.origins.items()}
+    left = tuple(LeftOut((at, *each.levels), each.fields) for each in inner.left_out)
+    return flat._replace(
+        graph=found.graph, origins={**flat.origins, **below}, left_out=flat.left_out + left
+    )
+
+
+def _origins(graph: Graph, subs: Container[Key]) -> Iterator[tuple[Key, LevelPath]]:
+    for action in graph.actions:
+        if action.key not in subs:
+            yield action.key, (HierarchyLevel(graph.name, action.key, action.full_name),)
+
+
+def _unknown(graph: Graph, flats: Mapping[Key, _Flat]) -> tuple[LeftOut, ...]:
+    """What the actions that were sub-graphs say besides, and those graphs."""
+    found = []
+    for action in graph.actions:
+        if (flat := flats.get(action.key)) is not None:
+            fields = ["description"] if action.description or flat.graph.description else []
+            fields += [field for field, _ in (*action.extra, *flat.graph.extra)]
+            at = (HierarchyLevel(graph.name, action.key, action.full_name),)
+            found += [LeftOut(at, tuple(dict.fromkeys(fields)))] if fields else []
+    return tuple(found)
+
+
+def _plain(graph: Graph) -> Iterator[FlatOrigin]:
+    for action in graph.actions:
+        at = HierarchyLevel(graph.name, action.key, action.full_name)
+        yield FlatOrigin(action.key, action.full_name, (at,))
+
+
+def _named(flat: _Flat) -> Flattened:
+    """The graph with a key of twelve characters for each action that comes from below."""
+    keys: dict[Key, Key] = {key: key for key, levels in flat.origins.items() if len(levels) == 1}
+    for key, levels in flat.origins.items():
+        if key not in keys:
+            keys[key] = identity((level.key for level in levels), keys.values())
+    actions = tuple(replace(a, key=keys[a.key]) for a in flat.graph.actions)
+    relations = tuple(
+        replace(r, parent=keys.get(r.parent, r.parent), child=keys.get(r.child, r.child))
+        for r in flat.graph.relations
+    )
+    paths = {keys[key]: each for key, each in flat.origins.items()}
+    origins = tuple(FlatOrigin(a.key, a.full_name, paths[a.key]) for a in actions)
+    graph = replace(flat.graph, actions=actions, relations=relations)
+    return Flattened(graph, origins, flat.left_out)

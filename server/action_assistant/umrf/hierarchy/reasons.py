@@ -1,0 +1,56 @@
+"""Why a hierarchy cannot be made flat, and where."""
+
+from typing import Final, Literal, TypeAlias
+
+import msgspec
+
+from action_assistant.umrf.hierarchy.level_courses import Trouble, TroubleKind
+from action_assistant.umrf.model import Key
+
+FlatteningCode: TypeAlias = Literal[
+    "faulty", "recursion", "signature", "too-large", "undecided", "actors", "spontaneous", "stops",
+    "allowed-values", "never-ends", "left-running", "asks-beside", "begins-again", "bypass",
+    "response", "crash", "exits", "entries", "inputs", "outputs", "renaming", "loop",
+]  # fmt: skip
+
+
+class HierarchyLevel(msgspec.Struct, frozen=True):
+    """One step of the way down to an action: a graph, and an action of it by key and full name."""
+
+    graph: str
+    key: Key
+    action: str
+
+
+#: From the top graph down; the last is the action meant. Empty is the top graph itself.
+LevelPath: TypeAlias = tuple[HierarchyLevel, ...]
+
+
+class FlatteningReason(msgspec.Struct, frozen=True):
+    """One reason why one graph would not do what the hierarchy does. `at`: the action it is about."""
+
+    code: FlatteningCode
+    message: str
+    at: LevelPath = ()
+
+
+_KINDS: Final[dict[TroubleKind, tuple[FlatteningCode, str]]] = {
+    "halts": ("never-ends", "It can end HALTED{when}, which the graph around it is never told: that stays RUNNING for ever, where one graph would be HALTED."),
+    "waits": ("never-ends", "It can wait for ever{when}; the action that it stands for then runs for ever, where one graph would go on."),
+    "unready": ("never-ends", "Its exit is asked and waits for outputs{when}, where one graph would go on."),
+    "early": ("left-running", "It can be FINISHED while actions in it still run{when}: they begin nothing any more then, and would in one graph."),
+    "beside": ("asks-beside", "What leads to its exit can ask another action as well{when}, which begins nothing any more then, and would in one graph."),
+    "ends": ("left-running", "The graph around it can be FINISHED while it runs{when}: the sub-graph then goes on to its end, and one graph would not."),
+    "again": ("begins-again", "It can be told to begin a second time{when}: a sub-graph begins anew each time, with nothing of its last run, and misses what comes while it runs."),
+    "crossing": ("bypass", "It can be bypassed together with others{when}: which of them reports last would differ."),
+    "response": ("response", "It can be told to stop, pause or restart as a whole{when}."),
+    "crash": ("crash", "The engine can abort or block itself here{when}."),
+    "undecided": ("undecided", "It has more courses than are looked at."),
+}  # fmt: skip
+
+
+def of_trouble(trouble: Trouble, at: LevelPath) -> FlatteningReason:
+    """What a course comes to, as a reason."""
+    code, message = _KINDS[trouble.kind]
+    when = f", for instance when {trouble.by} ends {trouble.result}" if trouble.by else ""
+    return FlatteningReason(code, message.format(when=when), at)
