@@ -320,6 +320,12 @@ def test_a_graph_is_told_as_the_action_that_stands_for_it(http: httpx.Client, na
     assert made not in [each["graph"] for each in http.get("/api/actions/graphs").json()]
 
 
+def test_of_graphs_of_one_name_the_oldest_is_listed_first(http: httpx.Client, name: str) -> None:
+    made = [graph(http, f"{name}_twice", action(f"{name}{n}")) for n in range(4)]
+    listed = http.get("/api/actions/graphs").json()
+    assert [each["graph"] for each in listed if each["name"] == f"{name}_twice"] == made
+
+
 def test_a_graph_is_no_action_and_an_action_no_graph_to_update(
     http: httpx.Client, name: str
 ) -> None:
