@@ -1,7 +1,7 @@
 /** Tasks in levels: into the graph for which an action stands, out again, by mouse, keys and touch. */
 
 import { expect, type Page, test } from "@playwright/test";
-import { card } from "./canvas";
+import { boxOf, card, saved, start } from "./canvas";
 import { type Person, Product } from "./product";
 import { post, violations } from "./valves";
 
@@ -81,6 +81,24 @@ test("a graph that others run inside says so, and which they are", async () => {
   await expect(card(page, "Fetch")).toBeVisible();
   await expect(where(page)).toContainText("Graphs/Round");
   await expect(page.getByRole("button", { name: /^Used in/ })).toHaveCount(0);
+});
+
+test("what runs is seen at its own level, while it runs and in the replay", async () => {
+  const { page } = ada;
+  await page.goto(`${product.url}/graphs/${round}`);
+  await saved(page);
+  await start(page);
+  await page.keyboard.press("Escape");
+  await inside(page, "Fetch").click();
+  await inside(page, "Grip").click();
+  const state = card(page, "CloseFingers").locator("[data-state]");
+  await expect(state).toHaveAttribute("data-state", /running|true/);
+  await expect(card(page, "CloseFingers").locator("[data-state='true']")).toBeVisible();
+  await page.reload();
+  await expect(card(page, "CloseFingers")).toBeVisible();
+  const { x, y, width, height } = await boxOf(page.locator("[data-ruler]").first());
+  await page.mouse.click(x + width * 0.98, y + height / 2);
+  await expect(card(page, "CloseFingers").locator("[data-state='true']")).toBeVisible();
 });
 
 test("on a phone a tap leads in and another one out", async ({ browser }) => {

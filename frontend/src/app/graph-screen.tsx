@@ -3,10 +3,12 @@ import { Button } from "@mantine/core";
 import { IconMapOff } from "@tabler/icons-react";
 import { memo, type ReactNode, useEffect, useMemo, useRef, useState } from "react";
 import { Link, Redirect, useSearch } from "wouter";
+import { type GraphAsAction, useGraphsAsActions } from "../api/documents/library";
 import { useVersions, versionName } from "../api/graphs";
 import { newestRun, openRuns, useLive } from "../api/live/use-live";
 import { type Run, useLastRun } from "../api/runs";
 import { useMay, usePerson } from "../api/use-person";
+import { levelsOf } from "../canvas/levels/level-path";
 import { useSeed } from "../editor/dry-run/use-seed";
 import { Editor, type Shown } from "../editor/editor";
 import { templatesOf, useKnownActions, usePlaceable } from "../library/known-actions";
@@ -17,6 +19,7 @@ import { ConnectionStatus } from "../runs/connection-status";
 import { RunDrawer } from "../runs/drawer/run-drawer";
 import { RecordDryRun } from "../runs/start/record-dry-run";
 import { StartControl } from "../runs/start/start-control";
+import { type GraphInRun, isInRun } from "../status/progress-inside";
 import { useProgress } from "../status/use-progress";
 import { roomUrl } from "../sync/room-connection";
 import { RoomProvider, useLinkPart, useRoom, useThrottledGraph } from "../sync/use-room";
@@ -72,6 +75,35 @@ function useRunHere(id: string): RunHere {
   };
 }
 
+const NO_GRAPHS: readonly GraphAsAction[] = [];
+
+/** Through which graph one came first, and what those below it are called, down to this one. */
+function useAround(): { outermost: string; names: readonly string[] } | null {
+  const { name } = useThrottledGraph();
+  const levels = useSearch();
+  const { data: graphs = NO_GRAPHS } = useGraphsAsActions();
+  return useMemo(() => {
+    const [first, ...below] = levelsOf(levels);
+    if (first === undefined) return null;
+    const known = new Map(graphs.map((each) => [each.graph, each.name]));
+    const names = [...below.map(({ graph }) => known.get(graph) ?? ""), name];
+    return { outermost: first.graph, names };
+  }, [levels, graphs, name]);
+}
+
+/** The run of this graph; or, for who came in through others, that of the outermost one, as far as this
+ * graph is a part of it. A run that is this graph's own comes first while it is new. */
+function useShownRun(id: string): RunHere & { inside: GraphInRun | null } {
+  const graph = useThrottledGraph();
+  const around = useAround();
+  const own = useRunHere(id);
+  const outer = useRunHere(around?.outermost ?? id);
+  const names = around?.names;
+  const inside = useMemo(() => names && { graph, names }, [graph, names]);
+  const isPart = inside && outer.run && (outer.live || isInRun(outer.run, inside.names));
+  return own.live === null && isPart ? { ...outer, inside } : { ...own, inside: null };
+}
+
 /** The right edge of what can be replayed: the end, or now. */
 function useEdge(run: Run | null): number {
   return instant(run?.ended_at) ?? Date.now();
@@ -82,11 +114,11 @@ function Inside({ id }: { id: string }) {
   const { create, choose } = useNewGraphs();
   const placeable = usePlaceable(id);
   const known = useMemo(() => templatesOf(placeable), [placeable]);
-  const { going, choose: chooseRun, live, run, label, unsure } = useRunHere(id);
+  const { going, choose: chooseRun, live, run, label, unsure, inside } = useShownRun(id);
   const { runner } = useLive();
   const replay = useReplay(runner, run ?? null, useEdge(run ?? null), null);
   const past = replay.at !== null;
-  const progress = useProgress(past ? replay.run : live, unsure && !past, replay.at);
+  const progress = useProgress(past ? replay.run : live, unsure && !past, replay.at, inside);
   const newest = run?.id;
   const { seek } = replay;
   // biome-ignore lint/correctness/useExhaustiveDependencies: another run is shown as it is now
@@ -119,7 +151,7 @@ function Inside({ id }: { id: string }) {
       status={(shown: Shown) => (
         <PartBoundary waiting={null}>
           <DraftStatus
-            run={live}
+            run={inside === null ? live : null}
             label={label}
             graph={shown.graph}
             seq={shown.seq}

@@ -1,6 +1,7 @@
 import { expect, test } from "vitest";
 import type { ActionRun, Run } from "../api/runs";
 import { progressByAid, progressOf, runEndText, runLabel } from "./progress";
+import { isInRun, progressInside } from "./progress-inside";
 
 const run: Run = {
   id: "r",
@@ -66,6 +67,33 @@ test("an end that was not seen is not told as one of the four outcomes", () => {
 test("actions of sub-graphs carry no place on this canvas", () => {
   const actions = { A_0: going, SUB__A_0: { ...going, aid: null } };
   expect([...progressByAid({ ...run, actions }, false).keys()]).toEqual(["a"]);
+});
+
+test("a graph inside of a run has the states of its own level, by name, and of no other", () => {
+  const bare: ActionRun = { ...going, aid: null };
+  const ended: ActionRun = {
+    ...bare,
+    state: "FINISHED",
+    visits: [{ ...visit, result: "true" }],
+  };
+  const actions = {
+    Fetch_0: going,
+    "g__Fetch__0/Grip_0": bare,
+    "g__Fetch__0__Grip__0/Close_0": ended,
+    "g__Other__0__Grip__0/Close_0": bare,
+  };
+  const nested = { ...run, actions };
+  const inside = (name: string) => ({ actions: [{ key: "k", name, instanceId: 0 }] }) as never;
+  const told = (name: string, ...names: string[]) =>
+    progressInside(nested, false, { graph: inside(name), names }).get("k")?.word;
+  expect(told("Grip", "Fetch")).toBe("running");
+  expect(told("Close", "Fetch", "Grip")).toBe("true");
+  expect(told("Close", "Other", "Grip")).toBe("running");
+  expect(told("Close", "Grip")).toBeUndefined();
+  expect(told("Close", "Fetch")).toBeUndefined();
+  expect(told("Fetch", "Fetch")).toBeUndefined();
+  expect([isInRun(nested, ["Fetch"]), isInRun(nested, ["F.tch"])]).toEqual([true, false]);
+  expect(isInRun({ ...nested, graph_name: "h" }, ["Fetch"])).toBe(false);
 });
 
 test("a run is called stopped or finished only by its own state", () => {

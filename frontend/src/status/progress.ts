@@ -139,8 +139,7 @@ export function progressByAid(run: Run | null, unsure: boolean): Map<string, Pro
 }
 
 /** Progress as it was at a moment, ms: what went on then had gone on for so long. */
-export function progressAt(run: Run, unsure: boolean, at: number | null): Map<string, Progress> {
-  const found = progressByAid(run, unsure);
+export function progressAt(found: Map<string, Progress>, at: number | null): Map<string, Progress> {
   if (at === null) return found;
   for (const [aid, progress] of found) {
     if (progress.since === null) continue;
