@@ -32,6 +32,14 @@ test.afterAll(async () => {
 });
 
 const where = (page: Page) => page.getByRole("navigation", { name: "Where you are" });
+/** The dialog about one graph without graphs inside. */
+async function asked(page: Page) {
+  await page.keyboard.press("Control+k");
+  await page.keyboard.type("one graph without");
+  await page.keyboard.press("Enter");
+  return page.getByRole("dialog", { name: "One graph without graphs inside" });
+}
+
 const inside = (page: Page, name: string) =>
   card(page, name).getByRole("button", { name: `Open the graph inside ${name}` });
 
@@ -99,6 +107,33 @@ test("what runs is seen at its own level, while it runs and in the replay", asyn
   const { x, y, width, height } = await boxOf(page.locator("[data-ruler]").first());
   await page.mouse.click(x + width * 0.98, y + height / 2);
   await expect(card(page, "CloseFingers").locator("[data-state='true']")).toBeVisible();
+});
+
+test("a task of three levels becomes one graph of its own, or it is said why not", async () => {
+  const { page } = ada;
+  await page.goto(`${product.url}/graphs/${round}`);
+  await expect(inside(page, "Fetch")).toBeVisible();
+  const dialog = await asked(page);
+  await expect(dialog.getByRole("list", { name: "Where its actions come from" })).toContainText(
+    "CloseFingers_0Fetch_0 › Grip_0 › CloseFingers_0",
+  );
+  await expect(dialog.getByRole("textbox", { name: "Name of the new graph" })).toHaveValue(
+    "Round flat",
+  );
+  expect(await violations(page)).toEqual([]);
+  await dialog.getByRole("button", { name: "Make it" }).click();
+  await expect(where(page)).toContainText("Graphs/Round flat");
+  await expect(card(page, "CloseFingers")).toBeVisible();
+
+  const never = { ...single("Round", "Fetch"), graph_name: "Odd" };
+  const actions = never.actions.map((each) => ({ ...each, type: "spontaneous" }));
+  const odd = await post<{ id: string }>(product, "/api/graphs", { ...never, actions });
+  await page.goto(`${product.url}/graphs/${odd.id}`);
+  await expect(inside(page, "Fetch")).toBeVisible();
+  const refused = await asked(page);
+  await expect(refused).toContainText("none is made");
+  await refused.getByRole("button", { name: "Fetch_0" }).first().click();
+  await expect(card(page, "Fetch")).toHaveClass(/\bselected\b/);
 });
 
 test("on a phone a tap leads in and another one out", async ({ browser }) => {

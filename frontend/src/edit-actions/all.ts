@@ -69,6 +69,7 @@ export const EDIT_ACTIONS: readonly EditAction[] = [
   graph.exportPng,
   graph.packages,
   graph.history,
+  look.flatten,
   graph.print,
   graph.copyLink,
 ];

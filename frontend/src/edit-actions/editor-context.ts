@@ -59,6 +59,8 @@ export type Overlay =
   | { readonly kind: "menu"; readonly screen: Position }
   /** The C++ packages of all actions; `action`: the name of the one that is shown first. */
   | { readonly kind: "packages"; readonly action?: string }
+  /** The graph and those inside of it as one graph. */
+  | { readonly kind: "flat" }
   | { readonly kind: "palette" }
   | { readonly kind: "keys" };
 

@@ -9,6 +9,7 @@ import {
   IconKeyboard,
   IconMarquee2,
   IconMenu2,
+  IconSitemapOff,
   IconStairsDown,
   IconStairsUp,
   IconZoomIn,
@@ -243,4 +244,18 @@ export const leave: EditAction = {
   enabled: () => (graphsInside.now()?.leave ?? null) !== null,
   idle: "You came here from no other graph.",
   run: () => graphsInside.now()?.leave?.(),
+};
+
+/** Of the whole graph, it is listed with what is done to that. */
+export const flatten: EditAction = {
+  ...look,
+  group: "Graph",
+  name: "flatten",
+  label: "One graph without graphs inside",
+  shortcuts: [],
+  icon: IconSitemapOff,
+  also: "flatten sub-graph inline unpack hierarchy levels",
+  enabled: ({ graph }) =>
+    graph.actions.some(({ name }) => graphsInside.now()?.byName.has(name) ?? false),
+  run: (context) => context.openOverlay({ kind: "flat" }),
 };

@@ -122,3 +122,31 @@ def test_all_levels_are_pinned(client: httpx.Client) -> None:
     outer = made(client, "Task", "Fetch")
     version = published(client, outer).json()
     assert [each["name"] for each in version["subgraphs"]] == ["Fetch", "Grip"]
+
+
+def test_a_graph_with_those_inside_is_made_one_that_does_the_same(client: httpx.Client) -> None:
+    inner = made(client, "Inner", "Step")
+    outer = made(client, "Outer", "Inner")
+    flat = client.get(f"/api/graphs/{outer}/flat").json()
+    assert [each["name"] for each in flat["umrf"]["actions"]] == ["Step"]
+    assert flat["umrf"]["graph_name"] == "Outer"
+    (origin,) = flat["origins"]
+    assert [each["graph"] for each in origin["levels"]] == ["Outer", "Inner"]
+    wanted = {"seq": flat["seq"], "name": "Flat"}
+    copy = client.post(f"/api/graphs/{outer}/flat", json=wanted)
+    assert copy.status_code == 201, copy.text
+    umrf = client.get(f"/api/graphs/{copy.json()['id']}/umrf").json()
+    assert (umrf["graph_name"], len(umrf["actions"])) == ("Flat", 1)
+    assert "Made of Outer" in umrf["graph_description"]
+    assert codes(client, copy.json()["id"]) == []
+
+    rewritten(client, inner, graph_file("Inner", "Step", exits=False))
+    refused = client.get(f"/api/graphs/{outer}/flat").json()
+    assert refused["umrf"] is None
+    (reason,) = refused["reasons"]
+    assert (reason["code"], [each["action"] for each in reason["at"]]) == (
+        "never-ends",
+        ["Inner_0"],
+    )
+    assert client.post(f"/api/graphs/{outer}/flat", json=wanted).status_code == 409
+    assert client.get("/api/graphs/nowhere/flat").status_code == 404

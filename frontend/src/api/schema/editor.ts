@@ -406,6 +406,49 @@ export interface EditorApi {
         merged?: EditorApi["MergedBy"];
     };
     /**
+     * FlatCopy
+     * @description Which moment of a graph to make flat, and what to call the new graph.
+     */
+    FlatCopy: {
+        seq: number;
+        name: string;
+    };
+    /**
+     * FlatGraph
+     * @description What a graph with its sub-graphs is as one graph (docs/decisions/069-flatten.md).
+     *
+     *     `umrf`: that graph, under the same name; null where none is known to do the same, for these
+     *     `reasons`. `origins`: where each of its actions comes from. `left_out`: what no action has now.
+     */
+    FlatGraph: {
+        seq: number;
+        umrf: {
+            [key: string]: unknown;
+        } | null;
+        origins: EditorApi["FlatOrigin"][];
+        left_out: EditorApi["LeftOut"][];
+        reasons: EditorApi["FlatteningReason"][];
+    };
+    /**
+     * FlatOrigin
+     * @description Where an action of the flat graph comes from: from the top graph down to the action itself.
+     */
+    FlatOrigin: {
+        key: string;
+        action: string;
+        levels: EditorApi["HierarchyLevel"][];
+    };
+    /**
+     * FlatteningReason
+     * @description One reason why one graph would not do what the hierarchy does. `at`: the action it is about.
+     */
+    FlatteningReason: {
+        /** @enum {string} */
+        code: "actors" | "allowed-values" | "asks-beside" | "begins-again" | "bypass" | "crash" | "entries" | "exits" | "faulty" | "inputs" | "left-running" | "loop" | "never-ends" | "outputs" | "recursion" | "renaming" | "response" | "signature" | "spontaneous" | "stops" | "too-large" | "undecided";
+        message: string;
+        at: EditorApi["HierarchyLevel"][];
+    };
+    /**
      * GoneBack
      * @description How far the log of the graph goes now, and of what not all was taken back, since others have changed
      *     it or built on it: actions, notes and arrows by their keys.
@@ -524,6 +567,15 @@ export interface EditorApi {
         node?: string;
         /** @default  */
         message?: string;
+    };
+    /**
+     * HierarchyLevel
+     * @description One step of the way down to an action: a graph, and an action of it by key and full name.
+     */
+    HierarchyLevel: {
+        graph: string;
+        key: string;
+        action: string;
     };
     /**
      * HistoryEntry
@@ -656,6 +708,15 @@ export interface EditorApi {
      */
     LastBuild: {
         build: EditorApi["ActionBuilt"] | null;
+    };
+    /**
+     * LeftOut
+     * @description The description and unknown fields of an action that was a sub-graph, or of the sub-graph:
+     *     nothing has them now.
+     */
+    LeftOut: {
+        levels: EditorApi["HierarchyLevel"][];
+        fields: string[];
     };
     /**
      * LibraryAction

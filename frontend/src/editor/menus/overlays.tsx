@@ -14,6 +14,9 @@ const CommandPalette = lazyPart(() =>
   import("./command-palette").then((part) => part.CommandPalette),
 );
 const ContextMenu = lazyPart(() => import("./context-menu").then((part) => part.ContextMenu));
+const FlatDialog = lazyPart(() =>
+  import("../../levels/flat-dialog").then((part) => part.FlatDialog),
+);
 const GraphPrint = lazyPart(() => import("./graph-print").then((part) => part.GraphPrint));
 const PackagesDialog = lazyPart(() =>
   import("../../packages/packages-dialog").then((part) => part.PackagesDialog),
@@ -65,6 +68,8 @@ function Opened({ context, known, overlay, onClose }: Props) {
       return <ContextMenu context={context} screen={overlay.screen} onClose={onClose} />;
     case "packages":
       return <PackagesDialog context={context} {...overlay} onClose={onClose} />;
+    case "flat":
+      return <FlatDialog context={context} onClose={onClose} />;
     case "palette":
       return <CommandPalette context={context} onClose={onClose} />;
     case "keys":

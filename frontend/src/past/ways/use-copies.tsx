@@ -9,8 +9,8 @@ import { errorText } from "../../api/http";
 import { pageUrl } from "../../api/page-url";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import { withPast } from "../../edit-actions/past-links";
+import { copyNameOf } from "../../graph/edit/copy-name";
 import { copyText } from "../../ui/copy-text";
-import { copyNameOf } from "./copy-name";
 
 /** Copies a moment as a new graph, and says where that is. `called`: `v11`, or when it was. */
 export function useCopyAsGraph() {

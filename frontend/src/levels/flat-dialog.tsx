@@ -1,0 +1,158 @@
+/** A graph with those inside of it, made into one graph: what that would be, or why it would not do the same. */
+import { Button, Modal, Skeleton, TextInput } from "@mantine/core";
+import { useQueryClient } from "@tanstack/react-query";
+import { useState } from "react";
+import { useLocation } from "wouter";
+import {
+  type FlatGraph,
+  type FlatteningReason,
+  makeFlatGraph,
+  useFlatGraph,
+} from "../api/documents/inside";
+import { type GraphSummary, queryKeys, refreshGraphs } from "../api/graphs";
+import { errorText } from "../api/http";
+import type { EditorContext } from "../edit-actions/editor-context";
+import { copyNameOf } from "../graph/edit/copy-name";
+import style from "./levels.module.css";
+
+const MOST = 100; // actions and reasons that are listed
+
+interface Props {
+  context: EditorContext;
+  onClose: () => void;
+}
+
+type LevelWay = FlatGraph["origins"][number]["levels"];
+const wayWords = (way: LevelWay): string => way.map(({ action }) => action).join(" › ");
+
+function Reasons({ reasons, context, onClose }: Props & { reasons: readonly FlatteningReason[] }) {
+  const show = ({ at = [] }: FlatteningReason) => {
+    const [first] = at;
+    if (first === undefined) return;
+    onClose();
+    context.select([first.key]);
+    context.view.show([first.key]);
+  };
+  return (
+    <>
+      <p>One graph would not do the same as this one with those inside of it, so none is made:</p>
+      <ul className={style.list}>
+        {reasons.slice(0, MOST).map((reason) => {
+          const way = wayWords(reason.at ?? []);
+          return (
+            <li key={`${reason.code} ${way} ${reason.message}`}>
+              {way !== "" && (
+                <button type="button" className={style.way} onClick={() => show(reason)}>
+                  <bdi>{way}</bdi>
+                </button>
+              )}
+              <span>{reason.message}</span>
+            </li>
+          );
+        })}
+      </ul>
+    </>
+  );
+}
+
+function Origins({ flat: { origins, left_out } }: { flat: FlatGraph }) {
+  const more = origins.length - MOST;
+  return (
+    <>
+      <p>
+        It has {origins.length === 1 ? "1 action" : `${origins.length} actions`}, and does what this
+        graph does with those inside of it as they are now: the same actions with the same values,
+        in the same order, with the same end.
+      </p>
+      <ul className={style.list} aria-label="Where its actions come from">
+        {origins.slice(0, MOST).map(({ key, action, levels }) => (
+          <li key={key}>
+            <b>
+              <bdi>{action}</bdi>
+            </b>
+            {levels.length > 1 && <bdi className={style.quiet}>{wayWords(levels)}</bdi>}
+          </li>
+        ))}
+        {more > 0 && <li className={style.quiet}>and {more} more</li>}
+      </ul>
+      {left_out.length > 0 && (
+        <p className={style.quiet}>
+          No action has these any more:{" "}
+          {left_out
+            .map(({ levels, fields }) => `${fields.join(", ")} of ${wayWords(levels)}`)
+            .join("; ")}
+          .
+        </p>
+      )}
+    </>
+  );
+}
+
+function Make({ flat, context, onClose }: Props & { flat: FlatGraph }) {
+  const client = useQueryClient();
+  const [, go] = useLocation();
+  const [wrong, setWrong] = useState("");
+  const [busy, setBusy] = useState(false);
+  const [name, setName] = useState(() => {
+    const known = client.getQueryData<GraphSummary[]>(queryKeys.graphs) ?? [];
+    const taken = known.map((each) => each.name);
+    return copyNameOf(context.graph.name, "flat", taken);
+  });
+  const make = async () => {
+    setBusy(true);
+    try {
+      const made = await makeFlatGraph(context.id, { seq: flat.seq, name });
+      await refreshGraphs(client);
+      onClose();
+      go(`/graphs/${made.id}`);
+    } catch (error) {
+      setWrong(errorText(error));
+      setBusy(false);
+    }
+  };
+  return (
+    <form
+      onSubmit={(event) => {
+        event.preventDefault();
+        void make();
+      }}
+    >
+      <Origins flat={flat} />
+      <TextInput
+        label="Name of the new graph"
+        description="This graph stays as it is."
+        maxLength={200}
+        required
+        value={name}
+        error={wrong || undefined}
+        onChange={(event) => setName(event.currentTarget.value)}
+      />
+      <div className={style.answers}>
+        <Button onClick={onClose}>Cancel</Button>
+        <Button type="submit" variant="filled" loading={busy}>
+          Make it
+        </Button>
+      </div>
+    </form>
+  );
+}
+
+export function FlatDialog({ context, onClose }: Props) {
+  const flat = useFlatGraph(context.id);
+  const { mayEdit } = context;
+  return (
+    <Modal opened onClose={onClose} title="One graph without graphs inside" size="36rem">
+      {flat.isPending && <Skeleton height={180} />}
+      {flat.isError && <p role="alert">{errorText(flat.error)}</p>}
+      {flat.data?.umrf === null && (
+        <Reasons reasons={flat.data.reasons ?? []} {...{ context, onClose }} />
+      )}
+      {flat.data?.umrf &&
+        (mayEdit ? (
+          <Make flat={flat.data} {...{ context, onClose }} />
+        ) : (
+          <Origins flat={flat.data} />
+        ))}
+    </Modal>
+  );
+}
