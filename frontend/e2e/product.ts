@@ -104,6 +104,9 @@ export class Product {
     const gone = new Promise((done) => child.once("exit", done));
     process.kill(-child.pid, "SIGKILL");
     await gone;
+    // Its children are nobody's now, and hold their ports until the system has seen to them.
+    const deadline = Date.now() + 10_000;
+    while (!(await areFree(this.port)) && Date.now() < deadline) await pause(20);
   }
 
   /** The process id of the editor or the runner. */
@@ -198,10 +201,15 @@ async function answers(url: string): Promise<boolean> {
 async function freePorts(): Promise<number> {
   for (;;) {
     const port = 10_000 + 2 * randomInt(11_000);
-    const held = await Promise.allSettled([listen(port), listen(port + 1)]);
-    for (const each of held) if (each.status === "fulfilled") await each.value.close();
-    if (held.every(({ status }) => status === "fulfilled")) return port;
+    if (await areFree(port)) return port;
   }
+}
+
+/** Whether nobody listens on a port and the one after it. */
+async function areFree(port: number): Promise<boolean> {
+  const held = await Promise.allSettled([listen(port), listen(port + 1)]);
+  for (const each of held) if (each.status === "fulfilled") await each.value.close();
+  return held.every(({ status }) => status === "fulfilled");
 }
 
 /** A port that nobody listens on. */
