@@ -18,6 +18,7 @@ from action_assistant.editor.catalogue.graph_checks import GraphChecks
 from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.catalogue.people import People
 from action_assistant.editor.catalogue.versions import Versions
+from action_assistant.editor.documents import contents
 from action_assistant.editor.history import told_changes
 from action_assistant.editor.history.blame import Blame
 from action_assistant.editor.history.change_index import ChangeIndex
@@ -40,7 +41,7 @@ def tables() -> Iterator[Table]:
     """One row for each length of the log."""
     rows = [asyncio.run(_measured(changes, actions)) for changes, actions in SIZES]
     head = ["changes (actions)", "index made", "one more", "history of 50", "a moment", "500 steps"]
-    yield Table([*head, "who set what", "values of a field", "since when"], rows)
+    yield Table([*head, "who set what", "values of a field", "since when", "diff"], rows)
 
 
 async def _measured(changes: int, actions: int) -> list[str]:
@@ -51,12 +52,31 @@ async def _measured(changes: int, actions: int) -> list[str]:
         journal = await Journal.open(url, branch="editor", fold=fold)
         try:
             await store(journal, updates)
-            await _spread(journal)
             async with EditorWorkers.opened() as workers:
+                compared = await _compared(journal, workers, changes, dice)
+                await _spread(journal)
                 figures = await _asked(journal, workers, changes, keys, dice)
         finally:
             await journal.close()
-    return [f"{changes:,} ({actions:,})", *map(seconds, figures)]
+    return [f"{changes:,} ({actions:,})", *map(seconds, (*figures, compared))]
+
+
+async def _compared(
+    journal: Journal, workers: EditorWorkers, changes: int, dice: random.Random
+) -> float:
+    """How long the difference of two moments takes that nobody has asked for before."""
+    rooms = Rooms(journal)
+    reader = GraphReader(journal, rooms, workers.graphs)
+
+    async def compare() -> None:
+        first, last = sorted(dice.sample(range(1, changes), 2))
+        then, later = await reader.at(GRAPH, first), await reader.at(GRAPH, last)
+        await reader.ask(contents.differing, then, later)
+
+    try:
+        return await _median(compare)
+    finally:
+        await rooms.close()
 
 
 async def _asked(
