@@ -20,3 +20,11 @@ export async function copyMoment(graph: string, at: number, name: string): Promi
     throw error;
   }
 }
+
+/** A graph inside of a version: as it was then, and what its name stands for now. */
+export type PinnedGraph = EditorApi["PinnedGraph"];
+
+/** One version with all that it has by value. */
+export function fetchVersion(id: string, signal: AbortSignal): Promise<Version> {
+  return fetchJson(`/api/versions/${encodeURIComponent(id)}`, { signal });
+}

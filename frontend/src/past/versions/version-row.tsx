@@ -9,6 +9,7 @@ import { StateLabel } from "../../status/state-label";
 import { Tooltip } from "../../ui/floating/tooltip";
 import { day, hourMinute, instant } from "../../ui/times";
 import { copied } from "../ways/use-copies";
+import { InsideVersion } from "./inside-version";
 import { type ListedVersion, resultCounts, runsWords, shortDigest } from "./version-facts";
 import style from "./versions.module.css";
 
@@ -143,6 +144,7 @@ export function VersionItem(props: Props) {
         </Tooltip>
       </p>
       <Runs runs={runs} now={now} />
+      {chosen && <InsideVersion version={version} />}
       {chosen && <Ways {...props} />}
     </li>
   );
