@@ -8,7 +8,7 @@ import tempfile
 import time
 from collections.abc import Awaitable, Callable, Iterator
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from pycrdt import Doc, Map
 from sqlalchemy import text
@@ -22,6 +22,7 @@ from action_assistant.editor.documents import contents
 from action_assistant.editor.history import told_changes
 from action_assistant.editor.history.blame import Blame
 from action_assistant.editor.history.change_index import ChangeIndex
+from action_assistant.editor.history.grafts import Grafts
 from action_assistant.editor.history.graph_history import GraphHistory
 from action_assistant.editor.history.since_when import AskingSince, CourseSearch
 from action_assistant.editor.log.graph_events import UPDATED, fold, graph_stream
@@ -47,52 +48,42 @@ def tables() -> Iterator[Table]:
 async def _measured(changes: int, actions: int) -> list[str]:
     dice = random.Random(1)
     updates, keys = long_past(dice, changes, actions)
-    with tempfile.TemporaryDirectory() as folder:
-        url = f"sqlite:///{Path(folder) / 'editor.db'}"
-        journal = await Journal.open(url, branch="editor", fold=fold)
-        try:
-            await store(journal, updates)
-            async with EditorWorkers.opened() as workers:
-                compared = await _compared(journal, workers, changes, dice)
-                await _spread(journal)
-                figures = await _asked(journal, workers, changes, keys, dice)
-        finally:
-            await journal.close()
-    return [f"{changes:,} ({actions:,})", *map(seconds, (*figures, compared))]
+
+    async def measured(work: Callable[["_Past"], Awaitable[list[float]]]) -> list[float]:
+        with tempfile.TemporaryDirectory() as folder:
+            url = f"sqlite:///{Path(folder) / 'editor.db'}"
+            journal = await Journal.open(url, branch="editor", fold=fold)
+            try:
+                await store(journal, updates)
+                async with EditorWorkers.opened() as workers:
+                    return await work(_Past(journal, workers, changes, keys, dice))
+            finally:
+                await journal.close()
+
+    figures = [*await measured(_asked), *await measured(_replayed)]
+    return [f"{changes:,} ({actions:,})", *map(seconds, figures)]
 
 
-async def _compared(
-    journal: Journal, workers: EditorWorkers, changes: int, dice: random.Random
-) -> float:
-    """How long the difference of two moments takes that nobody has asked for before."""
-    rooms = Rooms(journal)
-    reader = GraphReader(journal, rooms, workers.graphs)
+class _Past(NamedTuple):
+    """A stored log of so many changes; `keys`: of its actions."""
 
-    async def compare() -> None:
-        first, last = sorted(dice.sample(range(1, changes), 2))
-        then, later = await reader.at(GRAPH, first), await reader.at(GRAPH, last)
-        await reader.ask(contents.differing, then, later)
-
-    try:
-        return await _median(compare)
-    finally:
-        await rooms.close()
+    journal: Journal
+    workers: EditorWorkers
+    changes: int
+    keys: list[str]
+    dice: random.Random
 
 
-async def _asked(
-    journal: Journal, workers: EditorWorkers, changes: int, keys: list[str], dice: random.Random
-) -> list[float]:
+async def _asked(past: _Past) -> list[float]:
+    """What the index and what is made of it answer."""
+    journal, workers, changes, keys, dice = past
+    await _spread(journal)
     people, rooms = await People.known(journal), Rooms(journal)
     index = ChangeIndex(journal, workers.graphs)
     reader = GraphReader(journal, rooms, workers.graphs)
-    checks = GraphChecks(journal, rooms, reader)
-    history = GraphHistory(
-        journal, people, Versions(journal, reader, checks), index, workers.graphs
-    )
-    blame, search = (
-        Blame(index, people),
-        CourseSearch(index, people, reader, checks, workers.graphs),
-    )
+    versions = Versions(journal, reader, GraphChecks(journal, rooms, reader))
+    history = GraphHistory(journal, people, versions, index, workers.graphs)
+    blame = Blame(index, people, Grafts(journal, index, people))
 
     async def moment() -> None:
         found = await index.at(GRAPH, dice.randrange(1, changes))
@@ -102,7 +93,6 @@ async def _asked(
         at = dice.randrange(1, changes - 500)
         await blame.changes(GRAPH, at, at + 500, 5000)
 
-    asked = AskingSince(1, {"behaviours": {}}, changes)
     try:
         return [
             await _median(lambda: index.upto(GRAPH, changes - 1), 1),
@@ -112,8 +102,29 @@ async def _asked(
             await _median(steps),
             await _median(lambda: blame.of(GRAPH, keys[0], changes)),
             await _median(lambda: blame.of_field(GRAPH, keys[0], "in/speed", changes)),
-            await _median(lambda: search.since(GRAPH, asked), 1),
         ]
+    finally:
+        await rooms.close()
+
+
+async def _replayed(past: _Past) -> list[float]:
+    """What replays the log: the search for an edit, and two moments that nobody has asked for before."""
+    journal, workers, changes, _, dice = past
+    people, rooms = await People.known(journal), Rooms(journal)
+    index = ChangeIndex(journal, workers.graphs)
+    reader = GraphReader(journal, rooms, workers.graphs)
+    checks = GraphChecks(journal, rooms, reader)
+    search = CourseSearch(index, people, reader, checks, workers.graphs)
+
+    async def compare() -> None:
+        first, last = sorted(dice.sample(range(1, changes), 2))
+        then, later = await reader.at(GRAPH, first), await reader.at(GRAPH, last)
+        await reader.ask(contents.differing, then, later)
+
+    asked = AskingSince(1, {"behaviours": {}}, changes)
+    try:
+        await index.upto(GRAPH)
+        return [await _median(lambda: search.since(GRAPH, asked), 1), await _median(compare)]
     finally:
         await rooms.close()
 
