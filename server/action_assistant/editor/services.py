@@ -72,7 +72,7 @@ class EditorServices:
             journal, self.rooms, self.graph_reader, self.change_index, workers.graphs
         )
         self.course_search = CourseSearch(
-            self.change_index, people, self.graph_reader, self.graph_checks, workers.graphs
+            self.change_index, people, self.graph_checks, workers.graphs
         )
         self.grafts = Grafts(journal, self.change_index, people)
         self.blame = Blame(self.change_index, people, self.grafts)

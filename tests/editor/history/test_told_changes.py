@@ -2,13 +2,14 @@
 
 import random
 
+import msgspec
 import pytest
 
 from action_assistant.editor.documents.document import read_maps
 from action_assistant.editor.documents.values import ROOTS, ends_of
 from action_assistant.editor.history.change_index import ChangeIndex
 from action_assistant.editor.history.key_changes import LoggedChange, owner_of
-from action_assistant.editor.history.told_changes import Changes, Stretch, told
+from action_assistant.editor.history.told_changes import Changes, Stretch, differing, names, told
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.journal.journal import Journal
 from action_assistant.umrf.difference import difference
@@ -89,3 +90,32 @@ async def test_a_long_sitting_is_told_in_part(journal: Journal, rooms: Rooms) ->
     (found,) = told(await index.at(GRAPH, 1), changes, [Stretch("ada", 2, len(held))])
     assert len(found.actions) == 30
     assert found.more > 0
+
+
+@pytest.mark.parametrize("seed", range(examples(12) // 2))
+async def test_two_moments_differ_as_the_graphs_of_their_replay_do(
+    journal: Journal, rooms: Rooms, seed: int
+) -> None:
+    held = await edited(rooms, seed, 40)
+    index = ChangeIndex(journal)
+    await index.upto(GRAPH)
+    first, last = sorted(random.Random(seed).sample(range(1, len(held) + 1), 2))
+    found = differing((first, await index.at(GRAPH, first)), (last, await index.at(GRAPH, last)))
+    sought = difference((first, read_maps(held[first - 1])), (last, read_maps(held[last - 1])))
+    assert found == msgspec.json.encode(sought)
+
+
+@pytest.mark.parametrize("seed", range(examples(12) // 2))
+async def test_names_are_all_that_actions_had_from_a_moment_on(
+    journal: Journal, rooms: Rooms, seed: int
+) -> None:
+    held = await edited(rooms, seed, 40)
+    index = ChangeIndex(journal)
+    await index.upto(GRAPH)
+    first = random.Random(seed).randrange(1, len(held))
+    later = await index.between(GRAPH, first, len(held), limit=_ALL)
+    own, uses = names([*await index.at(GRAPH, first), *later])
+    graphs = [read_maps(maps) for maps in held[first - 1 :]]
+    real = {each.name for graph in graphs for each in graph.actions if not each.missing}
+    assert own == graphs[-1].name
+    assert real - {""} <= set(uses)

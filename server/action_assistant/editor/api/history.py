@@ -8,14 +8,14 @@ from litestar.params import Parameter
 from litestar.types import ControllerRouterHandler
 
 from action_assistant.editor.catalogue.catalogue import GraphView
-from action_assistant.editor.documents import contents
 from action_assistant.editor.history import told_changes
 from action_assistant.editor.history.blame import DocumentStep, FieldBlame, FieldValue
 from action_assistant.editor.history.going_back import EditsOfOne, GoneBack
 from action_assistant.editor.history.graph_history import HistoryEntry
+from action_assistant.editor.history.key_changes import LoggedChange
 from action_assistant.editor.history.since_when import AskingSince, SinceWhen
 from action_assistant.editor.log.graph_events import graph_stream
-from action_assistant.editor.services import EditorState
+from action_assistant.editor.services import EditorServices, EditorState
 from action_assistant.editor.workers import encoded
 from action_assistant.errors import Conflict
 from action_assistant.umrf.difference import Difference
@@ -44,6 +44,22 @@ class PastDocument(msgspec.Struct, frozen=True):
     relations: dict[str, Any]
     positions: dict[str, Any]
     comments: dict[str, Any]
+
+
+async def _moment(
+    services: EditorServices, graph: str, seq: int | None, place: str
+) -> tuple[int, list[LoggedChange]]:
+    """A change of a graph, without `seq` the newest, and the changes that left it as it was then.
+
+    Raises Conflict with the place of `seq` where there is no such change.
+    """
+    at = await services.journal.newest(graph_stream(graph)) if seq is None else seq
+    upto = await services.change_index.upto(graph, at)
+    if upto < at:
+        raise Conflict(
+            f"This graph has the changes 1 to {upto}; there is no {at}.", where={"path": place}
+        )
+    return at, await services.change_index.at(graph, at)
 
 
 def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
@@ -75,13 +91,7 @@ def _looking(app_state: EditorState) -> list[ControllerRouterHandler]:
     async def get_document(graph_id: str, at: Seq) -> Response[bytes]:
         services = app_state.services
         await services.catalogue.require(graph_id)
-        upto = await services.change_index.upto(graph_id, at)
-        if upto < at:
-            raise Conflict(
-                f"This graph has the changes 1 to {upto}; there is no {at}.",
-                where={"path": "/at"},
-            )
-        found = await services.change_index.at(graph_id, at)
+        _, found = await _moment(services, graph_id, at, "/at")
         text = await services.workers.graphs(told_changes.document, found)
         return Response(text, media_type="application/json")
 
@@ -114,10 +124,10 @@ def _looking(app_state: EditorState) -> list[ControllerRouterHandler]:
     ) -> Difference:
         services = app_state.services
         await services.catalogue.require(graph_id)
-        then = await services.graph_reader.at(graph_id, before)
-        later = await services.graph_reader.moment(graph_id, after)
+        then = await _moment(services, graph_id, before, "/from")
+        later = await _moment(services, graph_id, after, "/to")
         found: Difference = encoded(
-            await services.graph_reader.ask(contents.differing, then, later)
+            await services.workers.graphs(told_changes.differing, then, later)
         )
         return found
 

@@ -15,7 +15,6 @@ from action_assistant.editor.documents.document import Maps
 from action_assistant.editor.documents.fingerprint import Fingerprint, fingerprint
 from action_assistant.umrf.check import check_written
 from action_assistant.umrf.checks.subgraphs import Resolution
-from action_assistant.umrf.difference import difference
 from action_assistant.umrf.digest import digest, tree_digest
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.json.text import parse_small
@@ -243,12 +242,6 @@ def _text(graph: Graph, stamp: codec.Stamp) -> bytes:
 def digest_at(sight: GraphAtSeq) -> str:
     """The digest of a graph at a moment."""
     return digest(read(sight).moment.graph)
-
-
-def differing(before: GraphAtSeq, after: GraphAtSeq) -> bytes:
-    """What differs, as JSON."""
-    then, later = read(before).moment, read(after).moment
-    return msgspec.json.encode(difference((then.seq, then.graph), (later.seq, later.graph)))
 
 
 def shown(state: bytes) -> Fingerprint:

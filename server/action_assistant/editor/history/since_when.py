@@ -7,11 +7,10 @@ from typing import Annotated, Any, Final
 import msgspec
 
 from action_assistant.editor.catalogue.graph_checks import GraphChecks
-from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.catalogue.people import People
 from action_assistant.editor.history.change_index import ChangeIndex
 from action_assistant.editor.history.parting import followed
-from action_assistant.editor.history.told_changes import Changes
+from action_assistant.editor.history.told_changes import Changes, names
 from action_assistant.editor.log.document_events import when
 from action_assistant.errors import BadInput, TooLarge
 from action_assistant.umrf.semantics import SCRIPT, script_from
@@ -67,11 +66,9 @@ class CourseSearch:
         self,
         index: ChangeIndex,
         people: People,
-        reader: GraphReader,
         checks: GraphChecks,
         run_in_worker: RunInWorker = run_here,
     ) -> None:
-        self._reader = reader
         self._checks = checks
         self._index = index
         self._people = people
@@ -96,8 +93,8 @@ class CourseSearch:
         if len(changes) > _MOST:
             raise TooLarge("That is too long ago; name a later moment that was good.")
         base = await self._index.at(graph, asked.good)
-        ends = [await self._reader.at(graph, seq) for seq in dict.fromkeys((bad, asked.good))]
-        follow = partial(followed, inside=await self._checks.inside(*ends))
+        own, uses = await self._run_in_worker(names, [*base, *changes])
+        follow = partial(followed, inside=await self._checks.inside_of(own, uses))
         found = await self._run_in_worker(follow, base, changes, script, named_at)
         partings = tuple(
             CourseChange(

@@ -102,6 +102,37 @@ def graph_of(state: Mapping[Place, Packed]) -> Graph:
     return read_maps(maps_of(state))
 
 
+def differing(
+    before: tuple[int, Sequence[LoggedChange]], after: tuple[int, Sequence[LoggedChange]]
+) -> bytes:
+    """What differs between two moments, as JSON: each as its seq and the changes that left it."""
+    (then, earlier), (now, later) = before, after
+    was, is_now = graph_of(state_of(earlier)), graph_of(state_of(later))
+    return msgspec.json.encode(difference((then, was), (now, is_now)))
+
+
+def names(changes: Iterable[LoggedChange]) -> tuple[str, tuple[str, ...]]:
+    """The name of a graph that changes in order of time leave, and all names that they give actions."""
+    own, uses = "", set[str]()
+    for change in changes:
+        is_name = change.place == ("meta", "name")
+        if change.after is None or not (is_name or _is_name_of_action(change)):
+            continue
+        name = unpacked(change.after)
+        if not isinstance(name, str):
+            continue
+        if is_name:
+            own = name
+        elif name:
+            uses.add(name)
+    return own, tuple(sorted(uses))
+
+
+def _is_name_of_action(change: LoggedChange) -> bool:
+    """Whether it is what an action is called: the key of an action alone holds that."""
+    return change.root == "actions" and "|" not in change.key
+
+
 class _Current:
     """Which stretch a change belongs to. Those of one person follow one another."""
 
