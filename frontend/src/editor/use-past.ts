@@ -4,29 +4,9 @@ import { startTransition, useCallback, useEffect, useState } from "react";
 import type { PastPlace } from "../edit-actions/editor-context";
 import { pastOf, withPast } from "../edit-actions/past-links";
 import type { SeenPast } from "../past/past-bar";
+import { Watched } from "../ui/watched";
 
 const WRITTEN = 300; // ms after the last step: browsers take few changes of the address in a row
-
-/** One value that whoever needs it draws at once, without the page around. */
-class Watched<T> {
-  #now: T;
-  #listeners = new Set<() => void>();
-
-  constructor(now: T) {
-    this.#now = now;
-  }
-
-  subscribe = (listener: () => void): (() => void) => {
-    this.#listeners.add(listener);
-    return () => this.#listeners.delete(listener);
-  };
-  now = (): T => this.#now;
-
-  set(next: T): void {
-    this.#now = next;
-    for (const listener of [...this.#listeners]) listener();
-  }
-}
 
 export interface Past {
   /** Two moments stand beside each other, instead of over one another. Kept on the device. */

@@ -1,5 +1,6 @@
 /** What is another thing than when a run last went well, as quiet marks on cards and arrows. */
 import { type ComponentType, useSyncExternalStore } from "react";
+import { Watched } from "../../ui/watched";
 
 export interface SinceMark {
   readonly change: "added" | "changed";
@@ -27,25 +28,9 @@ export interface SinceSignProps {
   readonly since: SinceMarks;
 }
 
-/** One for the page: there is one canvas. What is drawn listens for itself, so that little draws again. */
-class SinceMarkStore {
-  #now: SinceMarks | null = null;
-  #listeners = new Set<() => void>();
-
-  subscribe = (listener: () => void): (() => void) => {
-    this.#listeners.add(listener);
-    return () => this.#listeners.delete(listener);
-  };
-  /** Null: nothing is marked. */
-  now = (): SinceMarks | null => this.#now;
-
-  set(marks: SinceMarks | null): void {
-    this.#now = marks;
-    for (const listener of [...this.#listeners]) listener();
-  }
-}
-
-export const sinceMarks = new SinceMarkStore();
+/** One for the page: there is one canvas. What is drawn listens for itself, so that little draws again. Null:
+ * nothing is marked. */
+export const sinceMarks = new Watched<SinceMarks | null>(null);
 
 /** The sign of an action or arrow that is another thing than when a run last went well. */
 export function SinceSpot({ of, on }: Pick<SinceSignProps, "of" | "on">) {

@@ -1,6 +1,7 @@
 /** Which actions stand for graphs of the server, and how one goes into those and out again. */
 import { type ComponentType, useSyncExternalStore } from "react";
 import type { Key } from "../../graph/model";
+import { Watched } from "../../ui/watched";
 
 export interface InsideSignProps {
   readonly of: Key;
@@ -23,23 +24,7 @@ interface GraphsInside {
 }
 
 /** One for the page: there is one canvas. Null while nothing is known of other graphs. */
-class GraphsInsideStore {
-  #now: GraphsInside | null = null;
-  #listeners = new Set<() => void>();
-
-  subscribe = (listener: () => void): (() => void) => {
-    this.#listeners.add(listener);
-    return () => this.#listeners.delete(listener);
-  };
-  now = (): GraphsInside | null => this.#now;
-
-  set(next: GraphsInside | null): void {
-    this.#now = next;
-    for (const listener of [...this.#listeners]) listener();
-  }
-}
-
-export const graphsInside = new GraphsInsideStore();
+export const graphsInside = new Watched<GraphsInside | null>(null);
 
 /** The sign of an action that stands for a graph. */
 export function InsideSpot({ of, name }: InsideSignProps) {

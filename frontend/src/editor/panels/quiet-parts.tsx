@@ -1,10 +1,8 @@
 /** Parts that say more of what is drawn. They come last, and whoever cannot have one misses nothing else. */
 import { type ComponentType, useEffect, useState } from "react";
 
-const LOADS: readonly (() => Promise<ComponentType>)[] = [
-  () => import("../../levels/levels").then((part) => part.Levels),
-  () => import("../../past/since/since-marks").then((part) => part.SinceMarks),
-];
+const levels = () => import("../../levels/levels").then((part) => part.Levels);
+const sinceMarks = () => import("../../past/since/since-marks").then((part) => part.SinceMarks);
 
 function QuietPart({ load }: { load: () => Promise<ComponentType> }) {
   const [Part, setPart] = useState<ComponentType | null>(null);
@@ -22,6 +20,10 @@ function QuietPart({ load }: { load: () => Promise<ComponentType> }) {
 }
 
 export function QuietParts() {
-  // biome-ignore lint/suspicious/noArrayIndexKey: they never change places
-  return LOADS.map((load, i) => <QuietPart key={i} load={load} />);
+  return (
+    <>
+      <QuietPart load={levels} />
+      <QuietPart load={sinceMarks} />
+    </>
+  );
 }
