@@ -1,7 +1,7 @@
 /** Versions with what ran of them, two moments side by side, and what broke a graph found and taken back. */
 
 import { expect, type Page, test } from "@playwright/test";
-import { card, saved, start, umrfOf } from "./canvas";
+import { boxOf, card, saved, start, umrfOf } from "./canvas";
 import { type Person, Product } from "./product";
 import { begun, choose, post, ran, setSpeed, VALVES, violations } from "./valves";
 
@@ -154,8 +154,11 @@ test("two moments stand side by side, with one view, and are walked by keys", as
   await expect.poll(async () => (await view(earlier)) === (await view(later))).toBe(true);
   await page.mouse.move(700, 300);
   await page.setViewportSize({ width: 390, height: 844 });
-  const [above, below] = [await earlier.boundingBox(), await later.boundingBox()];
-  expect((above?.y ?? 0) + (above?.height ?? 0)).toBeLessThanOrEqual((below?.y ?? 0) + 3);
+  const overlap = async () => {
+    const [above, below] = [await boxOf(earlier), await boxOf(later)];
+    return above.y + above.height - below.y;
+  };
+  await expect.poll(overlap).toBeLessThanOrEqual(3); // once both are laid out anew
   expect(await violations(page)).toEqual([]);
   await page.setViewportSize({ width: 1280, height: 800 });
   await bar(page).getByText("One canvas").click();
