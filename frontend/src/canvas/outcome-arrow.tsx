@@ -1,11 +1,12 @@
 /** An arrow from an outcome: the first of a bundle draws its line and pill, each its own port. */
 import { BaseEdge, EdgeLabelRenderer, type EdgeProps, useStoreApi } from "@xyflow/react";
 import { memo, use, useLayoutEffect, useRef, useState } from "react";
-import { BendHandles, LineEditingContext } from "./arrows/bend-handles";
+import { lazyPart } from "../ui/parts/lazy-part";
+import { PartBoundary } from "../ui/parts/part-boundary";
 import { pillWord } from "./arrows/bundles";
 import { PILL_PLAY } from "./arrows/docks";
 import { behindPill, pathOf } from "./arrows/line-path";
-import { useIsOpen, useLine } from "./arrows/line-store";
+import { LineEditingContext, useIsOpen, useLine } from "./arrows/line-store";
 import { type DraggedOutcome, useOutcomeDrag } from "./arrows/outcome-drag";
 import type { Point } from "./arrows/scene";
 import type { RoutedLine } from "./arrows/simple-lines";
@@ -18,10 +19,18 @@ import { type Outcome, OutcomeSign, outcomeColor, outcomeWord } from "./outcome"
 import style from "./outcome-arrow.module.css";
 import { ProblemBadge } from "./problem-badge";
 
+const BendHandles = lazyPart(() =>
+  import("./arrows/bend-handles").then((part) => part.BendHandles),
+);
+
 type ArrowData = NonNullable<Arrow["data"]>;
 
 /** One outcome colours its line, and so does the one that came; several have none in common. */
-function toneOf({ bundle, entry, came }: ArrowData): keyof typeof TIPS {
+export function toneOf({
+  bundle,
+  entry,
+  came,
+}: Pick<ArrowData, "bundle" | "entry" | "came">): keyof typeof TIPS {
   if (entry) return "edge";
   if (bundle.response === "ignore") return "ignore";
   if (came !== null) return came;
@@ -45,6 +54,9 @@ function stub(line: RoutedLine, x: number, y: number, pill: Point): Point[] {
   const turn = (side?.[1] ?? y) + 15;
   return [[x, y - 10], [x, turn], [pill[0], turn], pill];
 }
+
+/** In a drawing of lines there is no room for notices. */
+const nowhere = () => null;
 
 export const OutcomeArrow = memo(function OutcomeArrow(props: EdgeProps<Arrow>) {
   const { id, data, selected, sourceX, sourceY, targetX, targetY } = props;
@@ -77,7 +89,11 @@ export const OutcomeArrow = memo(function OutcomeArrow(props: EdgeProps<Arrow>) 
         />
       )}
       {data.lead && pill && <Pill {...{ id, data, line, pill }} selected={selected === true} />}
-      {data.lead && selected && <BendHandles arrow={id} bundle={data.bundle} line={line} />}
+      {data.lead && selected && (
+        <PartBoundary waiting={null} frame={nowhere}>
+          <BendHandles arrow={id} bundle={data.bundle} line={line} />
+        </PartBoundary>
+      )}
     </g>
   );
 });
@@ -182,7 +198,7 @@ interface GlyphsProps {
   untaken: readonly Outcome[];
 }
 
-function Glyphs({ outcomes, untaken }: GlyphsProps) {
+export function Glyphs({ outcomes, untaken }: GlyphsProps) {
   return outcomes.map((outcome) => (
     <span
       key={outcome}
@@ -241,7 +257,7 @@ function DraggedLine({ from, dragged }: { from: Point; dragged: DraggedOutcome }
   );
 }
 
-const TIPS = {
+export const TIPS = {
   edge: "var(--edge)",
   ignore: "var(--ink4)",
   on_true: "var(--true)",

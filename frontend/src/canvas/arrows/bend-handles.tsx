@@ -1,29 +1,14 @@
 /** Handles by which the line of a chosen arrow is bent: with a mouse, a finger, or keys. */
 import { EdgeLabelRenderer, useStore } from "@xyflow/react";
-import { createContext, type KeyboardEvent, use, useContext, useEffect, useRef } from "react";
-import type { Position, Precondition } from "../../graph/model";
+import { type KeyboardEvent, use, useContext, useEffect, useRef } from "react";
 import { MOST_WAYPOINTS } from "../../graph/waypoints";
 import { type BendHandle, useBendDrag, withBend } from "./bend-drag";
 import style from "./bend-handles.module.css";
 import { middlesOf } from "./bend-places";
 import type { Bundle } from "./bundles";
-import { LineContext } from "./line-store";
+import { LineContext, type LineEditing, LineEditingContext } from "./line-store";
 import { type Point, STEP } from "./scene";
 import type { RoutedLine } from "./simple-lines";
-
-/** How lines are changed by hand; without it they are only shown. */
-export interface LineEditing {
-  /** Leads a line through these places. `byKey`: presses in a row are one step of undo. */
-  bend(bundle: Bundle, via: readonly Point[], byKey?: boolean): void;
-  /** Leads one outcome to the card at a place on the screen. */
-  drop(bundle: Bundle, outcome: Precondition, at: Position): void;
-  /** Asks where to lead one outcome. */
-  choose(bundle: Bundle, outcome: Precondition): void;
-  /** What a line is called: “Drive 0 → Grip 0”. */
-  nameOf(bundle: Bundle): string;
-}
-
-export const LineEditingContext = createContext<LineEditing | null>(null);
 
 const WAYS: Readonly<Record<string, Point>> = {
   ArrowLeft: [-1, 0],

@@ -1,5 +1,7 @@
 /** The lines of one canvas: simple ones at once, routed ones when a worker has them. */
 import { createContext, useCallback, useContext, useSyncExternalStore } from "react";
+import type { Position, Precondition } from "../../graph/model";
+import type { Bundle } from "./bundles";
 import { lineNow } from "./line-path";
 import type { RouterReport } from "./router.worker";
 import { type Point, type Scene, STEP } from "./scene";
@@ -223,3 +225,17 @@ export function useIsOpen(id: string): boolean {
   const subscribe = useCallback((tell: () => void) => store.subscribe(id, tell), [store, id]);
   return useSyncExternalStore(subscribe, () => store.isOpen(id));
 }
+
+/** How lines are changed by hand; without it they are only shown. */
+export interface LineEditing {
+  /** Leads a line through these places. `byKey`: presses in a row are one step of undo. */
+  bend(bundle: Bundle, via: readonly Point[], byKey?: boolean): void;
+  /** Leads one outcome to the card at a place on the screen. */
+  drop(bundle: Bundle, outcome: Precondition, at: Position): void;
+  /** Asks where to lead one outcome. */
+  choose(bundle: Bundle, outcome: Precondition): void;
+  /** What a line is called: “Drive 0 → Grip 0”. */
+  nameOf(bundle: Bundle): string;
+}
+
+export const LineEditingContext = createContext<LineEditing | null>(null);

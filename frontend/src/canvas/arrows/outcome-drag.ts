@@ -2,8 +2,8 @@
 import { useReactFlow } from "@xyflow/react";
 import { type PointerEvent, useEffect, useRef, useState } from "react";
 import type { Precondition } from "../../graph/model";
-import type { LineEditing } from "./bend-handles";
 import type { Bundle } from "./bundles";
+import type { LineEditing } from "./line-store";
 import type { Point } from "./scene";
 
 const STILL = 3; // px on the screen that a press may move
