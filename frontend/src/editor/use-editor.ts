@@ -22,8 +22,8 @@ import {
   useThrottledLink,
   useUndo,
 } from "../sync/use-room";
+import { useKeptKeys } from "../ui/hooks/use-kept-keys";
 import { exportGraph } from "./export-graph";
-import { useFoldedFrames } from "./use-folded-frames";
 import { NO_PAST, type Past } from "./use-past";
 
 const NONE: ReadonlySet<string> = new Set();
@@ -182,7 +182,7 @@ export function useEditor(
   const latest = useRef<EditorContext | null>(null);
   const edited = useEdited(id, past);
   const tools = useTools();
-  const folding = useFoldedFrames(id);
+  const { keys: folded, put: fold } = useKeptKeys("aa.folded", id);
   const { openers, shown } = useDialogs(latest, onPanel);
   const canvasHandle = useRef<CanvasHandle>({
     view: NO_CANVAS_VIEW,
@@ -193,8 +193,8 @@ export function useEditor(
     if (latest.current) void exportGraph(latest.current, format);
   }, []);
   const context = useMemo<EditorContext>(
-    () => ({ ...edited, ...tools, ...folding, ...openers, ...canvasOf(canvasHandle), download }),
-    [edited, tools, folding, openers, download],
+    () => ({ ...edited, ...tools, folded, fold, ...openers, ...canvasOf(canvasHandle), download }),
+    [edited, tools, folded, fold, openers, download],
   );
   latest.current = context;
   return { context, canvasHandle, ...shown };

@@ -1,30 +1,30 @@
-/** Which frames of a graph are folded: each person's own, kept on the device. */
+/** What of each graph somebody has folded or expanded: their own, kept on the device. */
 import { useLocalStorage } from "@mantine/hooks";
 import { useCallback, useMemo } from "react";
 
-/** Keys of frames by graph, the last one that was changed at the end. */
-type FoldedFrames = Readonly<Record<string, readonly string[]>>;
+/** Keys by graph, the last one that was changed at the end. */
+type KeptKeys = Readonly<Record<string, readonly string[]>>;
 
 const MOST_GRAPHS = 200;
 const NONE: ReadonlySet<string> = new Set();
 
 /** What was kept for a graph; what has another shape is as if it were not there. */
-export function foldedIn(kept: unknown, id: string): ReadonlySet<string> {
+export function keptIn(kept: unknown, id: string): ReadonlySet<string> {
   const found: unknown =
     typeof kept === "object" && kept !== null ? (kept as Record<string, unknown>)[id] : undefined;
   if (!Array.isArray(found) || found.length === 0) return NONE;
   return new Set(found.filter((key): key is string => typeof key === "string"));
 }
 
-export function withFolded(
+export function withKept(
   kept: unknown,
   id: string,
-  frames: readonly string[],
-  folded: boolean,
-): FoldedFrames {
-  const next = new Set(foldedIn(kept, id));
-  for (const key of frames) {
-    if (folded) next.add(key);
+  keys: readonly string[],
+  isIn: boolean,
+): KeptKeys {
+  const next = new Set(keptIn(kept, id));
+  for (const key of keys) {
+    if (isIn) next.add(key);
     else next.delete(key);
   }
   const others = Object.entries(typeof kept === "object" && kept !== null ? kept : {})
@@ -33,17 +33,17 @@ export function withFolded(
   return Object.fromEntries(next.size > 0 ? [...others, [id, [...next]]] : others);
 }
 
-export function useFoldedFrames(id: string) {
-  const [kept, keep] = useLocalStorage<FoldedFrames>({
-    key: "aa.folded",
+/** `name`: of the place on the device. */
+export function useKeptKeys(name: string, id: string) {
+  const [kept, keep] = useLocalStorage<KeptKeys>({
+    key: name,
     defaultValue: {},
     getInitialValueInEffect: false,
   });
-  const fold = useCallback(
-    (frames: readonly string[], folded: boolean) =>
-      keep((before) => withFolded(before, id, frames, folded)),
+  const put = useCallback(
+    (keys: readonly string[], isIn: boolean) => keep((before) => withKept(before, id, keys, isIn)),
     [keep, id],
   );
-  const now = useMemo(() => foldedIn(kept, id), [kept, id]);
-  return useMemo(() => ({ folded: now, fold }), [now, fold]);
+  const keys = useMemo(() => keptIn(kept, id), [kept, id]);
+  return useMemo(() => ({ keys, put }), [keys, put]);
 }
