@@ -15,6 +15,15 @@ const rows: string[][] = [];
 const frames: string[][] = [];
 const followed: string[][] = [];
 const stepped: string[][] = [];
+const nested: string[][] = [];
+/** Actions of all levels, and how many levels there are. */
+const HIERARCHIES = [
+  [1000, 1],
+  [300, 2],
+  [1000, 3],
+  [2000, 5],
+  [3000, 5],
+] as const;
 const PASTS = [1_000, 10_000, 100_000];
 
 test.skip(process.env.SPEED === undefined, "measures; started by `make performance`");
@@ -35,6 +44,10 @@ test.afterEach(() => {
     { head, rows },
     { head: ["1,000 actions", "frame (median)", "95 %", "99 %", "longest", "CPU"], rows: frames },
     { head: ["changes (actions)", "key to paint (median)", "longest"], rows: stepped },
+    {
+      head: ["actions in levels", "expand all", "longest frame", "zooming: frame", "longest"],
+      rows: nested,
+    },
     { head: ["a run of 70 actions", "page's thread", "whole browser"], rows: followed },
   ];
   writeFileSync(resolve(ROOT, "frontend/test-results/speed.json"), JSON.stringify(tables));
@@ -186,6 +199,71 @@ for (const size of SIZES) {
     ];
     rows.push([size.toLocaleString("en"), ...figures]);
     expect(drag.length).toBeGreaterThan(0);
+    await context.close();
+  });
+}
+
+/** Levels of as many actions each: the last action of each stands for the next. */
+async function hierarchy(size: number, levels: number): Promise<string> {
+  let id = "";
+  for (let level = levels - 1; level >= 0; level -= 1) {
+    const count = Math.floor(size / levels);
+    const wide = Math.ceil(Math.sqrt(count));
+    const names = Array.from({ length: count }, () => "Step");
+    if (level < levels - 1) names.push(`level_${size}_${level + 1}`);
+    const named = (n: number) => ({ name: names[n] ?? "", instance_id: n });
+    const graph = {
+      graph_name: `level_${size}_${level}`,
+      graph_entry: [named(0)],
+      graph_exit: [named(names.length - 1)],
+      actions: names.map((_, n) => ({
+        ...named(n),
+        type: "sync",
+        parents: n < wide ? [] : [named(n - wide)],
+        children: n + wide < names.length ? [named(n + wide)] : [],
+        gui_attributes: { position: { x: (n % wide) * 260, y: Math.floor(n / wide) * 190 } },
+      })),
+    };
+    const body = JSON.stringify(graph);
+    const headers = { "content-type": "application/json" };
+    id = (await product.ask<{ id: string }>("/api/graphs", { method: "POST", body, headers })).id;
+  }
+  return id;
+}
+
+for (const [size, levels] of HIERARCHIES) {
+  test(`${size} actions in ${levels} levels`, async ({ browser }) => {
+    const { page, context } = await product.person(browser, "Ada");
+    await page.goto(`${product.url}/graphs/${await hierarchy(size, levels)}`);
+    await shown(page);
+    await page.keyboard.press("f");
+    await pause(1_000);
+    const inner = page.locator("[data-inner]");
+    const gaps = await watchFrames(page);
+    let expanded = 0;
+    for (let level = 1; level < levels; level += 1) {
+      await page.keyboard.press("Control+k");
+      await page.keyboard.type("one level more");
+      const before = Date.now();
+      await page.keyboard.press("Enter");
+      const wanted = Math.floor(size / levels) * level;
+      const poll = { timeout: 60_000, intervals: [20] };
+      await expect.poll(() => inner.count(), poll).toBeGreaterThanOrEqual(wanted);
+      expanded += Date.now() - before;
+    }
+    const longest = share(await gaps(), 1);
+    await page.keyboard.press("f");
+    await pause(1_500);
+    const box = await boxOf(page.locator(".react-flow__pane"));
+    const pans = await watchFrames(page);
+    for (let step = 0; step < 60; step += 1) {
+      await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+      await page.mouse.wheel(0, step % 2 === 0 ? -40 : 30);
+      await pause(16);
+    }
+    const panned = await pans();
+    const figures = [ms(expanded), ms(longest), ms(share(panned, 0.5)), ms(share(panned, 1))];
+    nested.push([`${size.toLocaleString("en")} in ${levels}`, ...figures]);
     await context.close();
   });
 }
