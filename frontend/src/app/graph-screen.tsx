@@ -19,7 +19,7 @@ import { ConnectionStatus } from "../runs/connection-status";
 import { RunDrawer } from "../runs/drawer/run-drawer";
 import { RecordDryRun } from "../runs/start/record-dry-run";
 import { StartControl } from "../runs/start/start-control";
-import { type GraphInRun, isInRun } from "../status/progress-inside";
+import { type GraphInRun, isInRun, runOnCanvas } from "../status/progress-inside";
 import { useProgress } from "../status/use-progress";
 import { roomUrl } from "../sync/room-connection";
 import { RoomProvider, useLinkPart, useRoom, useThrottledGraph } from "../sync/use-room";
@@ -109,6 +109,20 @@ function useEdge(run: Run | null): number {
   return instant(run?.ended_at) ?? Date.now();
 }
 
+/** Tells what is drawn inside of actions which run is shown. */
+function useRunOnCanvas(
+  run: Run | null,
+  unsure: boolean,
+  at: number | null,
+  inside: GraphInRun | null,
+): void {
+  const names = inside?.names;
+  useEffect(() => {
+    runOnCanvas.set(run && { run, unsure, at, names: names ?? [] });
+  }, [run, unsure, at, names]);
+  useEffect(() => () => runOnCanvas.set(null), []);
+}
+
 function Inside({ id }: { id: string }) {
   const { person, visit } = usePerson();
   const { create, choose } = useNewGraphs();
@@ -119,6 +133,7 @@ function Inside({ id }: { id: string }) {
   const replay = useReplay(runner, run ?? null, useEdge(run ?? null), null);
   const past = replay.at !== null;
   const progress = useProgress(past ? replay.run : live, unsure && !past, replay.at, inside);
+  useRunOnCanvas(past ? replay.run : live, unsure && !past, replay.at, inside);
   const newest = run?.id;
   const { seek } = replay;
   // biome-ignore lint/correctness/useExhaustiveDependencies: another run is shown as it is now

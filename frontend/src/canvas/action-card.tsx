@@ -24,12 +24,14 @@ import { ChangeTag } from "./changes/change-tag";
 import { SinceSpot } from "./changes/since-marks";
 import type { CardNode } from "./elements";
 import { CARD_LINES, cardSize } from "./geometry/arrange";
+import { useExpandedCard } from "./levels/expanded-graphs";
 import { InsideSpot } from "./levels/graphs-inside";
 import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "./outcome";
 import { ProblemBadge } from "./problem-badge";
 import { STATE_LETTER } from "./zoom/detail";
 
-function ProgressLine({ progress }: { progress: Progress }) {
+/** What it says of a run. */
+export function CardState({ progress }: { progress: Progress }) {
   const now = useNow(1000, progress.since !== null);
   const parts: string[] = [];
   const took = durationText(progress);
@@ -60,6 +62,30 @@ function Head({ action, oldName }: { action: Action; oldName: string | null }) {
   );
 }
 
+/** What is read on it. */
+function Words({ data, selected }: Pick<NodeProps<CardNode>, "data" | "selected">) {
+  const { action, progress, givers } = data;
+  const rows = cardRows(action.inputs, givers, progress?.inputs);
+  const says = progress !== null || action.missing;
+  const instead = use(CardStateContext)?.(action.key);
+  const change = useChangeMark(action.key);
+  return (
+    <>
+      <Head action={action} oldName={change?.oldName ?? null} />
+      {action.missing && <div className={style.hint}>named by an arrow, but not there</div>}
+      {!action.missing && (instead ?? (progress && <CardState progress={progress} />))}
+      <CardLines
+        rows={rows}
+        most={says ? CARD_LINES - 1 : CARD_LINES}
+        selected={selected}
+        old={change?.oldValues}
+        differing={change?.rows}
+        inferred={progress?.inferred ?? false}
+      />
+    </>
+  );
+}
+
 /** Outcomes stand 22 px apart at the right, however high the card is, else along its lower edge. */
 function spotOf(i: number, right: boolean): React.CSSProperties {
   return right ? { top: `calc(50% + ${(i - 1.5) * 22}px)` } : { left: `${14 + i * 24}%` };
@@ -70,16 +96,14 @@ export const ActionCard = memo(function ActionCard({
   selected,
   isConnectable,
 }: NodeProps<CardNode>) {
-  const { action, progress, mark, other, direction, givers } = data;
+  const { action, progress, mark, other, direction } = data;
   const right = direction === "right";
-  const rows = cardRows(action.inputs, givers, progress?.inputs);
-  const says = progress !== null || action.missing;
-  const { height } = cardSize(action, direction);
+  const expanded = useExpandedCard(action.key);
+  const { height, width } = expanded?.size ?? cardSize(action, direction);
   const color = colorOfName(action.actor);
   const dim = useIsDimmed(action.actor);
   const talk = useOpenThreadCount(action.key);
   const role = useDataRole(action.key);
-  const instead = use(CardStateContext)?.(action.key);
   const change = useChangeMark(action.key);
   const never = useIsUnvisited(action.key);
   const card = useRef<HTMLDivElement>(null);
@@ -88,7 +112,7 @@ export const ActionCard = memo(function ActionCard({
     <div
       ref={card}
       className={style.card}
-      style={{ height, "--c": color, "--other": other ?? undefined } as React.CSSProperties}
+      style={{ height, width, "--c": color, "--other": other ?? undefined } as React.CSSProperties}
       data-other={other === null ? undefined : true}
       data-selected={selected || undefined}
       data-tone={progress?.tone}
@@ -100,6 +124,7 @@ export const ActionCard = memo(function ActionCard({
       data-flow={role}
       data-direction={direction}
       data-change={change?.change}
+      data-card={expanded ? undefined : true}
       data-unvisited={never || undefined}
     >
       <Handle
@@ -123,17 +148,11 @@ export const ActionCard = memo(function ActionCard({
           <span className="visually-hidden"> open comments</span>
         </span>
       )}
-      <Head action={action} oldName={change?.oldName ?? null} />
-      {action.missing && <div className={style.hint}>named by an arrow, but not there</div>}
-      {!action.missing && (instead ?? (progress && <ProgressLine progress={progress} />))}
-      <CardLines
-        rows={rows}
-        most={says ? CARD_LINES - 1 : CARD_LINES}
-        selected={selected}
-        old={change?.oldValues}
-        differing={change?.rows}
-        inferred={progress?.inferred ?? false}
-      />
+      {expanded ? (
+        <expanded.Frame of={action.key} progress={progress} />
+      ) : (
+        <Words data={data} selected={selected} />
+      )}
       {OUTCOMES.map((outcome, i) => (
         <Handle
           key={outcome}

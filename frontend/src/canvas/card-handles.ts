@@ -62,8 +62,11 @@ function remembered(name: string, make: () => Known): Known {
 }
 
 /** How large a card is before it is drawn: what lies out of sight need never be. */
-export function expectedCard(action: Pick<Action, "inputs">, direction: Direction): Known {
-  const measured = cardSize(action, direction);
+export function expectedCard(
+  action: Pick<Action, "inputs">,
+  direction: Direction,
+  measured: Extent = cardSize(action, direction),
+): Known {
   return remembered(`${direction} ${measured.width} ${measured.height}`, () => ({
     measured,
     handles: cardHandles(measured, direction),

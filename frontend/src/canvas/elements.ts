@@ -21,7 +21,7 @@ import type { Progress } from "../status/progress";
 import { type Bundle, bundlesOf, pillSizeOf } from "./arrows/bundles";
 import { gridOffset, type Scene, type SceneCard } from "./arrows/scene";
 import { expectedCard, expectedEnd } from "./card-handles";
-import { cardSize, type Positions, pillSize } from "./geometry/arrange";
+import { cardSize, type Positions, pillSize, type Sizes } from "./geometry/arrange";
 import { type FoldedNode, type NoteNode, noteNodes } from "./notes/note-nodes";
 import { OUTCOMES, outcomeWord } from "./outcome";
 import { type ProblemMark, type ProblemMarks, problemMarkWords } from "./problem-marks";
@@ -94,6 +94,8 @@ export interface NodeOptions {
   measured: ReadonlyMap<Key, { width?: number; height?: number }>;
   /** A note as it is while somebody drags its edges. */
   resized?: Note | null;
+  /** How large the cards are in which a graph is expanded. */
+  expanded?: Sizes | undefined;
 }
 
 export type ArrowOptions = Pick<NodeOptions, "selected" | "progress" | "marks">;
@@ -140,7 +142,7 @@ function cardOf(
     direction,
     givers,
   };
-  const expected = expectedCard(action, direction);
+  const expected = expectedCard(action, direction, options.expanded?.get(action.key));
   const same =
     before?.type === "action" &&
     before.data.action === action &&
@@ -152,6 +154,7 @@ function cardOf(
     before.position.x === x &&
     before.position.y === y &&
     before.selected === options.selected.has(action.key) &&
+    before.handles === expected.handles &&
     before.measured === (options.measured.get(action.key) ?? expected.measured);
   if (same) return before;
   const ariaLabel = cardWords(action, options);

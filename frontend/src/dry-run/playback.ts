@@ -49,8 +49,8 @@ interface PlayedVisit {
   message: string | null;
 }
 
-/** The actions of the graph itself by the names that a trace gives them; sub-graphs are not drawn. */
-export function keysByName(graph: Graph): ReadonlyMap<string, Key> {
+/** The actions of one graph by the names that a trace gives them. */
+export function keysByName(graph: Pick<Graph, "actions">): ReadonlyMap<string, Key> {
   return new Map(graph.actions.filter((a) => !a.missing).map((a) => [fullName(a), a.key]));
 }
 
@@ -97,7 +97,7 @@ function wordOf({ state, result }: PlayedVisit, over: boolean): { tone: Tone; wo
 }
 
 /** What happened to each action by then, and the state of the graph. */
-function played(trace: readonly TraceEvent[], to: number, graph: Graph) {
+function played(trace: readonly TraceEvent[], to: number, graph: Pick<Graph, "name">) {
   const visits = new Map<string, PlayedVisit>();
   let state = "";
   for (const event of trace.slice(0, to)) {
@@ -128,7 +128,7 @@ function played(trace: readonly TraceEvent[], to: number, graph: Graph) {
 export function playbackStateAt(
   trace: readonly TraceEvent[],
   to: number,
-  graph: Graph,
+  graph: Pick<Graph, "name" | "actions">,
   keys = keysByName(graph),
 ): PlaybackState {
   const { visits, state } = played(trace, to, graph);

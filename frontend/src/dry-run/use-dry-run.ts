@@ -38,6 +38,8 @@ export interface DryRun {
   /** The moment that is shown. */
   readonly index: number;
   readonly sighting: PlaybackState;
+  /** What is seen then of a graph that runs inside: its name is as engines call it. */
+  inside(graph: Pick<Graph, "name" | "actions">): PlaybackState["progress"];
   /** What happens at this moment. */
   readonly words: readonly string[];
   readonly playing: boolean;
@@ -92,7 +94,14 @@ function useShownMoment(
     };
     return moment ? momentWords(trace, moment, moments[index - 1]?.to ?? 0, nameOf) : [];
   }, [trace, moments, index, graph]);
-  return useMemo(() => ({ moments, index, sighting, words }), [moments, index, sighting, words]);
+  const inside = useCallback<DryRun["inside"]>(
+    (below) => playbackStateAt(trace, moments[index]?.to ?? 0, below).progress,
+    [trace, moments, index],
+  );
+  return useMemo(
+    () => ({ moments, index, sighting, words, inside }),
+    [moments, index, sighting, words, inside],
+  );
 }
 
 /** Goes to the moment of a run from which a dry-run starts, once it is played; says what is not so. */

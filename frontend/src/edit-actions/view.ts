@@ -1,6 +1,8 @@
 /** Edit actions that change the view, not the graph. */
 import {
   IconArrowGuide,
+  IconArrowsDiagonal,
+  IconArrowsDiagonalMinimize2,
   IconBraces,
   IconCommand,
   IconFocus2,
@@ -244,6 +246,48 @@ export const leave: EditAction = {
   enabled: () => (graphsInside.now()?.leave ?? null) !== null,
   idle: "You came here from no other graph.",
   run: () => graphsInside.now()?.leave?.(),
+};
+
+const inPlace = { ...look, also: "sub-graph level hierarchy in place fold open" } as const;
+
+/** The actions that are chosen and stand for graphs. */
+const chosenGraphs = (context: EditorContext) =>
+  selectedActions(context).filter(({ name }) => graphsInside.now()?.byName.has(name));
+
+export const expandGraph: EditAction = {
+  ...inPlace,
+  name: "expand-graph",
+  label: "Expand or collapse the graph inside",
+  shortcuts: ["}", "Mod+Shift+ArrowDown"],
+  icon: IconArrowsDiagonal,
+  enabled: (context) => chosenGraphs(context).length > 0,
+  idle: "Choose an action that stands for a graph first.",
+  run: (context) => {
+    for (const { key } of chosenGraphs(context)) graphsInside.now()?.expand.toggle(key);
+  },
+};
+
+export const expandMore: EditAction = {
+  ...inPlace,
+  name: "expand-more",
+  label: "Expand all graphs inside, one level more",
+  shortcuts: [],
+  icon: IconArrowsDiagonal,
+  enabled: ({ graph }) =>
+    graph.actions.some(({ name }) => graphsInside.now()?.byName.has(name) ?? false),
+  idle: "No action here stands for a graph.",
+  run: () => graphsInside.now()?.expand.expandMore(),
+};
+
+export const collapseGraphs: EditAction = {
+  ...inPlace,
+  name: "collapse-graphs",
+  label: "Collapse all graphs inside",
+  shortcuts: ["{", "Mod+Shift+ArrowUp"],
+  icon: IconArrowsDiagonalMinimize2,
+  enabled: () => graphsInside.now()?.expand.isAnyExpanded() ?? false,
+  idle: "Nothing is expanded.",
+  run: () => graphsInside.now()?.expand.collapseAll(),
 };
 
 /** Of the whole graph, it is listed with what is done to that. */

@@ -139,17 +139,16 @@ function Inside(props: Props) {
     progress: context.dryRun?.sighting.progress ?? progress,
     laidOut: first.places,
   });
-  const { flow, places, sizes } = canvas;
+  const { flow, places, sizes, view: drawn } = canvas;
   const side = seen?.side ?? null;
   const frame = useRef<HTMLDivElement>(null);
   const pointer = useRef<Position | null>(null);
   const waiting = !arrived || (first.pending && context.graph.actions.length > 1);
   const begun = arrived && context.graph.actions.length > 0 && !first.pending;
   const { view, lost, onPanned, onFollow } = useViewport({
-    flow,
     frame,
-    places: side?.placesWith(places) ?? places,
-    sizes,
+    ...drawn,
+    places: side?.placesWith(places) ?? drawn.places,
     lines: canvas.lines,
     ...useUnfolding(context, canvas),
     direction: graph.direction,

@@ -8,12 +8,21 @@ import {
   IconSquareRounded,
   IconX,
 } from "@tabler/icons-react";
-import { useDeferredValue, useEffect, useId, useMemo, useRef, useState } from "react";
+import {
+  useDeferredValue,
+  useEffect,
+  useId,
+  useMemo,
+  useRef,
+  useState,
+  useSyncExternalStore,
+} from "react";
 import type { Problem } from "../api/graphs";
+import { expandedGraphs } from "../canvas/levels/expanded-graphs";
 import { printedKeys } from "../edit-actions/edit-action";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { Tooltip } from "../ui/floating/tooltip";
-import { find, type Hit } from "./find";
+import { find, findInside, type Hit } from "./find";
 import style from "./find-bar.module.css";
 
 const MOST = 200;
@@ -76,9 +85,13 @@ export function FindBar({ problems, onClose }: Props) {
   const [query, setQuery] = useState("");
   const [at, setAt] = useState(0);
   const asked = useDeferredValue(query);
+  const expanded = useSyncExternalStore(expandedGraphs.subscribe, expandedGraphs.now);
   const hits = useMemo(
-    () => find(context.graph, problems, asked),
-    [context.graph, problems, asked],
+    () => [
+      ...find(context.graph, problems, asked),
+      ...findInside(context.graph, expanded?.partsOf, asked),
+    ],
+    [context.graph, problems, asked, expanded],
   );
   const field = useRef<HTMLInputElement>(null);
   const list = useRef<HTMLDivElement>(null);
@@ -96,7 +109,8 @@ export function FindBar({ problems, onClose }: Props) {
     const hit: Hit | undefined = hits[(index + hits.length) % Math.max(1, hits.length)];
     if (hit === undefined) return;
     setAt(hits.indexOf(hit));
-    context.select([hit.id]);
+    // What is found on a card with a graph in it is where that card is.
+    context.select([hit.id.split("/")[0] ?? hit.id]);
     context.view.show(hit.keys);
   };
   const close = () => {
@@ -109,7 +123,7 @@ export function FindBar({ problems, onClose }: Props) {
     if (event.key === "Escape") close();
     else if (step !== undefined) {
       // The first Enter goes to the first hit, later ones on.
-      const fresh = !context.selection.has(hits[current]?.id ?? "");
+      const fresh = !context.selection.has(hits[current]?.id.split("/")[0] ?? "");
       go(fresh ? current : current + step);
     } else return;
     event.preventDefault();

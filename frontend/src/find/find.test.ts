@@ -3,7 +3,7 @@ import * as Y from "yjs";
 import { mapsOf } from "../graph/document-keys";
 import { addAction, connect, setRemap, setRequired } from "../graph/edit";
 import { readGraph } from "../graph/read";
-import { find } from "./find";
+import { find, findInside } from "./find";
 
 const doc = new Y.Doc();
 const drive = addAction(doc, {
@@ -47,4 +47,21 @@ test.each([
 test("a hit says what of it was found, unless its name does", () => {
   expect(find(graph, [], "drive")[0]?.why).toBe("");
   expect(find(graph, [], "5.0")[0]?.why).toBe("parameter goal.x = 5.0");
+});
+
+test("what is drawn on a card is found where the card is, with the levels that lead there", () => {
+  const [, inner] = graph.actions;
+  if (!inner) throw new Error("no action");
+  const box = { x: 0, y: 0, width: 208, height: 88, progress: null, expanded: false };
+  const parts = [
+    { ...box, path: `${drive}/a`, action: { ...inner, name: "Fetch", actor: "" } },
+    { ...box, path: `${drive}/a/b`, action: { ...inner, name: "CloseFingers" } },
+  ];
+  const partsOf = (key: string) => (key === drive ? parts : []);
+  expect(findInside(graph, partsOf, "fingers")).toMatchObject([
+    { id: `${drive}/a/b`, title: "CloseFingers 0", keys: [drive], why: "in Drive › Fetch" },
+  ]);
+  expect(findInside(graph, partsOf, "robot:arm")[0]?.why).toBe("in Drive › Fetch · robot arm");
+  expect(findInside(graph, undefined, "fingers")).toEqual([]);
+  expect(findInside(graph, partsOf, " ")).toEqual([]);
 });

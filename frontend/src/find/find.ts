@@ -1,5 +1,6 @@
 /** Finding actions and arrows of a graph by anything that they say. Pure. */
 import type { Problem } from "../api/graphs";
+import type { PartOnCard } from "../canvas/levels/expanded-graphs";
 import { relationId } from "../graph/document-keys";
 import { ENTRY, EXIT, type Graph, type Key, PRECONDITIONS } from "../graph/model";
 import { placeOf } from "../graph/problems/told-problems";
@@ -124,4 +125,27 @@ export function find(graph: Graph, problems: readonly Problem[], query: string):
   });
   const rank = (hit: Hit) => (hit.why === "" ? 0 : hit.kind === "action" ? 1 : 2);
   return hits.sort((a, b) => rank(a) - rank(b));
+}
+
+/** The same of actions that are drawn on cards of the graph: they are found where those cards are. */
+export function findInside(
+  graph: Graph,
+  partsOf: ((key: Key) => readonly PartOnCard[]) | undefined,
+  query: string,
+): Hit[] {
+  if (partsOf === undefined || query.trim() === "") return [];
+  return graph.actions.flatMap(({ key, name }) => {
+    const parts = partsOf(key);
+    const names = new Map([
+      [key, name],
+      ...parts.map(({ path, action }) => [path, action.name] as const),
+    ]);
+    const actions = parts.map(({ path, action }) => ({ ...action, key: path }));
+    return find({ ...graph, actions, relations: [] }, [], query).map((hit) => {
+      const keys = hit.id.split("/").slice(0, -1);
+      const levels = keys.map((_, n) => names.get(keys.slice(0, n + 1).join("/")) ?? "");
+      const why = [`in ${levels.join(" › ")}`, ...(hit.why === "" ? [] : [hit.why])].join(" · ");
+      return { ...hit, keys: [key], why };
+    });
+  });
 }

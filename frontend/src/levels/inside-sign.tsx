@@ -1,22 +1,49 @@
-/** On the card of an action that stands for a graph: the way into it. */
-import { IconStairsDown } from "@tabler/icons-react";
+/** On the card of an action that stands for a graph: the way into it, and that graph in place. */
+import { IconArrowsDiagonal, IconStairsDown } from "@tabler/icons-react";
+import type { MouseEvent } from "react";
 import { graphsInside, type InsideSignProps } from "../canvas/levels/graphs-inside";
 import style from "./levels.module.css";
 
-export function InsideSign({ of, name }: InsideSignProps) {
+interface SignProps {
+  title: string;
+  label: string;
+  Sign: typeof IconStairsDown;
+  onClick: () => void;
+}
+
+function SignButton({ title, label, Sign, onClick }: SignProps) {
   return (
     <button
       type="button"
       className={`${style.inside} nodrag`}
-      title="Open the graph inside  ]"
-      aria-label={`Open the graph inside ${name}`}
-      onClick={(event) => {
+      title={title}
+      aria-label={label}
+      onClick={(event: MouseEvent) => {
         event.stopPropagation(); // else the card would be chosen
-        graphsInside.now()?.enter(of);
+        onClick();
       }}
       onDoubleClick={(event) => event.stopPropagation()}
     >
-      <IconStairsDown size={14} aria-hidden />
+      <Sign size={14} aria-hidden />
     </button>
+  );
+}
+
+export function InsideSign({ of, name }: InsideSignProps) {
+  return (
+    <span className={style.signs}>
+      <SignButton
+        title="Expand the graph inside  }"
+        label={`Expand the graph inside ${name}`}
+        Sign={IconArrowsDiagonal}
+        onClick={() => graphsInside.now()?.expand.toggle(of)}
+      />
+      <SignButton
+        title="Open the graph inside  ]"
+        label={`Open the graph inside ${name}`}
+        Sign={IconStairsDown}
+        onClick={() => graphsInside.now()?.enter(of)}
+      />
+    </span>
   );
 }

@@ -1,51 +1,90 @@
 /** Keeps known which actions stand for graphs, and the way through which one came here. */
-import { useEffect, useMemo } from "react";
+import { useCallback, useEffect, useMemo } from "react";
 import { useLocation, useSearch } from "wouter";
 import { useGraphsAsActions, useLibrary } from "../api/documents/library";
 import { graphsInside } from "../canvas/levels/graphs-inside";
-import { addressAround, addressInside, levelsOf } from "../canvas/levels/level-path";
+import { addressAround, addressInside, type Level, levelsOf } from "../canvas/levels/level-path";
 import { useEditorContext } from "../edit-actions/editor-context";
+import type { Graph } from "../graph/model";
 import { announcer } from "../ui/announcer";
 import { useStableCallback } from "../ui/hooks/use-stable-callback";
+import { expansion } from "./in-place/expansion";
+import { useExpansion } from "./in-place/use-expansion";
 import { InsideSign } from "./inside-sign";
 
 const NONE: readonly never[] = [];
 
 /** Graphs by the name of the actions that stand for them: engines look for an action of it first, of several
- * graphs of one name it is the oldest, which is listed first, and none stands for the graph that it is in. */
-function useGraphsByName(id: string) {
+ * graphs of one name it is the oldest, which is listed first. */
+function useGraphsByName() {
   const { data: graphs = NONE } = useGraphsAsActions();
   const { data: actions = NONE } = useLibrary();
   return useMemo(() => {
     const ofLibrary = new Set(actions.flatMap(({ document, name }) => (document ? [name] : [])));
-    const byName = new Map<string, string>();
+    const all = new Map<string, string>();
     for (const { graph, name } of graphs)
-      if (!ofLibrary.has(name) && !byName.has(name)) byName.set(name, graph);
-    const names = new Map(graphs.map(({ graph, name }) => [graph, name]));
+      if (!ofLibrary.has(name) && !all.has(name)) all.set(name, graph);
+    return { names: new Map(graphs.map(({ graph, name }) => [graph, name])), all };
+  }, [graphs, actions]);
+}
+
+/** No graph stands for an action that is in it. */
+function useGraphsHere(id: string) {
+  const { names, all } = useGraphsByName();
+  return useMemo(() => {
+    const byName = new Map(all);
     const own = names.get(id);
     const isNamed = own !== undefined && byName.get(own) === id;
     if (own !== undefined) byName.delete(own);
-    return { names, byName, isNamed };
-  }, [graphs, actions, id]);
+    return { names, byName, isNamed, idOf: (name: string) => all.get(name) };
+  }, [names, all, id]);
 }
 
-export function Levels() {
+const nameIn = (graph: Pick<Graph, "actions">, action: string): string =>
+  graph.actions.find(({ key }) => key === action)?.name ?? "";
+
+/** Goes into what an action stands for; where it stands for nothing, to where it is. `path`: of the action,
+ * through those that are expanded. */
+function useWayIn(byName: ReadonlyMap<string, string>) {
   const { id, graph } = useEditorContext();
   const [, go] = useLocation();
   const search = useSearch();
-  const { names, byName, isNamed } = useGraphsByName(id);
-  const around = addressAround(search, levelsOf(search).length - 1);
-  const enter = useStableCallback((action: string) => {
-    const { name = "" } = graph.actions.find(({ key }) => key === action) ?? {};
-    const inside = byName.get(name);
-    if (inside === undefined) return;
-    go(addressInside(search, { graph: id, action }, inside));
-    announcer.say(`Inside ${name}`);
+  return useStableCallback((path: string) => {
+    const keys = path.split("/");
+    const by: Level[] = [];
+    let [here, at] = [id, graph as Pick<Graph, "actions">];
+    let levels = expansion.now().levels;
+    for (const [n, action] of keys.entries()) {
+      const name = nameIn(at, action);
+      const level = levels.get(action);
+      const inside = level?.id ?? byName.get(name);
+      if (inside === undefined) {
+        if (n > 0) go(addressInside(search, by, here, action));
+        return;
+      }
+      by.push({ graph: here, action });
+      here = inside;
+      at = typeof level?.graph === "object" && level.graph !== null ? level.graph : { actions: [] };
+      levels = level?.levels ?? new Map();
+      if (n === keys.length - 1) announcer.say(`Inside ${name}`);
+    }
+    go(addressInside(search, by, here));
   });
+}
+
+export function Levels() {
+  const { id, graph, past } = useEditorContext();
+  const [, go] = useLocation();
+  const search = useSearch();
+  const { names, byName, isNamed, idOf } = useGraphsHere(id);
+  const around = addressAround(search, levelsOf(search).length - 1);
+  const enter = useWayIn(byName);
+  const expand = useExpansion({ id, graph, idOf, off: past !== null, enter });
+  const leave = useCallback(() => go(around ?? "/"), [go, around]);
   useEffect(() => {
-    const leave = around === null ? null : () => go(around);
-    graphsInside.set({ names, byName, isNamed, enter, leave, Sign: InsideSign });
-    return () => graphsInside.set(null);
-  }, [names, byName, isNamed, enter, around, go]);
+    const way = around === null ? null : leave;
+    graphsInside.set({ names, byName, isNamed, enter, leave: way, expand, Sign: InsideSign });
+  }, [names, byName, isNamed, enter, around, leave, expand]);
+  useEffect(() => () => graphsInside.set(null), []);
   return null;
 }

@@ -24,7 +24,7 @@ import { colorOfName, initials } from "../ui/name-colors";
 import style from "./outline.module.css";
 import { type RowAction, rowActionsOf } from "./row-actions";
 import { RowEdit, type RowEditKind } from "./row-edit";
-import type { OutlineItem } from "./rows";
+import type { InsideRow, OutlineItem } from "./rows";
 
 interface Props {
   row: OutlineItem;
@@ -75,6 +75,21 @@ export function Others({ people }: { people: readonly PersonHere[] }) {
   ));
 }
 
+/** An action inside of another one: to look at, and the way to where it is changed. */
+function PartWords({ row }: { row: InsideRow }) {
+  const { action, progress } = row.part;
+  return (
+    <span className={style.head}>
+      <b>
+        <bdi>{action.name}</bdi> {action.instanceId}
+      </b>
+      {progress && (
+        <StateLabel tone={progress.tone} word={progress.word} {...durationLabel(progress)} />
+      )}
+    </span>
+  );
+}
+
 export function Words({ row, progress, name }: Pick<Props, "row" | "progress" | "name">) {
   switch (row.kind) {
     case "entry":
@@ -118,6 +133,8 @@ export function Words({ row, progress, name }: Pick<Props, "row" | "progress" | 
           {!row.relation.required && <span className={style.sub}>optional</span>}
         </span>
       );
+    case "inside":
+      return <PartWords row={row} />;
     case "note": {
       const { kind, text } = row.note;
       const Sign = kind === "frame" ? IconFrame : IconNote;
@@ -192,6 +209,7 @@ const noteWord = ({ kind }: Note) => (kind === "frame" ? "Frame" : "Note");
 
 export function colorOf(row: OutlineItem): string {
   if (row.kind === "note") return noteColor[row.note.color];
+  if (row.kind === "inside") return colorOfName(row.part.action.actor);
   return row.kind === "action" ? colorOfName(row.action.actor) : "transparent";
 }
 
@@ -205,6 +223,8 @@ export function labelOf(row: OutlineItem, name: string): string {
       return `${name}, ${outcomeWord[row.outcome]}`;
     case "target":
       return `the arrow to ${name}`;
+    case "inside":
+      return row.part.action.name;
     case "note":
       return `${noteWord(row.note)}: ${spokenNote(row.note.text).slice(0, 60) || "empty"}`;
   }
@@ -219,6 +239,7 @@ export const OutlineRow = memo(function OutlineRow(props: Props) {
       className={style.row}
       data-row={row.id}
       data-level={row.level}
+      data-inside={row.kind === "inside" || undefined}
       aria-level={row.level}
       aria-posinset={row.at}
       aria-setsize={row.of}
@@ -226,7 +247,7 @@ export const OutlineRow = memo(function OutlineRow(props: Props) {
       aria-labelledby={words}
       {...(row.open === null ? {} : { "aria-expanded": row.open })}
       tabIndex={active ? 0 : -1}
-      style={{ "--c": colorOf(row) } as React.CSSProperties}
+      style={{ "--c": colorOf(row), "--level": row.level } as React.CSSProperties}
       onFocus={(event) => {
         if (event.target === event.currentTarget) handlers.focus(row.id);
       }}

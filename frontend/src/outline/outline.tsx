@@ -6,11 +6,14 @@
  */
 import { Button, Kbd } from "@mantine/core";
 import { IconListTree, IconPlus } from "@tabler/icons-react";
-import { useCallback, useEffect, useMemo, useRef, useState } from "react";
+import { useCallback, useEffect, useMemo, useRef, useState, useSyncExternalStore } from "react";
 import { useHighlightedRobot } from "../canvas/card-highlights";
+import { expandedGraphs } from "../canvas/levels/expanded-graphs";
+import { graphsInside } from "../canvas/levels/graphs-inside";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { ENTRY, type Graph, type Key } from "../graph/model";
 import type { Progress } from "../status/progress";
+import { runOnCanvas } from "../status/progress-inside";
 import { useSelectedByOthers } from "../sync/use-room";
 import { announcer } from "../ui/announcer";
 import { Empty } from "../ui/empty";
@@ -82,12 +85,15 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
   const robot = useHighlightedRobot();
   const others = useSelectedByOthers();
   const { isOpen, flip } = useOpen(graph.actions.length);
+  const expanded = useSyncExternalStore(expandedGraphs.subscribe, expandedGraphs.now);
+  const run = useSyncExternalStore(runOnCanvas.subscribe, runOnCanvas.now);
+  // biome-ignore lint/correctness/useExhaustiveDependencies: with each change of the run there are other states
   const rows = useMemo(() => {
-    const all = rowsOf(graph, phone ? closed : isOpen);
+    const all = rowsOf(graph, phone ? closed : isOpen, expanded?.partsOf);
     if (robot === null) return all;
     const lit = new Set(graph.actions.filter(({ actor }) => actor === robot).map(({ key }) => key));
     return all.filter((row) => row.kind === "entry" || lit.has(ownerOf(row)));
-  }, [graph, isOpen, robot, phone]);
+  }, [graph, isOpen, robot, phone, expanded, run]);
   const names = useMemo(() => namesOf(graph), [graph]);
   const [only] = selection.size === 1 ? selection : [];
   const chosen = () => rows.find((row) => subjectOf(row) === only);
@@ -109,6 +115,7 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
   };
   const choose = (row: OutlineItem) => {
     setActive(row.id);
+    if (row.kind === "inside") return graphsInside.now()?.enter(row.part.path);
     const subject = subjectOf(row);
     select([subject]);
     if (!phone) context.view.show(subject.split(">").map((end) => end.split(";")[0] ?? end));
@@ -123,7 +130,7 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
     found?.scrollIntoView({ block: "nearest" });
   }, [only, rows, active]);
 
-  const run = (rowAction: RowAction, row: OutlineItem) => {
+  const act = (rowAction: RowAction, row: OutlineItem) => {
     if (rowAction.changes && !mayEdit) return;
     switch (rowAction.name) {
       case "details":
@@ -133,6 +140,12 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
       case "comments":
         choose(row);
         setPanel("comments");
+        break;
+      case "enter":
+        graphsInside.now()?.enter(subjectOf(row));
+        break;
+      case "expand":
+        graphsInside.now()?.expand.toggle(subjectOf(row));
         break;
       case "delete":
         announcer.say(removeRow(context, row));
@@ -159,7 +172,7 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
     if (opens || closes) flip(row.id);
     else if (next !== null && next >= 0) focus(next);
     else if (event.key === " ") choose(row);
-    else if (rowAction) run(rowAction, row);
+    else if (rowAction) act(rowAction, row);
     else return;
     event.preventDefault();
     event.stopPropagation();
@@ -173,8 +186,8 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
   latest.current = {
     flip,
     focus: setActive,
-    choose: phone ? (row) => run(DETAILS, row) : choose,
-    run,
+    choose: (row) => (phone && row.kind !== "inside" ? act(DETAILS, row) : choose(row)),
+    run: act,
     done,
   };
   const handlers = useMemo((): RowHandlers => {
@@ -309,5 +322,7 @@ function ownerOf(row: OutlineItem): Key {
       return row.relation.parent;
     case "note":
       return row.note.key;
+    case "inside":
+      return row.part.path.split("/")[0] ?? "";
   }
 }

@@ -112,21 +112,22 @@ export const PhoneRow = memo(function PhoneRow(props: Props) {
     handlers,
   } = props;
   const words = useId();
-  const name = names.get(row.id) ?? "";
+  const name = row.kind === "inside" ? row.part.action.name : (names.get(row.id) ?? "");
   const open = row.kind === "action" && !row.action.missing ? leadingNowhere(bundles) : [];
   const asks = mayEdit && (open.includes("on_true") || (selected && open.length > 0));
   return (
     <tr
       className={style.row}
       data-row={row.id}
-      data-level={1}
-      aria-level={1}
+      data-level={row.level}
+      data-inside={row.kind === "inside" || undefined}
+      aria-level={row.level}
       aria-posinset={row.at}
       aria-setsize={row.of}
       aria-selected={selected}
       aria-labelledby={words}
       tabIndex={active ? 0 : -1}
-      style={{ "--c": colorOf(row) } as React.CSSProperties}
+      style={{ "--c": colorOf(row), "--level": row.level } as React.CSSProperties}
       onFocus={(event) => {
         if (event.target === event.currentTarget) handlers.focus(row.id);
       }}

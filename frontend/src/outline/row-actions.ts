@@ -1,5 +1,6 @@
 /** What can be done to a row of the outline, with its key. */
 
+import { graphsInside } from "../canvas/levels/graphs-inside";
 import type { EditorContext } from "../edit-actions/editor-context";
 import { relationId } from "../graph/document-keys";
 import {
@@ -10,13 +11,21 @@ import {
   setResponse,
   swapOrder,
 } from "../graph/edit";
-import { ENTRY, type Key, type Precondition, spokenOutcomes } from "../graph/model";
+import { type Action, ENTRY, type Key, type Precondition, spokenOutcomes } from "../graph/model";
 import { endName } from "../graph/relation-words";
 import type { RowEditKind } from "./row-edit";
 import type { BundleRow, OutlineItem } from "./rows";
 
 export interface RowAction {
-  readonly name: RowEditKind | "delete" | "up" | "down" | "details" | "comments";
+  readonly name:
+    | RowEditKind
+    | "delete"
+    | "up"
+    | "down"
+    | "details"
+    | "comments"
+    | "enter"
+    | "expand";
   readonly label: string;
   /** As in `KeyboardEvent.key`, with `Alt+` before it where needed. */
   readonly key: string;
@@ -39,12 +48,34 @@ const RESPONSE: RowAction = {
 };
 const TARGET: RowAction = { name: "target", label: "Lead it elsewhere …", key: "t", changes: true };
 
+const ENTER: RowAction = {
+  name: "enter",
+  label: "Open the graph inside",
+  key: "]",
+  changes: false,
+};
+const EXPAND: RowAction = {
+  name: "expand",
+  label: "Expand or collapse the graph inside",
+  key: "}",
+  changes: false,
+};
+
+/** What can be done with an action that stands for a graph. */
+const levelActions = ({ name }: Action): readonly RowAction[] =>
+  graphsInside.now()?.byName.has(name) ? [EXPAND, ENTER] : [];
+
 export function rowActionsOf(row: OutlineItem): readonly RowAction[] {
   switch (row.kind) {
     case "entry":
       return [{ ...CONNECT, label: "Start with …" }];
     case "action":
-      return [DETAILS, RENAME, CONNECT, TALK, UP, DOWN, DELETE];
+      return [DETAILS, ...levelActions(row.action), RENAME, CONNECT, TALK, UP, DOWN, DELETE];
+    case "inside":
+      return [
+        { ...ENTER, label: "Open its level", key: "Enter" },
+        ...levelActions(row.part.action),
+      ];
     case "outcome":
       return [CONNECT, DETAILS];
     case "target":

@@ -24,8 +24,35 @@ function words(graph: Graph, row: OutlineItem): string {
       return `${row.response} ${name(row.relation.child)}`;
     case "note":
       return row.note.text;
+    case "inside":
+      return row.part.action.name;
   }
 }
+
+test("what is expanded in an action stands below it, each level below its own", () => {
+  const doc = new Y.Doc();
+  const fetch = addAction(doc, { name: "Fetch" });
+  const graph = read(doc);
+  const part = (path: string, name: string) => {
+    const [action] = graph.actions;
+    if (!action) throw new Error("no action");
+    const box = { x: 0, y: 0, width: 208, height: 88, progress: null, expanded: false };
+    return { ...box, path, action: { ...action, name } };
+  };
+  const parts = [
+    part(`${fetch}/grip`, "Grip"),
+    part(`${fetch}/grip/close`, "Close"),
+    part(`${fetch}/lift`, "Lift"),
+  ];
+  const rows = rowsOf(graph, all, (key) => (key === fetch ? parts : []));
+  expect(rows.map((row) => [row.level, words(graph, row), row.parent, row.at, row.of])).toEqual([
+    [1, "entry", null, 1, 2],
+    [1, "Fetch", null, 2, 2],
+    [2, "Grip", fetch, 1, 2],
+    [3, "Close", `${fetch}/grip`, 1, 1],
+    [2, "Lift", fetch, 2, 2],
+  ]);
+});
 
 test("the outline follows the run, loops once, and forgets nobody", () => {
   const doc = new Y.Doc();

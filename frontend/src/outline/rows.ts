@@ -1,4 +1,5 @@
 /** The graph as rows of an outline: actions, their outcomes, and what follows each. Pure. */
+import type { PartOnCard } from "../canvas/levels/expanded-graphs";
 import { relationId } from "../graph/document-keys";
 import { type Note, notesOf } from "../graph/edit/notes";
 import {
@@ -15,7 +16,7 @@ import {
 
 interface OutlinePosition {
   readonly id: string;
-  readonly level: 1 | 2 | 3;
+  readonly level: number;
   /** The row above it in the tree; null at the top. */
   readonly parent: string | null;
   /** Whether what is under it is shown; null: nothing is under it. */
@@ -39,7 +40,11 @@ export type OutlineItem = OutlinePosition &
         readonly bundled?: readonly Precondition[];
       }
     | { readonly kind: "note"; readonly note: Note }
+    /** An action of a graph that is expanded in an action of this one. */
+    | { readonly kind: "inside"; readonly part: PartOnCard }
   );
+
+export type InsideRow = Extract<OutlineItem, { kind: "inside" }>;
 
 type Children = ReadonlyMap<Key, readonly Relation[]>;
 
@@ -74,8 +79,17 @@ export function inOrder(graph: Graph, children = childrenOf(graph)): Action[] {
   return [...[...found].flatMap((key) => actions.get(key) ?? []), ...rest];
 }
 
+/** What is drawn on the card of an action. */
+type PartsOf = (key: Key) => readonly PartOnCard[];
+
+const nothing: PartsOf = () => [];
+
 /** `isOpen` says of an action or outcome, by the id of its row, whether its children are shown. */
-export function rowsOf(graph: Graph, isOpen: (id: string) => boolean): OutlineItem[] {
+export function rowsOf(
+  graph: Graph,
+  isOpen: (id: string) => boolean,
+  partsOf: PartsOf = nothing,
+): OutlineItem[] {
   const children = childrenOf(graph);
   const actions = inOrder(graph, children);
   const rows: OutlineItem[] = [];
@@ -92,12 +106,34 @@ export function rowsOf(graph: Graph, isOpen: (id: string) => boolean): OutlineIt
     const place = { id: action.key, level: 1, parent: null, open, at: i + 2, of } as const;
     rows.push({ kind: "action", ...place, action, follows });
     if (open) rows.push(...outcomes(action, after, isOpen));
+    rows.push(...insides(partsOf(action.key)));
   }
   for (const [i, note] of notes.entries()) {
     const at = actions.length + i + 2;
     rows.push({ kind: "note", id: note.key, level: 1, parent: null, open: null, at, of, note });
   }
   return rows;
+}
+
+/** The actions of all levels of an expanded graph, each below the one that stands for its graph. */
+function insides(parts: readonly PartOnCard[]): InsideRow[] {
+  const counts = new Map<string, number>();
+  const around = ({ path }: PartOnCard) => path.slice(0, path.lastIndexOf("/"));
+  const places = parts.map((part) => {
+    const at = (counts.get(around(part)) ?? 0) + 1;
+    counts.set(around(part), at);
+    return at;
+  });
+  return parts.map((part, i) => ({
+    kind: "inside",
+    id: part.path,
+    level: part.path.split("/").length,
+    parent: around(part),
+    open: null,
+    at: places[i] ?? 1,
+    of: counts.get(around(part)) ?? 1,
+    part,
+  }));
 }
 
 function outcomes(
@@ -220,5 +256,7 @@ export function subjectOf(row: OutlineItem): string {
       return relationId(row.relation);
     case "note":
       return row.note.key;
+    case "inside":
+      return row.part.path;
   }
 }

@@ -2,6 +2,7 @@
 import { useStore, ViewportPortal } from "@xyflow/react";
 import { memo } from "react";
 import { checkedColor } from "../api/people";
+import type { Position } from "../graph/model";
 import { usePeople } from "../sync/use-room";
 import style from "./cursors.module.css";
 import { colored, Name } from "./people";
@@ -43,22 +44,20 @@ function AtOwnSize({ children }: { children: React.ReactNode }) {
   );
 }
 
-export function Cursors() {
+const same = (at: Position): Position => at;
+
+/** `toView`: where a place on the canvas is drawn. */
+export function Cursors({ toView = same }: { toView?: (at: Position) => Position }) {
   const people = usePeople();
   const pointing = people.filter(({ presence }) => presence.cursor !== undefined);
   if (pointing.length === 0) return null;
   return (
     <ViewportPortal>
       <AtOwnSize>
-        {pointing.map(({ client, name, color, presence }) => (
-          <Cursor
-            key={client}
-            x={presence.cursor?.[0] ?? 0}
-            y={presence.cursor?.[1] ?? 0}
-            name={name}
-            color={checkedColor(color)}
-          />
-        ))}
+        {pointing.map(({ client, name, color, presence }) => {
+          const [x, y] = toView(presence.cursor ?? [0, 0]);
+          return <Cursor key={client} x={x} y={y} name={name} color={checkedColor(color)} />;
+        })}
       </AtOwnSize>
     </ViewportPortal>
   );

@@ -15,8 +15,17 @@ interface GraphsInside {
   readonly byName: ReadonlyMap<string, string>;
   /** Whether actions of others with this graph's name stand for it, and for no older one. */
   readonly isNamed: boolean;
-  /** Opens the graph for which an action stands. */
-  enter(action: Key): void;
+  /** Opens the graph for which an action stands. One that is drawn inside of others is told by all their
+   * keys, joined by "/"; where it stands for none, the graph in which it is is opened. */
+  enter(path: string): void;
+  /** What is drawn in place, without going anywhere. */
+  readonly expand: {
+    toggle(path: string): void;
+    /** One level more than is expanded now, everywhere. */
+    expandMore(): void;
+    collapseAll(): void;
+    isAnyExpanded(): boolean;
+  };
   /** Back to the action through which one came; null where one came through none. */
   readonly leave: (() => void) | null;
   /** What is drawn at such an action. */

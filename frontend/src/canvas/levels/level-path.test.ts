@@ -11,7 +11,7 @@ test("whoever goes in by some actions comes out by the same, one after the other
     fc.property(fc.array(level, { minLength: 1, maxLength: 20 }), id, (way, last) => {
       let search = "";
       for (const [n, from] of way.entries())
-        search = searchOf(addressInside(search, from, way[n + 1]?.graph ?? last));
+        search = searchOf(addressInside(search, [from], way[n + 1]?.graph ?? last));
       expect(levelsOf(search)).toEqual(way);
       for (let n = way.length - 1; n >= 0; n -= 1) {
         const out = addressAround(search, n) ?? "";
@@ -36,7 +36,7 @@ test("an address that somebody made up leads nowhere else, and its length is bou
   );
   let search = "";
   for (let n = 0; n < 50; n += 1)
-    search = searchOf(addressInside(search, { graph: `g${n}`, action: "a" }, "h"));
+    search = searchOf(addressInside(search, [{ graph: `g${n}`, action: "a" }], "h"));
   expect(levelsOf(search).map(({ graph }) => graph)).toEqual(
     Array.from({ length: 20 }, (_, n) => `g${n + 30}`),
   );

@@ -25,9 +25,14 @@ function address(graph: string, levels: readonly Level[], action: Key | null): s
   return `/graphs/${encodeURIComponent(graph)}${text === "" ? "" : `?${text}`}`;
 }
 
-/** The graph for which an action stands, entered from where one is. */
-export function addressInside(search: string, from: Level, graph: string): string {
-  return address(graph, [...levelsOf(search), from], null);
+/** A graph inside, entered from where one is by these actions, with one of its own chosen. */
+export function addressInside(
+  search: string,
+  by: readonly Level[],
+  graph: string,
+  action: Key | null = null,
+): string {
+  return address(graph, [...levelsOf(search), ...by], action);
 }
 
 /** The n-th graph around, with the action chosen through which one came; null: there is none. */

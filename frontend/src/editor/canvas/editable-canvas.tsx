@@ -13,10 +13,10 @@ import {
 } from "@xyflow/react";
 import { type MouseEvent, type RefObject, useEffect, useMemo, useRef } from "react";
 import { actionDrag } from "../../canvas/action-drag";
-import { LineEditingContext } from "../../canvas/arrows/bend-handles";
-import { LineContext } from "../../canvas/arrows/line-store";
+import { LineContext, LineEditingContext } from "../../canvas/arrows/line-store";
 import type { Arrow, CanvasNode } from "../../canvas/elements";
 import { FoldedFrame } from "../../canvas/folding/folded-frame";
+import type { PlaceMap } from "../../canvas/folding/spread";
 import { CARD } from "../../canvas/geometry/arrange";
 import { edgeTypes, nodeTypes } from "../../canvas/graph-view";
 import { graphsInside } from "../../canvas/levels/graphs-inside";
@@ -94,11 +94,20 @@ function PendingHint({
   );
 }
 
+/** The box of a note in the document that is drawn as this one. */
+function boxIn({ at, size }: Parameters<NoteEditing["change"]>[1], toDocument: PlaceMap) {
+  if (!at || !size) return {};
+  const [from, to] = [toDocument(at), toDocument([at[0] + size[0], at[1] + size[1]])];
+  const whole = ([x, y]: Position): Position => [Math.round(x), Math.round(y)];
+  return { at: whole(from), size: whole([to[0] - from[0], to[1] - from[1]]) };
+}
+
 /** How notes are changed from the canvas itself. */
 function useNoteEditing(
   context: EditorContext,
   writing: string | null,
   setResized: NoteEditing["resizing"],
+  toDocument: PlaceMap,
 ) {
   const [only, ...others] = context.selection;
   const alone = only !== undefined && others.length === 0 ? only : null;
@@ -106,7 +115,7 @@ function useNoteEditing(
   const change = useStableCallback<Parameters<NoteEditing["change"]>, void>((key, change) => {
     const { text } = change;
     const linked = text === undefined ? {} : { text: withLinkIds(text, context.graph.actions) };
-    changeNote(doc, key, { ...change, ...linked });
+    changeNote(doc, key, { ...change, ...linked, ...boxIn(change, toDocument) });
   });
   return useMemo<NoteEditing | null>(() => {
     if (!mayEdit) return null;
@@ -252,11 +261,11 @@ function Drawing({
       <Background variant={BackgroundVariant.Dots} gap={20} size={1.4} />
       {context.past === null && (
         <>
-          <Cursors />
+          <Cursors toView={canvas.view.toView} />
           <PeopleAtCards
             me={me}
-            places={canvas.places}
-            sizes={canvas.sizes}
+            places={canvas.view.places}
+            sizes={canvas.view.sizes}
             blockOf={canvas.folding?.blockOf}
           />
         </>
@@ -284,12 +293,14 @@ export function EditableCanvas({ context, canvas, me, map, onPanned, pointer, wr
   const hands = useHands({ context, canvas, onPanned }, connecting);
   const press = useContextMenu(context);
   const pinch = usePinch(context, onPanned);
-  const noteEditing = useNoteEditing(context, writing, canvas.setResized);
-  const lineEditing = useLineEditing(context);
+  const noteEditing = useNoteEditing(context, writing, canvas.setResized, canvas.view.toDocument);
+  const lineEditing = useLineEditing(context, canvas.view.toDocument);
   const onDoubleClick = (event: MouseEvent) => {
     const target = event.target as Element;
+    const inner = target.closest<HTMLElement>("[data-inner]")?.dataset.inner;
     const card = target.closest<HTMLElement>(".react-flow__node-action")?.dataset.id;
-    if (card !== undefined) graphsInside.now()?.enter(card);
+    const path = inner ?? card;
+    if (path !== undefined) graphsInside.now()?.enter(path);
     if (!target.classList.contains("react-flow__pane")) return;
     openAddAt([event.clientX, event.clientY], null);
   };

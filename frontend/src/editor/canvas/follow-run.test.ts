@@ -1,8 +1,9 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
 import { CARD } from "../../canvas/geometry/arrange";
+import { expandedGraphs, type PartOnCard } from "../../canvas/levels/expanded-graphs";
 import type { Progress } from "../../status/progress";
-import { followedBox, followingViewport, runningKeys } from "./follow-run";
+import { followedBox, followingViewport, runningInside, runningKeys } from "./follow-run";
 
 const frame = { width: 900, height: 500 };
 const card = (x: number, y: number) => ({ x, y, width: CARD.width, height: CARD.height });
@@ -60,4 +61,20 @@ test("what runs in a folded frame is followed to its block", () => {
     ["b", "g/1"],
   ]);
   expect(runningKeys(progress, blockOf)).toEqual(["g/1", "c"]);
+});
+
+const Nothing = () => null;
+
+test("what runs on a card with a graph in it is followed there, and not the whole card", () => {
+  const places = new Map([["a", [1_000, 500] as const]]);
+  const sizes = new Map([["a", { width: 900, height: 400 }]]);
+  const part = (path: string, x: number, tone: string, expanded = false) =>
+    ({ path, x, y: 60, width: 208, height: 88, expanded, progress: { tone } }) as PartOnCard;
+  const parts = [part("a/b", 20, "run", true), part("a/b/c", 60, "run"), part("a/d", 400, "true")];
+  expandedGraphs.set({ sizes, Frame: Nothing, partsOf: (key) => (key === "a" ? parts : []) });
+  const found = runningInside(["a"], { places, sizes });
+  expect(found.keys).toEqual(["a/b/c"]);
+  expect(found.places.get("a/b/c")).toEqual([1_060, 560]);
+  expandedGraphs.set(null);
+  expect(runningInside(["a"], { places, sizes }).keys).toEqual(["a"]);
 });

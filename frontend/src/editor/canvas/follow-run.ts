@@ -4,6 +4,7 @@ import { type RefObject, useCallback, useEffect, useRef, useState } from "react"
 import type { Arrow, CanvasNode } from "../../canvas/elements";
 import type { Positions, Sizes } from "../../canvas/geometry/arrange";
 import { type Bounds, boundsOf } from "../../canvas/geometry/viewport";
+import { expandedGraphs } from "../../canvas/levels/expanded-graphs";
 import type { Key } from "../../graph/model";
 import type { Progress } from "../../status/progress";
 import { glideTo } from "./composited-glide";
@@ -31,6 +32,27 @@ export function runningKeys(
     .sort(([, a], [, b]) => (b.since ?? 0) - (a.since ?? 0))
     .map(([key]) => blockOf?.get(key) ?? key);
   return [...new Set(keys)];
+}
+
+interface DrawnPlaces {
+  readonly places: Positions;
+  readonly sizes: Sizes;
+}
+
+/** What runs on a card with a graph in it is followed there, as if it stood on the canvas itself. */
+export function runningInside(keys: readonly Key[], { places, sizes }: DrawnPlaces) {
+  const found = { keys: [] as Key[], places: new Map(places), sizes: new Map(sizes) };
+  for (const key of keys) {
+    const [x, y] = places.get(key) ?? [0, 0];
+    const parts = expandedGraphs.now()?.partsOf(key) ?? [];
+    const running = parts.filter((part) => part.progress?.tone === "run" && !part.expanded);
+    for (const part of running) {
+      found.places.set(part.path, [x + part.x, y + part.y]);
+      found.sizes.set(part.path, part);
+    }
+    found.keys.push(...(running.length > 0 ? running.map(({ path }) => path) : [key]));
+  }
+  return found;
 }
 
 /** Where to look so that a box is seen with room around it; null while it is. The zoom stays. */
@@ -115,7 +137,7 @@ interface Followed {
   flow: ReactFlowInstance<CanvasNode, Arrow>;
   frame: RefObject<HTMLDivElement | null>;
   /** Where everything stands now. */
-  now: RefObject<{ places: Positions; sizes: Sizes }>;
+  now: RefObject<DrawnPlaces>;
   /** The run that goes, if one does. */
   run: string | null;
   progress: ReadonlyMap<Key, Progress>;
@@ -129,7 +151,10 @@ interface Followed {
 export function useFollowRun({ flow, frame, now, run, progress, blockOf, glide }: Followed) {
   const [left, setLeft] = useState<string | null>(null);
   const lost = run !== null && left === run;
-  const going = runningKeys(progress, blockOf);
+  const { keys: going, ...standing } = runningInside(
+    run === null || lost ? [] : runningKeys(progress, blockOf),
+    now.current,
+  );
   const key = going.join(" ");
   const { isBusy, release } = useHandsOn(frame);
   // biome-ignore lint/correctness/useExhaustiveDependencies: only when other actions run
@@ -138,8 +163,7 @@ export function useFollowRun({ flow, frame, now, run, progress, blockOf, glide }
     if (run === null || lost || going.length === 0 || room === null || isBusy()) return;
     const size = { width: room.clientWidth, height: room.clientHeight };
     const here = flow.getViewport();
-    const { places, sizes } = now.current ?? { places: new Map(), sizes: new Map() };
-    const box = followedBox(going, places, sizes, size, here.zoom);
+    const box = followedBox(going, standing.places, standing.sizes, size, here.zoom);
     const next = box && followingViewport(box, size, here);
     if (next) glideTo(flow, room, next, glide(GLIDE).duration);
   }, [run, lost, key]);

@@ -31,7 +31,9 @@ import {
 } from "../../canvas/elements";
 import { foldedArrows, foldedNodes, foldedScene } from "../../canvas/folding/folded-drawing";
 import { type Folding, foldingOf, wholeSizes } from "../../canvas/folding/folding";
+import { type PlaceMap, useSpread } from "../../canvas/folding/spread";
 import { type Positions, positionsOf, unplaced } from "../../canvas/geometry/arrange";
+import { expandedGraphs } from "../../canvas/levels/expanded-graphs";
 import { notePlaces } from "../../canvas/notes/note-nodes";
 import type { ProblemMarks } from "../../canvas/problem-marks";
 import { asOneEdit, insertInto, moveActions } from "../../graph/edit";
@@ -182,18 +184,27 @@ interface Placed {
   readonly rest: Positions;
   readonly sizes: ReadonlyMap<Key, MeasuredSize>;
   readonly folding: Folding | null;
+  /** Where something stands that is drawn there. */
+  readonly toDocument: PlaceMap;
+}
+
+/** Where a card stands, on whole pixels, that React Flow has drawn there. */
+function standing({ toDocument }: Pick<Placed, "toDocument">, at: { x: number; y: number }) {
+  const [x, y] = toDocument([at.x, at.y]);
+  return [round(x), round(y)] as const;
 }
 
 /** Where things stand after they were dragged; frames take along what lies in them. */
 function afterMoves(
   before: Positions | null,
   moves: readonly NodeChange<CanvasNode>[],
-  { graph, rest, sizes }: Placed,
+  placed: Placed,
 ): Positions {
+  const { graph, rest, sizes } = placed;
   const next: Positions = new Map(before);
   for (const move of moves) {
     if (move.type !== "position" || !move.position) continue;
-    next.set(move.id, [round(move.position.x), round(move.position.y)]);
+    next.set(move.id, standing(placed, move.position));
   }
   const own = new Map(
     moves.flatMap((move): [string, Position][] => {
@@ -202,6 +213,16 @@ function afterMoves(
     }),
   );
   for (const [key, at] of withContents(graph, own, rest, sizes)) next.set(key, at);
+  return next;
+}
+
+/** What is expanded is as large as it was: that is how it stands in the document. */
+function afterSizes(before: Placed["sizes"], sized: readonly NodeChange<CanvasNode>[]) {
+  const expanded = expandedGraphs.now()?.sizes;
+  const next = new Map(before);
+  for (const change of sized)
+    if (change.type === "dimensions" && change.dimensions && !expanded?.has(change.id))
+      next.set(change.id, change.dimensions);
   return next;
 }
 
@@ -226,13 +247,7 @@ function useNodeChanges(
     (all: NodeChange<CanvasNode>[]) => {
       const changes = store.getState().userSelectionActive ? all.filter(isNoFrame) : all;
       const sized = changes.filter((change) => change.type === "dimensions");
-      if (sized.length > 0) {
-        setSizes((before) => {
-          const next = new Map(before);
-          for (const { id, dimensions } of sized) if (dimensions) next.set(id, dimensions);
-          return next;
-        });
-      }
+      if (sized.length > 0) setSizes((before) => afterSizes(before, sized));
       const moves = changes.filter((change) => change.type === "position" && change.dragging);
       if (moves.length > 0) {
         const { current } = now;
@@ -246,30 +261,29 @@ function useNodeChanges(
 
 /** What happens while cards are dragged, and when they are dropped. */
 function useDragging(
-  { graph, rest, sizes }: Placed,
+  placed: Placed,
   over: string | null,
   setOver: (arrow: string | null) => void,
   setDrag: (drag: Positions | null) => void,
 ) {
   const { doc, presence } = useRoom();
+  const { graph, rest, sizes } = placed;
   const begun = useRef<Position | null>(null);
   const onDrag = (
     event: MouseEvent | TouchEvent | ReactMouseEvent,
     node: CanvasNode,
     all: CanvasNode[],
   ) => {
-    const at: Position = [node.position.x, node.position.y];
+    const at = standing(placed, node.position);
     begun.current ??= rest.get(node.id) ?? at;
     const [dx, dy] = [round(at[0] - begun.current[0]), round(at[1] - begun.current[1])];
-    const moved = new Map(all.map(({ id, position: { x, y } }) => [id, [x, y] as const]));
+    const moved = new Map(all.map(({ id, position }) => [id, standing(placed, position)]));
     const ids = [...withContents(graph, moved, rest, sizes).keys()];
     presence.tell({ drag: { ids, dx, dy } });
     setOver(insertable(graph, all) ? arrowAt(pointOf(event)) : null);
   };
   const onDragStop = (_: unknown, __: CanvasNode, all: CanvasNode[]) => {
-    const moved = new Map(
-      all.map((node) => [node.id, [round(node.position.x), round(node.position.y)]] as const),
-    );
+    const moved = new Map(all.map(({ id, position }) => [id, standing(placed, position)] as const));
     if (begun.current !== null) {
       const dropped = withContents(graph, moved, rest, sizes);
       asOneEdit(doc, () => {
@@ -310,7 +324,7 @@ export function useCanvasElements(given: CanvasElementsInput) {
   const { graph, selection, select, progress, marks, laidOut, folded } = given;
   const here = usePeople();
   const people = given.alone ? NOBODY : here;
-  const flow: ReactFlowInstance<CanvasNode, Arrow> = useReactFlow<CanvasNode, Arrow>();
+  const onScreen: ReactFlowInstance<CanvasNode, Arrow> = useReactFlow<CanvasNode, Arrow>();
   const [sizes, setSizes] = useState<ReadonlyMap<Key, MeasuredSize>>(new Map());
   const [drag, setDrag] = useState<Positions | null>(null);
   const [resized, setResized] = useState<Note | null>(null);
@@ -320,7 +334,12 @@ export function useCanvasElements(given: CanvasElementsInput) {
     [graph, sizes, laidOut],
   );
   const { folding, known } = useFolding(graph, folded, rest, sizes);
+  const spread = useSpread({ graph, rest, folding, flow: onScreen });
   const places = useMemo(() => dragged(rest, people, drag), [rest, people, drag]);
+  const drawnPlaces = useMemo(() => spread.placesOf(places), [spread, places]);
+  const drawnRest = useMemo(() => spread.placesOf(rest), [spread, rest]);
+  const measured = useMemo(() => spread.sizesOf(sizes), [spread, sizes]);
+  const { flow, toDocument, expanded } = spread;
   const others = useChosenByOthers(people);
   // The arrow that would take in what is dragged looks as if it were chosen.
   const selected = useMemo(
@@ -328,17 +347,18 @@ export function useCanvasElements(given: CanvasElementsInput) {
     [selection, over],
   );
   const options = useMemo(
-    () => ({ others, places, selected, progress, marks, measured: sizes, resized }),
-    [others, places, selected, progress, marks, sizes, resized],
+    () => ({ others, places: drawnPlaces, selected, progress, marks, measured, resized, expanded }),
+    [others, drawnPlaces, selected, progress, marks, measured, resized, expanded],
   );
-  const drawn = useDrawn(graph, options, folding);
-  const lines = useLines(graph, { ...options, rest }, folding);
-  const placed = { graph, rest, sizes: known, folding };
+  const drawn = useDrawn(spread.graph, options, spread.folding);
+  const lines = useLines(spread.graph, { ...options, rest: drawnRest }, spread.folding);
+  const placed = { graph, rest, sizes: known, folding, toDocument };
   const onEdgesChange = useSelectionChanges(selection, select);
   const onNodesChange = useNodeChanges(placed, setSizes, setDrag, onEdgesChange);
-  const dragging = useDragging(placed, over, setOver, setDrag);
-  const hands = { onNodesChange, onEdgesChange, ...dragging };
-  return { flow, lines, ...drawn, folding, places, sizes: known, setResized, setOver, ...hands };
+  const hands = { onNodesChange, onEdgesChange, ...useDragging(placed, over, setOver, setDrag) };
+  const view = { ...spread, places: drawnPlaces, sizes: spread.sizesOf(known) };
+  const stands = { folding, places, sizes: known };
+  return { flow, lines, ...drawn, ...stands, view, setResized, setOver, ...hands };
 }
 
 /** One action that nothing leads to or from can be dropped into an arrow. */

@@ -1,7 +1,8 @@
 /** How lines are bent, and outcomes led elsewhere, on the canvas itself; null for who may not edit. */
 import { useMemo } from "react";
-import type { LineEditing } from "../../canvas/arrows/bend-handles";
 import { pillWord } from "../../canvas/arrows/bundles";
+import type { LineEditing } from "../../canvas/arrows/line-store";
+import type { PlaceMap } from "../../canvas/folding/spread";
 import { type EditorContext, nudging } from "../../edit-actions/editor-context";
 import { setWaypoints } from "../../graph/edit/waypoints";
 import { endName } from "../../graph/relation-words";
@@ -9,10 +10,12 @@ import { useStableCallback } from "../../ui/hooks/use-stable-callback";
 import { nodeAt } from "./hit-test";
 import { leadElsewhere } from "./lead-elsewhere";
 
-export function useLineEditing(context: EditorContext): LineEditing | null {
+/** `toDocument`: where something stands that is drawn there. */
+export function useLineEditing(context: EditorContext, toDocument: PlaceMap): LineEditing | null {
   const { mayEdit } = context;
   const bend = useStableCallback<Parameters<LineEditing["bend"]>, void>((bundle, via, byKey) => {
-    const write = () => setWaypoints(context.doc, bundle.id, via);
+    const places = via.map(toDocument).map(([x, y]) => [Math.round(x), Math.round(y)] as const);
+    const write = () => setWaypoints(context.doc, bundle.id, places);
     if (byKey) nudging(context, `bends ${bundle.id}`, write);
     else write();
   });

@@ -3,6 +3,7 @@ import type { ReactFlowInstance } from "@xyflow/react";
 import { type RefObject, useCallback, useEffect, useMemo, useRef } from "react";
 import type { LineStore } from "../../canvas/arrows/line-store";
 import type { Arrow, CanvasNode } from "../../canvas/elements";
+import type { PlaceMap } from "../../canvas/folding/spread";
 import { CARD, type Positions, pillSize, type Sizes } from "../../canvas/geometry/arrange";
 import {
   boundsOf,
@@ -24,9 +25,12 @@ import { useFollowRun } from "./follow-run";
 interface ViewportInput {
   flow: ReactFlowInstance<CanvasNode, Arrow>;
   frame: RefObject<HTMLDivElement | null>;
+  /** Where everything is drawn. */
   places: Positions;
   sizes: Sizes;
   lines: LineStore;
+  /** Where something is drawn that stands here. */
+  toView: PlaceMap;
   /** The folded frames that are drawn instead of what lies in them. */
   blockOf: ReadonlyMap<Key, string> | undefined;
   /** Unfolds what hides these. */
@@ -89,7 +93,7 @@ export function focusCard(room: HTMLElement, key: Key, tries: number): void {
 
 export function useViewport(given: ViewportInput) {
   const { flow, frame, places, sizes, lines, direction, phone, progress, run, pointer } = given;
-  const { blockOf, unfoldRound } = given;
+  const { blockOf, unfoldRound, toView } = given;
   const [begun, empty] = [given.opens === "cards", given.opens === "ends"];
   const now = useRef({ places, sizes, direction });
   now.current = { places, sizes, direction };
@@ -209,9 +213,10 @@ export function useViewport(given: ViewportInput) {
         unfoldRound(keys);
         show(keys, goal);
       },
-      reveal: ([x, y]) => {
+      reveal: (at) => {
         const room = frame.current;
         if (room === null) return;
+        const [x, y] = toView(at);
         const size = roomOf(room);
         const next = viewportShowing({ x, y, ...CARD }, size, flow.getViewport());
         fitted.current = null;
@@ -241,7 +246,7 @@ export function useViewport(given: ViewportInput) {
         if (room !== null) focusCard(room, key, 12);
       },
     }),
-    [showAll, show, flow, frame, pointer, unfoldRound],
+    [showAll, show, flow, frame, pointer, unfoldRound, toView],
   );
 
   const follow = useFollowRun({ flow, frame, now, run, progress, blockOf, glide });

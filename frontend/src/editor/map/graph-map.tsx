@@ -6,9 +6,19 @@
  */
 import { useThrottledValue } from "@mantine/hooks";
 import { Panel, type ReactFlowInstance, useStore, type Viewport } from "@xyflow/react";
-import { memo, type PointerEvent, type RefObject, useEffect, useMemo, useRef } from "react";
+import {
+  memo,
+  type PointerEvent,
+  type RefObject,
+  useEffect,
+  useMemo,
+  useRef,
+  useSyncExternalStore,
+} from "react";
 import type { Arrow, CanvasNode } from "../../canvas/elements";
+import { expandedGraphs } from "../../canvas/levels/expanded-graphs";
 import { onMac } from "../../edit-actions/edit-action";
+import { runOnCanvas } from "../../status/progress-inside";
 import { isWithin, MAP_SIZE, type MapArea, mapFrame, mapMarks, seenArea } from "./map-drawing";
 
 const REST = 500; // ms between two drawings of what is on the map
@@ -76,7 +86,10 @@ export function GraphMap({ nodes, flow }: Props) {
   const map = useRef<SVGSVGElement>(null);
   // Each change of anything makes all paths again, and has them painted.
   const shown = useThrottledValue(nodes, REST);
-  const { paths, area } = useMemo(() => mapMarks(shown), [shown]);
+  const run = useThrottledValue(useSyncExternalStore(runOnCanvas.subscribe, runOnCanvas.now), REST);
+  const expanded = useSyncExternalStore(expandedGraphs.subscribe, expandedGraphs.now);
+  // biome-ignore lint/correctness/useExhaustiveDependencies: with each change of the run there are other states
+  const { paths, area } = useMemo(() => mapMarks(shown, expanded?.partsOf), [shown, expanded, run]);
   const [x, y, zoom] = useStore((state) => state.transform);
   const size = {
     width: useStore((state) => state.width),

@@ -1,6 +1,8 @@
 /** The map shows everything, each in its colour, and what is seen. */
 import { expect, test } from "vitest";
 import type { CanvasNode } from "../../canvas/elements";
+import type { PartOnCard } from "../../canvas/levels/expanded-graphs";
+import type { Action } from "../../graph/model";
 import { isWithin, mapFrame, mapMarks, seenArea } from "./map-drawing";
 
 const card = (x: number, y: number, actor = "") =>
@@ -53,4 +55,15 @@ test("a map is needed as soon as anything is out of sight", () => {
     [0, 501],
   ] as const)
     expect(isWithin(at(x, y), seen)).toBe(false);
+});
+
+test("of a card with a graph in it the map shows what is in it, in the colours of their states", () => {
+  const action = { actor: "" } as Action;
+  const part = (x: number, expanded: boolean, progress: unknown) =>
+    ({ path: "p", x, y: 40, width: 50, height: 20, action, expanded, progress }) as PartOnCard;
+  const parts = [part(10, false, null), part(70, false, { tone: "run" }), part(130, true, null)];
+  const { paths, area } = mapMarks([card(1000, 0)], () => parts);
+  expect(paths).toHaveLength(3);
+  expect(paths.find(([color]) => color === "var(--run)")?.[1]).toMatch(/^M1080,40/);
+  expect(area).toEqual({ x: 1000, y: 0, width: 200, height: 100 });
 });

@@ -1,7 +1,9 @@
 /** The map of the canvas as paths: one for each colour, and what part of the graph the map shows. */
 import type { Viewport } from "@xyflow/react";
 import type { CanvasNode } from "../../canvas/elements";
+import type { PartOnCard } from "../../canvas/levels/expanded-graphs";
 import { noteColor } from "../../canvas/notes/note-colors";
+import type { Key } from "../../graph/model";
 import { toneColor } from "../../status/state-label";
 import { colorOfName } from "../../ui/name-colors";
 
@@ -21,6 +23,8 @@ interface MapMarks {
 }
 
 export const MAP_SIZE = { width: 132, height: 92 };
+/** Of a card on which others are seen. */
+const BEHIND = "color-mix(in srgb, var(--line2) 40%, transparent)";
 const ROUND = 10; // px of the graph
 const EDGE = 5; // px of the map
 
@@ -56,15 +60,29 @@ function rectangle({ x, y, width, height }: MapArea): string {
   return `M${x + r},${y}${right}h${-across}${turn(-r, -r)}v${-down}${turn(r, -r)}z`;
 }
 
-/** What nothing is known of the size of is left out. */
-export function mapMarks(nodes: readonly CanvasNode[]): MapMarks {
+const partColor = ({ progress, action: { actor } }: PartOnCard): string =>
+  progress && progress.tone !== "idle"
+    ? toneColor[progress.tone]
+    : actor === ""
+      ? "var(--line2)"
+      : colorOfName(actor);
+
+/** What nothing is known of the size of is left out. `partsOf`: what is drawn on a card that is expanded. */
+export function mapMarks(
+  nodes: readonly CanvasNode[],
+  partsOf: (key: Key) => readonly PartOnCard[] = () => [],
+): MapMarks {
   const paths = new Map<string, string>();
   let area: MapArea | null = null;
   for (const node of nodes) {
     const own = areaOf(node);
     if (own.width === 0 || own.height === 0) continue;
-    const color = markColor(node);
-    paths.set(color, (paths.get(color) ?? "") + rectangle(own));
+    const parts = partsOf(node.id);
+    const put = (color: string, at: MapArea) =>
+      paths.set(color, (paths.get(color) ?? "") + rectangle(at));
+    put(parts.length > 0 ? BEHIND : markColor(node), own);
+    for (const part of parts)
+      if (!part.expanded) put(partColor(part), { ...part, x: own.x + part.x, y: own.y + part.y });
     area = union(area, own);
   }
   return { paths: [...paths], area };

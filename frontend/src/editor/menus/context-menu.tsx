@@ -49,6 +49,7 @@ function offered(context: EditorContext): readonly (readonly EditAction[])[] {
     return [
       [
         editActions.enter,
+        editActions.expandGraph,
         editActions.details,
         editActions.connectTo,
         editActions.entry,
