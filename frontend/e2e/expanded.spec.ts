@@ -162,6 +162,32 @@ test("what a colleague changes inside is seen where it is expanded", async ({ br
   await mari.context.close();
 });
 
+test("what a graph takes and gives elsewhere is set at the graph, with a word before it is many", async () => {
+  const { page } = ada;
+  const open = { pvf_type: "string" };
+  const takes = { graph_name: "Take", graph_entry: [named("Reach")], graph_exit: [named("Reach")] };
+  const reach = { ...named("Reach"), type: "sync", input_parameters: { place: open, from: open } };
+  const body = { ...takes, actions: [reach] };
+  const { id } = await post<{ id: string }>(product, "/api/graphs", body);
+  for (const graph of ["First", "Second"])
+    await post(product, "/api/graphs", line(graph, ["Take"]));
+  await page.goto(`${product.url}/graphs/${id}`);
+  await expect(page.getByRole("button", { name: "Used in 2 graphs" })).toBeVisible();
+  const region = page.getByRole("region", { name: "Takes, inside of another graph" });
+  await expect(region.getByRole("listitem")).toHaveCount(2);
+  await region.getByRole("checkbox", { name: "required" }).last().uncheck();
+  await expect(page.getByRole("alert")).toContainText("This graph runs inside 2 others");
+  await saved(page);
+  const { actions } = await product.ask<{ actions: { input_parameters: object }[] }>(
+    `/api/graphs/${id}/umrf`,
+  );
+  expect(actions[0]?.input_parameters).toMatchObject({
+    from: { pvf_required: false },
+    place: open,
+  });
+  expect(await violations(page)).toEqual([]);
+});
+
 test("on a phone the outline expands, and leads into the level", async ({ browser }) => {
   const { page, context, failures } = await product.person(browser, "Ada", {
     viewport: { width: 390, height: 780 },

@@ -6,6 +6,7 @@ import { setGraphDescription, setGraphName } from "../graph/edit";
 import { DraftInput } from "../ui/draft-input";
 import { useHasFingersOnly } from "../ui/hooks/use-screen-size";
 import { SharedField } from "./fields/shared-field";
+import { GraphInterface } from "./graph-interface";
 import style from "./inspector.module.css";
 import { LabelsField } from "./labels-field";
 
@@ -36,6 +37,7 @@ export function GraphForm() {
         {graph.actions.length === 1 ? "1 action" : `${graph.actions.length} actions`},{" "}
         {arrows === 1 ? "1 arrow" : `${arrows} arrows`}
       </p>
+      <GraphInterface />
       <section className={style.section}>
         <div className={style.heading}>
           <h2>Drawing</h2>

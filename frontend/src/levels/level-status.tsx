@@ -1,7 +1,8 @@
 /** The graphs around this one: the way out, and all that run it inside them, which each edit here changes. */
 import { Menu } from "@mantine/core";
+import { notifications } from "@mantine/notifications";
 import { IconSitemap, IconStairsUp } from "@tabler/icons-react";
-import { useSyncExternalStore } from "react";
+import { useEffect, useSyncExternalStore } from "react";
 import { Link } from "wouter";
 import { useLibrary } from "../api/documents/library";
 import { graphsInside } from "../canvas/levels/graphs-inside";
@@ -18,8 +19,37 @@ function useUsedIn(): readonly string[] {
   return stands ? (found?.used_in ?? []).filter((each) => each !== id) : [];
 }
 
+const MANY = 2; // graphs around that change with this one
+/** Graphs of which this page has said so. */
+const told = new Set<string>();
+
+/** Says it at the first edit: what one changes here changes elsewhere, too. */
+function useNoticeOfMany(graphs: readonly string[]): void {
+  const { id, undo } = useEditorContext();
+  const count = graphs.length;
+  useEffect(() => {
+    const tell = ({ type }: { type: "undo" | "redo" }) => {
+      if (type !== "undo" || count < MANY || told.has(id)) return;
+      told.add(id);
+      const names = graphs.map((graph) => graphsInside.now()?.names.get(graph) || "Untitled");
+      notifications.show({
+        color: "yellow",
+        autoClose: NOTICE_MS,
+        title: `This graph runs inside ${count} others`,
+        message: `What you change here changes in each: ${names.slice(0, NAMED).join(", ")}${count > NAMED ? " …" : "."} Undo takes it back.`,
+      });
+    };
+    undo.on("stack-item-added", tell);
+    return () => undo.off("stack-item-added", tell);
+  }, [id, undo, graphs, count]);
+}
+
+const NOTICE_MS = 12_000;
+const NAMED = 4;
+
 function UsedIn() {
   const graphs = useUsedIn();
+  useNoticeOfMany(graphs);
   if (graphs.length === 0) return null;
   const words = graphs.length === 1 ? "in 1 graph" : `in ${graphs.length} graphs`;
   return (
