@@ -1,7 +1,9 @@
 /** Keeps known which actions stand for graphs, and the way through which one came here. */
+import { useQueryClient } from "@tanstack/react-query";
 import { useEffect, useMemo } from "react";
 import { useLocation, useSearch } from "wouter";
 import { useGraphsAsActions, useLibrary } from "../api/documents/library";
+import { refreshLibrary } from "../api/graphs";
 import { graphsInside } from "../canvas/levels/graphs-inside";
 import { addressAround, addressInside, levelsOf } from "../canvas/levels/level-path";
 import { useEditorContext } from "../edit-actions/editor-context";
@@ -29,11 +31,30 @@ function useGraphsByName(id: string) {
   }, [graphs, actions, id]);
 }
 
+/** Somebody may have made a graph just now, and the action that stands for it: who sees a name that nobody
+ * knows asks anew. */
+function useNewNames(names: readonly string[], byName: ReadonlyMap<string, string>): void {
+  const client = useQueryClient();
+  const { data: actions } = useLibrary();
+  const fresh = useMemo(() => {
+    const known = new Set(actions?.map(({ name }) => name));
+    const unknown = names.filter((name) => !known.has(name) && !byName.has(name));
+    return actions === undefined ? "" : [...new Set(unknown)].sort().join("\n");
+  }, [actions, names, byName]);
+  useEffect(() => {
+    if (fresh !== "") void refreshLibrary(client);
+  }, [fresh, client]);
+}
+
 export function Levels() {
   const { id, graph } = useEditorContext();
   const [, go] = useLocation();
   const search = useSearch();
   const { names, byName, isNamed } = useGraphsByName(id);
+  useNewNames(
+    useMemo(() => graph.actions.map(({ name }) => name), [graph]),
+    byName,
+  );
   const around = addressAround(search, levelsOf(search).length - 1);
   const enter = useStableCallback((action: string) => {
     const { name = "" } = graph.actions.find(({ key }) => key === action) ?? {};

@@ -3,7 +3,7 @@
 See docs/umrf-and-the-engine.md 2.3 and 2.6.
 """
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Final, NamedTuple
 
 from action_assistant.umrf.hierarchy.joint_parts import in_order
@@ -26,8 +26,9 @@ ENDS: Final[tuple[Precondition, ...]] = ("on_true", "on_false", "on_error")
 
 
 class Border(NamedTuple):
-    """Arrows of a graph by where they stand to the chosen actions. `entries`: the chosen actions to which
-    others lead, or that nothing leads to where no arrow comes in at all."""
+    """Arrows of a graph by where they stand to the chosen actions; `leading` those that come from each of
+    them. `entries`: the chosen actions to which others lead, or that nothing leads to where no arrow comes in
+    at all."""
 
     graph: Graph
     chosen: Mapping[Key, Action]
@@ -35,6 +36,7 @@ class Border(NamedTuple):
     within: tuple[Relation, ...]
     out: tuple[Relation, ...]
     entries: tuple[Key, ...]
+    leading: Mapping[Key, Sequence[Relation]]
 
     def at(self, key: Key) -> tuple[HierarchyLevel, ...]:
         """The place of a chosen action."""
@@ -48,12 +50,13 @@ class Border(NamedTuple):
 
     def answers(self, key: Key, outcome: Precondition) -> dict[Key, Response]:
         """What the actions outside that a chosen one leads to answer to an end of it."""
-        found = ((r.child, r.conditions.answer(outcome)) for r in self.out if r.parent == key)
+        ways = (r for r in self.leading.get(key, ()) if r.child not in self.chosen)
+        found = ((r.child, r.conditions.answer(outcome)) for r in ways)
         return {child: answer for child, answer in found if answer != "ignore"}
 
     def goes_on(self, key: Key, outcome: Precondition) -> bool:
         """Whether another chosen action answers to an end."""
-        ways = (r for r in self.within if r.parent == key)
+        ways = (r for r in self.leading.get(key, ()) if r.child in self.chosen)
         return any(r.conditions.answer(outcome) != "ignore" for r in ways)
 
 
@@ -68,9 +71,12 @@ def border_of(graph: Graph, chosen: Collection[Key]) -> Border:
         for r in in_order(graph.relations, by_parent=True)
         if r.parent in inside and r.child not in inside
     )
+    leading: dict[Key, list[Relation]] = {}
+    for relation in (*within, *out):
+        leading.setdefault(relation.parent, []).append(relation)
     reached = {r.child for r in (into or within)}
     entries = tuple(key for key in actions if (key in reached) == bool(into))
-    return Border(graph, actions, into, within, out, entries)
+    return Border(graph, actions, into, within, out, entries, leading)
 
 
 def ways_in_differ(border: Border) -> Iterator[FlatteningReason]:
@@ -106,6 +112,7 @@ def _told(border: Border, key: Key) -> dict[Key, tuple[Conditions | None, bool]]
 
 def ways_out_differ(border: Border) -> Iterator[FlatteningReason]:
     """Why these ends cannot be one: outside only the outcome is seen, and not who ended."""
+    differing: dict[tuple[Key, Key], list[Precondition]] = {}
     for outcome in PRECONDITIONS:
         known: tuple[Key, dict[Key, Response]] | None = None
         for key in border.chosen:
@@ -115,12 +122,14 @@ def ways_out_differ(border: Border) -> Iterator[FlatteningReason]:
             if known is None:
                 known = key, answers
             elif known[1] != answers:
-                one, two = border.named(known[0]), border.named(key)
-                message = (
-                    f"When {one} ends {outcome}, something else follows than when {two} does: outside "
-                    "only the outcome of the sub-graph is seen, and not who ended it."
-                )
-                yield FlatteningReason("ways-out", message, border.at(key))
+                differing.setdefault((known[0], key), []).append(outcome)
+    for (first, key), outcomes in differing.items():
+        one, two = border.named(first), border.named(key)
+        message = (
+            f"When {one} ends {' or '.join(outcomes)}, something else follows than when {two} does: "
+            "outside only the outcome of the sub-graph is seen, and not who ended it."
+        )
+        yield FlatteningReason("ways-out", message, border.at(key))
 
 
 def answers_of(border: Border, child: Key) -> Conditions:

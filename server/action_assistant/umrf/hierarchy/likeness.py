@@ -32,7 +32,7 @@ class Unlike(NamedTuple):
     message: str
 
 
-class _Arrow(NamedTuple):
+class _ArrowMeaning(NamedTuple):
     """What an arrow does: which values it hands over by input name."""
 
     conditions: Conditions | None
@@ -56,14 +56,14 @@ def unlike(graph: Graph, other: Graph) -> Iterator[Unlike]:
                 yield Unlike(about, f"{parent} would lead to {child}.")
             case _, None:
                 yield Unlike(about, f"{parent} would lead to {child} no more.")
-            case (_Arrow() as one, _Arrow() as two) if one != two:
+            case (_ArrowMeaning() as one, _ArrowMeaning() as two) if one != two:
                 yield Unlike(about, _otherwise(one, two, parent, child))
     ends = exit_owner(graph), exit_owner(other)
     if len({end.key if end is not None else "" for end in ends}) > 1:
         yield Unlike(None, "The exit would wait for the outputs of another action.")
 
 
-def _otherwise(one: _Arrow, two: _Arrow, parent: str, child: str) -> str:
+def _otherwise(one: _ArrowMeaning, two: _ArrowMeaning, parent: str, child: str) -> str:
     if one.values != two.values:
         return f"{parent} would hand other values to {child}."
     if one.conditions != two.conditions:
@@ -81,21 +81,21 @@ def _parameter(parameter: Parameter) -> tuple[str, object]:
     return parameter.path, parse_small(parameter.text)
 
 
-def _arrows(graph: Graph) -> dict[tuple[Key, Key], _Arrow]:
+def _arrows(graph: Graph) -> dict[tuple[Key, Key], _ArrowMeaning]:
     """By parent and child. An arrow that is not waited for and answers nothing does nothing, and whether
     one waits for the only parent there is makes no difference."""
     relations = [r for r in graph.relations if not _is_idle(r)]
     parents = Counter(r.child for r in relations)
     by_key = {action.key: action for action in graph.actions}
     ends = exit_inputs(graph)
-    found: dict[tuple[Key, Key], _Arrow] = {}
+    found: dict[tuple[Key, Key], _ArrowMeaning] = {}
     for relation in relations:
         inputs = ends if relation.child == EXIT else {}
         if (child := by_key.get(relation.child)) is not None:
             inputs = slots_of(child.inputs)
         parent = by_key.get(relation.parent)
         outputs = {} if parent is None else slots_of(parent.outputs)
-        found[relation.parent, relation.child] = _Arrow(
+        found[relation.parent, relation.child] = _ArrowMeaning(
             None if relation.parent == ENTRY else relation.conditions,
             relation.required or parents[relation.child] == 1,
             _values(relation, outputs, inputs),
