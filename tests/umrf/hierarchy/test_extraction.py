@@ -1,6 +1,7 @@
 """Actions made a graph of their own do what they did; what cannot be so is told."""
 
 from collections import Counter
+from collections.abc import Iterator, Mapping
 from random import Random
 
 import pytest
@@ -13,7 +14,7 @@ from action_assistant.umrf.hierarchy.extraction import Extracted, Unextractable,
 from action_assistant.umrf.model import ENGINE_DEFAULTS, Conditions, Graph, Remap
 from action_assistant.umrf.semantics import Behaviour, Script
 from support.doses import examples
-from umrf.hierarchy.hierarchies import Course, Drawn, course, leaf, outputs_of
+from umrf.hierarchy.hierarchies import Course, Drawn, course, hierarchies, leaf, outputs_of
 from umrf.hierarchy.lines import changed, with_values
 from umrf.semantics.traces import graph_of, optional
 
@@ -48,6 +49,20 @@ def played(graph: Graph, found: Extracted, random: Random, stop: bool) -> tuple[
         course(graph, {}, before, {(graph.name, name): name for name in behaviours}, stop_ms),
         course(outer, {sub.name: sub}, after, {at: name for name, at in places.items()}, stop_ms),
     )
+
+
+def leaves(
+    graph: Graph, graphs: Mapping[str, Graph], running: str, made: str = ""
+) -> Iterator[tuple[str, tuple[str, str]]]:
+    """The actions of all levels by their way down, but for the graph `made`, and where they run."""
+    for action in graph.actions:
+        place = f"{running}__{action.name}__{action.instance_id}"
+        if action.name not in graphs:
+            yield action.full_name, (running, action.full_name)
+            continue
+        way = "" if action.name == made else f"{action.full_name}/"
+        for name, at in leaves(graphs[action.name], graphs, place, made):
+            yield way + name, at
 
 
 def agree(graph: Graph, found: Extracted, random: Random, *, stop: bool, times: int = 25) -> int:
@@ -307,3 +322,56 @@ def test_the_interface_is_what_crosses_the_border_and_what_nobody_gives() -> Non
     assert [p.path for p in action.outputs] == ["r"]
     inputs = {p.path: p.text for p in found.inner.actions[0].inputs}
     assert inputs == {"p": TEXT, "own": leaf("number", "5"), "open": TEXT}
+
+
+@pytest.mark.timeout(900)
+def test_sub_graphs_of_sub_graphs_count_as_actions() -> None:
+    told = Counter[str]()
+
+    @settings(
+        max_examples=examples(150), deadline=None,
+        suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
+    )  # fmt: skip
+    @given(data=st.data(), wired=st.booleans(), seed=st.integers(0, 2**32))
+    def play(data: st.DataObject, wired: bool, seed: int) -> None:
+        graph, graphs = data.draw(hierarchies(wired=wired))
+        keys = [action.key for action in graph.actions]
+        chosen = data.draw(st.sets(st.sampled_from(keys), min_size=1))
+        found = extracted(graph, chosen, "Made", "new")
+        told["all"] += 1
+        if isinstance(found, Unextractable) or found.differences:
+            return
+        deep = graphs | {"Made": found.inner}
+        before = dict(leaves(graph, graphs, "g"))
+        after = dict(leaves(found.outer, deep, "g", "Made"))
+        assert before.keys() == after.keys()
+        random = Random(seed)
+        behaviours = {
+            name: tuple(
+                Behaviour(after_s=random.choice((0.2, 1, 3)) + 2.0**n / 1024, result=result)
+                for result in random.choices(RESULTS, k=3)
+            )
+            for n, name in enumerate(before)
+        }
+        one, two = (
+            course(
+                each,
+                library,
+                Script({f"{run}/{leaf}": behaviours[name] for name, (run, leaf) in at.items()}),
+                {place: name for name, place in at.items()},
+            )
+            for each, library, at in ((graph, graphs, before), (found.outer, deep, after))
+        )
+        if not one.tied:
+            told["courses"] += 1
+            assert (two.own, two.result, two.top) == (one.own, one.result, one.top)
+
+    play()
+    assert told["courses"] > told["all"] / 10
+
+
+def test_what_lies_between_the_chosen_is_named() -> None:
+    found = extracted(CHAIN, {"A", "C"}, "S", "new")
+    assert isinstance(found, Unextractable)
+    first = found.reasons[0]
+    assert (first.code, first.at[0].action) == ("between", "B_0")

@@ -478,7 +478,7 @@ export interface EditorApi {
      */
     FlatteningReason: {
         /** @enum {string} */
-        code: "actors" | "allowed-values" | "asks-beside" | "begins-again" | "bypass" | "crash" | "entries" | "exits" | "faulty" | "inputs" | "left-running" | "loop" | "name" | "never-ends" | "otherwise" | "outputs" | "recursion" | "renaming" | "response" | "selection" | "signature" | "spontaneous" | "stops" | "too-large" | "undecided" | "values" | "ways-in" | "ways-out";
+        code: "actors" | "allowed-values" | "asks-beside" | "begins-again" | "between" | "bypass" | "crash" | "entries" | "exits" | "faulty" | "inputs" | "left-running" | "loop" | "name" | "never-ends" | "otherwise" | "outputs" | "recursion" | "renaming" | "response" | "selection" | "signature" | "spontaneous" | "stops" | "too-large" | "undecided" | "values" | "ways-in" | "ways-out";
         message: string;
         at: EditorApi["HierarchyLevel"][];
     };

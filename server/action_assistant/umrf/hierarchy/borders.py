@@ -79,6 +79,30 @@ def border_of(graph: Graph, chosen: Collection[Key]) -> Border:
     return Border(graph, actions, into, within, out, entries, leading)
 
 
+def between(border: Border) -> Iterator[FlatteningReason]:
+    """What was not chosen though ways lead over it from chosen actions to others."""
+    ahead, back = dict[Key, list[Key]](), dict[Key, list[Key]]()
+    for relation in border.graph.relations:
+        ahead.setdefault(relation.parent, []).append(relation.child)
+        back.setdefault(relation.child, []).append(relation.parent)
+    there = _reached(border, ahead) & _reached(border, back)
+    for action in border.graph.actions:
+        if action.key in there and action.key not in border.chosen:
+            at = (HierarchyLevel(border.graph.name, action.key, action.full_name),)
+            yield FlatteningReason("between", "It lies between them and is not chosen.", at)
+
+
+def _reached(border: Border, ways: Mapping[Key, Sequence[Key]]) -> set[Key]:
+    found: set[Key] = set()
+    stack = list(border.chosen)
+    while stack:
+        for key in ways.get(stack.pop(), ()):
+            if key not in found:
+                found.add(key)
+                stack.append(key)
+    return found
+
+
 def ways_in_differ(border: Border) -> Iterator[FlatteningReason]:
     """Why these entries cannot be one: each has to be told the same by the same."""
     if not border.entries:
@@ -92,8 +116,9 @@ def ways_in_differ(border: Border) -> Iterator[FlatteningReason]:
         one, two = border.named(first), border.named(key)
         for parent in sorted(told.keys() ^ other.keys()):
             leads, not_ = (one, two) if parent in told else (two, one)
+            subject = "The entry" if parent == ENTRY else border.named(parent)
             message = (
-                f"{border.named(parent)} leads to {leads} and not to {not_}: a sub-graph begins with all "
+                f"{subject} leads to {leads} and not to {not_}: a sub-graph begins with all "
                 "of its entry actions at once."
             )
             yield FlatteningReason("ways-in", message, border.at(key))

@@ -14,6 +14,7 @@ import msgspec
 
 from action_assistant.umrf.hierarchy.borders import (
     Border,
+    between,
     border_of,
     ways_in_differ,
     ways_out_differ,
@@ -53,22 +54,23 @@ def extracted(graph: Graph, chosen: Collection[Key], name: str, key: Key) -> Ext
     reasons = [*_unfit_names(graph, name), *_unfit(graph, chosen)]
     border = border_of(graph, chosen)
     if border.chosen:
-        reasons += [*ways_in_differ(border), *ways_out_differ(border)]
+        against = [*ways_in_differ(border), *ways_out_differ(border)]
+        reasons += [*between(border), *against] if against else []
     if reasons:
         return Unextractable(tuple(dict.fromkeys(reasons)))
     best: Extracted | None = None
-    against: tuple[FlatteningReason, ...] = ()
+    uncut: tuple[FlatteningReason, ...] = ()
     for plan in _plans(border):
         found = cut(border, name, key, plan)
         if not isinstance(found, Cut):
-            against = against or found
+            uncut = uncut or found
             continue
         differences = _differences(graph, found)
         if best is None or len(differences) < len(best.differences):
             best = Extracted(found.inner, found.outer, key, differences)
         if not differences or any(each.code == "undecided" for each in differences):
             break
-    return best or Unextractable(tuple(dict.fromkeys(against)))
+    return best or Unextractable(tuple(dict.fromkeys(uncut)))
 
 
 def _unfit_names(graph: Graph, name: str) -> Iterator[FlatteningReason]:
