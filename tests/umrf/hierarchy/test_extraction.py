@@ -21,6 +21,7 @@ from umrf.semantics.traces import graph_of, optional
 RESULTS = ("on_true", "on_false", "on_error")
 SAFE = Conditions("run")
 TEXT = leaf("string")
+OPTIONAL = leaf("string", extra=',"pvf_required":false')
 
 
 def played(graph: Graph, found: Extracted, random: Random, stop: bool) -> tuple[Course, Course]:
@@ -196,7 +197,38 @@ def test_a_sub_graph_does_what_its_actions_did(wired: bool) -> None:
     assert told["courses"] > told["same"]
 
 
+def renamed(graph: Graph, **names: str) -> Graph:
+    """`renamed(graph, BD="x")`: the output `p` reaches D as `x`."""
+    relations = (
+        replace(r, remap=(Remap("p", names[r.parent + r.child]),))
+        if r.parent + r.child in names
+        else r
+        for r in graph.relations
+    )
+    return replace(graph, relations=tuple(relations))
+
+
 OTHERWISE = {
+    "two ends that give one output to two inputs": (
+        "otherwise",
+        with_values(
+            renamed(
+                optional(
+                    graph_of(
+                        "entry>A", "A>B", "A>C", "B>D", "C>D", "D>exit",
+                        AB=Conditions("run"), AC=Conditions("ignore", "run", "run"),
+                        BD=ENGINE_DEFAULTS, CD=ENGINE_DEFAULTS,
+                    ),
+                    "B>D", "C>D",
+                ),
+                BD="x", CD="y",
+            ),
+            B=({}, {"p": TEXT}),
+            C=({}, {"p": TEXT}),
+            D=({"x": OPTIONAL, "y": OPTIONAL}, {}),
+        ),
+        "ABC",
+    ),
     "a loop that leads back in": (
         "begins-again",
         optional(
@@ -266,62 +298,6 @@ def test_what_cannot_be_a_sub_graph_says_why_and_where(what: str) -> None:
     assert {reason.code for reason in found.reasons} == {code}
     if code in ("ways-in", "ways-out", "values") and what != "each follows another":
         assert all(reason.at for reason in found.reasons)
-
-
-@pytest.mark.parametrize("name", ["", "  ", "g", "A", "graph_exit"])
-def test_a_name_that_would_stand_for_something_else_is_refused(name: str) -> None:
-    found = extracted(CHAIN, {"B"}, name, "new")
-    assert isinstance(found, Unextractable)
-    assert [reason.code for reason in found.reasons] == ["name"]
-
-
-def test_layout_labels_and_unknown_fields_are_kept() -> None:
-    at = {"A": (0.0, 0.0), "B": (0.0, 200.0), "C": (100.0, 400.0), "D": (0.0, 600.0)}
-    graph = replace(
-        CHAIN,
-        actions=tuple(
-            replace(a, position=at[a.name], extra=(("mark", "1"),)) for a in CHAIN.actions
-        ),
-        relations=tuple(
-            replace(r, waypoints=(("run", "[[5,5]]"),), parents_extra=(("why", '"x"'),))
-            for r in CHAIN.relations
-        ),
-        extra=(("gui_attributes", '{"labels":["night"],"zoom":2}'), ("team", '"red"')),
-        notes=(("n", '{"kind":"note","at":[5,1]}'),),
-    )  # fmt: skip
-    found = extracted(graph, {"B", "C"}, "S", "new")
-    assert isinstance(found, Extracted)
-    assert [(a.name, a.position, a.extra) for a in found.inner.actions] == [
-        ("B", (0.0, 200.0), (("mark", "1"),)), ("C", (100.0, 400.0), (("mark", "1"),)),
-    ]  # fmt: skip
-    assert dict(found.inner.extra) == {"gui_attributes": '{"labels":["night"]}'}
-    assert [(a.name, a.position) for a in found.outer.actions] == [
-        ("A", (0.0, 0.0)), ("S", (50.0, 300.0)), ("D", (0.0, 600.0)),
-    ]  # fmt: skip
-    assert (found.outer.extra, found.outer.notes) == (graph.extra, graph.notes)
-    arrows = {(r.parent, r.child): r for r in (*found.inner.relations, *found.outer.relations)}
-    assert arrows["B", "C"].waypoints == (("run", "[[5,5]]"),)
-    assert arrows["A", "new"].parents_extra == (("why", '"x"'),)
-    assert arrows["entry", "A"].waypoints == (("run", "[[5,5]]"),)
-
-
-def test_the_interface_is_what_crosses_the_border_and_what_nobody_gives() -> None:
-    graph = with_values(
-        CHAIN,
-        A=({}, {"p": TEXT}),
-        B=({"p": leaf("string", '"x"'), "own": leaf("number", "5"), "open": TEXT}, {"q": TEXT}),
-        C=({"q": TEXT}, {"r": TEXT}),
-        D=({"r": TEXT}, {}),
-    )
-    found = extracted(with_arrows(graph, SAFE), {"B", "C"}, "S", "new")
-    assert isinstance(found, Extracted)
-    action = next(a for a in found.outer.actions if a.key == "new")
-    assert [(p.path, p.text) for p in action.inputs] == [
-        ("p", leaf("string", '"x"')), ("open", TEXT),
-    ]  # fmt: skip
-    assert [p.path for p in action.outputs] == ["r"]
-    inputs = {p.path: p.text for p in found.inner.actions[0].inputs}
-    assert inputs == {"p": TEXT, "own": leaf("number", "5"), "open": TEXT}
 
 
 @pytest.mark.timeout(900)
