@@ -33,6 +33,8 @@ export const EDIT_ACTIONS: readonly EditAction[] = [
   draw.duplicate,
   draw.removeSelection,
   draw.removeAndReconnect,
+  draw.extract,
+  draw.unpack,
   draw.undo,
   draw.redo,
   draw.selectAll,

@@ -11,6 +11,8 @@ import {
   IconDeselect,
   IconFlag,
   IconLine,
+  IconPackageExport,
+  IconPackageImport,
   IconPlayerPlay,
   IconPlus,
   IconRouteAltRight,
@@ -41,6 +43,7 @@ import {
   selectedNotes,
   selectedRelations,
 } from "./editor-context";
+import { chosenGraph } from "./view";
 
 const always = () => true;
 const anyAction = (context: EditorContext) => context.graph.actions.length > 0;
@@ -157,6 +160,38 @@ export const removeAndReconnect: EditAction = {
     const actions = selectedActions(context).map((action) => action.key);
     removeActions(context.doc, actions, { heal: true });
     context.select([]);
+  },
+};
+
+export const extract: EditAction = {
+  name: "extract",
+  label: "Make a sub-graph of these …",
+  group: "Draw",
+  shortcuts: ["Mod+g"],
+  icon: IconPackageImport,
+  changes: true,
+  also: "extract group hierarchy level inside",
+  enabled: (context) => selectedActions(context).some(({ missing }) => !missing),
+  idle: "Choose the actions first.",
+  run: (context) => {
+    const actions = selectedActions(context).map(({ key }) => key);
+    context.openOverlay({ kind: "extract", actions });
+  },
+};
+
+export const unpack: EditAction = {
+  name: "unpack",
+  label: "Unpack the sub-graph",
+  group: "Draw",
+  shortcuts: ["Mod+Shift+g"],
+  icon: IconPackageExport,
+  changes: true,
+  also: "ungroup inline hierarchy level dissolve",
+  enabled: (context) => chosenGraph(context) !== null,
+  idle: "Choose an action that stands for a graph first.",
+  run: (context) => {
+    const action = chosenGraph(context);
+    if (action) context.openOverlay({ kind: "unpack", action: action.key });
   },
 };
 

@@ -61,6 +61,10 @@ export type Overlay =
   | { readonly kind: "packages"; readonly action?: string }
   /** The graph and those inside of it as one graph. */
   | { readonly kind: "flat" }
+  /** A graph of its own for these actions. */
+  | { readonly kind: "extract"; readonly actions: readonly Key[] }
+  /** The actions of the graph for which this one stands, in its place. */
+  | { readonly kind: "unpack"; readonly action: Key }
   | { readonly kind: "palette" }
   | { readonly kind: "keys" };
 

@@ -215,7 +215,7 @@ export const WALK: readonly EditAction[] = (["up", "down", "left", "right"] as c
 );
 
 /** The one action that is chosen, if it stands for a graph. */
-function chosenGraph(context: EditorContext) {
+export function chosenGraph(context: EditorContext) {
   const [only, ...others] = selectedActions(context);
   const stands = only !== undefined && graphsInside.now()?.byName.has(only.name);
   return stands && others.length === 0 ? only : null;
@@ -298,7 +298,7 @@ export const flatten: EditAction = {
   label: "One graph without graphs inside",
   shortcuts: [],
   icon: IconSitemapOff,
-  also: "flatten sub-graph inline unpack hierarchy levels",
+  also: "flatten sub-graph inline hierarchy levels",
   enabled: ({ graph }) =>
     graph.actions.some(({ name }) => graphsInside.now()?.byName.has(name) ?? false),
   run: (context) => context.openOverlay({ kind: "flat" }),

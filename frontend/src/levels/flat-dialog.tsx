@@ -14,43 +14,18 @@ import { errorText } from "../api/http";
 import type { EditorContext } from "../edit-actions/editor-context";
 import { copyNameOf } from "../graph/edit/copy-name";
 import style from "./levels.module.css";
-
-const MOST = 100; // actions and reasons that are listed
+import { MOST, ReasonList, wayWords } from "./reason-list";
 
 interface Props {
   context: EditorContext;
   onClose: () => void;
 }
 
-type LevelWay = FlatGraph["origins"][number]["levels"];
-const wayWords = (way: LevelWay): string => way.map(({ action }) => action).join(" › ");
-
 function Reasons({ reasons, context, onClose }: Props & { reasons: readonly FlatteningReason[] }) {
-  const show = ({ at = [] }: FlatteningReason) => {
-    const [first] = at;
-    if (first === undefined) return;
-    onClose();
-    context.select([first.key]);
-    context.view.show([first.key]);
-  };
   return (
     <>
       <p>One graph would not do the same as this one with those inside of it, so none is made:</p>
-      <ul className={style.list}>
-        {reasons.slice(0, MOST).map((reason) => {
-          const way = wayWords(reason.at ?? []);
-          return (
-            <li key={`${reason.code} ${way} ${reason.message}`}>
-              {way !== "" && (
-                <button type="button" className={style.way} onClick={() => show(reason)}>
-                  <bdi>{way}</bdi>
-                </button>
-              )}
-              <span>{reason.message}</span>
-            </li>
-          );
-        })}
-      </ul>
+      <ReasonList label="Why none is made" {...{ reasons, context, onClose }} />
     </>
   );
 }

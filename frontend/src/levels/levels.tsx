@@ -1,7 +1,9 @@
 /** Keeps known which actions stand for graphs, and the way through which one came here. */
+import { useQueryClient } from "@tanstack/react-query";
 import { useCallback, useEffect, useMemo } from "react";
 import { useLocation, useSearch } from "wouter";
 import { useGraphsAsActions, useLibrary } from "../api/documents/library";
+import { refreshLibrary } from "../api/graphs";
 import { graphsInside } from "../canvas/levels/graphs-inside";
 import { addressAround, addressInside, type Level, levelsOf } from "../canvas/levels/level-path";
 import { useEditorContext } from "../edit-actions/editor-context";
@@ -38,6 +40,21 @@ function useGraphsHere(id: string) {
     if (own !== undefined) byName.delete(own);
     return { names, byName, isNamed, idOf: (name: string) => all.get(name) };
   }, [names, all, id]);
+}
+
+/** Somebody may have made a graph just now, and the action that stands for it: who sees a name that nobody
+ * knows asks anew. */
+function useNewNames(names: readonly string[], byName: ReadonlyMap<string, string>): void {
+  const client = useQueryClient();
+  const { data: actions } = useLibrary();
+  const fresh = useMemo(() => {
+    const known = new Set(actions?.map(({ name }) => name));
+    const unknown = names.filter((name) => !known.has(name) && !byName.has(name));
+    return actions === undefined ? "" : [...new Set(unknown)].sort().join("\n");
+  }, [actions, names, byName]);
+  useEffect(() => {
+    if (fresh !== "") void refreshLibrary(client);
+  }, [fresh, client]);
 }
 
 const nameIn = (graph: Pick<Graph, "actions">, action: string): string =>
@@ -77,6 +94,10 @@ export function Levels() {
   const [, go] = useLocation();
   const search = useSearch();
   const { names, byName, isNamed, idOf } = useGraphsHere(id);
+  useNewNames(
+    useMemo(() => graph.actions.map(({ name }) => name), [graph]),
+    byName,
+  );
   const around = addressAround(search, levelsOf(search).length - 1);
   const enter = useWayIn(byName);
   const expand = useExpansion({ id, graph, idOf, off: past !== null, enter });

@@ -22,6 +22,7 @@ from action_assistant.editor.api import (
     library,
     packages,
     room,
+    subgraphs,
     versions,
 )
 from action_assistant.editor.catalogue.people import People
@@ -144,6 +145,7 @@ def _routes(
         *history.routes(app_state),
         *versions.routes(app_state),
         *flat.routes(app_state),
+        *subgraphs.routes(app_state),
         *drafts.routes(app_state),
         *drawing.routes(app_state),
         *packages.routes(app_state),

@@ -21,6 +21,7 @@ _PRELOADED: Final = (
     "action_assistant.editor.interchange.action_uses",
     "action_assistant.editor.interchange.action_packages",
     "action_assistant.editor.interchange.text_merging",
+    "action_assistant.editor.interchange.subgraph_edits",
     "action_assistant.editor.history.told_changes",
     "action_assistant.editor.history.reverting",
     "action_assistant.editor.history.parting",

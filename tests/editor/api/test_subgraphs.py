@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -150,3 +151,98 @@ def test_a_graph_with_those_inside_is_made_one_that_does_the_same(client: httpx.
     )
     assert client.post(f"/api/graphs/{outer}/flat", json=wanted).status_code == 409
     assert client.get("/api/graphs/nowhere/flat").status_code == 404
+
+
+def line(name: str, *actions: str) -> dict[str, Any]:
+    """Actions one after another."""
+    ends = [{"name": each, "instance_id": 0} for each in actions]
+    pairs = list(pairwise(ends))
+    return {
+        "graph_name": name,
+        "graph_entry": ends[:1],
+        "graph_exit": ends[-1:],
+        "gui_attributes": {"labels": ["night"]},
+        "actions": [
+            {
+                **end,
+                "type": "sync",
+                "parents": [one for one, two in pairs if two is end],
+                "children": [two for one, two in pairs if one is end],
+            }
+            for end in ends
+        ],
+    }
+
+
+def keys(http: httpx.Client, graph: str) -> dict[str, str]:
+    """The keys of a graph's actions, by name."""
+    seq = http.get(f"/api/graphs/{graph}").json()["seq"]
+    document = http.get(f"/api/graphs/{graph}/document", params={"at": seq}).json()
+    actions = document["actions"] if "actions" in document else document["maps"]["actions"]
+    return {name: key for key, name in actions.items() if "|" not in key}
+
+
+def changed(http: httpx.Client, graph: str, look: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """The root maps of a graph once a page has made these changes."""
+    answer = http.get(f"/api/graphs/{graph}/document", params={"at": look["seq"]}).json()
+    maps: dict[str, dict[str, Any]] = answer.get("maps", answer)
+    for change in look["changes"]:
+        assert maps[change["root"]].get(change["key"]) == change.get("before")
+        if "after" in change:
+            maps[change["root"]][change["key"]] = change["after"]
+        else:
+            del maps[change["root"]][change["key"]]
+    return maps
+
+
+def test_actions_become_a_graph_of_their_own_and_are_unpacked_again(client: httpx.Client) -> None:
+    outer = client.post("/api/graphs", json=line("Task", "A", "B", "C", "D")).json()["id"]
+    known = keys(client, outer)
+    wanted = {"actions": [known["B"], known["C"]], "name": " Middle "}
+    look = client.post(f"/api/graphs/{outer}/extraction", json=wanted).json()
+    assert (look["differences"], look["reasons"]) == ([], [])
+    assert [each["name"] for each in look["umrf"]["actions"]] == ["B", "C"]
+    answer = client.post(f"/api/graphs/{outer}/subgraphs", json=wanted | {"seq": look["seq"]})
+    assert answer.status_code == 201, answer.text
+    made_graph = answer.json()["graph"]
+    assert (made_graph["name"], made_graph["labels"]) == ("Middle", ["night"])
+    assert keys(client, outer) == known  # the page makes these changes
+    maps = changed(client, outer, answer.json() | {"seq": look["seq"]})
+    names = {value for key, value in maps["actions"].items() if "|" not in key}
+    assert names == {"A", "Middle", "D"}
+    assert not any(known["B"] in key for fields in maps.values() for key in fields)
+
+    client.post("/api/graphs", json=line("Round", "A", "Middle", "D"))
+    again = client.post("/api/graphs", json=line("Again", "A", "Middle", "D")).json()["id"]
+    key = keys(client, again)["Middle"]
+    back = client.post(f"/api/graphs/{again}/unpacking", json={"action": key}).json()
+    assert (back["inside"], back["differences"], back["reasons"]) == (made_graph["id"], [], [])
+    maps = changed(client, again, back)
+    names = {value for key, value in maps["actions"].items() if "|" not in key}
+    assert names == {"A", "B", "C", "D"}
+    assert {maps["actions"][key] for key in back["actions"]} == {"B", "C"}
+
+
+def test_what_is_no_sub_graph_or_has_a_name_twice_is_refused(client: httpx.Client) -> None:
+    made(client, "Inner", "Step")
+    outer = client.post("/api/graphs", json=line("Task", "A", "B", "C")).json()["id"]
+    known = keys(client, outer)
+
+    def asked(route: str, *actions: str, **more: Any) -> httpx.Response:
+        body = {"actions": [known.get(each, each) for each in actions], "name": "New", **more}
+        return client.post(f"/api/graphs/{outer}/{route}", json=body)
+
+    assert [r["code"] for r in asked("extraction", "B", name="Inner").json()["reasons"]] == ["name"]
+    assert asked("subgraphs", "B", name="Inner").status_code == 409
+    assert asked("subgraphs", "nobody").status_code == 409
+    assert asked("extraction", "B", name="").status_code == 400
+    spontaneous = line("Odd", "A", "B", "C")
+    spontaneous["actions"][1]["type"] = "spontaneous"
+    outer = client.post("/api/graphs", json=spontaneous).json()["id"]
+    known = keys(client, outer)
+    assert asked("extraction", "B").json()["differences"][0]["code"] == "spontaneous"
+    assert asked("subgraphs", "B").status_code == 409
+    assert asked("subgraphs", "B", otherwise=True).status_code == 201
+    for key, status in ((known["A"], 404), ("nobody", 404)):
+        body = {"action": key}
+        assert client.post(f"/api/graphs/{outer}/unpacking", json=body).status_code == status

@@ -83,7 +83,7 @@ WIRES = st.sets(st.sampled_from("pq"), min_size=1).map(
 ANY = st.builds(Conditions, *[st.sampled_from(RESPONSES)] * 4)
 
 
-class _Drawn:
+class Drawn:
     """One graph while it is drawn."""
 
     def __init__(
@@ -258,10 +258,10 @@ def hierarchies(draw: st.DrawFn, *, wired: bool = False) -> Hierarchy:
     below: list[Graph] = []
     for level in range(levels):
         names = [f"H{level}", f"I{level}"][: draw(st.integers(1, 2 if level == 0 else 1))]
-        made = [_Drawn(draw, name, below, 3, wired=wired).graph() for name in names]
+        made = [Drawn(draw, name, below, 3, wired=wired).graph() for name in names]
         graphs |= {graph.name: graph for graph in made}
         below = made
-    return Hierarchy(_Drawn(draw, TOP, below, 4, wired=wired).graph(), graphs)
+    return Hierarchy(Drawn(draw, TOP, below, 4, wired=wired).graph(), graphs)
 
 
 # Courses

@@ -46,3 +46,32 @@ export function useFlatGraph(graph: string) {
 export function makeFlatGraph(graph: string, body: EditorApi["FlatCopy"]): Promise<GraphSummary> {
   return fetchJson(flatRoute(graph), { method: "POST", body });
 }
+
+const routeOf = (graph: string, route: string): string =>
+  `/api/graphs/${encodeURIComponent(graph)}/${route}`;
+
+/** What a sub-graph of chosen actions would be, or why there is none. */
+export type ExtractionLook = EditorApi["ExtractionLook"];
+type ExtractionWish = EditorApi["Extracting"];
+
+export function lookAtExtraction(graph: string, body: ExtractionWish): Promise<ExtractionLook> {
+  return fetchJson(routeOf(graph, "extraction"), { method: "POST", body });
+}
+
+/** A new graph of them; the graph around it is changed by who asks. */
+export function makeSubGraph(
+  graph: string,
+  body: ExtractionWish,
+): Promise<EditorApi["MadeSubGraph"]> {
+  return fetchJson(routeOf(graph, "subgraphs"), { method: "POST", body });
+}
+
+/** What a graph would have instead of an action that stands for another. */
+export type UnpackingLook = EditorApi["UnpackingLook"];
+
+export function lookAtUnpacking(
+  graph: string,
+  body: EditorApi["UnpackingAction"],
+): Promise<UnpackingLook> {
+  return fetchJson(routeOf(graph, "unpacking"), { method: "POST", body });
+}

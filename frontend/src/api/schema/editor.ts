@@ -368,6 +368,40 @@ export interface EditorApi {
         };
     };
     /**
+     * Extracting
+     * @description Which actions to make a sub-graph of, after which change of the graph (without: now), and what to
+     *     call it. `otherwise`: also where it may do something else than they did.
+     */
+    Extracting: {
+        actions: string[];
+        name: string;
+        /** @default null */
+        seq?: number | null;
+        /** @default false */
+        otherwise?: boolean;
+    };
+    /**
+     * ExtractionLook
+     * @description What a sub-graph of chosen actions would be. `umrf`: that graph; null where there is none, for these
+     *     `reasons`. `inputs`, `outputs`: what it takes and gives, by flat name, with types. `changes`: of the
+     *     document of the graph around it after `seq`. `differences`: in what it may then do otherwise.
+     */
+    ExtractionLook: {
+        seq: number;
+        umrf: {
+            [key: string]: unknown;
+        } | null;
+        inputs: {
+            [key: string]: string;
+        };
+        outputs: {
+            [key: string]: string;
+        };
+        changes: EditorApi["KeyChange"][];
+        differences: EditorApi["FlatteningReason"][];
+        reasons: EditorApi["FlatteningReason"][];
+    };
+    /**
      * Field
      * @description A field that says something else now. null where it said nothing.
      */
@@ -444,7 +478,7 @@ export interface EditorApi {
      */
     FlatteningReason: {
         /** @enum {string} */
-        code: "actors" | "allowed-values" | "asks-beside" | "begins-again" | "bypass" | "crash" | "entries" | "exits" | "faulty" | "inputs" | "left-running" | "loop" | "never-ends" | "outputs" | "recursion" | "renaming" | "response" | "signature" | "spontaneous" | "stops" | "too-large" | "undecided";
+        code: "actors" | "allowed-values" | "asks-beside" | "begins-again" | "between" | "bypass" | "crash" | "entries" | "exits" | "faulty" | "inputs" | "left-running" | "loop" | "name" | "never-ends" | "otherwise" | "outputs" | "recursion" | "renaming" | "response" | "selection" | "signature" | "spontaneous" | "stops" | "too-large" | "undecided" | "values" | "ways-in" | "ways-out";
         message: string;
         at: EditorApi["HierarchyLevel"][];
     };
@@ -788,6 +822,15 @@ export interface EditorApi {
         /** @default 0 */
         drafts?: number;
         reading?: EditorApi["ImportReport"];
+    };
+    /**
+     * MadeSubGraph
+     * @description A new graph, and what to change in the document of the one around it, so that an action there stands
+     *     for it. Nothing of that document is changed yet.
+     */
+    MadeSubGraph: {
+        graph: EditorApi["GraphView"];
+        changes: EditorApi["KeyChange"][];
     };
     /**
      * MergePreview
@@ -1325,6 +1368,36 @@ export interface EditorApi {
         seq: number;
         changes: EditorApi["KeyChange"][];
         problems: EditorApi["Problem"][];
+    };
+    /**
+     * UnpackingAction
+     * @description Which action to unpack, after which change of the graph (without: now). `at`: where it is drawn, for
+     *     one that nobody has placed.
+     */
+    UnpackingAction: {
+        action: string;
+        /** @default null */
+        seq?: number | null;
+        /** @default null */
+        at?: [
+            number,
+            number
+        ] | null;
+    };
+    /**
+     * UnpackingLook
+     * @description What the document of a graph would have instead of an action that stands for another graph, which is
+     *     `inside`: `changes` after `seq`, none for these `reasons`. `actions`: the keys of what is new;
+     *     `differences`: in what the graph may then do otherwise; `left_out`: fields that no action has now.
+     */
+    UnpackingLook: {
+        seq: number;
+        inside: string;
+        changes: EditorApi["KeyChange"][];
+        actions: string[];
+        differences: EditorApi["FlatteningReason"][];
+        left_out: string[];
+        reasons: EditorApi["FlatteningReason"][];
     };
     /**
      * UpdatedGraph

@@ -39,6 +39,7 @@ function offered(context: EditorContext): readonly (readonly EditAction[])[] {
         editActions.connectTo,
         editActions.entry,
         editActions.exit,
+        editActions.extract,
         editActions.zoomSelection,
         editActions.copyLink,
       ],
@@ -56,6 +57,7 @@ function offered(context: EditorContext): readonly (readonly EditAction[])[] {
         editActions.exit,
       ],
       [copy, cut, duplicate, pasteHere],
+      [editActions.extract, editActions.unpack],
       [editActions.frame, editActions.zoomSelection, editActions.copyLink, editActions.packages],
       [remove, heal],
     ];

@@ -17,6 +17,12 @@ const ContextMenu = lazyPart(() => import("./context-menu").then((part) => part.
 const FlatDialog = lazyPart(() =>
   import("../../levels/flat-dialog").then((part) => part.FlatDialog),
 );
+const ExtractDialog = lazyPart(() =>
+  import("../../levels/extract-dialog").then((part) => part.ExtractDialog),
+);
+const UnpackDialog = lazyPart(() =>
+  import("../../levels/unpack-dialog").then((part) => part.UnpackDialog),
+);
 const GraphPrint = lazyPart(() => import("./graph-print").then((part) => part.GraphPrint));
 const PackagesDialog = lazyPart(() =>
   import("../../packages/packages-dialog").then((part) => part.PackagesDialog),
@@ -70,6 +76,10 @@ function Opened({ context, known, overlay, onClose }: Props) {
       return <PackagesDialog context={context} {...overlay} onClose={onClose} />;
     case "flat":
       return <FlatDialog context={context} onClose={onClose} />;
+    case "extract":
+      return <ExtractDialog context={context} {...overlay} onClose={onClose} />;
+    case "unpack":
+      return <UnpackDialog context={context} {...overlay} onClose={onClose} />;
     case "palette":
       return <CommandPalette context={context} onClose={onClose} />;
     case "keys":

@@ -10,12 +10,12 @@ import {
   selectedRelations,
   useEditorContext,
 } from "../../edit-actions/editor-context";
+import { applyChanges, collisions, places } from "../../graph/edit/key-changes";
 import { Tooltip } from "../../ui/floating/tooltip";
 import { lazyPart } from "../../ui/parts/lazy-part";
 import { PartBoundary } from "../../ui/parts/part-boundary";
 import type { JsonError } from "./json-editor";
 import { actionAt, rangeOf, rangeOfArrow } from "./json-positions";
-import { applyTextChanges, collisions, places } from "./json-rewrite";
 import style from "./json-view.module.css";
 import { useJson, type Verdict } from "./use-json";
 
@@ -116,7 +116,7 @@ export function JsonView({ graph, seq }: { graph: string; seq: number }) {
   const faults = useMemo(() => (draft ? faultsOf(verdict) : NO_FAULTS), [draft, verdict]);
   const changes = verdict.kind === "fits" && draft ? verdict.rewriting.changes : [];
   const write = (some: readonly KeyChange[]) => {
-    applyTextChanges(context.doc, some);
+    applyChanges(context.doc, some);
     setAsking(null);
     json.done();
   };

@@ -75,6 +75,10 @@ class GraphNames:
         """Whether several graphs have the name."""
         return len(self._graphs.get(name, ())) > 1
 
+    def is_taken(self, name: str) -> bool:
+        """Whether a graph, or an action of the library, has the name."""
+        return name in self._graphs or bool(self._actions[name])
+
     async def refresh(self) -> None:
         """Take in what has been stored by now. Raises Unavailable."""
         await asyncio.shield(self._begun())  # others wait for it too

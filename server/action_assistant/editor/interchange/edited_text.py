@@ -78,7 +78,7 @@ def text_edit(
     old = _under_keys(shown.graph, _keys_of(moment.graph, shown.graph))
     new = _under_keys(wanted.graph, _aligned(old, wanted.graph))
     _refuse_ghosts(old, new, wanted.text)
-    changes = tuple(_changes(moment.maps, old, new))
+    changes = tuple(key_changes(moment.maps, old, new))
     worse = wanted.placed(_worse(known, new, inside)) if changes else []
     return TextEdit(moment.seq, changes, tuple(worse))
 
@@ -202,7 +202,8 @@ def _naming(file: object, ghost: Action) -> str:
 # What differs
 
 
-def _changes(maps: Maps, old: Graph, new: Graph) -> list[KeyChange]:
+def key_changes(maps: Maps, old: Graph, new: Graph) -> list[KeyChange]:
+    """What makes a document with these maps, which show `old`, show `new`: key by key."""
     wanted = _fields(old, new) | _orders(maps, old, new) | _leftovers(maps, old, new)
     changes = []
     for (root, key), after in sorted(wanted.items(), key=lambda item: item[0]):

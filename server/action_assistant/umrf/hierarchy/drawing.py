@@ -5,7 +5,7 @@ one side is moved away by as much as that needs there.
 """
 
 from collections.abc import Callable, Sequence
-from typing import Final, TypeAlias
+from typing import Final, Literal, TypeAlias
 
 from action_assistant.umrf.json.text import Json, Number, dump, number, parse_small
 from action_assistant.umrf.model import Action, Graph, JsonText, Key, Position, Response
@@ -14,6 +14,13 @@ from action_assistant.umrf.model import Action, Graph, JsonText, Key, Position, 
 ALONG: Final = 280.0
 ASIDE: Final = 140.0
 
+#: What a card takes up on the page, and a little around it.
+WIDE: Final = 240.0
+HIGH: Final = 110.0
+
+#: Whether what stands around a sub-graph is moved away, or only where something would lie upon it.
+Room: TypeAlias = Literal["always", "needed"]
+
 _Ways: TypeAlias = tuple[tuple[Response, JsonText], ...]
 _Moved: TypeAlias = Callable[[Json], Json]
 
@@ -21,10 +28,26 @@ _Moved: TypeAlias = Callable[[Json], Json]
 class Drawing:
     """Puts the actions of one sub-graph where its action stands, and makes room for them."""
 
-    def __init__(self, around: Graph, action: Action, inside: Graph) -> None:
+    def __init__(self, around: Graph, action: Action, inside: Graph, room: Room = "always") -> None:
         self._at = action.position
         self._places = _drawn(inside, right=around.direction == "right")
         self._middle, self._half = _box(list(self._places.values()))
+        if room == "needed" and not self._lies_upon(around, action):
+            self._half = (0.0, 0.0)
+
+    def _lies_upon(self, around: Graph, action: Action) -> bool:
+        """Whether an action of the sub-graph would cover something around it."""
+        if self._at is None:
+            return False
+        there = [a.position for a in around.actions if a.key != action.key]
+        there += [around.entry_position, around.exit_position]
+        own = [self._inner(place) for place in self._places.values()]
+        return any(
+            abs(x - place[0]) < WIDE and abs(y - place[1]) < HIGH
+            for place in there
+            if place is not None
+            for x, y in own
+        )
 
     def inner(self, action: Action) -> Position | None:
         """The place of an action of the sub-graph; none where its action had none."""

@@ -13,7 +13,7 @@ from typing import Final, NamedTuple, TypeAlias
 import msgspec
 from msgspec.structs import replace
 
-from action_assistant.umrf.hierarchy.inlining import identity, inlined
+from action_assistant.umrf.hierarchy.inlining import identity, inlined, under_keys
 from action_assistant.umrf.hierarchy.joint_parts import JoinedPlace, SubGraphPlace
 from action_assistant.umrf.hierarchy.joints import joined
 from action_assistant.umrf.hierarchy.level_courses import BUDGET, LevelCourses, level_courses
@@ -248,12 +248,7 @@ def _named(flat: _Flat) -> Flattened:
     for key, levels in flat.origins.items():
         if key not in keys:
             keys[key] = identity((level.key for level in levels), keys.values())
-    actions = tuple(replace(a, key=keys[a.key]) for a in flat.graph.actions)
-    relations = tuple(
-        replace(r, parent=keys.get(r.parent, r.parent), child=keys.get(r.child, r.child))
-        for r in flat.graph.relations
-    )
     paths = {keys[key]: each for key, each in flat.origins.items()}
-    origins = tuple(FlatOrigin(a.key, a.full_name, paths[a.key]) for a in actions)
-    graph = replace(flat.graph, actions=actions, relations=relations)
+    graph = under_keys(flat.graph, keys)
+    origins = tuple(FlatOrigin(a.key, a.full_name, paths[a.key]) for a in graph.actions)
     return Flattened(graph, origins, flat.left_out)

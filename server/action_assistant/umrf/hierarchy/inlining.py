@@ -7,7 +7,7 @@ from typing import NamedTuple, TypeAlias
 from msgspec.structs import replace
 
 from action_assistant.umrf.files.writing import name_order
-from action_assistant.umrf.hierarchy.drawing import Drawing
+from action_assistant.umrf.hierarchy.drawing import Drawing, Room
 from action_assistant.umrf.hierarchy.joint_parts import JoinedArrow, JoinedPlace
 from action_assistant.umrf.model import ENTRY, EXIT, Action, Graph, Key, Relation
 
@@ -28,12 +28,20 @@ class _Arrow(NamedTuple):
     by_child: _Order
 
 
-def inlined(around: Graph, own: Key, inside: Graph, found: JoinedPlace, kept: set[str]) -> Inlined:
-    """The graph with these actions in the place of one. `kept`: full names that nobody else gets."""
+def inlined(
+    around: Graph,
+    own: Key,
+    inside: Graph,
+    found: JoinedPlace,
+    kept: set[str],
+    room: Room = "always",
+) -> Inlined:
+    """The graph with these actions in the place of one. `kept`: full names that nobody else gets; `room`:
+    whether what stands around is moved away where there is room already."""
     action = next(a for a in around.actions if a.key == own)
     there = {a.key for a in around.actions}
     keys = {a.key: _fresh(there, f"{own}/{a.key}") for a in inside.actions}
-    drawing = Drawing(around, action, inside)
+    drawing = Drawing(around, action, inside, room)
     actions = [found.entries.get(a.key, a) for a in inside.actions]
     moved = [
         replace(
@@ -58,6 +66,16 @@ def inlined(around: Graph, own: Key, inside: Graph, found: JoinedPlace, kept: se
         ),
     )
     return Inlined(graph, keys)
+
+
+def under_keys(graph: Graph, keys: Mapping[Key, Key]) -> Graph:
+    """The graph with other keys for some of its actions."""
+    actions = tuple(replace(a, key=keys.get(a.key, a.key)) for a in graph.actions)
+    relations = tuple(
+        replace(r, parent=keys.get(r.parent, r.parent), child=keys.get(r.child, r.child))
+        for r in graph.relations
+    )
+    return replace(graph, actions=actions, relations=relations)
 
 
 def identity(parts: Iterable[str], taken: Iterable[str]) -> str:

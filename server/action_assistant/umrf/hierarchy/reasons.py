@@ -11,6 +11,7 @@ FlatteningCode: TypeAlias = Literal[
     "faulty", "recursion", "signature", "too-large", "undecided", "actors", "spontaneous", "stops",
     "allowed-values", "never-ends", "left-running", "asks-beside", "begins-again", "bypass",
     "response", "crash", "exits", "entries", "inputs", "outputs", "renaming", "loop",
+    "name", "selection", "between", "ways-in", "ways-out", "values", "otherwise",
 ]  # fmt: skip
 
 

@@ -40,7 +40,7 @@ _TO_EXIT: Final = frozenset({"run", "stop", "pause", "restart", "ignore"})
 def ways_out(place: SubGraphPlace, relations: Sequence[Relation]) -> Iterator[JoinedArrow]:
     _, exits = ends_of(place.inside)
     kind = _kind(exits)
-    _check_outputs(place, exits, kind)
+    _check_outputs(place, exits, kind, relations)
     for relation in relations:
         incoming = [r for r in place.around.relations if r.child == relation.child]
         required = _required(relation, exits, kind, is_only=len(incoming) == 1)
@@ -107,7 +107,9 @@ def _composed(end: Conditions, following: Conditions) -> Conditions:
     return Conditions(**answers)
 
 
-def _check_outputs(place: SubGraphPlace, exits: Sequence[Relation], kind: str) -> None:
+def _check_outputs(
+    place: SubGraphPlace, exits: Sequence[Relation], kind: str, following: Sequence[Relation]
+) -> None:
     given = exit_inputs(place.inside)
     own = slots_of(place.action.outputs)
     if not given:
@@ -117,7 +119,7 @@ def _check_outputs(place: SubGraphPlace, exits: Sequence[Relation], kind: str) -
     actions = {action.key: action for action in place.inside.actions}
     for end in exits:
         action = actions[end.parent]
-        _check_end(place.inside, end)
+        _check_end(place.inside, end, following)
         for name, slot in slots_of(action.outputs).items():
             if name not in given:
                 continue
@@ -131,10 +133,13 @@ def _check_outputs(place: SubGraphPlace, exits: Sequence[Relation], kind: str) -
                 refuse("outputs", f"The output “{name}” of {action.full_name} has two types.")
 
 
-def _check_end(inside: Graph, end: Relation) -> None:
-    """Whoever ends the sub-graph hands over what the exit waits for, or ends it with an error."""
+def _check_end(inside: Graph, end: Relation, following: Sequence[Relation]) -> None:
+    """Whoever ends the sub-graph hands over what the exit waits for, or ends it with an error, or in a
+    way after which nobody is handed anything."""
     said = end.conditions
-    if "bypass" in (said.on_true, said.on_false) or said.on_error not in ("bypass", "ignore"):
+    empty: list[Precondition] = [o for o in _ENDS[:2] if said.answer(o) == "bypass"]
+    empty += ["on_error"] if said.on_error not in ("bypass", "ignore") else []
+    if any(r.conditions.answer(o) not in ("ignore", "bypass") for o in empty for r in following):
         refuse(
             "outputs", "It gives values, and can end without them: by a bypass, or with an error."
         )

@@ -1,0 +1,47 @@
+/** Why levels would do otherwise than one graph, each with the way to the action that it is about. */
+import type { FlatteningReason } from "../api/documents/inside";
+import type { EditorContext } from "../edit-actions/editor-context";
+import style from "./levels.module.css";
+
+/** Actions and reasons that are listed. */
+export const MOST = 100;
+
+type LevelWay = NonNullable<FlatteningReason["at"]>;
+export const wayWords = (way: LevelWay): string => way.map(({ action }) => action).join(" › ");
+
+interface Props {
+  context: EditorContext;
+  reasons: readonly FlatteningReason[];
+  /** What of the way is told; else all of it. */
+  told?: (way: LevelWay) => LevelWay;
+  label: string;
+  onClose: () => void;
+}
+
+export function ReasonList({ context, reasons, told = (way) => way, label, onClose }: Props) {
+  const show = (way: LevelWay) => {
+    const [first] = way;
+    if (first === undefined) return;
+    onClose();
+    context.select([first.key]);
+    context.view.show([first.key]);
+  };
+  return (
+    <ul className={style.list} aria-label={label}>
+      {reasons.slice(0, MOST).map((reason) => {
+        const way = told(reason.at ?? []);
+        const words = wayWords(way);
+        return (
+          <li key={`${reason.code} ${words} ${reason.message}`}>
+            {words !== "" && (
+              <button type="button" className={style.way} onClick={() => show(way)}>
+                <bdi>{words}</bdi>
+              </button>
+            )}
+            <span>{reason.message}</span>
+          </li>
+        );
+      })}
+    </ul>
+  );
+}

@@ -1,0 +1,123 @@
+"""Routes that make a sub-graph of chosen actions, and unpack one again."""
+
+from typing import Any
+
+import msgspec
+from litestar import Request, Response, post
+from litestar.types import ControllerRouterHandler
+
+from action_assistant.editor.catalogue.catalogue import GraphView, fit
+from action_assistant.editor.documents.contents import GraphAtSeq
+from action_assistant.editor.interchange.edited_text import KeyChange
+from action_assistant.editor.interchange.subgraph_edits import (
+    ChosenActions,
+    ExtractionLook,
+    UnpackingLook,
+    extraction_look,
+    name_of_action,
+    subgraph_file,
+    unpacking_look,
+)
+from action_assistant.editor.services import EditorServices, EditorState
+from action_assistant.editor.workers import encoded
+from action_assistant.errors import NotFound
+from action_assistant.umrf.model import Key, Position
+from action_assistant.web.auth.access import Needs, person_of
+
+
+class Extracting(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Which actions to make a sub-graph of, after which change of the graph (without: now), and what to
+    call it. `otherwise`: also where it may do something else than they did."""
+
+    actions: tuple[Key, ...]
+    name: str
+    seq: int | None = None
+    otherwise: bool = False
+
+
+class MadeSubGraph(msgspec.Struct, frozen=True):
+    """A new graph, and what to change in the document of the one around it, so that an action there stands
+    for it. Nothing of that document is changed yet."""
+
+    graph: GraphView
+    changes: tuple[KeyChange, ...]
+
+
+class UnpackingAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Which action to unpack, after which change of the graph (without: now). `at`: where it is drawn, for
+    one that nobody has placed."""
+
+    action: Key
+    seq: int | None = None
+    at: Position | None = None
+
+
+async def _chosen(
+    services: EditorServices, graph: str, data: Extracting
+) -> tuple[GraphAtSeq, ChosenActions]:
+    """The graph at that moment, and what to make of it."""
+    await services.catalogue.require(graph, "graph")
+    name, _ = fit(data.name, "")
+    names = services.graph_checks.names
+    await names.refresh()
+    chosen = ChosenActions(data.actions, name, names.is_taken(name), data.otherwise)
+    return await services.graph_reader.moment(graph, data.seq), chosen
+
+
+def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
+    """Everything about making and unpacking."""
+
+    @post(
+        "/api/graphs/{graph_id:str}/extraction",
+        status_code=200,
+        summary="What a sub-graph of chosen actions would be, or why there is none; stores nothing",
+        operation_id="lookAtExtraction",
+        guards=[Needs("see")],
+    )
+    async def look_at_extraction(graph_id: str, data: Extracting) -> ExtractionLook:
+        services = app_state.services
+        chosen = await _chosen(services, graph_id, data)
+        look: ExtractionLook = encoded(await services.workers.files(extraction_look, *chosen))
+        return look
+
+    @post(
+        "/api/graphs/{graph_id:str}/subgraphs",
+        summary="Make a new graph of chosen actions; the graph around it is changed by who asks",
+        operation_id="makeSubGraph",
+        guards=[Needs("edit")],
+    )
+    async def make_subgraph(
+        graph_id: str, request: Request[Any, Any, Any], data: Extracting
+    ) -> Response[MadeSubGraph]:
+        services, person = app_state.services, person_of(request)
+        chosen = await _chosen(services, graph_id, data)
+        await services.people.seen(person)
+        found = await services.workers.files(subgraph_file, *chosen)
+        made, _ = await services.catalogue.create(found.umrf, person.id)
+        body = MadeSubGraph(made, encoded(found.changes))
+        return Response(body, status_code=201, headers={"location": f"/api/graphs/{made.id}"})
+
+    @post(
+        "/api/graphs/{graph_id:str}/unpacking",
+        status_code=200,
+        summary="What a graph would have instead of an action that stands for another, or why nothing; "
+        "stores nothing",
+        operation_id="lookAtUnpacking",
+        guards=[Needs("see")],
+    )
+    async def look_at_unpacking(graph_id: str, data: UnpackingAction) -> UnpackingLook:
+        services = app_state.services
+        await services.catalogue.require(graph_id, "graph")
+        sight = await services.graph_reader.moment(graph_id, data.seq)
+        name = await services.graph_reader.ask(name_of_action, sight, data.action)
+        await services.graph_checks.names.refresh()
+        known = services.graph_checks.names.graph(name)
+        if known is None or known.graph == graph_id:
+            raise NotFound(f"“{name}” stands for no graph.")
+        inside = await services.graph_reader.now(known.graph)
+        look: UnpackingLook = encoded(
+            await services.workers.files(unpacking_look, sight, data.action, data.at, inside)
+        )
+        return look
+
+    return [look_at_extraction, make_subgraph, look_at_unpacking]

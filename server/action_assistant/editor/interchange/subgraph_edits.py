@@ -1,0 +1,132 @@
+"""Sub-graphs made of chosen actions, and unpacked again, as changes of a document key by key. For workers.
+
+The page makes the changes, so that they are an edit of the person's own; `before` lets it see what others
+changed meanwhile (docs/decisions/072-make-and-unpack-a-sub-graph.md).
+"""
+
+import msgspec
+from msgspec.structs import replace
+
+from action_assistant.editor.documents import document
+from action_assistant.editor.documents.contents import GraphAtSeq, read
+from action_assistant.editor.interchange.edited_text import KeyChange, key_changes
+from action_assistant.errors import Conflict, NotFound
+from action_assistant.umrf.files import codec
+from action_assistant.umrf.hierarchy.extraction import Extracted, extracted
+from action_assistant.umrf.hierarchy.reasons import FlatteningReason
+from action_assistant.umrf.hierarchy.unpacking import Unpackable, unpacked
+from action_assistant.umrf.json.embedded import UmrfGraph
+from action_assistant.umrf.model import Key, Position
+from action_assistant.umrf.signatures import signature_of
+
+
+class ChosenActions(msgspec.Struct, frozen=True):
+    """What to make a sub-graph of, and its name. `taken`: something else is called that; `otherwise`: also
+    where it may do something else than its actions did."""
+
+    keys: tuple[Key, ...]
+    name: str
+    taken: bool = False
+    otherwise: bool = False
+
+
+class ExtractionLook(msgspec.Struct, frozen=True):
+    """What a sub-graph of chosen actions would be. `umrf`: that graph; null where there is none, for these
+    `reasons`. `inputs`, `outputs`: what it takes and gives, by flat name, with types. `changes`: of the
+    document of the graph around it after `seq`. `differences`: in what it may then do otherwise."""
+
+    seq: int
+    umrf: UmrfGraph | None
+    inputs: dict[str, str] = {}
+    outputs: dict[str, str] = {}
+    changes: tuple[KeyChange, ...] = ()
+    differences: tuple[FlatteningReason, ...] = ()
+    reasons: tuple[FlatteningReason, ...] = ()
+
+
+class UnpackingLook(msgspec.Struct, frozen=True):
+    """What the document of a graph would have instead of an action that stands for another graph, which is
+    `inside`: `changes` after `seq`, none for these `reasons`. `actions`: the keys of what is new;
+    `differences`: in what the graph may then do otherwise; `left_out`: fields that no action has now."""
+
+    seq: int
+    inside: str
+    changes: tuple[KeyChange, ...] = ()
+    actions: tuple[Key, ...] = ()
+    differences: tuple[FlatteningReason, ...] = ()
+    left_out: tuple[str, ...] = ()
+    reasons: tuple[FlatteningReason, ...] = ()
+
+
+class SubGraphFile(msgspec.Struct, frozen=True):
+    """The file of a new sub-graph, and JSON of the changes that put an action for it in its place."""
+
+    umrf: bytes
+    changes: bytes
+
+
+def extraction_look(sight: GraphAtSeq, chosen: ChosenActions) -> bytes:
+    """JSON of an `ExtractionLook`."""
+    return msgspec.json.encode(_look(sight, chosen))
+
+
+def subgraph_file(sight: GraphAtSeq, chosen: ChosenActions) -> SubGraphFile:
+    """The new graph. Raises Conflict where there is none."""
+    look = _look(sight, chosen)
+    for reason in look.reasons:
+        raise Conflict(reason.message, where={"code": reason.code})
+    for reason in () if chosen.otherwise else look.differences:
+        raise Conflict(f"It may do otherwise: {reason.message}", where={"code": reason.code})
+    return SubGraphFile(msgspec.json.encode(look.umrf), msgspec.json.encode(look.changes))
+
+
+def _look(sight: GraphAtSeq, chosen: ChosenActions) -> ExtractionLook:
+    moment = read(sight).moment
+    found = extracted(moment.graph, frozenset(chosen.keys), chosen.name, document.new_aid())
+    if not isinstance(found, Extracted):
+        return ExtractionLook(sight.seq, None, reasons=found.reasons)
+    if chosen.taken:
+        message = f"A graph, or an action of the library, is called “{chosen.name}” already."
+        return ExtractionLook(sight.seq, None, reasons=(FlatteningReason("name", message),))
+    action = next(a for a in found.outer.actions if a.key == found.key)
+    signature = signature_of(action)
+    return ExtractionLook(
+        sight.seq,
+        msgspec.Raw(codec.write(found.inner).encode()),
+        signature.inputs,
+        signature.outputs,
+        tuple(key_changes(moment.maps, moment.graph, found.outer)),
+        found.differences,
+    )
+
+
+def unpacking_look(
+    sight: GraphAtSeq, action: Key, at: Position | None, inside: GraphAtSeq
+) -> bytes:
+    """JSON of an `UnpackingLook`. `at`: where the action is drawn if it has no place."""
+    moment = read(sight).moment
+    drawn = tuple(
+        replace(a, position=a.position or at) if a.key == action else a
+        for a in moment.graph.actions
+    )
+    shown = replace(moment.graph, actions=drawn)
+    found = unpacked(shown, action, read(inside).moment.graph)
+    look = UnpackingLook(sight.seq, inside.graph)
+    if isinstance(found, Unpackable):
+        return msgspec.json.encode(replace(look, reasons=found.reasons))
+    whole = replace(
+        look,
+        changes=tuple(key_changes(moment.maps, moment.graph, found.graph)),
+        actions=found.keys,
+        differences=found.differences,
+        left_out=found.left_out,
+    )
+    return msgspec.json.encode(whole)
+
+
+def name_of_action(sight: GraphAtSeq, action: Key) -> str:
+    """What an action is called. Raises NotFound."""
+    for each in read(sight).moment.graph.actions:
+        if each.key == action and not each.missing:
+            return each.name
+    raise NotFound("That action is not there any more.")

@@ -1,0 +1,132 @@
+"""Some actions of a graph made a graph of their own, and one action in their place.
+
+`extracted` answers the two graphs, with everything in which they would do otherwise than the one did, or
+every reason why there are none. They do the same where made flat again (`flattening`) they are that graph:
+flattening proves what the two do, and `likeness` that nothing was lost on the way.
+
+See docs/decisions/072-make-and-unpack-a-sub-graph.md.
+"""
+
+from collections.abc import Collection, Iterator
+from typing import Final, TypeAlias
+
+import msgspec
+
+from action_assistant.umrf.hierarchy.borders import (
+    Border,
+    between,
+    border_of,
+    ways_in_differ,
+    ways_out_differ,
+)
+from action_assistant.umrf.hierarchy.cutting import Cut, Plan, cut
+from action_assistant.umrf.hierarchy.flattening import Flattened, flattened
+from action_assistant.umrf.hierarchy.inlining import under_keys
+from action_assistant.umrf.hierarchy.likeness import unlike
+from action_assistant.umrf.hierarchy.reasons import FlatteningReason, HierarchyLevel
+from action_assistant.umrf.model import Graph, Key
+
+#: What no action is called: the engine takes these for the ends of a graph.
+_RESERVED: Final = frozenset({"graph_entry", "graph_exit"})
+
+
+class Extracted(msgspec.Struct, frozen=True, tag="extracted", tag_field="kind"):
+    """The new graph, and the old one in which the action `key` stands for it. `differences`: in what they
+    may do otherwise than the graph did; where there are none, they do the same."""
+
+    inner: Graph
+    outer: Graph
+    key: Key
+    differences: tuple[FlatteningReason, ...] = ()
+
+
+class Unextractable(msgspec.Struct, frozen=True, tag="unextractable", tag_field="kind"):
+    """Why no sub-graph can be made of the chosen actions: everything that was found."""
+
+    reasons: tuple[FlatteningReason, ...]
+
+
+Extraction: TypeAlias = Extracted | Unextractable
+
+
+def extracted(graph: Graph, chosen: Collection[Key], name: str, key: Key) -> Extraction:
+    """These actions as a graph of this name. `key`: of the action that stands for it."""
+    reasons = [*_unfit_names(graph, name), *_unfit(graph, chosen)]
+    border = border_of(graph, chosen)
+    if border.chosen:
+        against = [*ways_in_differ(border), *ways_out_differ(border)]
+        reasons += [*between(border), *against] if against else []
+    if reasons:
+        return Unextractable(tuple(dict.fromkeys(reasons)))
+    best: Extracted | None = None
+    uncut: tuple[FlatteningReason, ...] = ()
+    for plan in _plans(border):
+        found = cut(border, name, key, plan)
+        if not isinstance(found, Cut):
+            uncut = uncut or found
+            continue
+        differences = _differences(graph, found)
+        if best is None or len(differences) < len(best.differences):
+            best = Extracted(found.inner, found.outer, key, differences)
+        if not differences or any(each.code == "undecided" for each in differences):
+            break
+    return best or Unextractable(tuple(dict.fromkeys(uncut)))
+
+
+def _unfit_names(graph: Graph, name: str) -> Iterator[FlatteningReason]:
+    if not name.strip() or name in _RESERVED:
+        yield FlatteningReason("name", "No action can be called that.")
+    elif name == graph.name:
+        message = "This graph has that name: an action of that name is no graph inside of it."
+        yield FlatteningReason("name", message)
+    elif any(action.name == name for action in graph.actions):
+        message = f"“{name}” is an action of this graph; it would stand for the new one."
+        yield FlatteningReason("name", message)
+
+
+def _unfit(graph: Graph, chosen: Collection[Key]) -> Iterator[FlatteningReason]:
+    actions = {action.key: action for action in graph.actions}
+    if not chosen:
+        yield FlatteningReason("selection", "No action is chosen.")
+    if not set(chosen) <= actions.keys():
+        yield FlatteningReason("selection", "Some of the chosen actions are not there any more.")
+    for key in actions:
+        if key in chosen and actions[key].missing:
+            at = (HierarchyLevel(graph.name, key, actions[key].full_name),)
+            yield FlatteningReason("selection", "There is no such action.", at)
+    for relation in graph.relations:
+        if {relation.parent, relation.child} & set(chosen) and (relation.only or relation.listing):
+            key = relation.child if relation.child in chosen else relation.parent
+            at = (HierarchyLevel(graph.name, key, actions[key].full_name),)
+            message = "An arrow of it is listed by one side only, or is there twice."
+            yield FlatteningReason("selection", message, at)
+
+
+def _plans(border: Border) -> Iterator[Plan]:
+    """Ways to cut, the likelier first."""
+    waiting: dict[Key, int] = {}
+    for relation in border.out:
+        waiting[relation.child] = waiting.get(relation.child, 0) + relation.required
+    if any(count > 1 for count in waiting.values()):
+        yield Plan(closing=False, all_ends=True)
+    yield Plan(closing=True, all_ends=False)
+    yield Plan(closing=False, all_ends=False)
+
+
+def _differences(graph: Graph, found: Cut) -> tuple[FlatteningReason, ...]:
+    """In what the two graphs may do otherwise than the one."""
+    flat = flattened(found.outer, {found.inner.name: found.inner})
+    if not isinstance(flat, Flattened):
+        return flat.reasons
+    keys = {origin.key: origin.levels[-1].key for origin in flat.origins}
+    names = {action.key: action.full_name for action in graph.actions}
+    return tuple(
+        FlatteningReason(
+            "otherwise",
+            each.message,
+            ()
+            if each.about is None
+            else (HierarchyLevel(graph.name, each.about, names.get(each.about, "")),),
+        )
+        for each in unlike(graph, under_keys(flat.graph, keys))
+    )
