@@ -19,7 +19,7 @@ import { ConnectionStatus } from "../runs/connection-status";
 import { RunDrawer } from "../runs/drawer/run-drawer";
 import { RecordDryRun } from "../runs/start/record-dry-run";
 import { StartControl } from "../runs/start/start-control";
-import { type GraphInRun, isInRun } from "../status/levels/progress-inside";
+import { type GraphInRun, isInRun } from "../status/progress-inside";
 import { useProgress } from "../status/use-progress";
 import { roomUrl } from "../sync/room-connection";
 import { RoomProvider, useLinkPart, useRoom, useThrottledGraph } from "../sync/use-room";

@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
 import type { ActionRun, Run } from "../api/runs";
-import { isInRun, progressInside } from "./levels/progress-inside";
 import { progressByAid, progressOf, runEndText, runLabel } from "./progress";
+import { isInRun, progressInside } from "./progress-inside";
 
 const run: Run = {
   id: "r",

@@ -1,8 +1,8 @@
 /** Progress of a run for React: the same map as before while nothing in it has changed. */
 import { useRef } from "react";
 import type { Run } from "../api/runs";
-import { type GraphInRun, progressInside } from "./levels/progress-inside";
 import { type Progress, progressAt, progressByAid } from "./progress";
+import { type GraphInRun, progressInside } from "./progress-inside";
 
 export type ProgressByAid = ReadonlyMap<string, Progress>;
 

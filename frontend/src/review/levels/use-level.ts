@@ -3,8 +3,8 @@ import { useMemo, useState } from "react";
 import type { Run } from "../../api/runs";
 import type { Level } from "../../canvas/levels/level-path";
 import { fullName, type Graph, type Key } from "../../graph/model";
-import { factOf, placesOf } from "../../status/levels/places";
-import type { GraphInRun } from "../../status/levels/progress-inside";
+import { factOf, placesOf } from "../../status/level-places";
+import type { GraphInRun } from "../../status/progress-inside";
 import { announcer } from "../../ui/announcer";
 import { useStableCallback } from "../../ui/hooks/use-stable-callback";
 import {

@@ -5,7 +5,7 @@ import { useMemo, useState } from "react";
 import type { ReplayMark } from "../../api/documents/replay";
 import { authorName } from "../../api/graphs";
 import { type Run, runPlace } from "../../api/runs";
-import { placesOf, wayWords } from "../../status/levels/places";
+import { placesOf, wayWords } from "../../status/level-places";
 import {
   runEndText,
   type Tone,

@@ -2,7 +2,7 @@
 import { IconAlertTriangle } from "@tabler/icons-react";
 import { type Cause, needsExplanation, useCauses } from "../../api/review";
 import type { Run } from "../../api/runs";
-import { placesOf } from "../../status/levels/places";
+import { placesOf } from "../../status/level-places";
 import { clock, instant } from "../../ui/times";
 import style from "./causes.module.css";
 import { SinceWhenButton } from "./since-when";

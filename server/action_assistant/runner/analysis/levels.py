@@ -1,7 +1,7 @@
 """Where each fact of a run belongs: an engine tells what runs inside as `OUTER__NAME__ID/ACTION`. Pure.
 
 See docs/umrf-and-the-engine.md 2.6 and docs/decisions/073-a-run-by-its-levels.md. The page places by the same
-rule (`frontend/src/status/levels/places.ts`), and both are held to tests/vectors/levels.json.
+rule (`frontend/src/status/level-places.ts`), and both are held to tests/vectors/levels.json.
 """
 
 from collections import defaultdict, deque

@@ -1,8 +1,8 @@
 /** What is said of a graph that runs inside of another: its actions are told by the names of all levels. Pure. */
-import type { Run } from "../../api/runs";
-import { fullName, type Graph } from "../../graph/model";
-import { type Progress, progressOfAction } from "../progress";
-import { placesOf } from "./places";
+import type { Run } from "../api/runs";
+import { fullName, type Graph } from "../graph/model";
+import { placesOf } from "./level-places";
+import { type Progress, progressOfAction } from "./progress";
 
 /** The way from the outermost graph to one inside: by the names of the graphs below it, down to this one, or
  * by the very actions that one is inside of. */

@@ -3,7 +3,7 @@ import { readFileSync } from "node:fs";
 import { fileURLToPath } from "node:url";
 import fc from "fast-check";
 import { expect, test } from "vitest";
-import { factOf, placesIn } from "./places";
+import { factOf, placesIn } from "./level-places";
 
 interface Vector {
   why: string;
@@ -12,7 +12,7 @@ interface Vector {
   names: string[];
   places: Record<string, [string[], string, boolean]>;
 }
-const file = new URL("../../../../tests/vectors/levels.json", import.meta.url);
+const file = new URL("../../../tests/vectors/levels.json", import.meta.url);
 const vectors = JSON.parse(readFileSync(fileURLToPath(file), "utf8")) as Vector[];
 
 test.each(vectors)("places are as the vectors say: $why", ({ graph, own, names, places }) => {

@@ -1,6 +1,6 @@
 /** Where each fact of a run belongs: an engine tells what runs inside as `OUTER__NAME__ID/ACTION`. Pure.
  * The runner places by the same rule (docs/decisions/073-a-run-by-its-levels.md). */
-import type { Run } from "../../api/runs";
+import type { Run } from "../api/runs";
 
 /** Between the levels, as people read them. */
 export const INTO = " › ";
