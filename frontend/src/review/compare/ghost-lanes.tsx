@@ -163,9 +163,11 @@ export function GhostLanes({ found, a, b, selected, onPick }: Props) {
   return (
     <section className={style.lanes} aria-label="Both runs over time">
       <header>
-        <span className={style.levels}>
-          <AllLevels lanes={actions} inside={inside} />
-        </span>
+        {nested !== null && (
+          <span className={style.levels}>
+            <AllLevels lanes={actions} inside={nested} />
+          </span>
+        )}
         <span>A faded or hatched end: when it ended is known only to this range.</span>
         <Segments
           size="xs"

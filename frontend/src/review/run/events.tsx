@@ -25,6 +25,8 @@ interface Happening {
   /** The action as the run calls it. */
   fact: string | null;
   text: string;
+  /** Of what happens at one moment: what is inside ends before what it is inside of, and begins after. */
+  order?: number;
 }
 
 /** Seconds after the start. The clock of an engine may stand a little behind the runner's. */
@@ -54,12 +56,15 @@ export function eventLines(
   const start = instant(run.started_at);
   const places = placesOf(run);
   for (const [fact, action] of Object.entries(run.actions ?? {})) {
-    const who = { name: wayWords(places.get(fact) ?? { levels: [], name: fact }), fact };
+    const place = places.get(fact) ?? { levels: [], name: fact };
+    const who = { name: wayWords(place), fact };
+    const depth = place.levels.length;
     action.visits.forEach((visit, i) => {
       const from = visitBegin(visit);
       const until = visitEnd(visit);
       const again = i > 0 ? `again (${i + 1}.)` : "";
-      if (from !== null) all.push({ at: from, tone: "run", ...who, text: `runs ${again}`.trim() });
+      if (from !== null)
+        all.push({ at: from, tone: "run", ...who, text: `runs ${again}`.trim(), order: depth });
       if (until !== null) {
         const result = visit.result?.replace(/^on_/, "") ?? null;
         const tone = (result ?? "done") as Tone;
@@ -69,13 +74,19 @@ export function eventLines(
           last === until || start === null ? "" : ` (not before ${after(start, until)})`;
         const open = last === null ? "; its code may go on" : "";
         const at = last ?? Math.max(until, from ?? until);
-        all.push({ at, tone, ...who, text: (result ?? "finished") + seen + since + open });
+        all.push({
+          at,
+          tone,
+          ...who,
+          text: (result ?? "finished") + seen + since + open,
+          order: -depth,
+        });
       }
     });
     for (const message of action.messages) {
       const at = instant(message.at);
       if (at === null) continue;
-      all.push({ at, tone: "idle", ...who, text: `“${message.text}”` });
+      all.push({ at, tone: "idle", ...who, text: `“${message.text}”`, order: -depth });
     }
   }
   for (const line of run.log ?? []) {
@@ -99,8 +110,9 @@ export function eventLines(
       name: null,
       fact: null,
       text: `Run ${runEndText(run)}${run.detail ? `: ${run.detail}` : ""}`,
+      order: Number.MAX_VALUE,
     });
-  all.sort((a, b) => a.at - b.at);
+  all.sort((a, b) => a.at - b.at || (a.order ?? 0) - (b.order ?? 0));
   if (start === null) return all;
   const where = run.engine === "simulator" ? "in the simulator" : `on ${runPlace(run)}`;
   const text = `${authorName(run.author)} started ${version} ${where}`;
