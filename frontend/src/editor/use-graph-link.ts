@@ -3,7 +3,7 @@ import { notifications } from "@mantine/notifications";
 import { useEffect, useRef } from "react";
 import { useSearch } from "wouter";
 import type { EditorContext } from "../edit-actions/editor-context";
-import { asksForHistory, present, targetOf } from "../edit-actions/graph-links";
+import { asksForFlat, asksForHistory, present, targetOf } from "../edit-actions/graph-links";
 import { withPast } from "../edit-actions/past-links";
 import { shownKeys } from "../edit-actions/view";
 import { focusField } from "../ui/focus-field";
@@ -17,6 +17,7 @@ export function useGraphLink(context: EditorContext, begun: boolean): void {
   now.current = context;
   useEffect(() => {
     if (begun && asksForHistory(search)) now.current.setPanel("history");
+    if (begun && asksForFlat(search)) now.current.openOverlay({ kind: "flat" });
   }, [search, begun]);
   useEffect(() => {
     const target = begun ? targetOf(search) : null;

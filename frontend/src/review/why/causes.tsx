@@ -15,8 +15,6 @@ interface Props {
 }
 
 const SHOWN = 3;
-/** A moment within a millisecond: it has happened by the next one. */
-const PART_OF_MS = /\.\d{3}\d*[1-9]/;
 
 interface CauseLineProps extends Pick<Props, "onShow"> {
   cause: Cause;
@@ -26,7 +24,7 @@ interface CauseLineProps extends Pick<Props, "onShow"> {
 
 function Line({ cause, inside, onShow }: CauseLineProps) {
   const at = instant(cause.at) ?? 0;
-  const show = () => onShow(at + (PART_OF_MS.test(cause.at) ? 1 : 0), cause.action);
+  const show = () => onShow(at, cause.action);
   return (
     <li>
       <button type="button" className={style.at} title="Show this moment" onClick={show}>
