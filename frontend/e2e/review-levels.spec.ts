@@ -166,7 +166,7 @@ test("where a robot lacks a graph inside its files are offered, and one graph wi
     await page.goto(`${product.url}/graphs/${round}`);
     await saved(page);
     await page
-      .getByRole("button", { name: /^Start/ })
+      .getByRole("button", { name: "Choose where to start" })
       .first()
       .click();
     await page.getByRole("checkbox", { name: /David/ }).click();
