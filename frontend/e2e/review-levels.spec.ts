@@ -165,10 +165,7 @@ test("where a robot lacks a graph inside its files are offered, and one graph wi
     await post(product, "/api/robots", robot, product.runnerUrl);
     await page.goto(`${product.url}/graphs/${round}`);
     await saved(page);
-    await page
-      .getByRole("button", { name: "Choose where to start" })
-      .first()
-      .click();
+    await page.getByRole("button", { name: "Choose where to start" }).first().click();
     await page.getByRole("checkbox", { name: /David/ }).click();
     const looked = page.getByRole("list", { name: "Looked at on David" });
     await expect(looked).toContainText("David has not indexed Fetch, Grip", { timeout: 30_000 });
