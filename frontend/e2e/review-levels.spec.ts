@@ -178,6 +178,8 @@ test("where a robot lacks a graph inside its files are offered, and one graph wi
     await expect(
       page.getByRole("dialog", { name: "One graph without graphs inside" }),
     ).toContainText("CloseFingers_0");
+    await expect(page.getByRole("dialog", { name: /^Start/ })).toHaveCount(0);
+    await expect(page).toHaveURL(`${product.url}/graphs/${round}`);
   } finally {
     await david.end();
   }

@@ -17,7 +17,11 @@ export function useGraphLink(context: EditorContext, begun: boolean): void {
   now.current = context;
   useEffect(() => {
     if (begun && asksForHistory(search)) now.current.setPanel("history");
-    if (begun && asksForFlat(search)) now.current.openOverlay({ kind: "flat" });
+    if (!begun || !asksForFlat(search)) return;
+    now.current.openOverlay({ kind: "flat" });
+    const answered = new URL(window.location.href);
+    answered.searchParams.delete("flat");
+    window.history.replaceState(window.history.state, "", answered);
   }, [search, begun]);
   useEffect(() => {
     const target = begun ? targetOf(search) : null;

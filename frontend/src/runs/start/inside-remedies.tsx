@@ -9,6 +9,8 @@ import style from "./preflight-list.module.css";
 export interface MomentLookedAt {
   readonly graph: string;
   readonly seq: number;
+  /** What leads away from the look closes it. */
+  readonly onLeave: () => void;
 }
 
 interface Props extends MomentLookedAt {
@@ -16,7 +18,7 @@ interface Props extends MomentLookedAt {
   look: Preflight;
 }
 
-function Files({ graph, seq }: MomentLookedAt) {
+function Files({ graph, seq }: Omit<MomentLookedAt, "onLeave">) {
   const path = `/api/graphs/${encodeURIComponent(graph)}/subgraphs.zip?at=${seq}`;
   return (
     <a className={style.remedy} href={serverPath(path)} download="graphs_inside.zip">
@@ -25,26 +27,30 @@ function Files({ graph, seq }: MomentLookedAt) {
   );
 }
 
-function OneGraph({ graph }: Pick<MomentLookedAt, "graph">) {
+function OneGraph({ graph, onLeave }: Omit<MomentLookedAt, "seq">) {
   return (
-    <Link className={style.remedy} to={`/graphs/${encodeURIComponent(graph)}?flat`}>
+    <Link
+      className={style.remedy}
+      to={`/graphs/${encodeURIComponent(graph)}?flat`}
+      onClick={onLeave}
+    >
       <IconSitemapOff size={14} aria-hidden /> Make it one graph
     </Link>
   );
 }
 
 /** Nothing where nothing of this item comes from graphs inside. */
-export function InsideRemedies({ item, look, graph, seq }: Props) {
+export function InsideRemedies({ item, look, graph, seq, onLeave }: Props) {
   if (item.verdict !== "blocked") return null;
   if (item.code === "subgraphs") {
     return (
       <span className={style.remedies}>
         <span>
-          Put its files into a package that the robot indexes and restart its engine, or start one
+          Put their files into a package that the robot indexes and restart its engine, or start one
           graph that does the same without graphs inside.
         </span>
         <Files graph={graph} seq={seq} />
-        <OneGraph graph={graph} />
+        <OneGraph graph={graph} onLeave={onLeave} />
       </span>
     );
   }
@@ -55,7 +61,7 @@ export function InsideRemedies({ item, look, graph, seq }: Props) {
         One graph that does the same has no graphs inside that would have to be looked up, and a
         name of its own.
       </span>
-      <OneGraph graph={graph} />
+      <OneGraph graph={graph} onLeave={onLeave} />
     </span>
   );
 }
