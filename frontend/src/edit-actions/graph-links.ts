@@ -63,8 +63,3 @@ export function present(graph: Graph, selection: readonly string[]): string[] {
 export function asksForHistory(search: string): boolean {
   return new URLSearchParams(search).has("history");
 }
-
-/** Whether an address asks for one graph without graphs inside. */
-export function asksForFlat(search: string): boolean {
-  return new URLSearchParams(search).has("flat");
-}

@@ -3,7 +3,7 @@ import { notifications } from "@mantine/notifications";
 import { useEffect, useRef } from "react";
 import { useSearch } from "wouter";
 import type { EditorContext } from "../edit-actions/editor-context";
-import { asksForFlat, asksForHistory, present, targetOf } from "../edit-actions/graph-links";
+import { asksForHistory, present, targetOf } from "../edit-actions/graph-links";
 import { withPast } from "../edit-actions/past-links";
 import { shownKeys } from "../edit-actions/view";
 import { focusField } from "../ui/focus-field";
@@ -17,11 +17,6 @@ export function useGraphLink(context: EditorContext, begun: boolean): void {
   now.current = context;
   useEffect(() => {
     if (begun && asksForHistory(search)) now.current.setPanel("history");
-    if (!begun || !asksForFlat(search)) return;
-    now.current.openOverlay({ kind: "flat" });
-    const answered = new URL(window.location.href);
-    answered.searchParams.delete("flat");
-    window.history.replaceState(window.history.state, "", answered);
   }, [search, begun]);
   useEffect(() => {
     const target = begun ? targetOf(search) : null;

@@ -8,6 +8,7 @@ import { useEditorContext } from "../edit-actions/editor-context";
 import { announcer } from "../ui/announcer";
 import { useStableCallback } from "../ui/hooks/use-stable-callback";
 import { InsideSign } from "./inside-sign";
+import { useFlatLink } from "./use-flat-link";
 
 const NONE: readonly never[] = [];
 
@@ -33,6 +34,7 @@ export function Levels() {
   const { id, graph } = useEditorContext();
   const [, go] = useLocation();
   const search = useSearch();
+  useFlatLink();
   const { names, byName, isNamed } = useGraphsByName(id);
   const around = addressAround(search, levelsOf(search).length - 1);
   const enter = useStableCallback((action: string) => {

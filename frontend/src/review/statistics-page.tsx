@@ -8,7 +8,7 @@ import { useLive } from "../api/live/use-live";
 import { type ActionStatistics, type Statistics, useStatistics } from "../api/review";
 import type { DurationBounds, Run } from "../api/runs";
 import { boundsText } from "../status/durations";
-import { INTO } from "../status/level-places";
+import { INTO } from "../status/level-words";
 import { runLabel } from "../status/progress";
 import { toneColor } from "../status/state-label";
 import { Empty } from "../ui/empty";

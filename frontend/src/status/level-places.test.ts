@@ -3,7 +3,8 @@ import { readFileSync } from "node:fs";
 import { fileURLToPath } from "node:url";
 import fc from "fast-check";
 import { expect, test } from "vitest";
-import { factOf, placesIn } from "./level-places";
+import { placesIn } from "./level-places";
+import { factOf } from "./level-words";
 
 interface Vector {
   why: string;

@@ -2,9 +2,6 @@
  * The runner places by the same rule (docs/decisions/073-a-run-by-its-levels.md). */
 import type { Run } from "../api/runs";
 
-/** Between the levels, as people read them. */
-export const INTO = " › ";
-
 /** Of an action in a run. */
 export interface LevelPlace {
   /** The actions that it is inside of, outermost first, by their full names. */
@@ -16,16 +13,9 @@ export interface LevelPlace {
 }
 
 /** How an engine calls the graph that an action of `graph` stands for. */
-function partOf(graph: string, action: string): string {
+export function partOf(graph: string, action: string): string {
   const at = action.lastIndexOf("_");
   return `${graph}__${action.slice(0, Math.max(0, at))}__${action.slice(at + 1)}`;
-}
-
-/** How a run calls the last of a way of actions, each inside of the one before. */
-export function factOf(graph: string, way: readonly string[]): string {
-  const [last = "", ...above] = [...way].reverse();
-  if (above.length === 0) return last;
-  return `${above.reverse().reduce(partOf, graph)}/${last}`;
 }
 
 /** Names by all that may be the graph in front of the action: both may have the mark inside. */
@@ -90,14 +80,4 @@ export function placesOf(run: Run): ReadonlyMap<string, LevelPlace> {
   const found = placesIn(run.graph_name, new Set(own), Object.keys(actions));
   lastPlaces.set(actions, { graph: run.graph_name, found });
   return found;
-}
-
-/** An action as people call it: `Grip_0` is Grip 0. */
-export function spaced(fullName: string): string {
-  return fullName.replace(/_(\d+)$/, " $1");
-}
-
-/** The way to an action, in words. */
-export function wayWords({ levels, name }: Pick<LevelPlace, "levels" | "name">): string {
-  return [...levels, name].map(spaced).join(INTO);
 }

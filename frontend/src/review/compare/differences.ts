@@ -3,7 +3,7 @@ import type { ComparedField, ComparedStep, Comparison } from "../../api/review";
 import type { Visit } from "../../api/runs";
 import { plainValue } from "../../history/difference-words";
 import { boundsText } from "../../status/durations";
-import { INTO, spaced, wayWords } from "../../status/level-places";
+import { INTO, spaced, wayWords } from "../../status/level-words";
 import { visitDuration } from "../../status/progress";
 
 /** How long something took, ms; `most` is Infinity where nothing bounds it. */

@@ -7,7 +7,7 @@ import { barOf } from "../../status/lanes/bars";
 import { AllLevels, LaneToggle } from "../../status/lanes/lane-toggle";
 import { openLanes } from "../../status/lanes/lanes";
 import { type OpenLanes, useOpenLanes } from "../../status/lanes/use-open-lanes";
-import { wayWords } from "../../status/level-places";
+import { wayWords } from "../../status/level-words";
 import { visitBegin, visitEnd } from "../../status/progress";
 import { toneColor } from "../../status/state-label";
 import { Segments } from "../../ui/segments";

@@ -2,7 +2,7 @@
 import type { ComparedStep, Comparison } from "../../api/review";
 import type { Visit } from "../../api/runs";
 import { durationText } from "../../status/durations";
-import { INTO } from "../../status/level-places";
+import { INTO } from "../../status/level-words";
 import { visitDuration } from "../../status/progress";
 import { StateLabel } from "../../status/state-label";
 import style from "./compare-page.module.css";

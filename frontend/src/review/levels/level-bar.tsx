@@ -3,7 +3,7 @@ import { IconExternalLink, IconStairsDown } from "@tabler/icons-react";
 import { Link } from "wouter";
 import { addressInside } from "../../canvas/levels/level-path";
 import { fullName } from "../../graph/model";
-import { spaced } from "../../status/level-places";
+import { spaced } from "../../status/level-words";
 import style from "./level-bar.module.css";
 import { keyAt } from "./sent-levels";
 import type { LevelCursor } from "./use-level";

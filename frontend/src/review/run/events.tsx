@@ -5,7 +5,8 @@ import { useMemo, useState } from "react";
 import type { ReplayMark } from "../../api/documents/replay";
 import { authorName } from "../../api/graphs";
 import { type Run, runPlace } from "../../api/runs";
-import { placesOf, wayWords } from "../../status/level-places";
+import { placesOf } from "../../status/level-places";
+import { wayWords } from "../../status/level-words";
 import {
   runEndText,
   type Tone,

@@ -14,7 +14,7 @@ import { fromUmrf } from "../../canvas/from-umrf";
 import { GraphView } from "../../canvas/graph-view";
 import { type Lane, lanesOf, useLanes } from "../../status/lanes/lanes";
 import { Timeline, type Track } from "../../status/lanes/timeline";
-import { INTO } from "../../status/level-places";
+import { INTO } from "../../status/level-words";
 import { runEndText, runLabel } from "../../status/progress";
 import { StateLabel } from "../../status/state-label";
 import { useProgress } from "../../status/use-progress";

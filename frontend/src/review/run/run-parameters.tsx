@@ -1,6 +1,7 @@
 /** Values as they were sent beside those that the engine reported, visit by visit. */
 import type { ActionRun, Run } from "../../api/runs";
-import { placesOf, wayWords } from "../../status/level-places";
+import { placesOf } from "../../status/level-places";
+import { wayWords } from "../../status/level-words";
 import { type ParameterRow, parametersOfVisits } from "./parameter-changes";
 import style from "./run-parameters.module.css";
 

@@ -1,7 +1,8 @@
 /** The record of a run on paper: what each action did, when as far as that is known, and who started it. */
 import { type Run, requesterPlace, runPlace, type Visit } from "../../api/runs";
 import { boundsText, durationText } from "../../status/durations";
-import { INTO, placesOf } from "../../status/level-places";
+import { placesOf } from "../../status/level-places";
+import { INTO } from "../../status/level-words";
 import { progressOf, runEndText, visitDuration } from "../../status/progress";
 import { PrintSheet } from "../../ui/print-sheet";
 import { clock, dateText, instant } from "../../ui/times";

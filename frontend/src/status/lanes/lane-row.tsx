@@ -4,7 +4,7 @@ import type { Visit } from "../../api/runs";
 import { colorOfName } from "../../ui/name-colors";
 import { stopwatch, useNow } from "../../ui/times";
 import { durationText } from "../durations";
-import { wayWords } from "../level-places";
+import { wayWords } from "../level-words";
 import type { Progress, Tone } from "../progress";
 import { StateLabel, toneColor } from "../state-label";
 import { shareOf, type TimeAxis } from "./axis";

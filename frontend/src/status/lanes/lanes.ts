@@ -3,7 +3,8 @@ import { useRef } from "react";
 import type { Run } from "../../api/runs";
 import { isEqual } from "../../graph/equal";
 import { fullName, type Graph } from "../../graph/model";
-import { factOf, type LevelPlace, placesIn, placesOf } from "../level-places";
+import { type LevelPlace, placesIn, placesOf } from "../level-places";
+import { factOf } from "../level-words";
 
 export interface Lane {
   /** As the run tells it. */
