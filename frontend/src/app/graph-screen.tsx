@@ -116,7 +116,7 @@ function useRunOnCanvas(
   at: number | null,
   inside: GraphInRun | null,
 ): void {
-  const names = inside?.names;
+  const names = inside !== null && "names" in inside ? inside.names : undefined;
   useEffect(() => {
     runOnCanvas.set(run && { run, unsure, at, names: names ?? [] });
   }, [run, unsure, at, names]);

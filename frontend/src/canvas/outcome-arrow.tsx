@@ -7,7 +7,7 @@ import { pillWord } from "./arrows/bundles";
 import { PILL_PLAY } from "./arrows/docks";
 import { behindPill, pathOf } from "./arrows/line-path";
 import { LineEditingContext, useIsOpen, useLine } from "./arrows/line-store";
-import { type DraggedOutcome, useOutcomeDrag } from "./arrows/outcome-drag";
+import type { DraggedOutcome } from "./arrows/outcome-drag";
 import type { Point } from "./arrows/scene";
 import type { RoutedLine } from "./arrows/simple-lines";
 import { useUntakenOutcomes } from "./card-highlights";
@@ -15,10 +15,13 @@ import { useChangeMark } from "./changes/change-marks";
 import { ChangeSign } from "./changes/change-tag";
 import { SinceSpot } from "./changes/since-marks";
 import type { Arrow } from "./elements";
-import { type Outcome, OutcomeSign, outcomeColor, outcomeWord } from "./outcome";
+import { type Outcome, OutcomeSign, outcomeColor } from "./outcome";
 import style from "./outcome-arrow.module.css";
 import { ProblemBadge } from "./problem-badge";
 
+const OutcomeHandles = lazyPart(() =>
+  import("./outcome-handles").then((part) => part.OutcomeHandles),
+);
 const BendHandles = lazyPart(() =>
   import("./arrows/bend-handles").then((part) => part.BendHandles),
 );
@@ -147,6 +150,7 @@ function Pill({ id, data, pill: [x, y], selected }: BundleProps & { pill: Point 
   const change = useChangeMark(data.relation);
   const untaken = useUntakenOutcomes(data.relation);
   const never = data.bundle.outcomes.filter((outcome) => untaken.includes(outcome));
+  const glyphs = <Glyphs outcomes={data.bundle.outcomes} untaken={untaken} />;
   return (
     <>
       {dragged && <DraggedLine from={[x, y]} dragged={dragged} />}
@@ -171,9 +175,11 @@ function Pill({ id, data, pill: [x, y], selected }: BundleProps & { pill: Point 
             </span>
           )}
           {data.entry ? null : selected && editing ? (
-            <OutcomeHandles bundle={data.bundle} editing={editing} onDrag={setDragged} />
+            <PartBoundary waiting={glyphs} frame={() => glyphs}>
+              <OutcomeHandles bundle={data.bundle} editing={editing} onDrag={setDragged} />
+            </PartBoundary>
           ) : (
-            <Glyphs outcomes={data.bundle.outcomes} untaken={untaken} />
+            glyphs
           )}
           {never.length > 0 && (
             <span className={style.never}>
@@ -208,39 +214,6 @@ export function Glyphs({ outcomes, untaken }: GlyphsProps) {
     >
       <OutcomeSign outcome={outcome} size={11} />
     </span>
-  ));
-}
-
-/** The outcomes of a chosen arrow, each of which can be dragged off. */
-function OutcomeHandles(props: Parameters<typeof useOutcomeDrag>[0]) {
-  const { bundle, editing } = props;
-  const drag = useOutcomeDrag(props);
-  const line = editing.nameOf(bundle);
-  return bundle.outcomes.map((outcome) => (
-    <button
-      key={outcome}
-      type="button"
-      className={`${style.handle} nodrag nopan`}
-      data-own-keys
-      data-dragged={drag.dragged === outcome || undefined}
-      aria-label={`Lead “${outcomeWord[outcome]}” of ${line} elsewhere`}
-      style={{ color: outcomeColor[outcome] }}
-      onPointerDown={drag.start}
-      onPointerMove={(event) => drag.move(event, outcome)}
-      onPointerUp={drag.drop}
-      onPointerCancel={drag.stop}
-      // The arrow has its own answer to these two; every other key is a shortcut as elsewhere.
-      onKeyDown={(event) => {
-        if (event.key === "Enter" || event.key === " ") event.stopPropagation();
-      }}
-      onClick={(event) => {
-        event.stopPropagation();
-        // A press of Enter or Space has no pointer, hence no clicks to count.
-        if (event.detail === 0) editing.choose(bundle, outcome);
-      }}
-    >
-      <OutcomeSign outcome={outcome} size={11} />
-    </button>
   ));
 }
 

@@ -2,7 +2,6 @@
 import { Button } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { estimatedSizes, type Positions, type Sizes } from "../canvas/geometry/arrange";
-import { notesAfter } from "../canvas/geometry/follow-notes";
 import { LayoutLeft, layOut } from "../canvas/geometry/layout";
 import { asOneEdit, moveActions, setDirection } from "../graph/edit";
 import { changeNote, notesOf } from "../graph/edit/notes";
@@ -15,6 +14,22 @@ const PATIENCE_MS = 1_000;
 const NOTICE = "layout";
 
 let running: AbortController | null = null;
+
+function sayNothingArranged(error: unknown): void {
+  notifications.show({
+    color: "red",
+    title: "Nothing was arranged",
+    message: `The layout could not be computed (${error instanceof Error ? error.message : String(error)}).`,
+    autoClose: 12_000,
+  });
+}
+
+/** How notes follow what they stand beside: loaded with the first layout. */
+const followNotes = () =>
+  import("../canvas/geometry/follow-notes").catch((error: unknown) => {
+    sayNothingArranged(error);
+    return null;
+  });
 
 /** Fresh places, with a notice that has a way out when it takes long; null when left or failed. */
 export async function freshPlaces(
@@ -41,14 +56,7 @@ export async function freshPlaces(
   try {
     return await layOut(graph, sizes, mine.signal);
   } catch (error) {
-    if (!(error instanceof LayoutLeft)) {
-      notifications.show({
-        color: "red",
-        title: "Nothing was arranged",
-        message: `The layout could not be computed (${error instanceof Error ? error.message : String(error)}).`,
-        autoClose: 12_000,
-      });
-    }
+    if (!(error instanceof LayoutLeft)) sayNothingArranged(error);
     return null;
   } finally {
     clearTimeout(timer);
@@ -75,9 +83,11 @@ export async function layOutGraph(
   const before = context.graph;
   const graph: Graph = { ...before, direction };
   const [old, sizes] = [new Map(context.positions()), sizesFor(context, graph)];
+  const following = followNotes();
   const places = await freshPlaces(graph, sizes);
-  if (places === null) return;
-  const notes = notesAfter(notesOf(before), old, places, sizes, direction);
+  const follow = await following;
+  if (places === null || follow === null) return;
+  const notes = follow.notesAfter(notesOf(before), old, places, sizes, direction);
   asOneEdit(doc, () => {
     setDirection(doc, direction);
     straighten(doc, context.graph.relations);

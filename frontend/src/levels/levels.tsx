@@ -13,6 +13,7 @@ import { useStableCallback } from "../ui/hooks/use-stable-callback";
 import { expansion } from "./in-place/expansion";
 import { useExpansion } from "./in-place/use-expansion";
 import { InsideSign } from "./inside-sign";
+import { useFlatLink } from "./use-flat-link";
 
 const NONE: readonly never[] = [];
 
@@ -93,6 +94,7 @@ export function Levels() {
   const { id, graph, past } = useEditorContext();
   const [, go] = useLocation();
   const search = useSearch();
+  useFlatLink();
   const { names, byName, isNamed, idOf } = useGraphsHere(id);
   useNewNames(
     useMemo(() => graph.actions.map(({ name }) => name), [graph]),

@@ -8,6 +8,7 @@ import { useLive } from "../api/live/use-live";
 import { type ActionStatistics, type Statistics, useStatistics } from "../api/review";
 import type { DurationBounds, Run } from "../api/runs";
 import { boundsText } from "../status/durations";
+import { INTO } from "../status/level-words";
 import { runLabel } from "../status/progress";
 import { toneColor } from "../status/state-label";
 import { Empty } from "../ui/empty";
@@ -82,6 +83,16 @@ function SpreadBar({ action, most }: { action: ActionStatistics; most: number })
   );
 }
 
+/** What ran inside stands behind the actions that it was inside of. */
+function ActionWay({ action: { levels, name } }: { action: ActionStatistics }) {
+  return (
+    <bdi>
+      {levels.length > 0 && <span className={style.levels}>{[...levels, ""].join(INTO)}</span>}
+      {name}
+    </bdi>
+  );
+}
+
 function Actions({ actions }: { actions: readonly ActionStatistics[] }) {
   const most = Math.max(0.001, ...actions.map((action) => high(action.spans.longest)));
   const weight = (action: ActionStatistics) => high(action.spans.p50) * action.visits;
@@ -103,7 +114,9 @@ function Actions({ actions }: { actions: readonly ActionStatistics[] }) {
         <tbody>
           {slowest.map((action) => (
             <tr key={action.action}>
-              <th scope="row">{action.action}</th>
+              <th scope="row">
+                <ActionWay action={action} />
+              </th>
               <td className={style.number}>{action.visits}</td>
               <td>
                 <ResultBar action={action} />
@@ -158,7 +171,10 @@ function Found({ found }: { found: Statistics }) {
             <ul className={style.list}>
               {failing.map((action) => (
                 <li key={action.action}>
-                  <b>{action.action}</b> {failures(action)} of {action.visits} visits
+                  <b>
+                    <ActionWay action={action} />
+                  </b>{" "}
+                  {failures(action)} of {action.visits} visits
                 </li>
               ))}
             </ul>

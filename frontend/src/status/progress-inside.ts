@@ -1,18 +1,18 @@
 /** What is said of a graph that runs inside of another: its actions are told by the names of all levels. Pure. */
 import type { Run } from "../api/runs";
-import { type Action, fullName, type Graph } from "../graph/model";
+import { fullName, type Graph } from "../graph/model";
 import { Watched } from "../ui/watched";
+import { placesOf } from "./level-places";
 import { type Progress, progressAt, progressOfAction } from "./progress";
 
-/** By its name alone where nobody knows which of several actions of that name was entered. */
-export type LevelName = string | Pick<Action, "name" | "instanceId">;
+/** The way from the outermost graph to one inside: by the names of the graphs below it, as far as nobody knows
+ * which of several actions of a name was entered, and then by the very actions that one is inside of. */
+type WayInside =
+  | { readonly names: readonly string[]; readonly levels?: readonly string[] }
+  | { readonly levels: readonly string[] };
 
 /** A graph in a run of the outermost one around it. */
-export interface GraphInRun {
-  readonly graph: Pick<Graph, "actions">;
-  /** The names of the graphs below the outermost one, down to this one. */
-  readonly names: readonly LevelName[];
-}
+export type GraphInRun = WayInside & { readonly graph: Pick<Graph, "actions"> };
 
 /** The run whose states are on the canvas. */
 export interface RunOnCanvas {
@@ -21,53 +21,52 @@ export interface RunOnCanvas {
   /** The moment at which its replay stands, ms. */
   readonly at: number | null;
   /** The names of the graphs below the run's, down to the one on the canvas. */
-  readonly names: readonly LevelName[];
+  readonly names: readonly string[];
 }
 
 /** One for the page: there is one canvas. Null while none is shown. */
 export const runOnCanvas = new Watched<RunOnCanvas | null>(null);
 
-const escaped = (text: string): string => text.replace(/[.*+?^${}()|[\]\\]/g, "\\$&");
+const nameOf = (action: string): string => action.slice(0, Math.max(0, action.lastIndexOf("_")));
 
-/** How an engine calls the actions of such a graph: `OUTER__INNER__0/Grip_0` (docs/umrf-and-the-engine.md 2.6). */
-function namePattern(outermost: string, names: readonly LevelName[]): RegExp {
-  const levels = names
-    .map((level) =>
-      typeof level === "string"
-        ? `__${escaped(level)}__\\d+`
-        : `__${escaped(level.name)}__${level.instanceId}`,
-    )
-    .join("");
-  return new RegExp(`^${escaped(outermost)}${levels}/(.+)$`, "s");
+function isThere(told: readonly string[], way: WayInside): boolean {
+  const { names = [], levels = [] } = "names" in way ? way : { levels: way.levels };
+  return (
+    told.length === names.length + levels.length &&
+    names.every((name, i) => name === nameOf(told[i] ?? "")) &&
+    levels.every((action, i) => action === told[names.length + i])
+  );
 }
 
 /** Progress by the keys that the actions have here; those that the run knows under no such name have none. */
 export function progressInside(
   run: Run,
   unsure: boolean,
-  { graph, names }: GraphInRun,
+  inside: GraphInRun,
 ): Map<string, Progress> {
-  const pattern = namePattern(run.graph_name, names);
-  const keys = new Map(graph.actions.map((action) => [fullName(action), action.key]));
+  const keys = new Map(inside.graph.actions.map((action) => [fullName(action), action.key]));
   const found = new Map<string, Progress>();
+  const places = placesOf(run);
   for (const [name, action] of Object.entries(run.actions ?? {})) {
-    const key = keys.get(pattern.exec(name)?.[1] ?? "");
+    const place = places.get(name);
+    if (place === undefined || !isThere(place.levels, inside)) continue;
+    const key = keys.get(place.name);
     if (key !== undefined) found.set(key, progressOfAction(name, action, run, unsure));
   }
   return found;
 }
 
 /** Whether a run has anything of it. */
-export function isInRun(run: Run, names: readonly LevelName[]): boolean {
-  const pattern = namePattern(run.graph_name, names);
-  return Object.keys(run.actions ?? {}).some((name) => pattern.test(name));
+export function isInRun(run: Run, names: readonly string[]): boolean {
+  return [...placesOf(run).values()].some(({ levels }) => isThere(levels, { names }));
 }
 
-/** Progress of the actions of a graph that is drawn inside of the one on the canvas. */
+/** Progress of the actions of a graph that is drawn inside of the one on the canvas: the actions `levels` lead
+ * from there to it, by their full names. */
 export function progressBelow(
   { run, unsure, at, names }: RunOnCanvas,
   graph: Pick<Graph, "actions">,
-  below: readonly LevelName[],
+  levels: readonly string[],
 ): ReadonlyMap<string, Progress> {
-  return progressAt(progressInside(run, unsure, { graph, names: [...names, ...below] }), at);
+  return progressAt(progressInside(run, unsure, { graph, names, levels }), at);
 }

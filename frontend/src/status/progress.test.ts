@@ -78,8 +78,10 @@ test("a graph inside of a run has the states of its own level, by name, and of n
   };
   const actions = {
     Fetch_0: going,
+    Other_0: going,
     "g__Fetch__0/Grip_0": bare,
     "g__Fetch__0__Grip__0/Close_0": ended,
+    "g__Other__0/Grip_0": bare,
     "g__Other__0__Grip__0/Close_0": bare,
   };
   const nested = { ...run, actions };

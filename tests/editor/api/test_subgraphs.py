@@ -1,6 +1,8 @@
 """Graphs inside of graphs over HTTP: told, played, and pinned by versions."""
 
+import io
 import json
+import zipfile
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -246,3 +248,31 @@ def test_what_is_no_sub_graph_or_has_a_name_twice_is_refused(client: httpx.Clien
     for key, status in ((known["A"], 404), ("nobody", 404)):
         body = {"action": key}
         assert client.post(f"/api/graphs/{outer}/unpacking", json=body).status_code == status
+
+
+def test_the_graphs_inside_come_as_files_that_an_engine_indexes(client: httpx.Client) -> None:
+    made(client, "Grip it", "Step")
+    made(client, "grip_it", "Step", "Stride")
+    made(client, "Fetch", "Grip it", "grip_it")
+    outer = made(client, "Outer", "Fetch")
+    answer = client.get(f"/api/graphs/{outer}/subgraphs.zip")
+    assert (answer.status_code, answer.headers["content-type"]) == (200, "application/zip")
+    told = client.get(f"/api/graphs/{outer}/subgraphs").json()
+    with zipfile.ZipFile(io.BytesIO(answer.content)) as file:
+        texts = {name: file.read(name) for name in file.namelist()}
+    assert sorted(texts) == [
+        "Fetch.umrf.graph.json", "Grip_it.umrf.graph.json", "grip_it-2.umrf.graph.json"
+    ]  # fmt: skip
+    # What an engine takes for actions has another ending.
+    assert all("graph.json" in name and "umrf.json" not in name for name in texts)
+    graphs = [codec.read(text).graph for text in texts.values()]
+    assert {each.name: digest(each) for each in graphs} == {
+        each["name"]: each["digest"] for each in told["subgraphs"]
+    }
+    assert client.get(f"/api/graphs/{outer}/subgraphs.zip").content == answer.content
+    leaf = made(client, "Leaf", "Step")
+    with zipfile.ZipFile(
+        io.BytesIO(client.get(f"/api/graphs/{leaf}/subgraphs.zip").content)
+    ) as file:
+        assert file.namelist() == []
+    assert client.get("/api/graphs/none/subgraphs.zip").status_code == 404

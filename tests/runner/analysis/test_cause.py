@@ -202,3 +202,69 @@ def test_a_robot_that_tells_no_result_still_shows_what_was_thrown() -> None:
     assert found(LINE, thrown, Ended(9, "finished")) == ["A ended in error."]
     done = Observed(4, (state(3, "A_0", "RUNNING"), state(4, "A_0", "FINISHED")))
     assert found(LINE, done, Ended(9, "finished")) == []
+
+
+def part(at: int, graph: str, node: str, name: str) -> NodeState:
+    return NodeState(at, graph, node, name)
+
+
+def inside(at: int, graph: str, node: str, result: str, said: str | None = None) -> tuple[Any, ...]:
+    """An action of a graph inside, from a moment on to the next."""
+    end = "ERROR" if result == "error" else "FINISHED"
+    return (
+        part(at, graph, node, "RUNNING"),
+        NodeResult(at + 1, graph, node, f"on_{result}", said),
+        part(at + 1, graph, node, end),
+    )
+
+
+def test_what_failed_inside_is_named_with_the_way_to_it() -> None:
+    told = (
+        state(3, "A_0", "RUNNING"),
+        part(3, "task__A__0", "Pick_1", "RUNNING"),
+        part(3, "task__A__0", "Pick_2", "RUNNING"),
+        *inside(4, "task__A__0__Pick__2", "Grip_0", "error", "jammed"),
+        NodeResult(5, "task__A__0", "Pick_2", "on_error"),
+        part(5, "task__A__0", "Pick_2", "FINISHED"),
+        NodeResult(5, "task", "A_0", "on_error"),
+        state(5, "A_0", "FINISHED"),
+    )
+    assert found(LINE, Observed(5, told), Ended(6, "finished", "on_error")) == [
+        "A › Pick 2 › Grip ended in error: “jammed”"
+    ]
+
+
+def test_a_run_that_ended_false_goes_back_to_the_last_that_ended_false_inside() -> None:
+    told = (
+        state(3, "A_0", "RUNNING"),
+        *inside(4, "task__A__0", "Look_0", "false"),
+        *inside(6, "task__A__0", "Look_1", "false"),
+        NodeResult(7, "task", "A_0", "on_false"),
+        state(7, "A_0", "FINISHED"),
+    )
+    assert found(LINE, Observed(7, told), Ended(8, "finished", "on_false")) == [
+        "A › Look 1 ended false."
+    ]
+
+
+def test_what_was_made_good_inside_is_not_the_cause_of_what_failed_after_it() -> None:
+    told = (
+        state(3, "A_0", "RUNNING"),
+        *inside(4, "task__A__0", "Grip_0", "error", "slipped"),
+        *inside(5, "task__A__0", "Again_0", "true"),
+        NodeResult(6, "task", "A_0", "on_true"),
+        state(6, "A_0", "FINISHED"),
+        state(6, "B_0", "RUNNING"),
+        NodeResult(7, "task", "B_0", "on_error", "jammed"),
+        state(7, "B_0", "ERROR"),
+    )
+    assert found(LINE, Observed(7, told), Ended(8, "finished", "on_error")) == [
+        "B ended in error: “jammed”"
+    ]
+
+
+def test_of_a_stop_only_what_went_on_inmost_is_told() -> None:
+    told = (state(3, "A_0", "RUNNING"), part(3, "task__A__0", "Grip_0", "RUNNING"))
+    assert found(LINE, Observed(4, told), StopRequested(6, ANN), Ended(7, "stopped")) == [
+        "A › Grip had not reported its end when Ann pressed Stop."
+    ]

@@ -5,7 +5,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from action_assistant.runner.analysis.comparison import compare
+from action_assistant.runner.analysis.comparison import SentTree, compare
 from action_assistant.runner.links.observations import NodeResult, NodeState
 from action_assistant.runner.runs.events import Ended, Observed, Published
 from action_assistant.runner.runs.fold import replay
@@ -54,7 +54,7 @@ def went(
 
 
 def compared(a: tuple[Run, str], b: tuple[Run, str]) -> Any:
-    return compare(a[0], b[0], a[1], b[1])
+    return compare(a[0], b[0], SentTree(a[1]), SentTree(b[1]))
 
 
 GOOD = went(1, ("Work_0", "true"), ("Work_1", "true"))

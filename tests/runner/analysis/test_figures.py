@@ -168,10 +168,10 @@ def test_what_ended_unseen_and_what_was_seen_to_go_on_are_not_the_same() -> None
         getattr(each.place.harness.ledger.told(each.run.id)[0], "umrf", "")
         for each in (done, other)
     ]
-    found = comparison.compare(done.run, other.run, *texts)
+    found = comparison.compare(done.run, other.run, *map(comparison.SentTree, texts))
     first = next(step for step in found.steps if step.action == "Work_0")
     assert first.relation == "end"
-    twice = comparison.compare(done.run, done.run, texts[0], texts[0])
+    twice = comparison.compare(done.run, done.run, *[comparison.SentTree(texts[0])] * 2)
     assert {step.relation for step in twice.steps} == {"unknown"}
     assert "not known" in twice.text
 

@@ -38,12 +38,15 @@ export interface RunnerApi {
     };
     /**
      * ActionStatistics
-     * @description One action over all these runs. Durations are seconds over `timed` visits, those that have ended,
+     * @description One action over all these runs. `levels`: the actions that it is inside of, outermost first, and
+     *     `name` its own there; `action` as the engine of its newest run told it. Durations are seconds over `timed` visits, those that have ended,
      *     and stand where they are known exactly; `spans` has all of them between their bounds. `unknown`
      *     counts visits whose result is not known.
      */
     ActionStatistics: {
         action: string;
+        levels: string[];
+        name: string;
         aid: string | null;
         runs: number;
         visits: number;
@@ -303,11 +306,14 @@ export interface RunnerApi {
     };
     /**
      * ComparedVisit
-     * @description The `visit`-th visit (from 1) of an action in both runs. `slower` names the run in which it
-     *     took notably longer, whatever of its bounds is true.
+     * @description The `visit`-th visit (from 1) of an action in both runs. `levels`: the actions that it is inside
+     *     of, outermost first, and `name` its own there; `action` as its engine told it. `slower` names the
+     *     run in which it took notably longer, whatever of its bounds is true.
      */
     ComparedVisit: {
         action: string;
+        levels: string[];
+        name: string;
         aid: string | null;
         visit: number;
         a: RunnerApi["VisitShown"] | null;
@@ -968,7 +974,8 @@ export interface RunnerApi {
     /**
      * RunComparison
      * @description Run `a` against run `b`. `graph` is the difference of what was sent; `parameters` those of its
-     *     changes that touch the values of actions.
+     *     changes that touch the values of actions; `subgraphs` names the graphs inside that were sent along
+     *     and were not the same.
      */
     RunComparison: {
         a: RunnerApi["RunSummary"];
@@ -977,6 +984,7 @@ export interface RunnerApi {
         same_engine: boolean;
         graph: RunnerApi["Difference"];
         parameters: RunnerApi["ActionChange"][];
+        subgraphs: string[];
         steps: RunnerApi["ComparedVisit"][];
         left_out: number;
         parting: RunnerApi["Parting"] | null;

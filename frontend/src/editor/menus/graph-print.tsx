@@ -1,7 +1,7 @@
 /** The graph on paper: black on white, with its name, version, digest and the day. */
 import { useVersions, versionName } from "../../api/graphs";
-import { type PrintPages, pagesOf } from "../../canvas/print-pages";
-import { svgPictureOf } from "../../canvas/svg-picture";
+import { type PrintPages, pagesOf } from "../../canvas/views/print-pages";
+import { svgPictureOf } from "../../canvas/views/svg-picture";
 import type { EditorContext } from "../../edit-actions/editor-context";
 import { useThrottledLink } from "../../sync/use-room";
 import { PrintSheet } from "../../ui/print-sheet";

@@ -2,7 +2,7 @@
 import { useMemo, useSyncExternalStore } from "react";
 import type { DryRun } from "../../dry-run/use-dry-run";
 import { useEditorContext } from "../../edit-actions/editor-context";
-import type { Key } from "../../graph/model";
+import { fullName, type Key } from "../../graph/model";
 import type { Progress } from "../../status/progress";
 import { progressBelow, type RunOnCanvas, runOnCanvas } from "../../status/progress-inside";
 import type { LevelGraph } from "./level-graph";
@@ -28,7 +28,7 @@ export function progressOf(
   const { graph } = level;
   if (graph === null || typeof graph === "string") return NOTHING;
   if (dryRun) return dryRun.inside({ ...graph, name: calledBy(outermost, level) });
-  return run ? progressBelow(run, graph, level.names) : NOTHING;
+  return run ? progressBelow(run, graph, level.names.map(fullName)) : NOTHING;
 }
 
 export function useLevelProgress(level: LevelGraph): ReadonlyMap<Key, Progress> {

@@ -2,7 +2,7 @@
 import { ReactFlowProvider, useReactFlow, useStoreApi } from "@xyflow/react";
 import { useLayoutEffect } from "react";
 import { ChangeMarked } from "../../canvas/changes/change-marks";
-import { GraphView } from "../../canvas/graph-view";
+import { GraphView } from "../../canvas/views/graph-view";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import type { Progress } from "../../status/progress";
 import style from "./side.module.css";

@@ -4,6 +4,21 @@ import { DifferenceView } from "../../history/difference-view";
 import style from "./compare-page.module.css";
 
 export function GraphChanges({ found }: { found: Comparison }) {
-  if (found.same_graph) return <p className={style.same}>Both ran exactly the same graph.</p>;
-  return <DifferenceView found={found.graph} label="What changed in the graph" />;
+  const { subgraphs } = found;
+  const same =
+    subgraphs.length === 0 ? "Both ran exactly the same graph." : "The graph was the same.";
+  return (
+    <>
+      {subgraphs.length > 0 && (
+        <p className={style.same}>
+          Graphs inside were not the same: <bdi>{subgraphs.join(", ")}</bdi>.
+        </p>
+      )}
+      {found.same_graph ? (
+        <p className={style.same}>{same}</p>
+      ) : (
+        <DifferenceView found={found.graph} label="What changed in the graph" />
+      )}
+    </>
+  );
 }

@@ -18,7 +18,7 @@ import type { RunBarParts } from "../run/run-page";
 import { GraphChanges } from "./changes";
 import style from "./compare-page.module.css";
 import { ComparedCanvas, Legend } from "./compared-cards";
-import { differencesOf, likelyCause, sameAsSeen } from "./differences";
+import { differencesOf, likelyCause, outermostAid, sameAsSeen } from "./differences";
 import { GhostLanes } from "./ghost-lanes";
 import { Steps } from "./steps-table";
 
@@ -103,7 +103,7 @@ function WhereTheyPart({ found, onSelect }: SideProps) {
           {all.slice(0, MOST).map(({ number, step, title, text }) => (
             <li key={number}>
               <i aria-hidden>{number}</i>
-              <button type="button" onClick={() => onSelect(step.aid)}>
+              <button type="button" onClick={() => onSelect(outermostAid(found, step))}>
                 {title}
               </button>
               <p>{text}</p>

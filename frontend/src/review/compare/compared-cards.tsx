@@ -5,12 +5,12 @@ import type { Comparison } from "../../api/review";
 import type { Run } from "../../api/runs";
 import { CardStateContext } from "../../canvas/card-highlights";
 import { fromUmrf } from "../../canvas/from-umrf";
-import { GraphView } from "../../canvas/graph-view";
+import { GraphView } from "../../canvas/views/graph-view";
 import type { Tone } from "../../status/progress";
 import { StateLabel } from "../../status/state-label";
 import { useProgress } from "../../status/use-progress";
 import style from "./compare-page.module.css";
-import { type ActionSummary, comparedActions, rangeText } from "./differences";
+import { type ActionSummary, comparedActions, outermostAid, rangeText } from "./differences";
 
 const MOST = 4; // outcomes in a row; the rest are counted
 
@@ -59,13 +59,17 @@ export function ComparedCanvas({ found, run, selected, onSelect }: Props) {
     () => new Map(comparedActions(found).map((each) => [each.aid, each])),
     [found],
   );
-  const parting = found.parting?.step.aid ?? null;
+  const parting = found.parting ? outermostAid(found, found.parting.step) : null;
   const stateOf = useCallback(
     (aid: string) => {
       const action = actions.get(aid);
       return (
         <span className={style.rows}>
-          {aid === parting && <span className={style.flag}>1 · first difference</span>}
+          {aid === parting && (
+            <span className={style.flag}>
+              1 · first difference{found.parting?.step.levels.length ? ", inside" : ""}
+            </span>
+          )}
           <RunRow number={found.b.number} ghost={false} summary={action?.b ?? null} />
           <RunRow number={found.a.number} ghost summary={action?.a ?? null} />
         </span>

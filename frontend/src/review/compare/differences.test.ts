@@ -2,7 +2,14 @@ import fc from "fast-check";
 import { expect, test } from "vitest";
 import type { ComparedStep, Comparison } from "../../api/review";
 import type { Visit } from "../../api/runs";
-import { comparedActions, differencesOf, likelyCause, overlap, sameAsSeen } from "./differences";
+import {
+  comparedActions,
+  differencesOf,
+  likelyCause,
+  outermostAid,
+  overlap,
+  sameAsSeen,
+} from "./differences";
 
 const iso = (s: number) => new Date(s * 1000).toISOString();
 const visit = (from: number, until: number, result: Visit["result"], latest = until): Visit => ({
@@ -16,6 +23,8 @@ const visit = (from: number, until: number, result: Visit["result"], latest = un
 });
 const step = (action: string, part: Partial<ComparedStep>): ComparedStep => ({
   action,
+  levels: [],
+  name: action,
   aid: action,
   visit: 1,
   a: null,
@@ -33,6 +42,7 @@ const comparison = (steps: ComparedStep[], part: Partial<Comparison> = {}): Comp
     same_engine: true,
     graph: { before: 0, after: 0, fields: [], actions: [], relations: [], notes: [] },
     parameters: [],
+    subgraphs: [],
     steps,
     left_out: 0,
     parting: first ? { step: first, text: "", messages_a: [], messages_b: [] } : null,
@@ -117,4 +127,32 @@ test("visits of one action are told together, their durations as the range of th
       b: { results: ["false", "error"], took: { least: 5_500, most: 6_500 } },
     },
   ]);
+});
+
+test("what is inside of an action stands below it, and what differs there is told with the way", () => {
+  const outer = step("Fetch_0", {
+    a: visit(0, 9, "true"),
+    b: visit(0, 9, "error"),
+    relation: "result",
+  });
+  const inner = { aid: null, levels: ["Fetch_0"] };
+  const grip = step("g__Fetch__0/Grip_0", {
+    ...inner,
+    name: "Grip_0",
+    a: visit(1, 3, "true"),
+    b: visit(1, 2, "error"),
+    relation: "result",
+  });
+  const lost = step("h__Gone__0/Grip_0", { aid: null, b: visit(8, 9, "true"), relation: "only_b" });
+  const close = step("Close_0", { a: visit(9, 10, "true"), relation: "only_a" });
+  const found = comparison([grip, outer, close, lost], { subgraphs: ["Fetch"] });
+  expect(comparedActions(found).map(({ name, around, holds }) => [name, around, holds])).toEqual([
+    ["Fetch_0", null, true],
+    ["g__Fetch__0/Grip_0", "Fetch_0", false],
+    ["Close_0", null, false],
+    ["h__Gone__0/Grip_0", null, false],
+  ]);
+  expect(differencesOf(found)[0]?.title).toBe("Fetch 0 › Grip 0 ended with an error");
+  expect(likelyCause(found)).toBe("the graph inside Fetch 0 was another one");
+  expect(outermostAid(found, grip)).toBe("Fetch_0");
 });

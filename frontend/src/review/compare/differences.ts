@@ -3,6 +3,7 @@ import type { ComparedField, ComparedStep, Comparison } from "../../api/review";
 import type { Visit } from "../../api/runs";
 import { plainValue } from "../../history/difference-words";
 import { boundsText } from "../../status/durations";
+import { INTO, spaced, wayWords } from "../../status/level-words";
 import { visitDuration } from "../../status/progress";
 
 /** How long something took, ms; `most` is Infinity where nothing bounds it. */
@@ -19,9 +20,14 @@ export interface ActionSummary {
   readonly took: DurationRange | null;
 }
 
-export interface ComparedAction {
+export interface ComparedAction extends LevelPlaceInWords {
   readonly aid: string | null;
+  /** As the engine told it. */
   readonly name: string;
+  /** The action that it is right inside of, as the engine told that. */
+  readonly around: string | null;
+  /** Whether others are inside of it. */
+  readonly holds: boolean;
   /** Null: it did not run. */
   readonly a: ActionSummary | null;
   readonly b: ActionSummary | null;
@@ -47,18 +53,48 @@ function summaryOf(visits: readonly Visit[]): ActionSummary | null {
   };
 }
 
-/** Each action once, in the order in which they began. */
+interface LevelPlaceInWords {
+  readonly levels: readonly string[];
+  /** Its own name on its level. */
+  readonly label: string;
+}
+
+const keyOf = (way: readonly string[]): string => JSON.stringify(way);
+
+/** Each action once, in the order in which they began, and right below each those inside of it. */
 export function comparedActions(found: Comparison): ComparedAction[] {
   const steps = new Map<string, ComparedStep[]>();
   for (const step of found.steps) {
-    steps.set(step.action, [...(steps.get(step.action) ?? []), step]);
+    const key = keyOf([...step.levels, step.name]);
+    const known = steps.get(key);
+    if (known === undefined) steps.set(key, [step]);
+    else known.push(step);
   }
-  return [...steps].map(([name, all]) => ({
-    name,
-    aid: all[0]?.aid ?? null,
-    a: summaryOf(all.flatMap(({ a }) => a ?? [])),
-    b: summaryOf(all.flatMap(({ b }) => b ?? [])),
-  }));
+  const inside = new Map<string, ComparedStep[][]>();
+  for (const all of steps.values()) {
+    const levels = keyOf(all[0]?.levels ?? []);
+    const around = steps.has(levels) ? levels : keyOf([]);
+    inside.set(around, [...(inside.get(around) ?? []), all]);
+  }
+  const put = (way: string, around: string | null): ComparedAction[] =>
+    (inside.get(way) ?? []).flatMap((all) => {
+      const [{ action, levels, name: label, aid } = NO_STEP] = all;
+      const own = keyOf([...levels, label]);
+      const [a, b] = [all.flatMap((each) => each.a ?? []), all.flatMap((each) => each.b ?? [])];
+      const place = { name: action, levels, label, aid, around, holds: inside.has(own) };
+      return [{ ...place, a: summaryOf(a), b: summaryOf(b) }, ...put(own, action)];
+    });
+  return put(keyOf([]), null);
+}
+
+const NO_STEP = { action: "", levels: [], name: "", aid: null };
+
+/** The identity of the outermost action around a step, or of its own: the one on the canvas. */
+export function outermostAid(found: Comparison, { levels, aid }: ComparedStep): string | null {
+  const [outermost] = levels;
+  if (outermost === undefined) return aid;
+  const around = found.steps.find((each) => each.levels.length === 0 && each.name === outermost);
+  return around?.aid ?? null;
 }
 
 export function rangeText(range: DurationRange | null): string {
@@ -79,15 +115,13 @@ export interface NumberedDifference {
   readonly text: string;
 }
 
-const spaced = (name: string) => name.replace(/_(\d+)$/, " $1");
-
 function ended(visit: Visit): string {
   if (visit.result === null) return visit.until === null ? "went on" : "ended, result not known";
   return visit.result === "error" ? "ended with an error" : `ended ${visit.result}`;
 }
 
 function visitWords(step: ComparedStep): string {
-  return step.visit > 1 ? `${spaced(step.action)}, visit ${step.visit},` : spaced(step.action);
+  return step.visit > 1 ? `${wayWords(step)}, visit ${step.visit},` : wayWords(step);
 }
 
 function differenceOf(
@@ -126,14 +160,14 @@ export function differencesOf(found: Comparison): NumberedDifference[] {
 
 /** Actions that ended the same, and for which no difference in time is claimed. */
 export function sameAsSeen(found: Comparison): { name: string; text: string }[] {
-  return comparedActions(found).flatMap(({ name, a, b }) => {
+  return comparedActions(found).flatMap(({ name, levels, label, a, b }) => {
     const steps = found.steps.filter(({ action }) => action === name);
     const same = steps.every(({ relation, slower }) => relation === "same" && !slower);
     if (!same || !a?.took || !b?.took) return [];
     if (!overlap(a.took, b.took)) return [];
     const [x, y] = [rangeText(b.took), rangeText(a.took)];
     const text = x === y ? `${x} in both` : `${x} and ${y} overlap: no difference is claimed`;
-    return [{ name: spaced(name), text }];
+    return [{ name: wayWords({ levels, name: label }), text }];
   });
 }
 
@@ -157,7 +191,10 @@ export function likelyCause(found: Comparison): string | null {
   const { parting } = found;
   if (parting === null) return null;
   const { step } = parting;
-  const own = found.graph.actions.find(({ aid }) => aid === step.aid);
+  const level = step.levels.at(-1)?.replace(/_\d+$/, "");
+  if (level !== undefined && found.subgraphs.includes(level))
+    return `the graph inside ${step.levels.map(spaced).join(INTO)} was another one`;
+  const own = found.graph.actions.find(({ aid }) => step.aid !== null && aid === step.aid);
   const field = own?.fields.find(({ field }) => /^(in|out)\//.test(field)) ?? undefined;
   if (field !== undefined) return changedWords(field);
   const input = ranWithOther(step);

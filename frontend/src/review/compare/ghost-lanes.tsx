@@ -1,9 +1,13 @@
 /** Two runs on one time axis: this run filled, the other one as a ghost beneath, and where they part. */
-import { useState } from "react";
+import { useMemo, useState } from "react";
 import type { ComparedStep, Comparison } from "../../api/review";
 import type { Run, Visit } from "../../api/runs";
 import { shareOf, type TimeAxis, ticksOf, wholeSpan } from "../../status/lanes/axis";
 import { barOf } from "../../status/lanes/bars";
+import { AllLevels, LaneToggle } from "../../status/lanes/lane-toggle";
+import { openLanes } from "../../status/lanes/lanes";
+import { type OpenLanes, useOpenLanes } from "../../status/lanes/use-open-lanes";
+import { wayWords } from "../../status/level-words";
 import { visitBegin, visitEnd } from "../../status/progress";
 import { toneColor } from "../../status/state-label";
 import { Segments } from "../../ui/segments";
@@ -65,9 +69,39 @@ interface LaneProps {
   parts: boolean;
   selected: boolean;
   onPick: (aid: string | null) => void;
+  /** Null where no action has others inside. */
+  inside: OpenLanes | null;
 }
 
-function GhostLane({ action, axes, steps, parts, selected, onPick }: LaneProps) {
+/** Its name, with what opens the lanes inside of it. */
+function GhostName({ action, parts, onPick, inside }: Omit<LaneProps, "steps" | "axes">) {
+  const { aid, levels, label, name, holds } = action;
+  const words = wayWords({ levels, name: label });
+  const opened = holds && inside !== null ? inside.open.has(name) : null;
+  return (
+    <span
+      className={style.first}
+      style={{ paddingLeft: `${Math.min(6, levels.length) * 0.75}rem` }}
+    >
+      {inside !== null && (
+        <LaneToggle words={words} opened={opened} onOpen={() => inside.toggle(name)} />
+      )}
+      <button
+        type="button"
+        disabled={aid === null}
+        title={words}
+        aria-label={levels.length > 0 ? words : undefined}
+        onClick={() => onPick(aid)}
+      >
+        {parts && <b className={style.mark}>1</b>}
+        <bdi>{label}</bdi>
+      </button>
+    </span>
+  );
+}
+
+function GhostLane(props: LaneProps) {
+  const { action, axes, steps, parts, selected } = props;
   const own = steps.filter((step) => step.action === action.name);
   const words = (side: "a" | "b") => {
     const found = action[side];
@@ -77,10 +111,7 @@ function GhostLane({ action, axes, steps, parts, selected, onPick }: LaneProps) 
   };
   return (
     <li data-parting={parts || undefined} data-selected={selected || undefined}>
-      <button type="button" disabled={action.aid === null} onClick={() => onPick(action.aid)}>
-        {parts && <b className={style.mark}>1</b>}
-        {action.name}
-      </button>
+      <GhostName {...props} />
       <div className={style.track} aria-hidden>
         {own.map((step) => (
           <span key={step.visit}>
@@ -111,6 +142,12 @@ function spanOf(steps: readonly ComparedStep[], begun: { a: number; b: number })
   return wholeSpan(Math.max(0, ...ends) * 1.04);
 }
 
+/** Whether a step is of this action, or of one inside of it. */
+function leadsTo({ levels, label }: ComparedAction, step: ComparedStep): boolean {
+  const way = [...step.levels, step.name];
+  return [...levels, label].every((each, depth) => way[depth] === each);
+}
+
 export function GhostLanes({ found, a, b, selected, onPick }: Props) {
   const [by, setBy] = useState<Alignment>("start");
   const step = found.parting?.step ?? null;
@@ -118,9 +155,19 @@ export function GhostLanes({ found, a, b, selected, onPick }: Props) {
   const span = spanOf(found.steps, begun);
   const axes = { a: { start: begun.a, span }, b: { start: begun.b, span } };
   const parts = partingAt(step, begun);
+  const inside = useOpenLanes();
+  const actions = useMemo(() => comparedActions(found), [found]);
+  const shown = openLanes(actions, inside.open);
+  const marked = shown.findLast((action) => step !== null && leadsTo(action, step))?.name;
+  const nested = actions.some(({ holds }) => holds) ? inside : null;
   return (
     <section className={style.lanes} aria-label="Both runs over time">
       <header>
+        {nested !== null && (
+          <span className={style.levels}>
+            <AllLevels lanes={actions} inside={nested} />
+          </span>
+        )}
         <span>A faded or hatched end: when it ended is known only to this range.</span>
         <Segments
           size="xs"
@@ -151,15 +198,16 @@ export function GhostLanes({ found, a, b, selected, onPick }: Props) {
         <span className={style.took}>run {found.a.number}</span>
       </div>
       <ul>
-        {comparedActions(found).map((action) => (
+        {shown.map((action) => (
           <GhostLane
             key={action.name}
             action={action}
             axes={axes}
             steps={found.steps}
-            parts={step?.action === action.name}
+            parts={action.name === marked}
             selected={action.aid !== null && action.aid === selected}
             onPick={onPick}
+            inside={nested}
           />
         ))}
       </ul>

@@ -2,6 +2,7 @@
 import type { ComparedStep, Comparison } from "../../api/review";
 import type { Visit } from "../../api/runs";
 import { durationText } from "../../status/durations";
+import { INTO } from "../../status/level-words";
 import { visitDuration } from "../../status/progress";
 import { StateLabel } from "../../status/state-label";
 import style from "./compare-page.module.css";
@@ -63,7 +64,7 @@ export function Steps({ found }: { found: Comparison }) {
             data-parting={is(step) || undefined}
           >
             <th scope="row">
-              {step.action}
+              <bdi>{[...step.levels, step.name].join(INTO)}</bdi>
               {step.visit > 1 && <span className={style.none}> visit {step.visit}</span>}
             </th>
             <td>

@@ -5,6 +5,8 @@ import { useMemo, useState } from "react";
 import type { ReplayMark } from "../../api/documents/replay";
 import { authorName } from "../../api/graphs";
 import { type Run, runPlace } from "../../api/runs";
+import { placesOf } from "../../status/level-places";
+import { wayWords } from "../../status/level-words";
 import {
   runEndText,
   type Tone,
@@ -21,12 +23,11 @@ interface Happening {
   at: number;
   tone: Tone;
   name: string | null;
-  aid: string | null;
+  /** The action as the run calls it. */
+  fact: string | null;
   text: string;
-}
-
-function spaced(fullName: string): string {
-  return fullName.replace(/_(\d+)$/, " $1");
+  /** Of what happens at one moment: what is inside ends before what it is inside of, and begins after. */
+  order?: number;
 }
 
 /** Seconds after the start. The clock of an engine may stand a little behind the runner's. */
@@ -54,13 +55,17 @@ export function eventLines(
 ): Happening[] {
   const all: Happening[] = [];
   const start = instant(run.started_at);
-  for (const [name, action] of Object.entries(run.actions ?? {})) {
+  const places = placesOf(run);
+  for (const [fact, action] of Object.entries(run.actions ?? {})) {
+    const place = places.get(fact) ?? { levels: [], name: fact };
+    const who = { name: wayWords(place), fact };
+    const depth = place.levels.length;
     action.visits.forEach((visit, i) => {
       const from = visitBegin(visit);
       const until = visitEnd(visit);
       const again = i > 0 ? `again (${i + 1}.)` : "";
-      const who = { name: spaced(name), aid: action.aid };
-      if (from !== null) all.push({ at: from, tone: "run", ...who, text: `runs ${again}`.trim() });
+      if (from !== null)
+        all.push({ at: from, tone: "run", ...who, text: `runs ${again}`.trim(), order: depth });
       if (until !== null) {
         const result = visit.result?.replace(/^on_/, "") ?? null;
         const tone = (result ?? "done") as Tone;
@@ -70,33 +75,33 @@ export function eventLines(
           last === until || start === null ? "" : ` (not before ${after(start, until)})`;
         const open = last === null ? "; its code may go on" : "";
         const at = last ?? Math.max(until, from ?? until);
-        all.push({ at, tone, ...who, text: (result ?? "finished") + seen + since + open });
+        all.push({
+          at,
+          tone,
+          ...who,
+          text: (result ?? "finished") + seen + since + open,
+          order: -depth,
+        });
       }
     });
     for (const message of action.messages) {
       const at = instant(message.at);
       if (at === null) continue;
-      all.push({
-        at,
-        tone: "idle",
-        name: spaced(name),
-        aid: action.aid,
-        text: `“${message.text}”`,
-      });
+      all.push({ at, tone: "idle", ...who, text: `“${message.text}”`, order: -depth });
     }
   }
   for (const line of run.log ?? []) {
     const at = instant(line.at);
-    if (at !== null) all.push({ at, tone: "idle", name: "engine", aid: null, text: line.text });
+    if (at !== null) all.push({ at, tone: "idle", name: "engine", fact: null, text: line.text });
   }
   for (const mark of marks) {
     const at = instant(mark.at);
     if (at === null || !TOLD.has(mark.kind)) continue;
-    all.push({ at, tone: "stopped", name: null, aid: null, text: markText(mark) });
+    all.push({ at, tone: "stopped", name: null, fact: null, text: markText(mark) });
   }
   for (const alarm of run.alarms) {
     const at = instant(alarm.at);
-    if (at !== null) all.push({ at, tone: "error", name: null, aid: null, text: alarm.text });
+    if (at !== null) all.push({ at, tone: "error", name: null, fact: null, text: alarm.text });
   }
   const end = instant(run.ended_at);
   if (end !== null)
@@ -104,21 +109,23 @@ export function eventLines(
       at: end,
       tone: "idle",
       name: null,
-      aid: null,
+      fact: null,
       text: `Run ${runEndText(run)}${run.detail ? `: ${run.detail}` : ""}`,
+      order: Number.MAX_VALUE,
     });
-  all.sort((a, b) => a.at - b.at);
+  all.sort((a, b) => a.at - b.at || (a.order ?? 0) - (b.order ?? 0));
   if (start === null) return all;
   const where = run.engine === "simulator" ? "in the simulator" : `on ${runPlace(run)}`;
   const text = `${authorName(run.author)} started ${version} ${where}`;
-  return [{ at: start, tone: "idle", name: null, aid: null, text }, ...all];
+  return [{ at: start, tone: "idle", name: null, fact: null, text }, ...all];
 }
 
 interface Props {
   run: Run;
   version: string;
+  /** The action that is chosen, as the run calls it. */
   selected: string | null;
-  onPick: (aid: string | null) => void;
+  onPick: (fact: string | null) => void;
   marks: readonly ReplayMark[];
   /** Where the replay stands, ms; null at the end. */
   at: number | null;
@@ -137,7 +144,7 @@ function Line(
   return (
     <li
       className={style.event}
-      data-selected={(event.aid !== null && event.aid === selected) || undefined}
+      data-selected={(event.fact !== null && event.fact === selected) || undefined}
       data-later={(at !== null && event.at > at) || undefined}
     >
       <button
@@ -152,8 +159,8 @@ function Line(
       </button>
       <span>
         {event.name !== null && (
-          <button type="button" className={style.name} onClick={() => onPick(event.aid)}>
-            {event.name}
+          <button type="button" className={style.name} onClick={() => onPick(event.fact)}>
+            <bdi>{event.name}</bdi>
           </button>
         )}{" "}
         <span style={event.tone === "idle" ? {} : { color: toneColor[event.tone] }}>

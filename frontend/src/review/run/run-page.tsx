@@ -2,7 +2,7 @@
 import { Skeleton, Tabs } from "@mantine/core";
 import { IconAlertTriangle } from "@tabler/icons-react";
 import { ReactFlowProvider } from "@xyflow/react";
-import { memo, type ReactNode, useEffect, useMemo, useState } from "react";
+import { memo, type ReactNode, useCallback, useEffect, useMemo, useState } from "react";
 import { useSearch } from "wouter";
 import { type ReplayMark, useReplayData } from "../../api/documents/replay";
 import { authorName } from "../../api/graphs";
@@ -11,16 +11,19 @@ import { useLive } from "../../api/live/use-live";
 import { useRunsOfSameStart } from "../../api/review";
 import { type Run, useRun } from "../../api/runs";
 import { fromUmrf } from "../../canvas/from-umrf";
-import { GraphView } from "../../canvas/graph-view";
-import type { Graph } from "../../graph/model";
-import { lanesOf, useLanes } from "../../status/lanes/lanes";
+import { GraphView } from "../../canvas/views/graph-view";
+import { type Lane, lanesOf, useLanes } from "../../status/lanes/lanes";
 import { Timeline, type Track } from "../../status/lanes/timeline";
+import { INTO } from "../../status/level-words";
 import { runEndText, runLabel } from "../../status/progress";
 import { StateLabel } from "../../status/state-label";
 import { useProgress } from "../../status/use-progress";
 import { Empty } from "../../ui/empty";
 import { clock, instant, useNow } from "../../ui/times";
 import type { Crumb } from "../../ui/top-bar";
+import { LevelBar } from "../levels/level-bar";
+import { graphsOn } from "../levels/sent-levels";
+import { type LevelCursor, useLevel } from "../levels/use-level";
 import { PlayerControls } from "../replay/replay-controls";
 import { silentTimesOf, timelineSignsOf } from "../replay/replay-marks";
 import { type ReplayCursor, useReplay } from "../replay/use-replay";
@@ -51,27 +54,25 @@ interface Props {
   start: (again: RepeatActions, onClose: () => void) => ReactNode;
 }
 
-/** Where a link points: a moment, in ms after the start, and an action. */
-function usePlace(run: Run) {
-  const query = new URLSearchParams(useSearch());
-  const t = query.get("t");
+/** The moment to which a link points, in ms after the start. */
+function momentAsked(run: Run, search: string): number | null {
+  const t = new URLSearchParams(search).get("t");
   const start = instant(run.started_at);
-  const from =
-    t !== null && start !== null && Number.isFinite(Number(t)) ? start + Number(t) : null;
-  return { from, action: query.get("action") };
+  return t !== null && start !== null && Number.isFinite(Number(t)) ? start + Number(t) : null;
 }
 
 /** Keeps the address in step, so that it can be sent to somebody. */
-function useAddress(id: string, replay: ReplayCursor, selected: string | null): void {
+function useAddress(id: string, replay: ReplayCursor, { way, key }: LevelCursor): void {
   const { at, start, playing } = replay;
   useEffect(() => {
     const query = new URLSearchParams();
+    for (const { graph, action } of way) query.append("in", `${graph}~${action}`);
     if (at !== null) query.set("t", String(Math.round(at - start)));
-    if (selected !== null) query.set("action", selected);
+    if (key !== null) query.set("action", key);
     const search = query.size > 0 ? `?${query}` : "";
     if (playing) return; // browsers refuse an address that changes with every frame
     window.history.replaceState(window.history.state, "", `/runs/${id}${search}`);
-  }, [id, at, start, playing, selected]);
+  }, [id, at, start, playing, way, key]);
 }
 
 /** The runs that began together with this one, as they are known now. */
@@ -133,8 +134,9 @@ interface AboutRunProps {
   replay: ReplayCursor;
   label: string;
   marks: readonly ReplayMark[];
+  /** The chosen action as the run calls it. */
   selected: string | null;
-  onSelect: (aid: string | null) => void;
+  onSelect: (fact: string | null) => void;
 }
 
 /** What was said, with which values, by whom: beside the canvas. */
@@ -192,21 +194,27 @@ const RunCanvas = memo(function RunCanvas(props: Parameters<typeof GraphView>[0]
 
 interface RunTimelineProps {
   newest: Run;
-  graph: Graph;
   replay: ReplayCursor;
   replayData: Parameters<typeof timelineSignsOf>[0];
   unsure: boolean;
-  selected: string | null;
-  onPick: (aid: string | null) => void;
+  level: LevelCursor;
   /** The runs that began together with this one. */
   mates: readonly Track[];
 }
 
 /** Every visit, and the controls of the replay. */
 function RunTimeline(props: RunTimelineProps) {
-  const { newest, graph, replay, replayData, unsure, selected, onPick, mates } = props;
+  const { newest, replay, replayData, unsure, level, mates } = props;
   const { now } = useLive();
+  const { graph } = level.sent.top;
   const lanes = useLanes(newest, graph, mates.length > 0 ? newest.engine : "");
+  const { sent, pick } = level;
+  const onPick = useCallback(({ name }: Lane) => pick(name), [pick]);
+  const picks = useCallback(
+    ({ aid, levels }: Lane) =>
+      aid !== null || (levels.length > 0 && graphsOn(sent, levels) !== null),
+    [sent],
+  );
   const silent = instant(newest.unknown_since);
   const until = instant(newest.ended_at) ?? silent ?? replay.end;
   const signs = useMemo(() => timelineSignsOf(replayData), [replayData]);
@@ -225,8 +233,9 @@ function RunTimeline(props: RunTimelineProps) {
         run={newest}
         lanes={lanes}
         silentSince={unsure ? now.since : silent}
-        selected={selected}
+        selected={level.fact}
         onPick={onPick}
+        picks={picks}
         cursor={replay.at}
         onSeek={replay.seek}
         signs={signs}
@@ -237,29 +246,33 @@ function RunTimeline(props: RunTimelineProps) {
   );
 }
 
+function canvasLabel({ graph_name }: Run, { levels }: LevelCursor, version: string): string {
+  const inside = levels.length > 0 ? `, inside ${levels.join(INTO)}` : "";
+  return `Version ${version} of ${graph_name}${inside}`;
+}
+
 function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
   const { now: live, runner } = useLive();
-  const place = usePlace(newest);
-  const [selected, setSelected] = useState<string | null>(place.action);
-  const graph = useMemo(() => fromUmrf(newest.umrf), [newest.umrf]);
+  const search = useSearch();
+  const level = useLevel(newest, search);
   const goes = newest.ended_at === null;
   const unsure = goes && live.link === "down";
   const present = useNow(1000, goes);
   const until = unsure ? live.since : (instant(newest.ended_at) ?? present);
-  const replay = useReplay(runner, newest, until, place.from);
+  const replay = useReplay(runner, newest, until, momentAsked(newest, search));
   const { run } = replay;
   const past = replay.at !== null;
-  useAddress(newest.id, replay, selected);
-  const progress = useProgress(run, unsure && !past, replay.at);
+  useAddress(newest.id, replay, level);
+  const progress = useProgress(run, unsure && !past, replay.at, level.inside);
   const mates = useTracks(runner, newest);
   const engines = useMemo(() => enginesOf(newest, mates), [newest, mates]);
   const [again, setAgain] = useState<RepeatActions | null>(null);
-  const picked = useMemo(() => new Set(selected === null ? [] : [selected]), [selected]);
+  const picked = useMemo(() => new Set(level.key === null ? [] : [level.key]), [level.key]);
   const replayData = useReplayData(runner, newest.id, 0, true).data;
   const label = useVersionLabel(newest);
-  const show = (at: number, aid: string | null) => {
+  const show = (at: number, fact: string | null) => {
     replay.seek(at);
-    if (aid !== null) setSelected(aid);
+    if (fact !== null) level.pick(fact);
   };
   return (
     <>
@@ -277,21 +290,21 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
         <FailureCauses runner={runner} run={newest} onShow={show} />
         <section className={style.canvas} aria-label="Graph of the run">
           <RunCanvas
-            graph={graph}
+            key={level.levels.join("\n")}
+            graph={level.graph}
             progress={progress}
             selected={picked}
-            onSelect={setSelected}
-            label={`Version ${label} of ${newest.graph_name}`}
+            onSelect={level.select}
+            label={canvasLabel(newest, level, label)}
           />
+          <LevelBar level={level} name={newest.graph_name} />
         </section>
         <RunTimeline
           newest={newest}
-          graph={graph}
           replay={replay}
           replayData={replayData}
           unsure={unsure}
-          selected={selected}
-          onPick={setSelected}
+          level={level}
           mates={mates}
         />
         <AboutRun
@@ -300,8 +313,8 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
           replay={replay}
           label={label}
           marks={replayData?.marks ?? NO_MARKS}
-          selected={selected}
-          onSelect={setSelected}
+          selected={level.fact}
+          onSelect={level.pick}
         />
       </main>
       {again !== null && start(again, () => setAgain(null))}

@@ -1,16 +1,15 @@
 /** Values as they were sent beside those that the engine reported, visit by visit. */
 import type { ActionRun, Run } from "../../api/runs";
+import { placesOf } from "../../status/level-places";
+import { wayWords } from "../../status/level-words";
 import { type ParameterRow, parametersOfVisits } from "./parameter-changes";
 import style from "./run-parameters.module.css";
 
 interface Props {
   run: Run;
+  /** The action that is chosen, as the run calls it. */
   selected: string | null;
-  onPick: (aid: string | null) => void;
-}
-
-function spaced(fullName: string): string {
-  return fullName.replace(/_(\d+)$/, " $1");
+  onPick: (fact: string | null) => void;
 }
 
 function Value({ text, differs }: { text: string | null; differs: boolean }) {
@@ -42,12 +41,13 @@ function Rows({ rows }: { rows: readonly ParameterRow[] }) {
 
 function Action(props: { name: string; action: ActionRun; run: Run; onPick: () => void }) {
   const { name, action, run, onPick } = props;
+  const words = wayWords(placesOf(run).get(name) ?? { levels: [], name });
   const found = parametersOfVisits(run.sent?.[name] ?? {}, action);
   return (
-    <section className={style.action} aria-label={`Parameters of ${spaced(name)}`}>
+    <section className={style.action} aria-label={`Parameters of ${words}`}>
       <h2>
         <button type="button" onClick={onPick}>
-          {spaced(name)}
+          <bdi>{words}</bdi>
         </button>
       </h2>
       {found.rows.length === 0 ? (
@@ -79,7 +79,7 @@ function Action(props: { name: string; action: ActionRun; run: Run; onPick: () =
 
 export function RunParameters({ run, selected, onPick }: Props) {
   const all = Object.entries(run.actions ?? {});
-  const chosen = all.filter(([, action]) => selected === null || action.aid === selected);
+  const chosen = all.filter(([name]) => selected === null || name === selected);
   const told = chosen.filter(
     ([name, action]) =>
       selected !== null ||
@@ -95,13 +95,7 @@ export function RunParameters({ run, selected, onPick }: Props) {
       )}
       {told.length === 0 && <p className={style.none}>No action was given a value.</p>}
       {told.map(([name, action]) => (
-        <Action
-          key={name}
-          name={name}
-          action={action}
-          run={run}
-          onPick={() => onPick(action.aid)}
-        />
+        <Action key={name} name={name} action={action} run={run} onPick={() => onPick(name)} />
       ))}
     </div>
   );

@@ -2,6 +2,7 @@
 import { IconAlertTriangle } from "@tabler/icons-react";
 import { type Cause, needsExplanation, useCauses } from "../../api/review";
 import type { Run } from "../../api/runs";
+import { placesOf } from "../../status/level-places";
 import { clock, instant } from "../../ui/times";
 import style from "./causes.module.css";
 import { SinceWhenButton } from "./since-when";
@@ -9,24 +10,34 @@ import { SinceWhenButton } from "./since-when";
 interface Props {
   runner: string | undefined;
   run: Run;
-  onShow: (at: number, aid: string | null) => void;
+  /** Goes to a moment, and to an action as the run calls it. */
+  onShow: (at: number, fact: string | null) => void;
 }
 
 const SHOWN = 3;
 
-function Line({ cause, onShow }: { cause: Cause; onShow: Props["onShow"] }) {
+interface CauseLineProps extends Pick<Props, "onShow"> {
+  cause: Cause;
+  /** The action stands in a graph inside. */
+  inside: boolean;
+}
+
+function Line({ cause, inside, onShow }: CauseLineProps) {
   const at = instant(cause.at) ?? 0;
+  const show = () => onShow(at, cause.action);
   return (
     <li>
-      <button
-        type="button"
-        className={style.at}
-        title="Show this moment"
-        onClick={() => onShow(at, cause.aid)}
-      >
+      <button type="button" className={style.at} title="Show this moment" onClick={show}>
         {clock(at)}
       </button>
-      <span>{cause.text}</span>
+      <span>
+        {cause.text}
+        {inside && (
+          <button type="button" className={style.into} onClick={show}>
+            Show it inside
+          </button>
+        )}
+      </span>
     </li>
   );
 }
@@ -35,6 +46,7 @@ function Line({ cause, onShow }: { cause: Cause; onShow: Props["onShow"] }) {
 export function FailureCauses({ runner, run, onShow }: Props) {
   const found = useCauses(runner, run).data;
   if (!needsExplanation(run) || found === undefined) return null;
+  const places = placesOf(run);
   const plain = run.ended_at === null || run.state === "stopped" || run.result === null;
   if (found.length === 0 && plain) return null;
   return (
@@ -47,7 +59,12 @@ export function FailureCauses({ runner, run, onShow }: Props) {
       ) : (
         <ol>
           {found.slice(0, SHOWN).map((cause) => (
-            <Line key={`${cause.kind} ${cause.at} ${cause.text}`} cause={cause} onShow={onShow} />
+            <Line
+              key={`${cause.kind} ${cause.at} ${cause.text}`}
+              cause={cause}
+              inside={(places.get(cause.action ?? "")?.levels.length ?? 0) > 0}
+              onShow={onShow}
+            />
           ))}
         </ol>
       )}

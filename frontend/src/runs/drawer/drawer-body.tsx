@@ -1,5 +1,5 @@
 /** What the drawer shows while it is open: lanes over time, values at the right. */
-import { useMemo } from "react";
+import { useCallback, useMemo } from "react";
 import { useLive } from "../../api/live/use-live";
 import type { Run } from "../../api/runs";
 import type { Graph } from "../../graph/model";
@@ -33,11 +33,12 @@ function useTracks(others: readonly Run[], graph: Graph, lanes: readonly Lane[])
   const engines = others.map(({ engine }) => engine).join("\n");
   const lanesBy = useMemo(() => {
     const actors = new Map(graph.actions.map((action) => [action.key, action.actor]));
+    const outermost = new Map(lanes.map(({ name, aid }) => [name, aid]));
     const own = (engine: string) =>
-      lanes.map((lane) => ({
-        ...lane,
-        robot: (lane.aid !== null && actors.get(lane.aid)) || engine,
-      }));
+      lanes.map((lane) => {
+        const aid = outermost.get(lane.levels[0] ?? lane.name) ?? null;
+        return { ...lane, robot: (aid !== null && actors.get(aid)) || engine };
+      });
     return new Map(engines.split("\n").map((engine) => [engine, own(engine)]));
   }, [engines, graph, lanes]);
   return others.map((run) => ({
@@ -63,6 +64,7 @@ export function DrawerBody(props: Props) {
   const { run, lanes, others, graph, selected, onPick, cursor, onSeek } = props;
   const silenceOf = useSilence();
   const tracks = useTracks(others, graph, lanes);
+  const pick = useCallback(({ aid }: Lane) => aid !== null && onPick(aid), [onPick]);
   return (
     <div className={style.body}>
       <Timeline
@@ -70,8 +72,8 @@ export function DrawerBody(props: Props) {
         lanes={lanes}
         silentSince={silenceOf(run)}
         others={tracks}
-        selected={selected}
-        onPick={onPick}
+        selected={lanes.find(({ aid }) => aid !== null && aid === selected)?.name ?? null}
+        onPick={pick}
         cursor={cursor}
         onSeek={onSeek}
         seeksByKeys

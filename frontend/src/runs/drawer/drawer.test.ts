@@ -38,7 +38,10 @@ const run = (part: object) =>
     actions: {},
     ...part,
   }) as unknown as Run;
-const lane = (name: string, robot: string) => ({ name, aid: name, robot });
+const lane = (name: string, robot: string) => ({
+  ...{ name, label: name, aid: name, robot },
+  ...{ levels: [], around: null, holds: false },
+});
 
 test("each run that goes on has a tab, with what moves on its robot; silence is not known", () => {
   const atlas = run({ actions: { Drive_0: action("d", "RUNNING", [visit(0, null)]) } });

@@ -4,6 +4,7 @@ import { IconAlertTriangle, IconCheck, IconX } from "@tabler/icons-react";
 import type { Preflight, PreflightItem } from "../../api/robots";
 import { SIMULATOR } from "../../api/robots";
 import { colorOfName } from "../../ui/name-colors";
+import { InsideRemedies, type MomentLookedAt } from "./inside-remedies";
 import style from "./preflight-list.module.css";
 
 const WAITING: Readonly<Record<string, string>> = {
@@ -22,7 +23,13 @@ const WAITING: Readonly<Record<string, string>> = {
 const SIGNS = { passed: IconCheck, warned: IconAlertTriangle, blocked: IconX } as const;
 const READ = { passed: "Fine", warned: "Note", blocked: "In the way" } as const;
 
-function Line({ item }: { item: PreflightItem }) {
+interface PreflightLineProps {
+  item: PreflightItem;
+  look: Preflight;
+  moment: MomentLookedAt;
+}
+
+function Line({ item, look, moment }: PreflightLineProps) {
   const Sign = SIGNS[item.verdict];
   return (
     <li className={style.line} data-verdict={item.verdict}>
@@ -43,6 +50,7 @@ function Line({ item }: { item: PreflightItem }) {
             </ul>
           </details>
         )}
+        <InsideRemedies item={item} look={look} {...moment} />
       </span>
     </li>
   );
@@ -53,9 +61,10 @@ interface Props {
   /** The only engine: its name needs no heading. */
   alone: boolean;
   look: Preflight | undefined;
+  moment: MomentLookedAt;
 }
 
-export function PreflightList({ engine, alone, look }: Props) {
+export function PreflightList({ engine, alone, look, moment }: Props) {
   const codes = engine === SIMULATOR ? ["graph"] : Object.keys(WAITING);
   return (
     <div className={style.engine}>
@@ -66,7 +75,9 @@ export function PreflightList({ engine, alone, look }: Props) {
       )}
       <ul className={style.list} aria-label={`Looked at on ${engine}`}>
         {look
-          ? look.items.map((item) => <Line key={item.code} item={item} />)
+          ? look.items.map((item) => (
+              <Line key={item.code} item={item} look={look} moment={moment} />
+            ))
           : codes.map((code) => (
               <li key={code} className={style.line} data-verdict="waiting">
                 <Loader size={13} color="var(--ink3)" className={style.sign ?? ""} />

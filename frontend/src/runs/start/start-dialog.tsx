@@ -241,6 +241,7 @@ export function StartDialog(props: Props) {
               engine={engine}
               alone={engines.length === 1}
               look={looks?.find((each) => each.engine === engine)}
+              moment={{ graph, seq, onLeave: onClose }}
             />
           ))}
         </section>

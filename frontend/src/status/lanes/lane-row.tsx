@@ -1,13 +1,15 @@
 /** One action over time: its visits as bars, and how it is now at the right. */
-import { Fragment, memo, useMemo, useRef } from "react";
+import { type CSSProperties, Fragment, memo, useMemo, useRef } from "react";
 import type { Visit } from "../../api/runs";
 import { colorOfName } from "../../ui/name-colors";
 import { stopwatch, useNow } from "../../ui/times";
 import { durationText } from "../durations";
+import { wayWords } from "../level-words";
 import type { Progress, Tone } from "../progress";
 import { StateLabel, toneColor } from "../state-label";
 import { shareOf, type TimeAxis } from "./axis";
 import { type Bar, barOf } from "./bars";
+import { LaneToggle } from "./lane-toggle";
 import type { Lane } from "./lanes";
 import { growingWay, useMoving } from "./moving";
 import style from "./timeline.module.css";
@@ -22,7 +24,38 @@ interface Props {
   /** Since when nothing is heard of its run, ms. */
   silentSince: number | null;
   selected: boolean;
-  onPick: ((aid: string) => void) | undefined;
+  onPick: ((lane: Lane) => void) | undefined;
+  /** Whether the lanes inside of it are shown; null where there are none. */
+  opened: boolean | null;
+  /** Whether any lane has others inside: then all names leave room for the sign of it. */
+  nested: boolean;
+  onOpen: (name: string) => void;
+}
+
+const DEEPEST = 6; // levels by which names are indented; deeper ones stand below those
+
+/** Its name, below the name of the action that it is inside of. */
+function LaneName({ lane, onPick, opened, nested, onOpen }: Omit<Props, "visits">) {
+  const indent = { "--depth": Math.min(DEEPEST, lane.levels.length) } as CSSProperties;
+  const way = wayWords({ levels: lane.levels, name: lane.label });
+  return (
+    <span className={style.first} style={indent}>
+      {nested && <LaneToggle words={way} opened={opened} onOpen={() => onOpen(lane.name)} />}
+      <button
+        type="button"
+        className={style.name}
+        disabled={onPick === undefined}
+        onClick={() => onPick?.(lane)}
+        title={way}
+        aria-label={lane.levels.length > 0 ? way : undefined}
+      >
+        <i style={{ background: colorOfName(lane.robot) }} aria-hidden />
+        <span>
+          <bdi>{lane.label}</bdi>
+        </span>
+      </button>
+    </span>
+  );
 }
 
 const percent = (share: number) => `${share * 100}%`;
@@ -117,21 +150,12 @@ function LaneState({ progress }: { progress: Progress }) {
 }
 
 export const LaneRow = memo(function LaneRow(props: Props) {
-  const { lane, visits, progress, axis, ended, silentSince, selected, onPick } = props;
+  const { lane, visits, progress, axis, ended, silentSince, selected } = props;
   const silent = ended === null ? silentSince : null;
   const was = visits.at(-1)?.until === null;
   return (
     <li className={style.lane} data-lane={lane.name} data-selected={selected || undefined}>
-      <button
-        type="button"
-        className={style.name}
-        disabled={lane.aid === null || onPick === undefined}
-        onClick={() => lane.aid && onPick?.(lane.aid)}
-        title={lane.name}
-      >
-        <i style={{ background: colorOfName(lane.robot) }} aria-hidden />
-        <span>{lane.name}</span>
-      </button>
+      <LaneName {...props} />
       <div className={style.track} data-track aria-hidden>
         {visits.map((visit, i) => (
           // biome-ignore lint/suspicious/noArrayIndexKey: visits only ever grow

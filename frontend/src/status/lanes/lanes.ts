@@ -3,30 +3,78 @@ import { useRef } from "react";
 import type { Run } from "../../api/runs";
 import { isEqual } from "../../graph/equal";
 import { fullName, type Graph } from "../../graph/model";
+import { type LevelPlace, placesIn, placesOf } from "../level-places";
+import { factOf } from "../level-words";
 
 export interface Lane {
+  /** As the run tells it. */
   name: string;
+  /** Its own name in its level. */
+  label: string;
   aid: string | null;
   robot: string;
+  /** The actions that it is inside of, outermost first. */
+  levels: readonly string[];
+  /** The lane of the action that it is right inside of. */
+  around: string | null;
+  /** Whether there are lanes inside of it. */
+  holds: boolean;
 }
 
-/** Every action, those that ran first, in the order in which they began. `robot` is whose they are
- * where the graph does not say. */
-export function lanesOf(run: Run, graph: Graph, robot = ""): Lane[] {
-  const known = new Map(graph.actions.map((action) => [fullName(action), action]));
-  const own = Object.keys(run.actions ?? {});
-  const names = own.length > 0 ? own : [...known.keys()];
+type Sorted = Map<string | null, { name: string; place: LevelPlace }[]>;
+
+/** What is right inside of each, those that ran first, in the order in which they began. */
+function byAround(run: Run, places: ReadonlyMap<string, LevelPlace>): Sorted {
   const began = (name: string) => run.actions?.[name]?.visits[0]?.from ?? "~";
-  return names
-    .map((name) => ({
-      name,
-      aid: run.actions?.[name]?.aid ?? known.get(name)?.key ?? null,
-      robot: known.get(name)?.actor || robot,
-    }))
-    .sort((a, b) => {
+  const inside: Sorted = new Map();
+  for (const [name, place] of places) {
+    const { levels } = place;
+    const around = levels.length === 0 ? null : factOf(run.graph_name, levels);
+    const beside = inside.get(around);
+    if (beside === undefined) inside.set(around, [{ name, place }]);
+    else beside.push({ name, place });
+  }
+  for (const beside of inside.values())
+    beside.sort((a, b) => {
       const [x, y] = [began(a.name), began(b.name)];
       return x < y ? -1 : x > y ? 1 : 0;
     });
+  return inside;
+}
+
+/** Every action, those that ran first, in the order in which they began, and right below each those inside
+ * of it. `robot` is whose they are where the graph does not say. */
+export function lanesOf(run: Run, graph: Graph, robot = ""): Lane[] {
+  const known = new Map(graph.actions.map((action) => [fullName(action), action]));
+  const own = Object.keys(run.actions ?? {});
+  const places = own.length > 0 ? placesOf(run) : placesIn(run.graph_name, new Set(), known.keys());
+  const inside = byAround(run, places);
+  const lanes: Lane[] = [];
+  const put = (around: string | null, whose: string | null) => {
+    for (const { name, place } of inside.get(around) ?? []) {
+      const aid = run.actions?.[name]?.aid ?? known.get(name)?.key ?? null;
+      const its = whose ?? (known.get(name)?.actor || robot);
+      const holds = inside.has(name);
+      const { levels, name: label } = place;
+      lanes.push({ name, label, aid, robot: its, levels, around, holds });
+      if (holds) put(name, its);
+    }
+  };
+  put(null, null);
+  return lanes;
+}
+
+/** Those that are seen while only these are open. */
+export function openLanes<One extends Pick<Lane, "name" | "around">>(
+  lanes: readonly One[],
+  open: ReadonlySet<string>,
+): One[] {
+  const seen = new Set<string>();
+  return lanes.filter(({ name, around }) => {
+    const shown = around === null || (seen.has(around) && open.has(around));
+    if (shown) seen.add(name);
+    return shown;
+  });
 }
 
 /** Whose lanes they are, in their order. */

@@ -15,13 +15,18 @@ import { progressOf, progressOfAction, type Tone } from "../progress";
 import { toneColor } from "../state-label";
 import { growingSpan, shareOf, type TimeAxis, ticksOf, wholeSpan } from "./axis";
 import { LaneRow } from "./lane-row";
-import { type Lane, robotsOf } from "./lanes";
+import { AllLevels } from "./lane-toggle";
+import { type Lane, openLanes, robotsOf } from "./lanes";
 import { Playhead } from "./playhead";
 import style from "./timeline.module.css";
+import { type OpenLanes, useOpenLanes } from "./use-open-lanes";
 
 interface Props extends Track {
+  /** The name of a lane. */
   selected?: string | null;
-  onPick?: (aid: string) => void;
+  onPick?: ((lane: Lane) => void) | undefined;
+  /** Whether a lane can be picked; without this those of the graph itself can be. */
+  picks?: (lane: Lane) => boolean;
   /** Where a replay stands, ms; null at the live edge. */
   cursor?: number | null;
   onSeek?: (at: number | null) => void;
@@ -192,16 +197,22 @@ function sliderOf(axis: TimeAxis, cursor: number | null) {
   } as const;
 }
 
-interface GroupsProps extends Pick<Props, "selected" | "onPick"> {
+const isOwn = (lane: Lane): boolean => lane.aid !== null;
+
+interface GroupsProps extends Pick<Props, "selected" | "onPick" | "picks"> {
   track: Track;
   axis: TimeAxis;
+  inside: OpenLanes;
   /** Robots have their names above their lanes. */
   named: boolean;
 }
 
 /** The lanes of one run, those of each robot together. */
-function Groups({ track, axis, named, selected = null, onPick }: GroupsProps) {
-  const { run, lanes, silentSince = null } = track;
+function Groups({ track, axis, named, inside, ...props }: GroupsProps) {
+  const { selected = null, picks = isOwn, onPick } = props;
+  const { run, silentSince = null } = track;
+  const lanes = openLanes(track.lanes, inside.open);
+  const nested = track.lanes.some(({ holds }) => holds);
   const ended = instant(run.ended_at);
   const silent = ended === null ? silentSince : null;
   return robotsOf(lanes).map((robot) => (
@@ -225,8 +236,11 @@ function Groups({ track, axis, named, selected = null, onPick }: GroupsProps) {
               axis={axis}
               ended={ended}
               silentSince={silent}
-              selected={lane.aid !== null && lane.aid === selected}
-              onPick={onPick}
+              selected={lane.name === selected}
+              onPick={picks(lane) ? onPick : undefined}
+              opened={lane.holds ? inside.open.has(lane.name) : null}
+              nested={nested}
+              onOpen={inside.toggle}
             />
           );
         })}
@@ -237,16 +251,22 @@ function Groups({ track, axis, named, selected = null, onPick }: GroupsProps) {
 export function Timeline(props: Props) {
   const { run, lanes, onSeek, cursor = null, signs = NOTHING, gaps = NOTHING } = props;
   const tracks: readonly Track[] = [props, ...(props.others ?? NOTHING)];
+  const inside = useOpenLanes();
   const axis = useAxis(tracks);
   const goes = tracks.some((track) => track.run.ended_at === null);
   const silentSince = run.ended_at === null ? (props.silentSince ?? null) : null;
-  const list = useNewestInView(lanes, run, run.ended_at === null && cursor === null);
+  const list = useNewestInView(
+    openLanes(lanes, inside.open),
+    run,
+    run.ended_at === null && cursor === null,
+  );
   const { ruler, pull, onKeyDown } = useSeeking(axis, cursor, onSeek);
   const named = tracks.length > 1 || robotsOf(lanes).length > 1;
   const slider = props.seeksByKeys && onSeek ? { ...sliderOf(axis, cursor), onKeyDown } : {};
   return (
     <div className={style.timeline} data-seeks={onSeek !== undefined || undefined} {...pull}>
       <div className={style.head}>
+        <AllLevels lanes={tracks.flatMap((track) => track.lanes)} inside={inside} />
         <div ref={ruler} className={style.ruler} data-ruler {...slider}>
           <Ticks span={axis.span} />
         </div>
@@ -259,8 +279,10 @@ export function Timeline(props: Props) {
             track={track}
             axis={axis}
             named={named}
+            inside={inside}
             selected={props.selected ?? null}
-            {...(props.onPick ? { onPick: props.onPick } : {})}
+            onPick={props.onPick}
+            {...(props.picks ? { picks: props.picks } : {})}
           />
         ))}
       </ul>

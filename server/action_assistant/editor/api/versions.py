@@ -8,9 +8,10 @@ from litestar.types import ControllerRouterHandler
 
 from action_assistant.editor.api.graphs import Seq
 from action_assistant.editor.catalogue.versions import InsideView, VersionView
+from action_assistant.editor.interchange.subgraph_files import packed
 from action_assistant.editor.services import EditorState
 from action_assistant.web.auth.access import Needs, person_of
-from action_assistant.web.server.openapi import answer
+from action_assistant.web.server.openapi import FileBytes, answer
 
 
 class Publishing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -69,6 +70,27 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         return await services.versions.inside(graph_id, at)
 
     @get(
+        "/api/graphs/{graph_id:str}/subgraphs.zip",
+        summary="These graphs as files for an engine to index, in a ZIP file",
+        operation_id="downloadSubgraphs",
+        responses={200: answer(FileBytes, media="application/zip")},
+    )
+    async def download_subgraphs(graph_id: str, at: Seq | None = None) -> Response[bytes]:
+        services = app_state.services
+        await services.catalogue.require(graph_id)
+        inside = await services.versions.inside(graph_id, at)
+        graphs = [(each.name, bytes(each.umrf)) for each in inside.subgraphs]
+        made = await services.workers.files(packed, graphs)
+        return Response(
+            made,
+            media_type="application/zip",
+            headers={
+                "content-disposition": 'attachment; filename="graphs_inside.zip"',
+                "x-seq": str(inside.seq),
+            },
+        )
+
+    @get(
         "/api/versions/{version_id:str}",
         summary="One version with its UMRF",
         operation_id="getVersion",
@@ -76,4 +98,4 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
     async def get_version(version_id: str) -> VersionView:
         return await app_state.services.versions.get(version_id)
 
-    return [list_versions, publish_version, get_subgraphs, get_version]
+    return [list_versions, publish_version, get_subgraphs, download_subgraphs, get_version]

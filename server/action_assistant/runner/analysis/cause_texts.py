@@ -1,5 +1,6 @@
 """Causes in plain sentences, for the page and for the list of runs. Pure."""
 
+from collections.abc import Iterable, Mapping
 from typing import assert_never
 
 from action_assistant.runner.analysis.causes import (
@@ -16,6 +17,7 @@ from action_assistant.runner.analysis.causes import (
     Warned,
     WrongParameter,
 )
+from action_assistant.runner.analysis.levels import INTO, LevelPlace, places_of
 from action_assistant.runner.runs.run import Run
 
 
@@ -89,7 +91,22 @@ def _stopper(run: Run) -> str:
 
 
 def called(run: Run, full_name: str) -> str:
-    """An action as people call it: without its number where it is the only one of its name."""
+    """An action as people call it: by the way into its level, each name without its number where it is
+    the only one of its name there."""
+    found = places_of(run)
+    place = found.get(full_name)
+    if place is None:
+        return _alone(full_name, run.actions)
+    way = place.way
+    steps = range(len(way))
+    return INTO.join(_alone(way[depth], _beside(found, way[:depth])) for depth in steps)
+
+
+def _beside(found: Mapping[str, LevelPlace], levels: tuple[str, ...]) -> list[str]:
+    return [place.name for place in found.values() if place.levels == levels]
+
+
+def _alone(full_name: str, beside: Iterable[str]) -> str:
     name, _, number = full_name.rpartition("_")
-    alike = [each for each in run.actions if each.rpartition("_")[0] == name]
+    alike = [each for each in beside if each.rpartition("_")[0] == name]
     return name if len(alike) < 2 else f"{name} {number}"

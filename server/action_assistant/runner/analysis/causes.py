@@ -10,6 +10,8 @@ from typing import Final, Literal, TypeAlias
 
 import msgspec
 
+from action_assistant.runner.analysis.failing import failing_visit
+from action_assistant.runner.analysis.levels import places_of
 from action_assistant.runner.runs import refusals, stall
 from action_assistant.runner.runs.events import Overridden
 from action_assistant.runner.runs.run import Alarm, Run
@@ -233,18 +235,10 @@ def _given(action: Action, problem: Overridden) -> tuple[str, str]:
 
 
 def _failures(run: Run) -> Iterator[Cause]:
-    """The first action that ended in error; of a run that ended false, the last that did."""
-    ended = [
-        (visit.not_after or visit.start, name, visit)
-        for name, action in run.actions.items()
-        for visit in action.visits
-        if visit.until is not None
-    ]
-    ended.sort(key=lambda each: each[:2])
-    wrong = [each for each in ended if each[2].result == "error"][:1]
-    if not wrong and run.result == "on_false":
-        wrong = [each for each in ended if each[2].result == "false"][-1:]
-    for at, name, visit in wrong:
+    """The visit that it goes back to, however deep inside."""
+    failing = failing_visit(run)
+    if failing is not None:
+        at, name, visit = failing
         yield ActionFailed(
             at=at,
             action=name,
@@ -283,10 +277,18 @@ def _waits(run: Run, graph: Graph) -> Iterator[Cause]:
                 held.add(wait.parent)
                 yield wait
     if until == "stop":
-        for name, action in run.actions.items():
-            visit = _going(action, moment)
+        going = {name: _going(action, moment) for name, action in run.actions.items()}
+        held |= _around(run, {name for name, visit in going.items() if visit is not None})
+        for name, visit in going.items():
             if visit is not None and name not in held:
                 yield Unended(at=visit.start, action=name)
+
+
+def _around(run: Run, going: set[str]) -> set[str]:
+    """Of these actions those that go on because one inside of them does."""
+    found = places_of(run)
+    levels = {found[name].levels for name in going}
+    return {name for name in going if found[name].way in levels}
 
 
 def _given_up(run: Run) -> tuple[int | None, Literal["stop", "silence", "end"]]:

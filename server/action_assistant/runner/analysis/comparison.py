@@ -1,10 +1,11 @@
 """Two runs side by side: what was sent, where they ran, and the first visit in which they part."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Final, Literal, TypeAlias
 
 import msgspec
 
+from action_assistant.runner.analysis.levels import INTO, LevelPlace, places_of
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.visits import ActionRun, Visit
@@ -22,10 +23,13 @@ Relation: TypeAlias = Literal["same", "result", "only_a", "only_b", "unknown", "
 
 
 class ComparedVisit(msgspec.Struct, frozen=True, kw_only=True):
-    """The `visit`-th visit (from 1) of an action in both runs. `slower` names the run in which it
-    took notably longer, whatever of its bounds is true."""
+    """The `visit`-th visit (from 1) of an action in both runs. `levels`: the actions that it is inside
+    of, outermost first, and `name` its own there; `action` as its engine told it. `slower` names the
+    run in which it took notably longer, whatever of its bounds is true."""
 
     action: str
+    levels: tuple[str, ...]
+    name: str
     aid: str | None
     visit: int
     a: views.VisitShown | None
@@ -45,7 +49,8 @@ class Parting(msgspec.Struct, frozen=True, kw_only=True):
 
 class RunComparison(msgspec.Struct, frozen=True, kw_only=True):
     """Run `a` against run `b`. `graph` is the difference of what was sent; `parameters` those of its
-    changes that touch the values of actions."""
+    changes that touch the values of actions; `subgraphs` names the graphs inside that were sent along
+    and were not the same."""
 
     a: views.RunSummary
     b: views.RunSummary
@@ -53,17 +58,28 @@ class RunComparison(msgspec.Struct, frozen=True, kw_only=True):
     same_engine: bool
     graph: Difference
     parameters: list[ActionChange]
+    subgraphs: list[str]
     steps: list[ComparedVisit]
     left_out: int
     parting: Parting | None
     text: str
 
 
-def compare(a: Run, b: Run, umrf_a: str, umrf_b: str) -> RunComparison:
+class SentTree(msgspec.Struct, frozen=True):
+    """What was sent: a graph, and the digests of those inside of it by their names."""
+
+    umrf: str
+    inside: Mapping[str, str] = {}
+
+
+def compare(a: Run, b: Run, sent_a: SentTree, sent_b: SentTree) -> RunComparison:
     """Compare two runs that may be of different graphs. Total."""
-    graph = difference((0, _graph(umrf_a)), (0, _graph(umrf_b)))
-    steps = _own_first(sorted(_steps(a, b), key=lambda step: _begun(step, a, b)))
-    parting = next((_parting(step, a, b) for step in steps if _parts(step)), None)
+    graph = difference((0, _graph(sent_a.umrf)), (0, _graph(sent_b.umrf)))
+    twins = _pairs(a, b)
+    begun = sorted(_steps(a, b, twins), key=lambda step: _begun(step, a, b))
+    steps = _own_first(_inner_first(begun))
+    parts = (step for step in steps if _parts(step))
+    parting = next((_parting(step, a, b, twins) for step in parts), None)
     return RunComparison(
         a=views.summary(a),
         b=views.summary(b),
@@ -71,6 +87,7 @@ def compare(a: Run, b: Run, umrf_a: str, umrf_b: str) -> RunComparison:
         same_engine=a.engine == b.engine,
         graph=graph,
         parameters=[change for change in graph.actions if _of_values(change)],
+        subgraphs=_changed_inside(sent_a.inside, sent_b.inside),
         steps=steps[:_MOST],
         left_out=max(0, len(steps) - _MOST),
         parting=parting,
@@ -87,14 +104,24 @@ def _graph(umrf: str) -> Graph:
         return Graph(name="")
 
 
-def _steps(a: Run, b: Run) -> Iterator[ComparedVisit]:
-    pairs = _pairs(a, b)
-    for name, (left, right) in pairs.items():
+def _changed_inside(a: Mapping[str, str], b: Mapping[str, str]) -> list[str]:
+    """Graphs inside that are not the same in both, or not in both. Runs of before, and of other
+    programs, have none with them, of which nothing is said."""
+    if not a or not b:
+        return []
+    return sorted(name for name in a.keys() | b.keys() if a.get(name) != b.get(name))
+
+
+def _steps(a: Run, b: Run, twins: Sequence["_Twins"]) -> Iterator[ComparedVisit]:
+    for pair in twins:
+        left, right = pair.of(a, b)
         visits_a, visits_b = _visits(left), _visits(right)
         for number in sorted(visits_a.keys() | visits_b.keys()):
             one, other = visits_a.get(number), visits_b.get(number)
             yield ComparedVisit(
-                action=name,
+                action=pair.action,
+                levels=pair.place.levels,
+                name=pair.place.name,
                 aid=(right or left or ActionRun()).aid,
                 visit=number,
                 a=views.visit(one) if one else None,
@@ -104,20 +131,42 @@ def _steps(a: Run, b: Run) -> Iterator[ComparedVisit]:
             )
 
 
-def _pairs(a: Run, b: Run) -> dict[str, tuple[ActionRun | None, ActionRun | None]]:
+class _Twins(msgspec.Struct, frozen=True):
+    """One action by its name in either run, and its place in the second where it is there."""
+
+    a: str | None
+    b: str | None
+    place: LevelPlace
+
+    @property
+    def action(self) -> str:
+        return self.b or self.a or ""
+
+    def of(self, a: Run, b: Run) -> tuple[ActionRun | None, ActionRun | None]:
+        return a.actions.get(self.a or ""), b.actions.get(self.b or "")
+
+
+def _pairs(a: Run, b: Run) -> list[_Twins]:
     """Actions of both runs, by identity where they have one, so that a renamed action is the same.
-    Sub-graphs' actions have none: their names count."""
-    by_aid = {action.aid: name for name, action in a.actions.items() if action.aid}
-    pairs: dict[str, tuple[ActionRun | None, ActionRun | None]] = {}
-    taken: set[str] = set()
-    for name, action in b.actions.items():
-        twin = by_aid.get(action.aid, name) if action.aid else name
-        pairs[name] = (a.actions.get(twin), action)
-        taken.add(twin)
-    for name, action in a.actions.items():
-        if name not in taken:
-            pairs[name] = (action, None)
-    return pairs
+    Those inside have none: their names count below the action that they are inside of."""
+    in_a, in_b = places_of(a), places_of(b)
+    same = {_identity(a, name, place): name for name, place in in_a.items()}
+    found = {name: same.get(_identity(b, name, place)) for name, place in in_b.items()}
+    matched = set(found.values())
+    named = {place.way: name for name, place in in_a.items() if name not in matched}
+    found |= {name: named.get(in_b[name].way) for name, twin in found.items() if twin is None}
+    taken = set(found.values())
+    return [
+        *(_Twins(twin, name, in_b[name]) for name, twin in found.items()),
+        *(_Twins(name, None, place) for name, place in in_a.items() if name not in taken),
+    ]
+
+
+def _identity(run: Run, name: str, place: LevelPlace) -> tuple[str, ...]:
+    """The same in all runs: the identity of the outermost action, and the names below it."""
+    first, *below = place.way
+    outermost = run.actions.get(first if below else name)
+    return ((outermost.aid if outermost is not None else None) or first, *below)
 
 
 def _visits(action: ActionRun | None) -> Mapping[int, Visit]:
@@ -163,6 +212,33 @@ def _parts(step: ComparedVisit) -> bool:
     return step.relation in {"result", "only_a", "only_b"}
 
 
+def _inner_first(steps: list[ComparedVisit]) -> list[ComparedVisit]:
+    """An action that ended otherwise because something inside of it did comes after that."""
+    ways = {
+        step.levels[:depth]
+        for step in steps
+        if _parts(step)
+        for depth in range(len(step.levels) + 1)
+    }
+    ordered: list[ComparedVisit] = []
+    held: list[ComparedVisit] = []
+    for step in steps:
+        if step.relation == "result" and (*step.levels, step.name) in ways:
+            held.append(step)
+            continue
+        ordered.append(step)
+        if _parts(step):
+            around = [each for each in held if _is_inside(step, each)]
+            ordered += reversed(around)
+            held = [each for each in held if each not in around]
+    return ordered + held
+
+
+def _is_inside(step: ComparedVisit, other: ComparedVisit) -> bool:
+    way = (*other.levels, other.name)
+    return step.levels[: len(way)] == way
+
+
 def _own_first(steps: list[ComparedVisit]) -> list[ComparedVisit]:
     """Where each run went on by an action that the other lacks, that of this run, `b`, comes first:
     which of them began earlier is chance, and only its own stand in its graph."""
@@ -177,14 +253,16 @@ def _own_first(steps: list[ComparedVisit]) -> list[ComparedVisit]:
     return steps
 
 
-def _parting(step: ComparedVisit, a: Run, b: Run) -> Parting:
-    said_a, said_b = _said(step, step.a, a), _said(step, step.b, b)
+def _parting(step: ComparedVisit, a: Run, b: Run, twins: Sequence[_Twins]) -> Parting:
+    one, other = next(pair for pair in twins if pair.action == step.action).of(a, b)
+    said_a, said_b = _said(one, step.a), _said(other, step.b)
     text = f"{_named(step)}: {_did(step.a, a)}, {_did(step.b, b)}."
     return Parting(step=step, text=text, messages_a=said_a, messages_b=said_b)
 
 
 def _named(step: ComparedVisit) -> str:
-    return step.action if step.visit == 1 else f"visit {step.visit} of {step.action}"
+    action = INTO.join((*step.levels, step.name))
+    return action if step.visit == 1 else f"visit {step.visit} of {action}"
 
 
 def _did(shown: views.VisitShown | None, run: Run) -> str:
@@ -205,9 +283,8 @@ def _did(shown: views.VisitShown | None, run: Run) -> str:
             return f"{shown.result} {where}"
 
 
-def _said(step: ComparedVisit, shown: views.VisitShown | None, run: Run) -> list[str]:
+def _said(action: ActionRun | None, shown: views.VisitShown | None) -> list[str]:
     """What the action said during that visit, or right after it."""
-    action = run.actions.get(step.action)
     if action is None or shown is None:
         return []
     until = shown.not_after

@@ -6,6 +6,7 @@ from typing import Any, Final
 import msgspec
 from sqlalchemy import Row, Select, select, union_all
 
+from action_assistant.runner.analysis.levels import LevelPlace, places
 from action_assistant.runner.runs.durations import Took, at_rank, took_us
 from action_assistant.runner.runs.run import Result, State
 from action_assistant.schema.runner_tables import action_sum, run
@@ -36,11 +37,14 @@ class Spans(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class ActionStatistics(msgspec.Struct, frozen=True, kw_only=True):
-    """One action over all these runs. Durations are seconds over `timed` visits, those that have ended,
+    """One action over all these runs. `levels`: the actions that it is inside of, outermost first, and
+    `name` its own there; `action` as the engine of its newest run told it. Durations are seconds over `timed` visits, those that have ended,
     and stand where they are known exactly; `spans` has all of them between their bounds. `unknown`
     counts visits whose result is not known."""
 
     action: str
+    levels: tuple[str, ...]
+    name: str
     aid: str | None
     runs: int
     visits: int
@@ -90,7 +94,10 @@ def runs_of(graph: str, engine: str | None, last: int) -> Select[Any]:
         .subquery()
         for column in (run.c.graph, run.c.graph_name)
     ]
-    wanted = (run.c.id, run.c.number, run.c.state, run.c.result, run.c.summary)
+    wanted = (
+        *(run.c.id, run.c.number, run.c.graph_name),
+        *(run.c.state, run.c.result, run.c.summary),
+    )
     named = union_all(*(select(each) for each in newest))
     return select(*wanted).where(run.c.id.in_(named)).order_by(run.c.number.desc()).limit(last)
 
@@ -106,11 +113,9 @@ def statistics(
     """Put it together. `newest` is the graph of the newest run, for its arrows."""
     ended = [row for row in runs if row.state in {"finished", "error", "halted"}]
     judged = [row for row in ended if row.state != "finished" or row.result is not None]
-    by_action: dict[str, list[Row[Any]]] = {}
-    for row in sums:
-        by_action.setdefault(row.action, []).append(row)
-    actions = [_action(name, rows) for name, rows in sorted(by_action.items())]
-    never, untold = _never_taken(newest, {each.action: each for each in actions})
+    by_place = _by_place(runs, sums)
+    actions = [_action(place, rows) for place, rows in by_place.items()]
+    never, untold = _never_taken(newest, {each.name: each for each in actions if not each.levels})
     return Statistics(
         runs=[_point(row) for row in runs],
         judged=len(judged),
@@ -129,7 +134,25 @@ def _point(row: Row[Any]) -> RunPoint:
     return RunPoint(row.id, row.number, row.state, row.result, took, span)
 
 
-def _action(name: str, rows: Sequence[Row[Any]]) -> ActionStatistics:
+def _by_place(
+    runs: Sequence[Row[Any]], sums: Iterable[Row[Any]]
+) -> dict[LevelPlace, list[Row[Any]]]:
+    """What an action adds up to in each run, the newest first: by its way from the top, since a graph
+    that was renamed since is in all names of what ran inside."""
+    by_run: dict[str, list[Row[Any]]] = {}
+    for row in sums:
+        by_run.setdefault(row.run, []).append(row)
+    found: dict[LevelPlace, list[Row[Any]]] = {}
+    for each in runs:
+        rows = by_run.get(each.id, [])
+        own = {row.action for row in rows if row.aid}
+        placed = places(each.graph_name, own, [row.action for row in rows])
+        for row in rows:
+            found.setdefault(placed[row.action], []).append(row)
+    return dict(sorted(found.items(), key=lambda item: item[0].way))
+
+
+def _action(place: LevelPlace, rows: Sequence[Row[Any]]) -> ActionStatistics:
     took = [_took(each) for row in rows for each in row.took]
     spans = Spans(
         p50=at_rank(took, 0.5),
@@ -144,7 +167,9 @@ def _action(name: str, rows: Sequence[Row[Any]]) -> ActionStatistics:
     }
     visits = sum(row.visits for row in rows)
     return ActionStatistics(
-        action=name,
+        action=rows[0].action,
+        levels=place.levels,
+        name=place.name,
         aid=next((row.aid for row in rows if row.aid), None),
         runs=sum(row.visits > 0 for row in rows),
         visits=visits,

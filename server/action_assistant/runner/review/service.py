@@ -13,7 +13,7 @@ from action_assistant.journal.events import Draft, Event
 from action_assistant.runner.analysis import annotations, expected_runs, exports, statistics
 from action_assistant.runner.analysis.cause_texts import words
 from action_assistant.runner.analysis.causes import causes
-from action_assistant.runner.analysis.comparison import RunComparison, compare
+from action_assistant.runner.analysis.comparison import RunComparison, SentTree, compare
 from action_assistant.runner.analysis.course_checks import CheckedCourses, check_courses
 from action_assistant.runner.analysis.keyframes import KeyframeStore
 from action_assistant.runner.analysis.replay import RunReplay, run_replay
@@ -145,14 +145,16 @@ class ReviewService:
     async def causes(self, run_id: str) -> list[CauseShown]:
         """What is proven to be behind the end of a run, the weightiest first. Raises NotFound."""
         found, graph = await self.known(run_id), await self._graph(run_id)
-        named = await self._run_in_worker(lambda: causes(found, graph))
+        named = await self._run_in_worker(
+            lambda: [(each, words(each, found)) for each in causes(found, graph)[:_CAUSES]]
+        )
         shown: list[CauseShown] = []
-        for each in named[:_CAUSES]:
+        for each, text in named:
             action = found.actions.get(each.action or "")
             shown.append(
                 CauseShown(
                     kind=str(each.__struct_config__.tag),
-                    text=words(each, found),
+                    text=text,
                     at=views.time(each.at),
                     seq=await self.keyframe_store.seq_at(run_id, each.at),
                     action=each.action,
@@ -220,9 +222,12 @@ class ReviewService:
     async def compare(self, a: str, b: str) -> RunComparison:
         """Two runs side by side. Raises NotFound."""
         one, other = await self.known(a), await self.known(b)
-        umrf_a = await self._control.history.umrf(a)
-        umrf_b = await self._control.history.umrf(b)
-        return await self._run_in_worker(lambda: compare(one, other, umrf_a, umrf_b))
+        sent_a, sent_b = await self._sent_tree(a), await self._sent_tree(b)
+        return await self._run_in_worker(lambda: compare(one, other, sent_a, sent_b))
+
+    async def _sent_tree(self, run_id: str) -> SentTree:
+        sent = await self._control.history.requested(run_id)
+        return SentTree(sent.umrf, {each.name: each.digest for each in sent.subgraphs})
 
     async def export(self, run_id: str, form: Format) -> bytes:
         """The run as a file. Raises NotFound."""

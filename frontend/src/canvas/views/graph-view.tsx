@@ -1,30 +1,16 @@
 /** A graph to look at: the canvas of the run page and of previews. */
-import {
-  Background,
-  BackgroundVariant,
-  type EdgeTypes,
-  type NodeTypes,
-  ReactFlow,
-  type Viewport,
-} from "@xyflow/react";
+import { Background, BackgroundVariant, ReactFlow, type Viewport } from "@xyflow/react";
 import { type ReactNode, useEffect, useMemo, useState } from "react";
-import type { Graph, Key } from "../graph/model";
-import type { Progress } from "../status/progress";
-import { ActionCard } from "./action-card";
-import { LineContext, LineStore } from "./arrows/line-store";
-import { type CanvasNode, edgesOf, nodesOf, sceneOf, surroundingsOf } from "./elements";
-import { EndPill } from "./end-pill";
-import { useLaidOut } from "./geometry/use-laid-out";
-import { NoteCard } from "./notes/note-card";
-import { notePlaces } from "./notes/note-nodes";
-import { ArrowTips, OutcomeArrow } from "./outcome-arrow";
-import { NO_PROBLEM_MARKS } from "./problem-marks";
-import { ZoomDetail } from "./zoom/zoom-detail";
-import "@xyflow/react/dist/style.css";
-import "./canvas.css";
-
-export const nodeTypes: NodeTypes = { action: ActionCard, end: EndPill, note: NoteCard };
-export const edgeTypes: EdgeTypes = { outcome: OutcomeArrow };
+import type { Graph, Key } from "../../graph/model";
+import type { Progress } from "../../status/progress";
+import { LineContext, LineStore } from "../arrows/line-store";
+import { type CanvasNode, edgesOf, nodesOf, sceneOf, surroundingsOf } from "../elements";
+import { useLaidOut } from "../geometry/use-laid-out";
+import { edgeTypes, nodeTypes } from "../node-types";
+import { notePlaces } from "../notes/note-nodes";
+import { ArrowTips } from "../outcome-arrow";
+import { NO_PROBLEM_MARKS } from "../problem-marks";
+import { ZoomDetail } from "../zoom/zoom-detail";
 
 const NONE: ReadonlySet<string> = new Set();
 

@@ -1,0 +1,36 @@
+"""The graphs inside of a graph as files, named so that an engine indexes them: `*graph.json`. Pure."""
+
+import io
+import re
+import zipfile
+from collections.abc import Iterable
+from typing import Final
+
+_ENDING: Final = ".umrf.graph.json"
+_UNFIT: Final = re.compile(r"[^A-Za-z0-9_.-]+")
+_LONG_AGO: Final = (1980, 1, 1, 0, 0, 0)  # the same files are the same bytes
+_MODE: Final = 0o644 << 16
+
+
+def packed(graphs: Iterable[tuple[str, bytes]]) -> bytes:
+    """A ZIP file with one file for each of these graphs, by name and text."""
+    made = io.BytesIO()
+    with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as file:
+        taken: set[str] = set()
+        for name, text in graphs:
+            entry = zipfile.ZipInfo(_free_name(name, taken), _LONG_AGO)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.external_attr = _MODE
+            file.writestr(entry, text)
+    return made.getvalue()
+
+
+def _free_name(graph: str, taken: set[str]) -> str:
+    """A name that every file system takes, also one that makes no difference of case."""
+    stem = _UNFIT.sub("_", graph).strip("._")[:80] or "graph"
+    number, name = 1, stem
+    while name.lower() in taken:
+        number += 1
+        name = f"{stem}-{number}"
+    taken.add(name.lower())
+    return f"{name}{_ENDING}"
