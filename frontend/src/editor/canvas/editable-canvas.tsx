@@ -6,7 +6,6 @@ import {
   BackgroundVariant,
   type Connection,
   ConnectionLineType,
-  type NodeProps,
   PanOnScrollMode,
   ReactFlow,
   SelectionMode,
@@ -16,12 +15,12 @@ import { type MouseEvent, type RefObject, useEffect, useMemo, useRef } from "rea
 import { actionDrag } from "../../canvas/action-drag";
 import { LineContext, LineEditingContext } from "../../canvas/arrows/line-store";
 import type { Arrow, CanvasNode } from "../../canvas/elements";
+import { FoldedFrame } from "../../canvas/folding/folded-frame";
 import type { PlaceMap } from "../../canvas/folding/spread";
 import { CARD } from "../../canvas/geometry/arrange";
 import { graphsInside } from "../../canvas/levels/graphs-inside";
 import { edgeTypes, nodeTypes } from "../../canvas/node-types";
 import { type NoteEditing, NoteEditingContext } from "../../canvas/notes/note-card";
-import type { FoldedNode } from "../../canvas/notes/note-nodes";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
 import { ArrowTips } from "../../canvas/outcome-arrow";
 import { ZoomDetail } from "../../canvas/zoom/zoom-detail";
@@ -53,19 +52,7 @@ const OTHER_BUTTONS = [1, 2];
 const MORE_KEYS = ["Shift", "Meta", "Control"];
 const PLAIN = { hideAttribution: true };
 const NOTES = ".react-flow__node-note, .react-flow__node-folded";
-const FoldedFrame = lazyPart(() =>
-  import("../../canvas/folding/folded-frame").then((part) => part.FoldedFrame),
-);
-
-function FoldedSpot(props: NodeProps<FoldedNode>) {
-  return (
-    <PartBoundary waiting={null}>
-      <FoldedFrame {...props} />
-    </PartBoundary>
-  );
-}
-
-const NODE_TYPES = { ...nodeTypes, folded: FoldedSpot };
+const NODE_TYPES = { ...nodeTypes, folded: FoldedFrame };
 
 interface Props {
   context: EditorContext;
