@@ -262,7 +262,8 @@ for (const [size, levels] of HIERARCHIES) {
       await pause(16);
     }
     const panned = await pans();
-    const figures = [ms(expanded), ms(longest), ms(share(panned, 0.5)), ms(share(panned, 1))];
+    const own = levels === 1 ? ["", ""] : [ms(expanded), ms(longest)];
+    const figures = [...own, ms(share(panned, 0.5)), ms(share(panned, 1))];
     nested.push([`${size.toLocaleString("en")} in ${levels}`, ...figures]);
     await context.close();
   });
