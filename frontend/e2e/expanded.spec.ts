@@ -104,6 +104,24 @@ test("a card is moved beside what is expanded, and stands there once it is colla
   expect(Math.abs(moved.y - y - 80 * zoom)).toBeLessThan(12);
 });
 
+test("from afar a card is one thing to press, wherever its signs would be", async () => {
+  const { page } = ada;
+  await page.keyboard.press("{");
+  await page.keyboard.press("f");
+  await page.keyboard.press("-");
+  await page.keyboard.press("-");
+  const fetch = outer(page, "Fetch");
+  const { x, y, width } = await boxOf(fetch);
+  expect(width / 208).toBeLessThan(0.9);
+  for (const right of [8, 20, 32, 44]) {
+    await page.keyboard.press("Escape");
+    await expect(fetch).not.toHaveClass(/\bselected\b/);
+    await page.mouse.click(x + width - right, y + 12);
+    await expect(fetch).toHaveClass(/\bselected\b/);
+  }
+  await expect(inner(page, "Look")).toHaveCount(0);
+});
+
 test("keys expand and collapse, the outline and the search reach inside", async () => {
   const { page } = ada;
   await page.keyboard.press("{");

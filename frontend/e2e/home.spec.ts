@@ -1,7 +1,7 @@
 /** Home and keyboard: rename, duplicate, delete and bring back; Delete, Tab, select all, marquee. */
 
 import { expect, type Page, test } from "@playwright/test";
-import { add, card, saved } from "./canvas";
+import { add, boxOf, card, saved } from "./canvas";
 import { Product } from "./product";
 
 const product = new Product();
@@ -76,8 +76,7 @@ test("keys and marquee: Tab searches, all are selected, Delete deletes, a frame 
 
   // A frame drawn round one of them selects that one.
   await page.getByRole("button", { name: "Select", exact: true }).click();
-  const two = await card(page, "Two").boundingBox();
-  if (two === null) throw new Error("no card");
+  const two = await boxOf(card(page, "Two"));
   await page.mouse.move(two.x - 14, two.y - 10);
   await page.mouse.down();
   await page.mouse.move(two.x + two.width / 2, two.y + two.height / 2, { steps: 6 });
