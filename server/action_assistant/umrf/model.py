@@ -147,9 +147,21 @@ class Where(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     column: int | None = None
 
 
+class PlaceInside(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """Where in a sub-graph a problem is. `levels` are the full names of the actions that lead there: from
+    that of the graph around it, down to the one that stands for `graph`. `where` is in the text of that
+    graph, whose own problem has this `code` and `message`."""
+
+    levels: tuple[str, ...]
+    graph: str
+    code: str
+    message: str
+    where: Where = Where()
+
+
 class Problem(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """Something about a graph that a person should know. Checks return these, never raise. `also`: the
-    other places of the same thing, which is told once."""
+    other places of the same thing, which is told once. `inside`: where below the place it is."""
 
     code: str
     severity: Severity
@@ -157,6 +169,7 @@ class Problem(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     message: str
     fix: str | None = None
     also: tuple[Where, ...] = ()
+    inside: PlaceInside | None = None
 
 
 class Note(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):

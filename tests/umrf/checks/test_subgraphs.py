@@ -195,3 +195,72 @@ def test_more_graphs_inside_than_are_looked_at_are_told() -> None:
     inner = {"Inner": graph("Inner", action("A"))}
     found = check(outer, graphs=inner, resolution=Resolution(cut=True))
     assert [(each.code, each.severity) for each in found] == [("not-tried", "warning")]
+
+
+def broken(name: str) -> Graph:
+    """One whose second action nobody leads to from both sides."""
+    return graph(name, action("A", children=[]), action("B", parents=[]))
+
+
+def test_an_error_two_levels_down_is_told_with_the_way_to_it() -> None:
+    outer = graph("outer", action("Fetch"))
+    inner = {"Fetch": graph("Fetch", action("Grip")), "Grip": broken("Grip")}
+    own = [p for p in check(broken("Grip")) if p.severity == "error"]
+    problems = check(outer, graphs=inner)
+    assert [(p.code, p.severity) for p in problems] == [("subgraph", "error")] * len(own)
+    assert {p.where.path for p in problems} == {"/actions/0/name"}
+    places = [p.inside for p in problems if p.inside]
+    assert [(each.code, each.message, each.where) for each in places] == [
+        (each.code, each.message, each.where) for each in own
+    ]
+    assert {(each.levels, each.graph) for each in places} == {(("Fetch_0", "Grip_0"), "Grip")}
+    assert problems[0].message.startswith(
+        f"The sub-graph “Grip” inside Fetch_0 has an error ({own[0].code}): "
+    )
+
+
+def test_what_an_action_two_levels_down_lacks_is_an_error_of_the_outermost_graph() -> None:
+    needy = graph("Grip", action("A", input_parameters={"text": TEXT}))
+    outer = graph("outer", action("Fetch"))
+    (problem,) = check(outer, graphs={"Fetch": graph("Fetch", action("Grip")), "Grip": needy})
+    assert problem.inside
+    assert (problem.code, problem.inside.code) == ("subgraph", "signature")
+    assert problem.inside.levels == ("Fetch_0",)
+    assert problem.inside.where.aid == needy_action(graph("Fetch", action("Grip")))
+
+
+def needy_action(around: Graph) -> str:
+    (only,) = around.actions
+    return only.key
+
+
+def test_a_pause_and_an_end_that_never_comes_reach_out_of_two_levels() -> None:
+    pausing = [{"name": "A", "conditions": ["on_true -> pause", "on_false -> run", *SAFE]}]
+    fetch = graph("Fetch", action("A"), action("Grip", parents=pausing))
+    inner = {"Fetch": fetch, "Grip": graph("Grip", action("B"))}
+    problems = check(graph("outer", action("Fetch")), graphs=inner)
+    paused = [p for p in problems if p.code == "H5" and "a pause of it never completes" in p.message]
+    assert [p.inside.levels for p in paused if p.inside] == [("Fetch_0",)]
+
+    halting = {"Fetch": graph("Fetch", action("Grip")), "Grip": graph("Grip", action("B"), exits=False)}
+    (problem,) = check(graph("outer", action("Fetch")), graphs=halting)
+    assert (problem.code, problem.severity) == ("subgraph", "error")
+    assert "inside" not in problem.message.split("has an error")[0]
+    assert "“Grip” ends HALTED in any case" in problem.message
+
+
+def test_graphs_that_contain_each_other_far_inside_are_found_once_and_with_their_way() -> None:
+    first, second = graph("First", action("Second")), graph("Second", action("First"))
+    around = {"Around": graph("Around", action("First")), "First": first, "Second": second}
+    (problem,) = check(graph("outer", action("Around")), graphs=around)
+    assert problem.inside
+    assert (problem.code, problem.inside.code) == ("subgraph", "recursion")
+    assert problem.inside.levels == ("Around_0",)
+
+
+def test_of_very_many_errors_inside_some_are_told_with_the_number_of_the_others() -> None:
+    lone = [action("A", instance_id=i, children=[], type="sync") for i in range(60)]
+    inner = graph("Inner", *lone)
+    one = check(graph("outer", action("Inner")), graphs={"Inner": inner})
+    assert 1 < len(one) <= 20
+    assert "more problems of this kind" in one[-1].message

@@ -13,6 +13,7 @@ from action_assistant.umrf.model import (
     Action,
     Graph,
     Key,
+    PlaceInside,
     Problem,
     Relation,
     Severity,
@@ -121,10 +122,11 @@ class Subject:
         fix: str | None = None,
         side: Literal["parents", "children"] | None = None,
         also: Iterable[Relation] = (),
+        inside: PlaceInside | None = None,
     ) -> None:
         """Adds a problem of the graph, of an action or of a relation; `member` goes below it, `side`
         says in which of the lists that have the relation it is. `also`: other relations of which the
-        same is to be said.
+        same is to be said; `inside`: where in the sub-graph of the action it is.
 
         Only the first `MAX_EACH` of one code and severity: more help nobody and fill the memory.
         """
@@ -140,7 +142,13 @@ class Subject:
         others = tuple(self._where(other, member, side) for other in islice(also, MAX_EACH))
         self.problems.append(
             Problem(
-                code=code, severity=severity, where=where, message=message, fix=fix, also=others
+                code=code,
+                severity=severity,
+                where=where,
+                message=message,
+                fix=fix,
+                also=others,
+                inside=inside,
             )
         )
 

@@ -3,21 +3,26 @@
 See docs/umrf-and-the-engine.md 2.6.
 """
 
+from collections import Counter
 from collections.abc import Container, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
+import msgspec
+
 from action_assistant.umrf.checks.flow import check_flow
-from action_assistant.umrf.checks.places import Subject
+from action_assistant.umrf.checks.places import Subject, more
 from action_assistant.umrf.checks.scenarios import check_scenarios, halted
 from action_assistant.umrf.checks.structure import check_structure
 from action_assistant.umrf.checks.values import check_signature, check_values
+from action_assistant.umrf.codes import rank
 from action_assistant.umrf.model import (
     EXIT,
     PRECONDITIONS,
     Action,
     Graph,
     Key,
+    PlaceInside,
     Problem,
     Severity,
     Signature,
@@ -26,13 +31,29 @@ from action_assistant.umrf.semantics.matching import unresolved
 from action_assistant.umrf.semantics.values import slots_of
 from action_assistant.umrf.signatures import signature_of_graph, with_inputs
 
+#: Errors of one sub-graph, with all that is inside of it, that are told at each action that stands for it.
+_ERRORS: Final = 20
+#: What of a sub-graph may go wrong for the graph around it: it takes the engine with it, or never ends, or
+#: is not reached by a stop.
+_REACHES_OUT: Final = frozenset({"H4", "H5", "H8", "H12"})
+
+
+@dataclass(frozen=True)
+class _Finding:
+    """A problem of a sub-graph, or of one inside of it: `place` leads there from the sub-graph."""
+
+    severity: Severity
+    place: PlaceInside
+
 
 @dataclass(frozen=True)
 class _Inner:
-    """What is the same wherever a sub-graph stands: found once, not once per action."""
+    """What is the same wherever a sub-graph stands: found once, not once per action. `halted`: when it ends
+    HALTED, and whether it does so in any case."""
 
     signature: Signature
-    problems: tuple[tuple[str, Severity, str], ...]
+    findings: tuple[_Finding, ...]
+    halted: tuple[str, bool] | None
 
 
 @dataclass(frozen=True)
@@ -48,6 +69,19 @@ class Resolution:
 CERTAIN: Final = Resolution()
 
 
+@dataclass(frozen=True)
+class _Graphs:
+    """The graphs by name, of which actions come before them, and what was found in each."""
+
+    by_name: Mapping[str, Graph]
+    known: Container[str]
+    resolution: Resolution
+    found: dict[str, _Inner] = field(default_factory=dict)
+
+    def of(self, name: str) -> Graph | None:
+        return None if name in self.known else self.by_name.get(name)
+
+
 def check_subgraphs(
     subject: Subject,
     graphs: Mapping[str, Graph],
@@ -61,40 +95,64 @@ def check_subgraphs(
             "and a dry-run plays it as one action."
         )
         subject.report("not-tried", "warning", message)
-    _check_each(subject, graphs, known, resolution)
+    _check_each(subject, _Graphs(graphs, known, resolution))
     _check_again(subject, graphs, known)
 
 
-def _check_each(
-    subject: Subject, graphs: Mapping[str, Graph], known: Container[str], resolution: Resolution
-) -> None:
-    inner: dict[str, _Inner | None] = {}
+def _check_each(subject: Subject, graphs: _Graphs) -> None:
+    contains: dict[str, bool] = {}
     for action in subject.real:
-        graph = graphs.get(action.name)
-        if graph is None or action.name in known:
+        graph = graphs.of(action.name)
+        if graph is None:
             continue
-        if action.name in resolution.several:
+        if action.name in graphs.resolution.several:
             message = (
                 f"Several graphs are called “{graph.name}”: the oldest of them is taken. Rename the "
                 "others, so that nobody is mistaken."
             )
             subject.report("subgraph-ambiguous", "warning", message, action=action, member="/name")
-        if action.name not in inner:
-            contains = _contains(graph, {subject.graph.name, graph.name}, graphs, known)
-            inner[action.name] = None if contains else _inner(subject, graph)
-        found = inner[action.name]
-        if found is None:
+        if action.name not in contains:
+            contains[action.name] = _contains(graph, {subject.graph.name, graph.name}, graphs)
+        if contains[action.name]:
             message = (
                 f"The sub-graph “{graph.name}” contains itself or the graph that it is in; the "
                 "engine cannot resolve the graph."
             )
             subject.report("recursion", "error", message, action=action, member="/name")
             continue
-        own = slots_of(action.inputs), slots_of(action.outputs)
-        check_signature(subject, action, found.signature, *own)
-        for code, severity, message in found.problems:
-            subject.report(code, severity, message, action=action, member="/name")
+        if action.name not in graphs.found:
+            graphs.found[action.name] = _inner(subject, graph, graphs)
+        _report(subject, action, graph, graphs.found[action.name])
         _check_pauses(subject, action)
+
+
+def _report(subject: Subject, action: Action, graph: Graph, found: _Inner) -> None:
+    """What a sub-graph does to the graph around it, at the action that stands for it."""
+    own = slots_of(action.inputs), slots_of(action.outputs)
+    check_signature(subject, action, found.signature, *own)
+    for each in found.findings:
+        place = msgspec.structs.replace(each.place, levels=(action.full_name, *each.place.levels))
+        code = "subgraph" if each.severity == "error" else place.code
+        message = _sentence(each.severity, place)
+        subject.report(code, each.severity, message, action=action, member="/name", inside=place)
+    if found.halted is not None:
+        when, certain = found.halted
+        message = (
+            f"The sub-graph “{graph.name}” ends HALTED {when}, which nobody is told: this action then "
+            "stays RUNNING for ever, and the graph with it."
+        )
+        severity: Severity = "error" if certain else "warning"
+        subject.report("H8", severity, message, action=action, member="/name")
+
+
+def _sentence(severity: Severity, place: PlaceInside) -> str:
+    *above, _ = place.levels
+    graph = f"The sub-graph “{place.graph}”" + (f" inside {' › '.join(above)}" if above else "")
+    if severity == "error":
+        return f"{graph} has an error ({place.code}): {place.message}"
+    if place.code == "H8":
+        return f"{graph} may never end, and the graph with it: {place.message}"
+    return f"{graph} may go wrong: {place.message}"
 
 
 def _check_again(subject: Subject, graphs: Mapping[str, Graph], known: Container[str]) -> None:
@@ -119,54 +177,70 @@ def _check_again(subject: Subject, graphs: Mapping[str, Graph], known: Container
             subject.report("subgraph-twice", "error", message, action=found.action, member="/name")
 
 
-def _inner(subject: Subject, graph: Graph) -> _Inner:
-    return _Inner(signature_of_graph(graph), tuple(_problems_of(subject, graph)))
-
-
-def _contains(
-    graph: Graph, above: set[str], graphs: Mapping[str, Graph], known: Container[str]
-) -> bool:
+def _contains(graph: Graph, above: set[str], graphs: _Graphs) -> bool:
     """Whether one of the graphs in which it is comes again inside."""
     seen: set[str] = set()
     stack = [graph]
     while stack:
         for action in stack.pop().actions:
-            if action.name in known or action.name not in graphs:
+            inner = graphs.of(action.name)
+            if inner is None:
                 continue
             if action.name in above:
                 return True
             if action.name not in seen:
                 seen.add(action.name)
-                stack.append(graphs[action.name])
+                stack.append(inner)
     return False
 
 
-def _problems_of(subject: Subject, graph: Graph) -> list[tuple[str, Severity, str]]:
-    """Code, severity and message of what a sub-graph does wrong."""
+def _inner(subject: Subject, graph: Graph, graphs: _Graphs) -> _Inner:
+    """What a sub-graph does wrong, with all that is inside of it: no graph is there that contains it."""
     inside = Subject(with_inputs(graph), subject.facts)
     check_structure(inside)
     check_flow(inside)
     check_values(inside, None)
+    _check_each(inside, graphs)
     check_scenarios(inside)
-    errors: list[Problem] = [p for p in inside.problems if p.severity == "error"]
+    findings = _findings(inside)
+    when = None if any(_stays(each) for each in findings) else halted(inside)
+    ends = None if when is None else (when, not inside.incoming.get(EXIT))
+    return _Inner(signature_of_graph(graph), findings, ends)
+
+
+def _stays(finding: _Finding) -> bool:
+    """Whether it is known already that the sub-graph may not end."""
+    return finding.severity == "error" or finding.place.code == "H8"
+
+
+def _findings(inside: Subject) -> tuple[_Finding, ...]:
+    """The worst of it: errors, else of each kind of what reaches out the first."""
+    problems = sorted(inside.problems, key=rank)
+    errors = [each for each in problems if each.severity == "error"]
     if errors:
-        message = (
-            f"The sub-graph “{graph.name}” has an error ({errors[0].code}): {errors[0].message}"
+        told, left = errors[:_ERRORS], len(errors) - _ERRORS
+        return (
+            *(_finding(inside, each) for each in told[:-1]),
+            _finding(inside, told[-1], left),
         )
-        return [("subgraph", "error", message)]
-    for problem in inside.problems:
-        if problem.code == "H8":
-            message = f"The sub-graph “{graph.name}” may never end, and the graph with it: {problem.message}"
-            return [("H8", "warning", message)]
-    when = halted(inside)
-    if when is None:
-        return []
-    certain = not inside.incoming.get(EXIT)
-    message = (
-        f"The sub-graph “{graph.name}” ends HALTED {when}, which nobody is told: this action then "
-        "stays RUNNING for ever, and the graph with it."
+    kinds = Counter(each.code for each in problems)
+    first = {each.code: each for each in reversed(problems) if each.code in _REACHES_OUT}
+    return tuple(
+        _finding(inside, each, kinds[each.code] - 1) for each in sorted(first.values(), key=rank)
     )
-    return [("H8", "error" if certain else "warning", message)]
+
+
+def _finding(inside: Subject, problem: Problem, left: int = 0) -> _Finding:
+    """As it is told further out, for `left` others too; what was deeper keeps its place."""
+    place = problem.inside or PlaceInside(
+        levels=(),
+        graph=inside.graph.name,
+        code=problem.code,
+        message=problem.message,
+        where=problem.where,
+    )
+    message = place.message + more(left, "problem", "problems")
+    return _Finding(problem.severity, msgspec.structs.replace(place, message=message))
 
 
 def _check_pauses(subject: Subject, action: Action) -> None:
