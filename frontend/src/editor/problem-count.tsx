@@ -1,7 +1,8 @@
 /** How much of the graph is wrong and to fill in: the same numbers as in its list, which it opens. */
 import { IconAlertTriangle, IconPencil } from "@tabler/icons-react";
-import { useMemo, useRef } from "react";
+import { useEffect, useMemo, useRef } from "react";
 import { useProblems } from "../api/graphs";
+import { toldOnCanvas } from "../canvas/levels/problems-inside";
 import { problemMarksOf } from "../canvas/problem-marks";
 import { useEditorContext } from "../edit-actions/editor-context";
 import type { Graph } from "../graph/model";
@@ -17,6 +18,10 @@ export function useToldProblems(id: string, seq: number, graph: Graph) {
   const found = problems?.problems;
   const told = useMemo(() => toldProblems(found ?? [], now.current), [found]);
   const marks = useMemo(() => problemMarksOf(told), [told]);
+  useEffect(() => {
+    toldOnCanvas.set(told);
+    return () => toldOnCanvas.set([]);
+  }, [told]);
   return { problems, told, marks };
 }
 

@@ -1,8 +1,9 @@
 /** What is wrong with the graph, what is still to fill in, and what may go wrong: where, and what mends it. */
 import { ActionIcon, Button } from "@mantine/core";
-import { IconCircleCheck, IconLink, IconTool } from "@tabler/icons-react";
+import { IconCircleCheck, IconLink, IconStairsDown, IconTool } from "@tabler/icons-react";
 import { useMemo } from "react";
 import type { Problems } from "../api/graphs";
+import { graphsInside } from "../canvas/levels/graphs-inside";
 import { copyLinkTo } from "../edit-actions/clipboard";
 import { type EditorContext, useEditorContext } from "../edit-actions/editor-context";
 import { linkToProblem } from "../edit-actions/graph-links";
@@ -10,7 +11,7 @@ import { relationId } from "../graph/document-keys";
 import { applyExamples, applySafeFixes, exampleFixes, safeFixes } from "../graph/edit/fixes";
 import type { Graph } from "../graph/model";
 import { dataFlowOf } from "../graph/parameters/data-flow";
-import type { ProblemKind } from "../graph/problems/problem-kinds";
+import type { CheckedPlaceInside, ProblemKind } from "../graph/problems/problem-kinds";
 import { endName } from "../graph/relation-words";
 import { pathWords } from "../graph/value-text";
 import { Tooltip } from "../ui/floating/tooltip";
@@ -70,6 +71,27 @@ function Values({ told }: { told: Told }) {
   ));
 }
 
+/** Leads to where in a graph inside it is. */
+function WayInside({ inside }: { inside: CheckedPlaceInside | undefined }) {
+  if (inside === undefined) return null;
+  const { levels, aids, where } = inside;
+  const steps = levels.map((level, i) => ({
+    key: aids[i] ?? "",
+    name: level.slice(0, level.lastIndexOf("_")),
+  }));
+  const words = levels.map((level) => level.replace(/_(\d+)$/, " $1")).join(" › ");
+  return (
+    <button
+      type="button"
+      className={style.jump}
+      onClick={() => graphsInside.now()?.show(steps, where?.relation ?? where?.aid ?? null)}
+      aria-label={`Show where it is inside ${words}`}
+    >
+      <IconStairsDown size={13} aria-hidden /> inside {levels.length > 1 && <bdi>{words}</bdi>}
+    </button>
+  );
+}
+
 function ProblemItem({ told }: { told: Told }) {
   const context = useEditorContext();
   const { place } = told;
@@ -90,6 +112,7 @@ function ProblemItem({ told }: { told: Told }) {
         ) : (
           <span className={style.graph}>Graph</span>
         )}
+        <WayInside inside={told.problems[0].inside} />
         <Tooltip label="Copy a link to this problem">
           <ActionIcon
             size="sm"

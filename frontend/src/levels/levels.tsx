@@ -4,7 +4,7 @@ import { useCallback, useEffect, useMemo } from "react";
 import { useLocation, useSearch } from "wouter";
 import { useGraphsAsActions, useLibrary } from "../api/documents/library";
 import { refreshLibrary } from "../api/graphs";
-import { graphsInside } from "../canvas/levels/graphs-inside";
+import { graphsInside, type InnerStep } from "../canvas/levels/graphs-inside";
 import { addressAround, addressInside, type Level, levelsOf } from "../canvas/levels/level-path";
 import { useEditorContext } from "../edit-actions/editor-context";
 import type { Graph } from "../graph/model";
@@ -90,6 +90,25 @@ function useWayIn(byName: ReadonlyMap<string, string>) {
   });
 }
 
+/** The same by actions that are known by name, whatever is drawn. */
+function useWayTo(byName: ReadonlyMap<string, string>) {
+  const { id } = useEditorContext();
+  const [, go] = useLocation();
+  const search = useSearch();
+  return useStableCallback((steps: readonly InnerStep[], chosen: string | null) => {
+    let here = id;
+    const by: Level[] = [];
+    for (const { key, name } of steps) {
+      const inside = byName.get(name);
+      if (inside === undefined) break; // somebody renamed it meanwhile: as far as the way goes
+      by.push({ graph: here, action: key });
+      here = inside;
+    }
+    if (by.length > 0)
+      go(addressInside(search, by, here, by.length === steps.length ? chosen : null));
+  });
+}
+
 export function Levels() {
   const { id, graph, past } = useEditorContext();
   const [, go] = useLocation();
@@ -102,12 +121,13 @@ export function Levels() {
   );
   const around = addressAround(search, levelsOf(search).length - 1);
   const enter = useWayIn(byName);
+  const show = useWayTo(byName);
   const expand = useExpansion({ id, graph, idOf, off: past !== null, enter });
   const leave = useCallback(() => go(around ?? "/"), [go, around]);
   useEffect(() => {
     const way = around === null ? null : leave;
-    graphsInside.set({ names, byName, isNamed, enter, leave: way, expand, Sign: InsideSign });
-  }, [names, byName, isNamed, enter, around, leave, expand]);
+    graphsInside.set({ names, byName, isNamed, enter, show, leave: way, expand, Sign: InsideSign });
+  }, [names, byName, isNamed, enter, show, around, leave, expand]);
   useEffect(() => () => graphsInside.set(null), []);
   return null;
 }

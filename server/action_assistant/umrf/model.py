@@ -148,11 +148,12 @@ class Where(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
 
 
 class PlaceInside(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """Where in a sub-graph a problem is. `levels` are the full names of the actions that lead there: from
-    that of the graph around it, down to the one that stands for `graph`. `where` is in the text of that
-    graph, whose own problem has this `code` and `message`."""
+    """Where in a sub-graph a problem is. `levels` are the full names of the actions that lead there, `aids`
+    their ids: from that of the graph around it, down to the one that stands for `graph`. `where` is in the
+    text of that graph, whose own problem has this `code` and `message`."""
 
     levels: tuple[str, ...]
+    aids: tuple[Key, ...]
     graph: str
     code: str
     message: str

@@ -4,6 +4,7 @@ import io
 import json
 import zipfile
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -223,6 +224,19 @@ def test_actions_become_a_graph_of_their_own_and_are_unpacked_again(client: http
     names = {value for key, value in maps["actions"].items() if "|" not in key}
     assert names == {"A", "B", "C", "D"}
     assert {maps["actions"][key] for key in back["actions"]} == {"B", "C"}
+
+
+def test_of_people_who_make_one_of_a_name_at_once_one_gets_it(client: httpx.Client) -> None:
+    tasks = [
+        client.post("/api/graphs", json=line(f"T{i}", "A", "B", "C")).json()["id"] for i in range(4)
+    ]
+
+    def make(task: str) -> int:
+        body = {"actions": [keys(client, task)["B"]], "name": "Same"}
+        return client.post(f"/api/graphs/{task}/subgraphs", json=body).status_code
+
+    with ThreadPoolExecutor() as people:
+        assert sorted(people.map(make, tasks)) == [201, 409, 409, 409]
 
 
 def test_what_is_no_sub_graph_or_has_a_name_twice_is_refused(client: httpx.Client) -> None:

@@ -268,3 +268,16 @@ def test_of_a_stop_only_what_went_on_inmost_is_told() -> None:
     assert found(LINE, Observed(4, told), StopRequested(6, ANN), Ended(7, "stopped")) == [
         "A › Grip had not reported its end when Ann pressed Stop."
     ]
+
+
+def test_a_false_end_is_not_put_down_to_an_error_that_was_made_good_before() -> None:
+    told = (
+        state(3, "A_0", "RUNNING"),
+        *inside(4, "task__A__0", "Grip_0", "error", "slipped"),
+        NodeResult(6, "task", "A_0", "on_true"),
+        state(6, "A_0", "FINISHED"),
+        state(6, "B_0", "RUNNING"),
+        NodeResult(7, "task", "B_0", "on_false"),
+        state(7, "B_0", "FINISHED"),
+    )
+    assert found(LINE, Observed(7, told), Ended(8, "finished", "on_false")) == ["B ended false."]

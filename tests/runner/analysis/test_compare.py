@@ -152,3 +152,55 @@ def test_comparing_is_total_for_graphs_of_different_names() -> None:
     found = compared(GOOD, went(2, ("Work_0", "false"), graph=other))
     assert found.parting is not None
     assert not found.same_graph
+
+
+def rounds(number: int, *course: tuple[str, str, str]) -> tuple[Run, str]:
+    """A run whose first action is a graph each time: how that ended, what was inside, and how the second
+    action ended after it."""
+    run, umrf = went(number)
+    events: list[Any] = [
+        msgspec.structs.replace(
+            REQUESTED,
+            run=f"r{number}",
+            number=number,
+            graph_name=PLAN.name,
+            digest=run.digest,
+            actions={each.full_name: each.key for each in PLAN.actions},
+            umrf=umrf,
+        ),
+        Published(1_000_000, "life"),
+    ]
+    at, below = 1_000_000, f"{PLAN.name}__Work__0"
+    for around, inside, after in course:
+        facts: list[NodeState | NodeResult] = [NodeState(at, PLAN.name, "Work_0", "RUNNING")]
+        for graph, name, result in (
+            (below, "Grip_0", inside),
+            (PLAN.name, "Work_0", around),
+            (PLAN.name, "Work_1", after),
+        ):
+            if name != "Work_0":
+                facts.append(NodeState(at, graph, name, "RUNNING"))
+            at += 1_000_000
+            facts += [
+                NodeResult(at, graph, name, f"on_{result}"),
+                NodeState(at, graph, name, "FINISHED"),
+            ]
+        events.append(Observed(at, tuple(facts)))
+    events.append(Ended(at, "finished", "on_true"))
+    found = replay(events)
+    assert found is not None
+    return found, umrf
+
+
+def test_an_action_waits_for_what_parted_in_its_own_visit_only() -> None:
+    alike = ("true", "true", "true")
+    good = rounds(1, alike, alike, alike)
+    inner = compared(good, rounds(2, ("false", "false", "true"), alike, alike))
+    assert inner.parting is not None
+    assert inner.parting.step.name == "Grip_0"
+    own = rounds(
+        3, ("false", "true", "true"), ("true", "true", "false"), ("false", "false", "true")
+    )
+    parting = compared(good, own).parting
+    assert parting is not None
+    assert (parting.step.action, parting.step.visit) == ("Work_0", 1)

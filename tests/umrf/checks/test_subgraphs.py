@@ -10,7 +10,7 @@ import pytest
 from action_assistant.umrf.check import blocking, check, check_reading
 from action_assistant.umrf.checks.subgraphs import Resolution
 from action_assistant.umrf.files.codec import read
-from action_assistant.umrf.model import Graph, Signature
+from action_assistant.umrf.model import Action, Graph, Signature
 from action_assistant.umrf.semantics import Engine, GraphRefused
 from support.recordings import family
 
@@ -197,6 +197,11 @@ def test_more_graphs_inside_than_are_looked_at_are_told() -> None:
     assert [(each.code, each.severity) for each in found] == [("not-tried", "warning")]
 
 
+def only(around: Graph) -> Action:
+    (action,) = around.actions
+    return action
+
+
 def broken(name: str) -> Graph:
     """One whose second action nobody leads to from both sides."""
     return graph(name, action("A", children=[]), action("B", parents=[]))
@@ -214,6 +219,8 @@ def test_an_error_two_levels_down_is_told_with_the_way_to_it() -> None:
         (each.code, each.message, each.where) for each in own
     ]
     assert {(each.levels, each.graph) for each in places} == {(("Fetch_0", "Grip_0"), "Grip")}
+    ways = {each.aids for each in places}
+    assert ways == {(only(outer).key, only(inner["Fetch"]).key)}
     assert problems[0].message.startswith(
         f"The sub-graph “Grip” inside Fetch_0 has an error ({own[0].code}): "
     )
@@ -226,12 +233,7 @@ def test_what_an_action_two_levels_down_lacks_is_an_error_of_the_outermost_graph
     assert problem.inside
     assert (problem.code, problem.inside.code) == ("subgraph", "signature")
     assert problem.inside.levels == ("Fetch_0",)
-    assert problem.inside.where.aid == needy_action(graph("Fetch", action("Grip")))
-
-
-def needy_action(around: Graph) -> str:
-    (only,) = around.actions
-    return only.key
+    assert problem.inside.where.path == "/actions/0/input_parameters"
 
 
 def test_a_pause_and_an_end_that_never_comes_reach_out_of_two_levels() -> None:
@@ -239,10 +241,15 @@ def test_a_pause_and_an_end_that_never_comes_reach_out_of_two_levels() -> None:
     fetch = graph("Fetch", action("A"), action("Grip", parents=pausing))
     inner = {"Fetch": fetch, "Grip": graph("Grip", action("B"))}
     problems = check(graph("outer", action("Fetch")), graphs=inner)
-    paused = [p for p in problems if p.code == "H5" and "a pause of it never completes" in p.message]
+    paused = [
+        p for p in problems if p.code == "H5" and "a pause of it never completes" in p.message
+    ]
     assert [p.inside.levels for p in paused if p.inside] == [("Fetch_0",)]
 
-    halting = {"Fetch": graph("Fetch", action("Grip")), "Grip": graph("Grip", action("B"), exits=False)}
+    halting = {
+        "Fetch": graph("Fetch", action("Grip")),
+        "Grip": graph("Grip", action("B"), exits=False),
+    }
     (problem,) = check(graph("outer", action("Fetch")), graphs=halting)
     assert (problem.code, problem.severity) == ("subgraph", "error")
     assert "inside" not in problem.message.split("has an error")[0]

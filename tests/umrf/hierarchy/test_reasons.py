@@ -238,6 +238,10 @@ def test_levels_and_actions_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None
     found = flattened(graph_of("entry>N0", "N0>exit"), doubling)
     assert isinstance(found, Unflattenable)
     assert {reason.code for reason in found.reasons} == {"too-large"}
+    doubling["N12"] = replace(changed(ONE, "X", name="N12"), name="N12")
+    found = flattened(graph_of("entry>N0", "N0>exit"), doubling)
+    assert isinstance(found, Unflattenable)
+    assert 0 < len(found.reasons) <= flattening.REASONS
 
 
 FORCED = [

@@ -1100,6 +1100,21 @@ export interface EditorApi {
         current_digest: string | null;
     };
     /**
+     * PlaceInside
+     * @description Where in a sub-graph a problem is. `levels` are the full names of the actions that lead there, `aids`
+     *     their ids: from that of the graph around it, down to the one that stands for `graph`. `where` is in the
+     *     text of that graph, whose own problem has this `code` and `message`.
+     */
+    PlaceInside: {
+        levels: string[];
+        aids: string[];
+        graph: string;
+        code: string;
+        message: string;
+        /** @default {} */
+        where?: EditorApi["Where"];
+    };
+    /**
      * Preview
      * @description What a file would become. `problems`: those of the file, then those of the graph. `remarks`
      *     are the notes with their places; all places are in the file as it was sent.
@@ -1115,7 +1130,7 @@ export interface EditorApi {
     /**
      * Problem
      * @description Something about a graph that a person should know. Checks return these, never raise. `also`: the
-     *     other places of the same thing, which is told once.
+     *     other places of the same thing, which is told once. `inside`: where below the place it is.
      */
     Problem: {
         code: string;
@@ -1126,6 +1141,7 @@ export interface EditorApi {
         fix?: string;
         /** @default [] */
         also?: EditorApi["Where"][];
+        inside?: EditorApi["PlaceInside"];
     };
     /**
      * ProblemDetails

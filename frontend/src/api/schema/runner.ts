@@ -684,6 +684,21 @@ export interface RunnerApi {
         messages_b: string[];
     };
     /**
+     * PlaceInside
+     * @description Where in a sub-graph a problem is. `levels` are the full names of the actions that lead there, `aids`
+     *     their ids: from that of the graph around it, down to the one that stands for `graph`. `where` is in the
+     *     text of that graph, whose own problem has this `code` and `message`.
+     */
+    PlaceInside: {
+        levels: string[];
+        aids: string[];
+        graph: string;
+        code: string;
+        message: string;
+        /** @default {} */
+        where?: RunnerApi["Where"];
+    };
+    /**
      * Preflight
      * @description What stands between a graph and its start on one engine. `override`: the codes that a person
      *     would have to answer for; `never`: something cannot be overridden; `digest`: of the graph that was
@@ -700,7 +715,7 @@ export interface RunnerApi {
     /**
      * Problem
      * @description Something about a graph that a person should know. Checks return these, never raise. `also`: the
-     *     other places of the same thing, which is told once.
+     *     other places of the same thing, which is told once. `inside`: where below the place it is.
      */
     Problem: {
         code: string;
@@ -711,6 +726,7 @@ export interface RunnerApi {
         fix?: string;
         /** @default [] */
         also?: RunnerApi["Where"][];
+        inside?: RunnerApi["PlaceInside"];
     };
     /**
      * ProblemDetails

@@ -8,6 +8,12 @@ export interface InsideSignProps {
   readonly name: string;
 }
 
+/** An action on the way inside. */
+export interface InnerStep {
+  readonly key: Key;
+  readonly name: string;
+}
+
 interface GraphsInside {
   /** The names of graphs by their id. */
   readonly names: ReadonlyMap<string, string>;
@@ -18,6 +24,8 @@ interface GraphsInside {
   /** Opens the graph for which an action stands. One that is drawn inside of others is told by all their
    * keys, joined by "/"; where it stands for none, the graph in which it is is opened. */
   enter(path: string): void;
+  /** Opens a graph inside by the actions that lead there, outermost first, with one thing of it chosen. */
+  show(by: readonly InnerStep[], chosen: string | null): void;
   /** What is drawn in place, without going anywhere. */
   readonly expand: {
     toggle(path: string): void;

@@ -20,12 +20,12 @@ export function levelsOf(search: string): Level[] {
 function address(graph: string, levels: readonly Level[], action: Key | null): string {
   const query = new URLSearchParams();
   for (const level of levels.slice(-MOST)) query.append("in", `${level.graph}~${level.action}`);
-  if (action !== null) query.append("action", action);
+  if (action !== null) query.append(action.includes(">") ? "arrow" : "action", action);
   const text = query.toString();
   return `/graphs/${encodeURIComponent(graph)}${text === "" ? "" : `?${text}`}`;
 }
 
-/** A graph inside, entered from where one is by these actions, with one of its own chosen. */
+/** A graph inside, entered from where one is by these actions, with one of its own or an arrow chosen. */
 export function addressInside(
   search: string,
   by: readonly Level[],

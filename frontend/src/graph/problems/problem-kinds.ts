@@ -9,6 +9,15 @@ interface CheckedPlace {
   readonly path?: string;
 }
 
+/** Where in the graph that an action stands for: `aids` of the actions that lead there, outermost first. */
+export interface CheckedPlaceInside {
+  readonly levels: readonly string[];
+  readonly aids: readonly string[];
+  readonly code: string;
+  readonly message: string;
+  readonly where?: CheckedPlace;
+}
+
 /** What of a checked problem is needed here. */
 export interface CheckedProblem {
   readonly code: string;
@@ -18,6 +27,7 @@ export interface CheckedProblem {
   /** Other places of which the same is said. */
   readonly also?: readonly CheckedPlace[];
   readonly fix?: string | null;
+  readonly inside?: CheckedPlaceInside;
 }
 
 /** `wrong`: certain harm, or a mistake. `fill-in`: still to be written. `warning`: may go wrong. */

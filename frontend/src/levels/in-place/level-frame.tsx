@@ -13,6 +13,7 @@ import { actionsWord } from "../../canvas/folding/folded-drawing";
 import { CARD_LINES } from "../../canvas/geometry/arrange";
 import type { LevelFrameProps } from "../../canvas/levels/expanded-graphs";
 import { graphsInside } from "../../canvas/levels/graphs-inside";
+import { ProblemBadge } from "../../canvas/problem-badge";
 import { STATE_LETTER } from "../../canvas/zoom/detail";
 import type { Action, Direction } from "../../graph/model";
 import { cardRows } from "../../graph/parameters/card-rows";
@@ -24,6 +25,7 @@ import style from "./level-frame.module.css";
 import type { LevelGraph } from "./level-graph";
 import { layoutOf } from "./level-layout";
 import { LevelLines } from "./level-lines";
+import { useMarkInside } from "./marks-inside";
 import { useLevelProgress } from "./use-level-progress";
 
 interface ButtonProps {
@@ -52,6 +54,11 @@ function HeadButton({ label, keys, Sign, onClick }: ButtonProps) {
 }
 
 const opensGraph = (name: string) => graphsInside.now()?.byName.has(name) ?? false;
+
+function MarkInside({ path }: { path: string }) {
+  const mark = useMarkInside(path);
+  return mark && <ProblemBadge mark={mark} on="card" />;
+}
 
 interface InnerCardProps {
   action: Action;
@@ -88,6 +95,7 @@ const InnerCard = memo(function InnerCard({
       data-letter={STATE_LETTER[progress?.tone ?? "idle"] || undefined}
     >
       {actor !== "" && <span className={card.robot}>{actor}</span>}
+      <MarkInside path={path} />
       <div className={card.head}>
         <b className={card.name} title={name}>
           {name}
@@ -171,6 +179,7 @@ function LevelBody({ level }: { level: LevelGraph }) {
             style={{ left, top, width, height }}
             data-tone={own?.tone}
           >
+            <MarkInside path={inner.path} />
             <LevelFrame level={inner} name={action.name} progress={own} />
           </div>
         ) : (

@@ -1,5 +1,6 @@
 """Routes that make a sub-graph of chosen actions, and unpack one again."""
 
+import asyncio
 from typing import Any
 
 import msgspec
@@ -66,6 +67,8 @@ async def _chosen(
 
 def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
     """Everything about making and unpacking."""
+    # Of two people who make one of the same name at once, the other is told that it is taken.
+    making = asyncio.Lock()
 
     @post(
         "/api/graphs/{graph_id:str}/extraction",
@@ -90,10 +93,11 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         graph_id: str, request: Request[Any, Any, Any], data: Extracting
     ) -> Response[MadeSubGraph]:
         services, person = app_state.services, person_of(request)
-        chosen = await _chosen(services, graph_id, data)
         await services.people.seen(person)
-        found = await services.workers.files(subgraph_file, *chosen)
-        made, _ = await services.catalogue.create(found.umrf, person.id)
+        async with making:
+            chosen = await _chosen(services, graph_id, data)
+            found = await services.workers.files(subgraph_file, *chosen)
+            made, _ = await services.catalogue.create(found.umrf, person.id)
         body = MadeSubGraph(made, encoded(found.changes))
         return Response(body, status_code=201, headers={"location": f"/api/graphs/{made.id}"})
 

@@ -214,16 +214,15 @@ def _parts(step: ComparedVisit) -> bool:
 
 def _inner_first(steps: list[ComparedVisit]) -> list[ComparedVisit]:
     """An action that ended otherwise because something inside of it did comes after that."""
-    ways = {
-        step.levels[:depth]
-        for step in steps
-        if _parts(step)
-        for depth in range(len(step.levels) + 1)
-    }
+    within: dict[tuple[str, ...], list[ComparedVisit]] = {}
+    for step in filter(_parts, steps):
+        for depth in range(len(step.levels)):
+            within.setdefault(step.levels[: depth + 1], []).append(step)
     ordered: list[ComparedVisit] = []
     held: list[ComparedVisit] = []
     for step in steps:
-        if step.relation == "result" and (*step.levels, step.name) in ways:
+        inner = within.get((*step.levels, step.name), ())
+        if step.relation == "result" and any(_is_inside(each, step) for each in inner):
             held.append(step)
             continue
         ordered.append(step)
@@ -235,8 +234,16 @@ def _inner_first(steps: list[ComparedVisit]) -> list[ComparedVisit]:
 
 
 def _is_inside(step: ComparedVisit, other: ComparedVisit) -> bool:
+    """Whether it can have been in just this visit of what is around it."""
     way = (*other.levels, other.name)
-    return step.levels[: len(way)] == way
+    pairs = ((step.a, other.a), (step.b, other.b))
+    return step.levels[: len(way)] == way and any(
+        inner is not None
+        and outer is not None
+        and inner.start >= outer.not_before
+        and (outer.not_after is None or inner.not_before <= outer.not_after)
+        for inner, outer in pairs
+    )
 
 
 def _own_first(steps: list[ComparedVisit]) -> list[ComparedVisit]:

@@ -13,16 +13,16 @@ Ended: TypeAlias = tuple[int, str, Visit]
 
 def failing_visit(run: Run) -> Ended | None:
     """The first that ended in error; of a run that ended false, the last that did. What went wrong
-    inside of an action that ended true all the same was made good there."""
+    inside of an action that ended true all the same was made good there: it is the last to be thought of."""
     found = places_of(run)
     ended = _ended(run, found, run.actions)
     errors = [each for each in ended if each[2].result == "error"]
     own = {place.way: name for name, place in found.items()}
     wrong = next((each for each in errors if not _made_good(run, found, own, each)), None)
-    wrong = wrong or next(iter(errors), None)
     if wrong is None and run.result == "on_false":
         top = [each for each in ended if each[2].result == "false" and not found[each[1]].levels]
         wrong = next(reversed(top), None)
+    wrong = wrong or next(iter(errors), None)
     return wrong and _inmost(run, found, wrong)
 
 

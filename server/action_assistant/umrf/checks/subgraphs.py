@@ -131,7 +131,9 @@ def _report(subject: Subject, action: Action, graph: Graph, found: _Inner) -> No
     own = slots_of(action.inputs), slots_of(action.outputs)
     check_signature(subject, action, found.signature, *own)
     for each in found.findings:
-        place = msgspec.structs.replace(each.place, levels=(action.full_name, *each.place.levels))
+        levels = (action.full_name, *each.place.levels)
+        aids = (action.key, *each.place.aids)
+        place = msgspec.structs.replace(each.place, levels=levels, aids=aids)
         code = "subgraph" if each.severity == "error" else place.code
         message = _sentence(each.severity, place)
         subject.report(code, each.severity, message, action=action, member="/name", inside=place)
@@ -234,6 +236,7 @@ def _finding(inside: Subject, problem: Problem, left: int = 0) -> _Finding:
     """As it is told further out, for `left` others too; what was deeper keeps its place."""
     place = problem.inside or PlaceInside(
         levels=(),
+        aids=(),
         graph=inside.graph.name,
         code=problem.code,
         message=problem.message,

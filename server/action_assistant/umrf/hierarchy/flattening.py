@@ -33,6 +33,8 @@ from action_assistant.umrf.semantics.values import slots_of
 OF_INNER: Final = frozenset({"halts", "waits", "unready", "early", "beside"})
 #: Actions of one graph, as many as the editor takes (decision 20), and levels below each other.
 MOST: Final = 5_000
+#: Reasons that are told: they are the same wherever a graph stands, and may double with each level.
+REASONS: Final = 100
 DEEPEST: Final = 32
 
 
@@ -61,7 +63,7 @@ class Flattened(msgspec.Struct, frozen=True, tag="flattened", tag_field="kind"):
 
 
 class Unflattenable(msgspec.Struct, frozen=True, tag="unflattenable", tag_field="kind"):
-    """Why no graph is known to have the same course: everything that was found."""
+    """Why no graph is known to have the same course: the first `REASONS` of what was found."""
 
     reasons: tuple[FlatteningReason, ...]
 
@@ -131,7 +133,8 @@ class _Hierarchy:
                 continue
             at = (HierarchyLevel(graph.name, action.key, action.full_name),)
             inside[action.key] = found = self._sub(action, (*above, graph.name))
-            reasons += [replace(reason, at=at + reason.at) for reason in found.reasons]
+            left = found.reasons[: max(0, REASONS - len(reasons))]
+            reasons += [replace(reason, at=at + reason.at) for reason in left]
         if reasons:
             return _Found(None, tuple(reasons))
         flats = {key: found.flat for key, found in inside.items() if found.flat is not None}
