@@ -17,11 +17,13 @@ from action_assistant.settings import check_environment, hide_password
 
 class CommandEntry(NamedTuple):
     """One word of the command line. Its `module` names it in COMMANDS, with the function that gives
-    a parser its arguments and its handler. `described`: its own help begins with the same words."""
+    a parser its arguments and its handler. `described`: its own help begins with the same words.
+    `diagnoses`: it tells wrong settings itself."""
 
     module: str
     help: str
     described: bool = False
+    diagnoses: bool = False
 
 
 #: Every command; `--help` lists them in this order. Only the module of the one that is asked for is
@@ -93,7 +95,9 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
         "backups.backup", "put a backup in the place of what is there; open pages notice and ask"
     ),
     "doctor": CommandEntry(
-        "doctor", "look what is wrong: ROS 2, robots, folders, databases, ports, the page"
+        "doctor.doctor",
+        "look what is wrong: ROS 2, robots, folders, databases, ports, the page",
+        diagnoses=True,
     ),
 }
 
@@ -168,7 +172,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         hide_password()
     options = parser().parse_args(_with_ids_last(sys.argv[1:] if arguments is None else arguments))
     try:
-        check_environment()
+        if not COMMANDS[options.command].diagnoses:
+            check_environment()
         code: int = options.handler(options)
     except CannotStart as error:
         print(f"action-assistant: {error}", file=sys.stderr)
