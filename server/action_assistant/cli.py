@@ -89,6 +89,11 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
     "simulate-robot": CommandEntry(
         "simulate_robot", "a robot that behaves like a real engine, on ROS 2, to practise with"
     ),
+    "service": CommandEntry(
+        "services.service",
+        "serve whenever the computer runs, by systemd: install, uninstall, status, upgrade",
+        posix=True,
+    ),
     "verify": CommandEntry(
         "maintenance", "look whether every stored event is what was written", posix=True
     ),

@@ -17,12 +17,17 @@ if TYPE_CHECKING:  # slow to load, and most commands do not need it
 
 def _add_serve(both: argparse.ArgumentParser) -> None:
     both.epilog = "example: action-assistant serve --data ./data --port 8000"
-    _address(both, port=8000)
-    _database(both, switch=True)
-    _sharing(both)
-    _behaviours(both)
+    add_serve_options(both)
     both.add_argument("--no-open", action="store_true", help="do not open a browser")
     both.set_defaults(handler=_serve)
+
+
+def add_serve_options(parser: argparse.ArgumentParser) -> None:
+    """What `serve` takes, also as a service."""
+    _address(parser, port=8000)
+    _database(parser, switch=True)
+    _sharing(parser)
+    _behaviours(parser)
 
 
 def _add_editor(editor: argparse.ArgumentParser) -> None:
@@ -129,7 +134,8 @@ def _behaviours(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _reached(options: argparse.Namespace) -> settings.Reachability:
+def reached(options: argparse.Namespace) -> settings.Reachability:
+    """How others come to us. Raises CannotStart."""
     return settings.reached(options.public_url, options.trusted_proxies)
 
 
@@ -138,7 +144,7 @@ def _host(options: argparse.Namespace) -> str:
     host: str = options.host or (settings.EVERYWHERE if options.share else "127.0.0.1")
     if options.share and host in {"0.0.0.0", "::"}:
         host = settings.EVERYWHERE
-    public = _reached(options).public
+    public = reached(options).public
     settings.check_host(host, settings.more_hosts(), share=options.share, public=public)
     return host
 
@@ -181,7 +187,7 @@ def _editor_settings(options: argparse.Namespace, data: Path) -> settings.Editor
         share=options.share,
         tls=options.tls,
         switch_database=options.switch_database,
-        reached=_reached(options),
+        reached=reached(options),
     )
 
 
@@ -201,7 +207,7 @@ def _serve(options: argparse.Namespace) -> int:
             port=options.port,
             share=options.share,
             tls=options.tls,
-            reached=_reached(options),
+            reached=reached(options),
             behaviours=options.behaviours,
             opens=not options.no_open,
         )
@@ -243,7 +249,7 @@ def _runner(options: argparse.Namespace) -> int:
         share=options.share,
         tls=options.tls,
         keep=settings.keep(data),
-        reached=_reached(options),
+        reached=reached(options),
         behaviours=options.behaviours,
     )
     listen(
