@@ -12,6 +12,7 @@ from litestar.types import ASGIApp, ControllerRouterHandler
 
 from action_assistant import paths
 from action_assistant.editor.api import (
+    doctor,
     drafts,
     drawing,
     editor,
@@ -110,7 +111,7 @@ def create_app(settings: EditorSettings) -> ASGIApp:
         browsers=browsers,
     )
     return application(
-        [*signing_in, *_routes(app_state, addresses, browsers)],
+        [*signing_in, *_routes(app_state, addresses, browsers), *doctor.routes(settings)],
         title="TeMoto Action Assistant: editor",
         keys=keys,
         revoked=revoked,

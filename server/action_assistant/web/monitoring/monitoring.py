@@ -87,10 +87,10 @@ class Monitoring:
         self._parts = dict(sorted(found.items()))
         return Readiness.of(self._parts)
 
-    async def exposition(self) -> bytes:
+    async def exposition(self) -> str:
         """All metrics, in the text format of Prometheus."""
         await self.readiness()
-        return generate_latest(self._registry)
+        return generate_latest(self._registry).decode()
 
     async def status(self) -> ProcessStatus:
         """How the process is, for whoever looks after it."""

@@ -225,8 +225,8 @@ def _health(monitoring: Monitoring | None) -> list[ControllerRouterHandler]:
         return Response(found, status_code=200 if found.ready else 503)
 
     @get(METRICS, media_type=MediaType.TEXT, summary="Measures, as Prometheus reads them")
-    async def metrics() -> Response[bytes]:
-        text = await monitoring.exposition() if monitoring is not None else b""
+    async def metrics() -> Response[str]:
+        text = await monitoring.exposition() if monitoring is not None else ""
         return Response(text, media_type="text/plain; version=0.0.4")
 
     @get(
