@@ -1,6 +1,7 @@
 """Graphs inside graphs, as `check` sees them."""
 
 import json
+import sys
 from itertools import pairwise
 from typing import Any
 
@@ -75,6 +76,32 @@ def test_graphs_that_contain_each_other_are_found() -> None:
     first, second = graph("First", action("Second")), graph("Second", action("First"))
     assert found(first, first, second) == {"recursion": "error"}
     assert found(graph("outer", action("First")), first, second) == {"recursion": "error"}
+
+
+def test_a_graph_that_is_known_by_another_name_than_its_own_may_contain_itself() -> None:
+    inner = graph("Called otherwise", action("First"))
+    assert found_by_name(graph("outer", action("First")), {"First": inner}) == {"recursion"}
+    ring = {"First": graph("x", action("Second")), "Second": graph("x", action("First"))}
+    assert found_by_name(graph("outer", action("First")), ring) == {"recursion"}
+
+
+def test_an_action_called_like_the_graph_that_it_is_in_is_no_way_into_an_older_one() -> None:
+    older = graph("outer", action("A"))
+    assert found_by_name(graph("outer", action("outer")), {"outer": older}) == {"recursion"}
+
+
+def found_by_name(outer: Graph, graphs: dict[str, Graph]) -> set[str]:
+    return {problem.code for problem in check(outer, graphs=graphs)}
+
+
+def test_a_hierarchy_may_be_deeper_than_the_stack_of_the_interpreter() -> None:
+    depth = 2 * sys.getrecursionlimit()
+    chain = {f"L{n}": graph(f"L{n}", action(f"L{n + 1}")) for n in range(depth)}
+    chain[f"L{depth}"] = graph(f"L{depth}", action("A"), exits=False)
+    (problem,) = check(graph("outer", action("L0")), graphs=chain)
+    assert problem.code == "subgraph"
+    assert problem.inside is not None
+    assert (len(problem.inside.levels), problem.inside.graph) == (depth, f"L{depth - 1}")
 
 
 def beside(*names: str) -> Graph:
