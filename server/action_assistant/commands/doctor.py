@@ -65,7 +65,13 @@ def _add_doctor(doctor: argparse.ArgumentParser) -> None:
         help="of the editor; default: the one that was served last",
     )
     doctor.add_argument("--host", default="127.0.0.1", metavar="H", help="default: %(default)s")
-    doctor.add_argument("--port", type=port_number, default=8000, metavar="N", help="default: 8000")
+    doctor.add_argument(
+        "--port",
+        type=port_number,
+        default=settings.port(),
+        metavar="N",
+        help="default: %(default)s",
+    )
     doctor.add_argument(
         "--public-url", metavar="URL", help="where a proxy shows the page; it is asked there"
     )
