@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
 from action_assistant.errors import CannotStart
+from action_assistant.logs.setup import say
 from action_assistant.safe_text import make_streams_printable
 from action_assistant.settings import (
     check_environment,
@@ -180,7 +181,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options = parser().parse_args(words)
         code: int = options.handler(options)
     except CannotStart as error:
-        print(f"action-assistant: {error}", file=sys.stderr)
+        say(str(error), "error")
         return 2
     except KeyboardInterrupt:
         return 130

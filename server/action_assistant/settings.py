@@ -33,6 +33,10 @@ VARIABLES: Final[Mapping[str, str]] = {
     "ACTION_ASSISTANT_KEEP_RAW": "days after which raw messages of robots go into archives; without "
     "it they are deleted after 7 days or beyond 500 MB",
     "ACTION_ASSISTANT_ARCHIVE": "the folder of archives (`archive` in the data folder)",
+    "ACTION_ASSISTANT_LOG_FORMAT": "`json` for programs, `console` for people, as --log-format",
+    "ACTION_ASSISTANT_LOG_LEVEL": "`debug`, `info`, `warning` or `error`, as --log-level",
+    "ACTION_ASSISTANT_METRICS_TOKEN": "a token that opens /metrics and nothing else",
+    "ACTION_ASSISTANT_METRICS_TOKEN_FILE": "the file that has it",
     "ACTION_ASSISTANT_LIMITS": "`off` lifts rate and socket limits, for load tests",
 }
 #: Where a secret may be that stands in a file, and which variable it is then.
@@ -48,6 +52,7 @@ ARCHIVE: Final = "archive"
 RESTORING: Final = "restore.unfinished"
 #: The host that stands for every address of this computer, of both families.
 EVERYWHERE: Final = "*"
+_MIN_TOKEN: Final = 32  # characters, as of the token that programs present
 LOOPBACK: Final = frozenset({"127.0.0.1", "::1", "localhost"})
 
 
@@ -73,6 +78,7 @@ class EditorSettings(msgspec.Struct, frozen=True, kw_only=True):
     tls: bool = False
     switch_database: bool = False
     reached: Reachability = Reachability()
+    metrics_token: str | None = None
 
 
 class Keep(msgspec.Struct, frozen=True, kw_only=True):
@@ -99,6 +105,7 @@ class RunnerSettings(msgspec.Struct, frozen=True, kw_only=True):
     keep: Keep | None = None
     reached: Reachability = Reachability()
     behaviours: Path | None = None
+    metrics_token: str | None = None
 
 
 def check_environment(environ: Mapping[str, str] = os.environ) -> None:
@@ -168,6 +175,26 @@ def _is_database(name: str) -> bool:
 def _has_password(url: str) -> bool:
     """Or may have: SQLAlchemy allows characters in it that others take for its end."""
     return "@" in url or "password=" in url
+
+
+def metrics_token(environ: Mapping[str, str] = os.environ) -> str | None:
+    """What opens /metrics and nothing else, if there is such a token. Raises CannotStart."""
+    name = "ACTION_ASSISTANT_METRICS_TOKEN"
+    token, file = environ.get(name, ""), environ.get(f"{name}_FILE", "")
+    if token and file:
+        raise CannotStart(f"{name} and {name}_FILE are both set: say it once.")
+    if file:
+        try:
+            token = Path(file).read_text(encoding="utf-8").strip()
+        except (OSError, UnicodeDecodeError) as error:
+            why = error.strerror if isinstance(error, OSError) else "it is no text"
+            raise CannotStart(f"{name}_FILE: {file} cannot be read ({why}).") from error
+    if (token or file) and len(token) < _MIN_TOKEN:
+        raise CannotStart(
+            f"{name}{'_FILE' if file else ''}: a token has at least {_MIN_TOKEN} characters, this one "
+            f"has {len(token)}."
+        )
+    return token or None
 
 
 def limits(environ: Mapping[str, str] = os.environ) -> bool:
