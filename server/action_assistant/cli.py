@@ -22,11 +22,13 @@ from action_assistant.settings import (
 
 class CommandEntry(NamedTuple):
     """One word of the command line. Its `module` names it in COMMANDS, with the function that gives
-    a parser its arguments and its handler. `described`: its own help begins with the same words."""
+    a parser its arguments and its handler. `described`: its own help begins with the same words.
+    `diagnoses`: it tells wrong settings itself."""
 
     module: str
     help: str
     described: bool = False
+    diagnoses: bool = False
 
 
 #: Every command; `--help` lists them in this order. Only the module of the one that is asked for is
@@ -101,7 +103,9 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
         "backups.backup", "put a backup in the place of what is there; open pages notice and ask"
     ),
     "doctor": CommandEntry(
-        "doctor", "look what is wrong: ROS 2, robots, folders, databases, ports, the page"
+        "doctor.doctor",
+        "look what is wrong: ROS 2, robots, folders, databases, ports, the page",
+        diagnoses=True,
     ),
 }
 
@@ -176,8 +180,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         hide_password()
     words = _with_ids_last(sys.argv[1:] if arguments is None else arguments)
     try:
-        check_environment()
-        take_secrets_from_files()
+        if not any(entry.diagnoses and name in words[:1] for name, entry in COMMANDS.items()):
+            check_environment()
+            take_secrets_from_files()
         options = parser().parse_args(words)
         code: int = options.handler(options)
     except CannotStart as error:

@@ -22,6 +22,11 @@ def page() -> Path:
     return _carried("static", _CHECKOUT / "frontend" / "dist")
 
 
+def page_sources() -> Path | None:
+    """What the page is built of, in a checkout; None outside of one."""
+    return _CHECKOUT / "frontend" / "src" if (_CHECKOUT / "pyproject.toml").is_file() else None
+
+
 def wheels() -> Path | None:
     """The environment that `make ros` makes in a checkout; None outside of one."""
     return _CHECKOUT / ".venv-ros" if (_CHECKOUT / "pyproject.toml").is_file() else None

@@ -85,3 +85,16 @@ def _close(path: Path) -> None:
         path.chmod(0o700 if path.is_dir() else 0o600)
     except OSError:  # somebody else's; `doctor` tells
         return
+
+
+def of_others(data: Path) -> list[Path]:
+    """What is ours in it, yet belongs to another user than the folder does."""
+    owner = data.stat().st_uid
+    found: list[Path] = []
+    for path in _ours_in(data):
+        try:
+            if path.lstat().st_uid != owner:
+                found.append(path)
+        except OSError:  # gone meanwhile
+            continue
+    return found

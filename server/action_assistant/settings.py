@@ -122,8 +122,9 @@ def take_secrets_from_files(environ: MutableMapping[str, str] = os.environ) -> N
     """Put the secrets of files that the environment names into it, for this process and what it starts.
     Raises CannotStart: a secret that is named and not there is not done without."""
     for name, secret in _FILES.items():
-        path = environ.pop(name, "")
+        path = environ.get(name, "")
         if not path:
+            environ.pop(name, None)
             continue
         if environ.get(secret):
             raise CannotStart(f"{name} and {secret} are both set; keep one of them.")
@@ -136,6 +137,7 @@ def take_secrets_from_files(environ: MutableMapping[str, str] = os.environ) -> N
         if not text or len(text.splitlines()) > 1:
             raise CannotStart(f"{name} is {path!r}, which has to hold one line.")
         environ[secret] = text
+        del environ[name]  # a process that we start would find both
 
 
 def port(environ: Mapping[str, str] = os.environ) -> int:
