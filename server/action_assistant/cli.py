@@ -13,16 +13,22 @@ from typing import Any, Final, NamedTuple
 from action_assistant.errors import CannotStart
 from action_assistant.logs.setup import say
 from action_assistant.safe_text import make_streams_printable
-from action_assistant.settings import check_environment, hide_password
+from action_assistant.settings import (
+    check_environment,
+    hide_password,
+    take_secrets_from_files,
+)
 
 
 class CommandEntry(NamedTuple):
     """One word of the command line. Its `module` names it in COMMANDS, with the function that gives
-    a parser its arguments and its handler. `described`: its own help begins with the same words."""
+    a parser its arguments and its handler. `described`: its own help begins with the same words.
+    `diagnoses`: it tells wrong settings itself."""
 
     module: str
     help: str
     described: bool = False
+    diagnoses: bool = False
 
 
 #: Every command; `--help` lists them in this order. Only the module of the one that is asked for is
@@ -77,6 +83,9 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
     "watch": CommandEntry(
         "watch.watch", "print each change of a graph as it comes, until Ctrl-C", described=True
     ),
+    "link": CommandEntry(
+        "people", "print the link that signs the owner in, of a server that runs", described=True
+    ),
     "people": CommandEntry("people", "links that let people in: list, invite, revoke"),
     "simulate-robot": CommandEntry(
         "simulate_robot", "a robot that behaves like a real engine, on ROS 2, to practise with"
@@ -94,7 +103,9 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
         "backups.backup", "put a backup in the place of what is there; open pages notice and ask"
     ),
     "doctor": CommandEntry(
-        "doctor", "look what is wrong: ROS 2, robots, folders, databases, ports, the page"
+        "doctor.doctor",
+        "look what is wrong: ROS 2, robots, folders, databases, ports, the page",
+        diagnoses=True,
     ),
 }
 
@@ -167,9 +178,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     make_streams_printable()
     if arguments is None:
         hide_password()
-    options = parser().parse_args(_with_ids_last(sys.argv[1:] if arguments is None else arguments))
+    words = _with_ids_last(sys.argv[1:] if arguments is None else arguments)
     try:
-        check_environment()
+        if not any(entry.diagnoses and name in words[:1] for name, entry in COMMANDS.items()):
+            check_environment()
+            take_secrets_from_files()
+        options = parser().parse_args(words)
         code: int = options.handler(options)
     except CannotStart as error:
         say(str(error), "error")

@@ -12,7 +12,8 @@ from action_assistant.errors import CannotStart
 #: What this program puts into a data folder.
 _OURS: Final = re.compile(
     r"(editor|runner)\.(database|db|mark).*|restore\.unfinished|token|\.token-.*|\.probe-.*|open\.html"
-    r"|revoked|sessions|tls|archive|recordings|before-restore-.*|\.backup-.*"
+    r"|revoked|sessions|tls|archive|recordings|before-(restore-|move-|upgrade).*|\.(backup|restore|rehearsal|move)-.*"
+    r"|backups\.json.*|\.backups\.json\.part"
 )
 _OTHERS: Final = stat.S_IRWXG | stat.S_IRWXO
 
@@ -84,3 +85,16 @@ def _close(path: Path) -> None:
         path.chmod(0o700 if path.is_dir() else 0o600)
     except OSError:  # somebody else's; `doctor` tells
         return
+
+
+def of_others(data: Path) -> list[Path]:
+    """What is ours in it, yet belongs to another user than the folder does."""
+    owner = data.stat().st_uid
+    found: list[Path] = []
+    for path in _ours_in(data):
+        try:
+            if path.lstat().st_uid != owner:
+                found.append(path)
+        except OSError:  # gone meanwhile
+            continue
+    return found

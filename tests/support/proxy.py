@@ -13,14 +13,39 @@ NGINX = shutil.which("nginx", path="/usr/sbin:/usr/local/sbin:/usr/bin") or ""
 
 
 @contextmanager
-def nginx(folder: Path, *, name: str, port: int, editor: int, without: str = "") -> Iterator[Path]:
+def nginx(
+    folder: Path,
+    *,
+    name: str,
+    port: int,
+    editor: int,
+    without: str = "",
+    identity: tuple[Path, Path] | None = None,
+) -> Iterator[Path]:
     """It runs inside the block; the file with the certificate that it shows. `without` is taken out
-    of what is documented."""
+    of what is documented. `identity`: key and chain, else new ones for the name."""
     folder.mkdir()
-    key, chain = folder / "key.pem", folder / "chain.pem"
-    subject = ("-subj", f"/CN={name}", "-addext", f"subjectAltName=DNS:{name}")
-    command = ("openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-keyout", key)
-    subprocess.run([*command, "-out", chain, *subject], check=True, capture_output=True)
+    key, chain = identity or _identity(folder, name)
+    whole = _configured(folder, (key, chain), (name, port, editor), without)
+    log = folder / "log"
+    with log.open("wb") as out:
+        process = subprocess.Popen(
+            [NGINX, "-p", str(folder), "-c", str(whole), "-g", "daemon off;"], stderr=out
+        )
+    try:
+        _wait(port, process, log)
+        yield chain
+    finally:
+        process.terminate()
+        process.wait(10)
+
+
+def _configured(
+    folder: Path, identity: tuple[Path, Path], at: tuple[str, int, int], without: str
+) -> Path:
+    """The documented file for a name, a port and the editor's port, in a configuration of nginx."""
+    key, chain = identity
+    name, port, editor = at
     text = DOCUMENTED.read_text()
     assert without in text
     changes = {
@@ -42,17 +67,16 @@ def nginx(folder: Path, *, name: str, port: int, editor: int, without: str = "")
         f"user root; pid {folder}/pid; error_log stderr; events {{}}\n"
         f"http {{ access_log off; {temporary}\n{text} }}"
     )
-    log = folder / "log"
-    with log.open("wb") as out:
-        process = subprocess.Popen(
-            [NGINX, "-p", str(folder), "-c", str(whole), "-g", "daemon off;"], stderr=out
-        )
-    try:
-        _wait(port, process, log)
-        yield chain
-    finally:
-        process.terminate()
-        process.wait(10)
+    return whole
+
+
+def _identity(folder: Path, name: str) -> tuple[Path, Path]:
+    """A key, and a certificate that signs itself."""
+    key, chain = folder / "key.pem", folder / "chain.pem"
+    subject = ("-subj", f"/CN={name}", "-addext", f"subjectAltName=DNS:{name}")
+    command = ("openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-keyout", key)
+    subprocess.run([*command, "-out", chain, *subject], check=True, capture_output=True)
+    return key, chain
 
 
 def _wait(port: int, process: "subprocess.Popen[bytes]", log: Path) -> None:

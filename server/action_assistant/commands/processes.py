@@ -15,7 +15,7 @@ if TYPE_CHECKING:  # slow to load, and most commands do not need it
 
 def _add_serve(both: argparse.ArgumentParser) -> None:
     both.epilog = "example: action-assistant serve --data ./data --port 8000"
-    _address(both, port=8000)
+    _address(both, port=settings.port())
     _database(both, switch=True)
     _sharing(both)
     _behaviours(both)
@@ -26,7 +26,7 @@ def _add_serve(both: argparse.ArgumentParser) -> None:
 
 def _add_editor(editor: argparse.ArgumentParser) -> None:
     editor.epilog = "example: action-assistant editor --port 8000 --runner-port 8001"
-    _address(editor, port=8000)
+    _address(editor, port=settings.port())
     _database(editor, switch=True)
     _sharing(editor)
     _logging(editor)
@@ -38,7 +38,7 @@ def _add_editor(editor: argparse.ArgumentParser) -> None:
 
 def _add_runner(runner: argparse.ArgumentParser) -> None:
     runner.epilog = "example: action-assistant runner --port 8001 --page-port 8000"
-    _address(runner, port=8001)
+    _address(runner, port=settings.port() + 1)
     _sharing(runner)
     _behaviours(runner)
     _logging(runner)

@@ -157,7 +157,7 @@ class Sqlite:
                 with engine.connect() as connection:
                     question(connection)
             except CannotStart as error:  # of the file that it is, also where a copy was read
-                raise CannotStart(str(error).replace(str(path), str(self._path))) from error
+                raise type(error)(str(error).replace(str(path), str(self._path))) from error
             except self.faults as error:
                 raise CannotStart(f"Cannot open {self._the}: {cause_of(error)}.") from error
             finally:

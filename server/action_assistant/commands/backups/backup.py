@@ -120,7 +120,7 @@ def _backup(options: argparse.Namespace) -> int:
 
 def _copied(source: str, branch: Branch, target: Path, progress: Progress) -> int:
     """A journal as it is at one moment, in a SQLite file; its events, all of which are sound."""
-    from action_assistant.journal.copying import copy
+    from action_assistant.journal.copies.copying import copy
 
     target.touch(mode=0o600)
     if source.startswith("sqlite:"):

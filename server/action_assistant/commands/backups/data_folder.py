@@ -13,7 +13,8 @@ from sqlalchemy import Row, Select, select
 
 from action_assistant.commands.backups.progress import Progress
 from action_assistant.errors import CannotStart
-from action_assistant.journal.copying import sentence
+from action_assistant.journal.copies import backup_state
+from action_assistant.journal.copies.copying import sentence
 from action_assistant.journal.database import Branch
 from action_assistant.journal.databases import database_of
 from action_assistant.journal.events import Fold
@@ -35,7 +36,7 @@ WHOLE: Final = frozenset({keys.TOKEN_FILE, certificate.FOLDER, "sessions", "sess
 _OWN: Final = frozenset(
     {
         *(f"{branch}.db" for branch in BRANCHES),
-        *("editor.mark", "editor.database", "open.html", ARCHIVE, RESTORING),
+        *("editor.mark", "editor.database", "open.html", ARCHIVE, RESTORING, backup_state.FILE),
     }
 )
 _PASSING: Final = (".lock", ".lock.new", "-wal", "-shm", "-journal", ".part")

@@ -159,7 +159,7 @@ def _begin(
 ) -> None:
     """Mark the folder; and bring the graphs into a database `elsewhere`, where one transaction does
     it. Raises CannotStart, and then the folder is as before."""
-    from action_assistant.journal.copying import copy
+    from action_assistant.journal.copies.copying import copy
 
     before = _under(mark)
     if elsewhere and before is not None and _is_there(url, before, about):

@@ -9,7 +9,6 @@ import logging
 import multiprocessing
 import os
 import pickle
-import resource
 import signal
 import threading
 from collections.abc import Callable, Sequence
@@ -21,6 +20,7 @@ from typing import Any, Final
 from action_assistant.errors import TooLarge
 from action_assistant.logs.setup import set_up_worker
 from action_assistant.safe_text import make_streams_printable
+from action_assistant.system import limits
 
 _MEMORY: Final = 768 << 20  # bytes that a worker may take beyond what it begins with
 _TIRED: Final = 256 << 20  # bytes in use after which a worker makes room for a fresh one
@@ -58,8 +58,7 @@ def _humbly(name: str, work: Callable[..., None], args: tuple[Any, ...], nice: i
     with contextlib.suppress(OSError):
         Path("/proc/self/oom_score_adj").write_text("1000")
     with contextlib.suppress(OSError, ValueError):
-        limit = _mapped() + _MEMORY
-        resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+        limits.bound_memory(_MEMORY)
     gc.freeze()
     work(*args)
 
@@ -69,19 +68,6 @@ def _end_with_parent() -> None:
     if parent is not None:
         parent.join()
         os._exit(0)
-
-
-def _mapped() -> int:
-    """Bytes of address space in use."""
-    return int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-
-
-def _in_use() -> int:
-    """Bytes of memory in use; 0 where nobody says."""
-    try:
-        return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
-    except OSError:
-        return 0
 
 
 _MORE: Final = b"+"
@@ -104,7 +90,7 @@ def _reply(request: bytes) -> bytes:
         return LAST + pickle.dumps(("raised", large))
     except Exception as error:  # noqa: BLE001 - it is raised where it was asked for
         reply = _raised(error)
-    return (LAST if _in_use() > _TIRED else _MORE) + reply
+    return (LAST if limits.memory_in_use() > _TIRED else _MORE) + reply
 
 
 def _raised(error: Exception) -> bytes:
