@@ -52,7 +52,10 @@ def prove_writable(data: Path) -> None:
 
 
 def open_to_others(data: Path) -> list[Path]:
-    """What other users of this computer may read or enter: the folder first, then what is ours in it."""
+    """What other users of this computer may read or enter: the folder first, then what is ours in it.
+    Not told on Windows."""
+    if not hasattr(os, "geteuid"):
+        return []  # Windows keeps rights in lists of its own, of which modes tell nothing
     return [path for path in (data, *_ours_in(data)) if _is_open(path)]
 
 

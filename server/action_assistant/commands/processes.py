@@ -15,13 +15,18 @@ if TYPE_CHECKING:  # slow to load, and most commands do not need it
 
 def _add_serve(both: argparse.ArgumentParser) -> None:
     both.epilog = "example: action-assistant serve --data ./data --port 8000"
-    _address(both, port=settings.port())
-    _database(both, switch=True)
-    _sharing(both)
-    _behaviours(both)
-    _logging(both)
+    add_serve_options(both)
     both.add_argument("--no-open", action="store_true", help="do not open a browser")
     both.set_defaults(handler=_serve)
+
+
+def add_serve_options(parser: argparse.ArgumentParser) -> None:
+    """What `serve` takes, also as a service."""
+    _address(parser, port=settings.port())
+    _database(parser, switch=True)
+    _sharing(parser)
+    _behaviours(parser)
+    _logging(parser)
 
 
 def _add_editor(editor: argparse.ArgumentParser) -> None:
@@ -137,7 +142,8 @@ def _logging(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--log-level", choices=LEVELS, help="what is not told below; default: info")
 
 
-def _reached(options: argparse.Namespace) -> settings.Reachability:
+def reached(options: argparse.Namespace) -> settings.Reachability:
+    """How others come to us. Raises CannotStart."""
     return settings.reached(options.public_url, options.trusted_proxies)
 
 
@@ -146,7 +152,7 @@ def _host(options: argparse.Namespace) -> str:
     host: str = options.host or (settings.EVERYWHERE if options.share else "127.0.0.1")
     if options.share and host in {"0.0.0.0", "::"}:
         host = settings.EVERYWHERE
-    public = _reached(options).public
+    public = reached(options).public
     settings.check_host(host, settings.more_hosts(), share=options.share, public=public)
     return host
 
@@ -192,7 +198,7 @@ def _editor_settings(options: argparse.Namespace, data: Path) -> settings.Editor
         share=options.share,
         tls=options.tls,
         switch_database=options.switch_database,
-        reached=_reached(options),
+        reached=reached(options),
         metrics_token=settings.metrics_token(),
     )
 
@@ -215,7 +221,7 @@ def _serve(options: argparse.Namespace) -> int:
             port=options.port,
             share=options.share,
             tls=options.tls,
-            reached=_reached(options),
+            reached=reached(options),
             behaviours=options.behaviours,
             opens=not options.no_open,
         )
@@ -257,7 +263,7 @@ def _runner(options: argparse.Namespace) -> int:
         share=options.share,
         tls=options.tls,
         keep=settings.keep(data),
-        reached=_reached(options),
+        reached=reached(options),
         behaviours=options.behaviours,
         metrics_token=settings.metrics_token(),
     )
