@@ -11,8 +11,13 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
 from action_assistant.errors import CannotStart
+from action_assistant.logs.setup import say
 from action_assistant.safe_text import make_streams_printable
-from action_assistant.settings import check_environment, hide_password
+from action_assistant.settings import (
+    check_environment,
+    hide_password,
+    take_secrets_from_files,
+)
 
 
 class CommandEntry(NamedTuple):
@@ -84,6 +89,9 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
     ),
     "watch": CommandEntry(
         "watch.watch", "print each change of a graph as it comes, until Ctrl-C", described=True
+    ),
+    "link": CommandEntry(
+        "people", "print the link that signs the owner in, of a server that runs", described=True
     ),
     "people": CommandEntry("people", "links that let people in: list, invite, revoke"),
     "simulate-robot": CommandEntry(
@@ -193,6 +201,7 @@ def _check(entry: CommandEntry, name: str) -> None:
         )
     if not entry.diagnoses:
         check_environment()
+        take_secrets_from_files()
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -200,12 +209,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     make_streams_printable()
     if arguments is None:
         hide_password()
-    options = parser().parse_args(_with_ids_last(sys.argv[1:] if arguments is None else arguments))
+    words = _with_ids_last(sys.argv[1:] if arguments is None else arguments)
     try:
-        _check(COMMANDS[options.command], options.command)
+        if words and words[0] in COMMANDS:
+            _check(COMMANDS[words[0]], words[0])
+        options = parser().parse_args(words)
         code: int = options.handler(options)
     except CannotStart as error:
-        print(f"action-assistant: {error}", file=sys.stderr)
+        say(str(error), "error")
         return 2
     except KeyboardInterrupt:
         return 130

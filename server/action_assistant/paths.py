@@ -38,6 +38,10 @@ def examples() -> Path:
 
 
 def data() -> Path:
-    """Where journals and the token are kept when nobody says otherwise (XDG base directories)."""
+    """Where journals and the token are kept when no option says otherwise: where the environment does,
+    else among the user's data (XDG base directories)."""
+    named = os.environ.get("ACTION_ASSISTANT_DATA")
+    if named:
+        return Path(named)
     base = os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share"
     return Path(base) / "temoto-action-assistant"

@@ -2,14 +2,12 @@
 
 import argparse
 import gc
-import logging
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from action_assistant import paths, settings
 from action_assistant.errors import CannotStart
-from action_assistant.safe_text import PrintableLog
+from action_assistant.logs.setup import FORMS, LEVELS, hand_on, log_settings, set_up
 
 if TYPE_CHECKING:  # slow to load, and most commands do not need it
     from action_assistant.web.server.listen import TlsIdentity
@@ -24,17 +22,19 @@ def _add_serve(both: argparse.ArgumentParser) -> None:
 
 def add_serve_options(parser: argparse.ArgumentParser) -> None:
     """What `serve` takes, also as a service."""
-    _address(parser, port=8000)
+    _address(parser, port=settings.port())
     _database(parser, switch=True)
     _sharing(parser)
     _behaviours(parser)
+    _logging(parser)
 
 
 def _add_editor(editor: argparse.ArgumentParser) -> None:
     editor.epilog = "example: action-assistant editor --port 8000 --runner-port 8001"
-    _address(editor, port=8000)
+    _address(editor, port=settings.port())
     _database(editor, switch=True)
     _sharing(editor)
+    _logging(editor)
     editor.add_argument(
         "--runner-port", type=port_number, metavar="N", help="default: the next port"
     )
@@ -43,9 +43,10 @@ def _add_editor(editor: argparse.ArgumentParser) -> None:
 
 def _add_runner(runner: argparse.ArgumentParser) -> None:
     runner.epilog = "example: action-assistant runner --port 8001 --page-port 8000"
-    _address(runner, port=8001)
+    _address(runner, port=settings.port() + 1)
     _sharing(runner)
     _behaviours(runner)
+    _logging(runner)
     runner.add_argument(
         "--page-port", type=port_number, metavar="N", help="default: the port before"
     )
@@ -134,6 +135,13 @@ def _behaviours(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _logging(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--log-format", choices=FORMS, help="how lines of the log look; default: console"
+    )
+    parser.add_argument("--log-level", choices=LEVELS, help="what is not told below; default: info")
+
+
 def reached(options: argparse.Namespace) -> settings.Reachability:
     """How others come to us. Raises CannotStart."""
     return settings.reached(options.public_url, options.trusted_proxies)
@@ -165,14 +173,17 @@ def _identity(
     return TlsIdentity(Certificate(chosen.data), addresses.certified)
 
 
-def _log(data: Path) -> None:
+def _log(process: str, options: argparse.Namespace, *secrets: str) -> None:
+    """From here on this process writes its log as it was told to. Raises CannotStart."""
+    chosen = log_settings(options.log_format, options.log_level)
+    hand_on(chosen)
+    set_up(process, chosen, *secrets)
+
+
+def _secrets(data: Path) -> tuple[str, ...]:
     from action_assistant.web.auth.keys import Keys
 
-    handler = logging.StreamHandler(sys.stderr)
-    handler.setFormatter(PrintableLog(Keys.of(data).token))
-    logging.basicConfig(level=logging.INFO, handlers=[handler])
-    logging.getLogger("uvicorn.error").setLevel(logging.WARNING)
-    logging.getLogger("httpx").setLevel(logging.WARNING)
+    return Keys.of(data).token, settings.metrics_token() or ""
 
 
 def _editor_settings(options: argparse.Namespace, data: Path) -> settings.EditorSettings:
@@ -188,6 +199,7 @@ def _editor_settings(options: argparse.Namespace, data: Path) -> settings.Editor
         tls=options.tls,
         switch_database=options.switch_database,
         reached=reached(options),
+        metrics_token=settings.metrics_token(),
     )
 
 
@@ -196,6 +208,8 @@ def _serve(options: argparse.Namespace) -> int:
 
     if options.port == 65535:
         raise CannotStart("The runner needs the port after --port; 65535 has none.")
+    _log("serve", options)
+    settings.metrics_token()
     host = _host(options)
     data = settings.data_folder(options.data.resolve())
     return serve(
@@ -220,7 +234,7 @@ def _editor(options: argparse.Namespace) -> int:
     from action_assistant.web.server.listen import serve as listen
 
     data = settings.data_folder(options.data.resolve())
-    _log(data)
+    _log("editor", options, *_secrets(data))
     chosen = _editor_settings(options, data)
     listen(
         lambda: create_app(chosen),
@@ -238,7 +252,7 @@ def _runner(options: argparse.Namespace) -> int:
     from action_assistant.web.server.listen import serve as listen
 
     data = settings.data_folder(options.data.resolve())
-    _log(data)
+    _log("runner", options, *_secrets(data))
     chosen = settings.RunnerSettings(
         data=data,
         host=_host(options),
@@ -251,6 +265,7 @@ def _runner(options: argparse.Namespace) -> int:
         keep=settings.keep(data),
         reached=reached(options),
         behaviours=options.behaviours,
+        metrics_token=settings.metrics_token(),
     )
     listen(
         lambda: create_app(chosen),

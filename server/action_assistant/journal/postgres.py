@@ -237,6 +237,11 @@ class Postgres:
         rows = [tuple(row) for row in connection.execute(chosen)]
         return list(rows), rows[-1][6] if rows else after
 
+    def bytes_in_use(self, connection: Connection) -> dict[str, int]:
+        """Bytes of the database; its log is that of the whole server."""
+        asked = "SELECT pg_database_size(current_database())"
+        return {"database": int(connection.exec_driver_sql(asked).scalar_one())}
+
     def complaints(self, connection: Connection) -> list[str]:
         """Nothing: the server looks after its own files."""
         del connection

@@ -224,6 +224,15 @@ class Sqlite:
             raw.text_factory = plain
         return [row[:8] for row in rows], rows[-1][8] if rows else after
 
+    def bytes_in_use(self, connection: Connection) -> dict[str, int]:
+        """Bytes of the file, and of the log beside it."""
+        del connection
+        log = self._path.with_name(f"{self._path.name}-wal")
+        return {
+            "database": self._path.stat().st_size,
+            "wal": log.stat().st_size if log.exists() else 0,
+        }
+
     def complaints(self, connection: Connection) -> list[str]:
         """What SQLite finds wrong with the file."""
         found = connection.exec_driver_sql("PRAGMA integrity_check").scalars().all()

@@ -3,6 +3,7 @@
 import argparse
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
@@ -14,6 +15,7 @@ from action_assistant.commands.doctor.examination import examine
 from action_assistant.commands.doctor.installation import Installation
 from action_assistant.commands.doctor.ros_checks import ROBOTS_S, look_here, robots_answer
 from action_assistant.commands.processes import port_number
+from action_assistant.errors import CannotStart
 from action_assistant.safe_text import one_line
 from action_assistant.system.diagnostics import Diagnostic, Severity
 
@@ -30,11 +32,15 @@ def _add_doctor(doctor: argparse.ArgumentParser) -> None:
     doctor.add_argument(
         "--database",
         metavar="URL",
-        default=settings.database(),
         help="of the editor; default: the one that was served last",
     )
     doctor.add_argument("--host", default="127.0.0.1", metavar="H", help="default: %(default)s")
-    doctor.add_argument("--port", type=port_number, default=8000, metavar="N", help="default: 8000")
+    doctor.add_argument(
+        "--port",
+        type=port_number,
+        metavar="N",
+        help="of the editor; default: ACTION_ASSISTANT_PORT",
+    )
     doctor.add_argument(
         "--public-url", metavar="URL", help="where a proxy shows the page; it is asked there"
     )
@@ -52,11 +58,14 @@ COMMANDS: Final = {"doctor": _add_doctor}
 
 
 def _doctor(options: argparse.Namespace) -> int:
+    with suppress(CannotStart):  # told as a finding
+        settings.take_secrets_from_files()
+    port = Installation.port_of_settings() if options.port is None else options.port
     place = Installation(
         data=options.data.absolute(),
-        database=options.database,
+        database=options.database or settings.database(),
         host=options.host,
-        port=options.port,
+        port=port,
         public_url=options.public_url,
     )
     if options.here:

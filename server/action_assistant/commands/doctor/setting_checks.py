@@ -75,7 +75,13 @@ def _days(name: str) -> Callable[[str], object]:
     return lambda value: settings.keep(Path(), {name: value})
 
 
+def _file(name: str) -> Callable[[str], object]:
+    return lambda value: settings.take_secrets_from_files({name: value})
+
+
 _READERS: Final[Mapping[str, Callable[[str], object]]] = {
+    "ACTION_ASSISTANT_PORT": lambda value: settings.port({"ACTION_ASSISTANT_PORT": value}),
+    **{name: _file(name) for name in settings.VARIABLES if name.endswith("_FILE")},
     "ACTION_ASSISTANT_TOKEN": lambda value: Keys(value, "ACTION_ASSISTANT_TOKEN"),
     "ACTION_ASSISTANT_DATABASE": database_of,
     "ACTION_ASSISTANT_URL": _url,

@@ -23,7 +23,14 @@ from action_assistant.errors import CannotStart
 from action_assistant.system import users
 
 #: Options of `serve` that a unit passes on.
-_VALUES: Final = ("host", "public_url", "trusted_proxies", "behaviours")
+_VALUES: Final = (
+    "host",
+    "public_url",
+    "trusted_proxies",
+    "behaviours",
+    "log_format",
+    "log_level",
+)
 _FLAGS: Final = ("share", "tls")
 _DEFAULT_PORT: Final = 8000
 

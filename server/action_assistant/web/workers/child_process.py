@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from action_assistant.errors import TooLarge
+from action_assistant.logs.setup import set_up_worker
 from action_assistant.safe_text import make_streams_printable
 from action_assistant.system import limits
 
@@ -47,14 +48,16 @@ def child(
     to exist. `preloaded`: the modules that the server process imports before it forks the first one.
     Raises OSError, EOFError."""
     _context().set_forkserver_preload(list(preloaded))
-    process = _context().Process(target=_humbly, args=(work, args, nice), name=name, daemon=True)
+    told = (name, work, args, nice)
+    process = _context().Process(target=_humbly, args=told, name=name, daemon=True)
     process.start()
     return process
 
 
-def _humbly(work: Callable[..., None], args: tuple[Any, ...], nice: int) -> None:
+def _humbly(name: str, work: Callable[..., None], args: tuple[Any, ...], nice: int) -> None:
     """In the process: others first, when time or memory runs short."""
     make_streams_printable()
+    set_up_worker(name)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # meant for our parent, which ends us
     threading.Thread(target=_end_with_parent, daemon=True).start()
     with contextlib.suppress(OSError):
