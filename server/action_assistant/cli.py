@@ -30,7 +30,10 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
     "serve": CommandEntry("processes", "start the editor and the runner, and open the page"),
     "editor": CommandEntry("processes", "the editor alone: graphs, versions, the page"),
     "runner": CommandEntry("processes", "the runner alone, the side of the robots: runs and Stop"),
-    "migrate": CommandEntry("processes", "bring the databases of a data folder to this version"),
+    "migrate": CommandEntry(
+        "databases.migrate",
+        "bring the databases of a data folder to this version, or back to a copy from before",
+    ),
     "check": CommandEntry("files", "say what is wrong with UMRF files; exit 1 if any has an error"),
     "convert": CommandEntry("files", "print a file of any dialect as canonical UMRF"),
     "simulate": CommandEntry("files", "run a file in the simulator, without a server or a robot"),
@@ -118,9 +121,9 @@ class _ShowVersion(argparse.Action):
     """`--version`. Finding out which was installed takes longer than all the rest of this module."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
-        from action_assistant.version import VERSION
+        from action_assistant.version import described
 
-        print(f"action-assistant {VERSION}")
+        print(f"action-assistant {described()}")
         parser.exit()
 
 

@@ -35,7 +35,7 @@ from action_assistant.runner.links.ros2.checkup import look
 from action_assistant.runner.runs import queries
 from action_assistant.safe_text import one_line
 from action_assistant.settings import reached
-from action_assistant.version import VERSION
+from action_assistant.version import described
 from action_assistant.web.auth.access import REFUSED_SOCKET
 from action_assistant.web.network.certificate import Certificate
 from action_assistant.web.server.sockets import bound
@@ -98,7 +98,7 @@ def _doctor(options: argparse.Namespace) -> int:
 
 def _machine(options: argparse.Namespace) -> Iterator[Diagnostic]:
     python = f"{sys.version_info.major}.{sys.version_info.minor}.{sys.version_info.micro}"
-    yield _fine("program", f"Version {VERSION} on Python {python}.")
+    yield _fine("program", f"Version {described()} on Python {python}.")
     yield _page()
     yield _folder(options.data)
     yield _graphs(options)

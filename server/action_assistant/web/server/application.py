@@ -14,7 +14,7 @@ from litestar.params import Parameter
 from litestar.routes import HTTPRoute
 from litestar.types import ASGIApp, ControllerRouterHandler, HTTPScope, Receive, Scope, Send
 
-from action_assistant.version import VERSION
+from action_assistant.version import VERSION, commit
 from action_assistant.web.auth.access import Access, Needs, require
 from action_assistant.web.auth.keys import Keys, ServerProof
 from action_assistant.web.auth.revocations import Revocations
@@ -32,6 +32,14 @@ _OPEN: Final = frozenset(
     {"/healthz", "/readyz", "/api/session", "/api/session/invitation", "/api/server"}
 )
 _SAFE: Final = frozenset({"GET", "HEAD", "OPTIONS"})
+
+
+class Health(msgspec.Struct, frozen=True):
+    """The process answers. `commit`: of this program, null when nobody knows."""
+
+    status: str
+    version: str
+    commit: str | None
 
 
 class Readiness(msgspec.Struct, frozen=True):
@@ -216,9 +224,11 @@ def _proving(keys: Keys) -> ControllerRouterHandler:
 
 
 def _health(ready: Check | None, measures: Measures | None) -> list[ControllerRouterHandler]:
+    health = Health("ok", VERSION, commit())
+
     @get("/healthz", summary="Whether the process answers")
-    async def healthz() -> dict[str, str]:
-        return {"status": "ok", "version": VERSION}
+    async def healthz() -> Health:
+        return health
 
     @get("/readyz", summary="Whether the process can do its work")
     async def readyz() -> Response[Readiness]:
