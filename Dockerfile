@@ -23,6 +23,7 @@ COPY scripts ./scripts
 COPY migrations ./migrations
 COPY server ./server
 COPY --from=page /source/frontend/dist ./frontend/dist
+ARG SOURCE_COMMIT=
 RUN scripts/image wheel /out
 
 FROM python:3.12.11-slim-bookworm AS editor-environment

@@ -51,6 +51,14 @@ def test_the_wheel_carries_page_and_migrations_and_nothing_foreign(wheel: Path) 
     assert {top for top in tops if not top.endswith(".dist-info")} == {"action_assistant"}
 
 
+def test_the_wheel_says_which_commit_it_was_built_from(wheel: Path) -> None:
+    """With a plus where files had been changed since."""
+    carried = zipfile.ZipFile(wheel).read("action_assistant/commit.txt").decode().strip()
+    asked = ["git", "-C", str(ROOT), "rev-parse", "HEAD"]
+    head = subprocess.run(asked, capture_output=True, text=True, check=True).stdout.strip()
+    assert carried.removesuffix("+") == head
+
+
 def test_the_wheel_carries_neither_tests_nor_what_builds(wheel: Path) -> None:
     names = [Path(name) for name in zipfile.ZipFile(wheel).namelist()]
     outside = [
@@ -61,6 +69,7 @@ def test_the_wheel_carries_neither_tests_nor_what_builds(wheel: Path) -> None:
         ".json",
         ".jsonl",
         ".typed",
+        ".txt",
         ".jinja",
     }
     assert {each.parts[1] for each in outside if each.suffix in {".json", ".jsonl"}} == {"examples"}
