@@ -18,8 +18,8 @@ from containers.engine import FOLDER, ROOT, environment, inspect, podman, run
 
 PROJECT: Final = "temoto-action-assistant"
 PROFILES: Final = ("simulator", "robot", "proxy")
-#: What this podman takes no other way than the machine allows: lowering it needs a capability here.
-_HERE: Final = "services: {runner: {oom_score_adj: 0}}\n"
+#: Whose `ipc: host` podman-compose does not read, so that it is said to podman.
+_WITH_ROBOTS: Final = frozenset({"runner", "robot"})
 _PATIENCE_S: Final = 120.0
 
 
@@ -35,22 +35,28 @@ class Stack:
         if settings:
             lines = [f"{name}={value}" for name, value in settings.items()]
             (folder / ".env").write_text("\n".join([*lines, ""]))
-        self._files = ["docker-compose.yml", "here.yml"]
-        (folder / "here.yml").write_text(_HERE)
+        self._files = ["docker-compose.yml"]
         if more:
             (folder / "docker-compose.override.yml").write_text(more)
             self._files.append("docker-compose.override.yml")
 
-    def compose(self, *words: str, check: bool = True) -> "subprocess.CompletedProcess[str]":
+    def compose(
+        self, *words: str, podman_run: str = "", check: bool = True
+    ) -> "subprocess.CompletedProcess[str]":
         """`docker compose …`, of all profiles."""
         files = [word for name in self._files for word in ("--file", name)]
         profiles = [word for name in PROFILES for word in ("--profile", name)]
-        return run("podman-compose", *files, *profiles, *words, cwd=self.folder, check=check)
+        also = [f"--podman-run-args={podman_run}"] if podman_run else []
+        return run("podman-compose", *also, *files, *profiles, *words, cwd=self.folder, check=check)
 
     def up(self, *services: str) -> None:
         """Start them, and wait until they are ready."""
         with health_checks():
-            self.compose("up", "--detach", "--no-build", *services)
+            robots = [each for each in services if each in _WITH_ROBOTS]
+            others = [each for each in services if each not in _WITH_ROBOTS]
+            for some, run_with in ((others, ""), (robots, "--ipc=host")):
+                if some:
+                    self.compose("up", "--detach", "--no-build", *some, podman_run=run_with)
             for service in services:
                 if service not in {"robot", "proxy"}:
                     self.wait(service)
@@ -90,7 +96,7 @@ class Stack:
 
     def log(self, service: str) -> str:
         """The end of what it said."""
-        answer = run("podman", "logs", "--tail", "60", self.container(service), check=False)
+        answer = run("podman", "logs", "--tail", "12", self.container(service), check=False)
         return answer.stdout + answer.stderr
 
     def processes(self, service: str) -> list[tuple[int, str]]:
