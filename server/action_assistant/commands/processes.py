@@ -97,11 +97,18 @@ def _database(parser: argparse.ArgumentParser, *, switch: bool = False) -> None:
 
 
 def _sharing(parser: argparse.ArgumentParser) -> None:
+    shared = settings.share()
     parser.add_argument(
-        "--share", action="store_true", help="let others on the network in, by links with a role"
+        "--share",
+        action="store_true",
+        default=bool(shared),
+        help="let others on the network in, by links with a role",
     )
     parser.add_argument(
-        "--tls", action="store_true", help="encrypt, with a certificate that is made here"
+        "--tls",
+        action="store_true",
+        default=shared == "tls",
+        help="encrypt, with a certificate that is made here",
     )
     parser.add_argument(
         "--public-url",

@@ -75,7 +75,7 @@ def _newer_source(built: float) -> Path | None:
     if sources is None:
         return None
     for folder, _, names in os.walk(sources):
-        for each in (Path(folder, name) for name in names):
+        for each in (Path(folder, name) for name in names if ".test." not in name):
             if each.stat().st_mtime > built + 1:
                 return each.relative_to(sources.parent)
     return None
