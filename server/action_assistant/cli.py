@@ -43,7 +43,9 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
         "processes", "the runner alone, the side of the robots: runs and Stop", posix=True
     ),
     "migrate": CommandEntry(
-        "processes", "bring the databases of a data folder to this version", posix=True
+        "databases.migrate",
+        "bring the databases of a data folder to this version, or back to a copy from before",
+        posix=True,
     ),
     "check": CommandEntry("files", "say what is wrong with UMRF files; exit 1 if any has an error"),
     "convert": CommandEntry("files", "print a file of any dialect as canonical UMRF"),
@@ -149,9 +151,9 @@ class _ShowVersion(argparse.Action):
     """`--version`. Finding out which was installed takes longer than all the rest of this module."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
-        from action_assistant.version import VERSION
+        from action_assistant.version import described
 
-        print(f"action-assistant {VERSION}")
+        print(f"action-assistant {described()}")
         parser.exit()
 
 

@@ -30,6 +30,15 @@ def make_folder(path: Path) -> None:
         path.mkdir(mode=0o700, exist_ok=True)
 
 
+def sync(path: Path) -> None:
+    """What was written or renamed has to be found after a power cut, too."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
 def own_folder(data: Path) -> Path:
     """A data folder, made if need be, proven writable, and closed to other users as far as it is ours.
     Raises CannotStart."""

@@ -1,4 +1,4 @@
-"""Commands that are processes: serve, editor, runner; and migrate, which prepares their databases."""
+"""Commands that are processes: serve, editor, runner."""
 
 import argparse
 import gc
@@ -53,18 +53,10 @@ def _add_runner(runner: argparse.ArgumentParser) -> None:
     runner.set_defaults(handler=_runner)
 
 
-def _add_migrate(migrate: argparse.ArgumentParser) -> None:
-    migrate.epilog = "example: action-assistant migrate --data ./data"
-    migrate.add_argument("--data", type=Path, default=paths.data(), metavar="DIR")
-    _database(migrate)
-    migrate.set_defaults(handler=_migrate)
-
-
 COMMANDS: Final = {
     "serve": _add_serve,
     "editor": _add_editor,
     "runner": _add_runner,
-    "migrate": _add_migrate,
 }
 
 
@@ -105,11 +97,18 @@ def _database(parser: argparse.ArgumentParser, *, switch: bool = False) -> None:
 
 
 def _sharing(parser: argparse.ArgumentParser) -> None:
+    shared = settings.share()
     parser.add_argument(
-        "--share", action="store_true", help="let others on the network in, by links with a role"
+        "--share",
+        action="store_true",
+        default=bool(shared),
+        help="let others on the network in, by links with a role",
     )
     parser.add_argument(
-        "--tls", action="store_true", help="encrypt, with a certificate that is made here"
+        "--tls",
+        action="store_true",
+        default=shared == "tls",
+        help="encrypt, with a certificate that is made here",
     )
     parser.add_argument(
         "--public-url",
@@ -274,19 +273,4 @@ def _runner(options: argparse.Namespace) -> int:
         proxies=chosen.reached.proxies,
         identity=_identity(chosen, chosen.page_port),
     )
-    return 0
-
-
-def _migrate(options: argparse.Namespace) -> int:
-    from action_assistant.editor.log import database_location
-    from action_assistant.journal.database import Branch
-    from action_assistant.journal.databases import database_of, migrate
-
-    data = settings.data_folder(options.data.resolve())
-    database = options.database or database_location.of(data)
-    urls: dict[Branch, str] = {"editor": database, "runner": f"sqlite:///{data / 'runner.db'}"}
-    for branch, url in urls.items():
-        revision = migrate(url, branch)
-        name = database_of(url).name.removeprefix("The database ")
-        print(f"{branch}: {name} is at revision {revision}")
     return 0
