@@ -36,13 +36,14 @@ VARIABLES: Final[Mapping[str, str]] = {
     "ACTION_ASSISTANT_LOG_FORMAT": "`json` for programs, `console` for people, as --log-format",
     "ACTION_ASSISTANT_LOG_LEVEL": "`debug`, `info`, `warning` or `error`, as --log-level",
     "ACTION_ASSISTANT_METRICS_TOKEN": "a token that opens /metrics and nothing else",
-    "ACTION_ASSISTANT_METRICS_TOKEN_FILE": "the file that has it",
+    "ACTION_ASSISTANT_METRICS_TOKEN_FILE": "a file with that token",
     "ACTION_ASSISTANT_LIMITS": "`off` lifts rate and socket limits, for load tests",
 }
 #: Where a secret may be that stands in a file, and which variable it is then.
 _FILES: Final[Mapping[str, str]] = {
     "ACTION_ASSISTANT_TOKEN_FILE": "ACTION_ASSISTANT_TOKEN",
     "ACTION_ASSISTANT_DATABASE_FILE": "ACTION_ASSISTANT_DATABASE",
+    "ACTION_ASSISTANT_METRICS_TOKEN_FILE": "ACTION_ASSISTANT_METRICS_TOKEN",
     "ACTION_ASSISTANT_DATABASE_PASSWORD_FILE": "PGPASSWORD",
 }
 _SECRET: Final = 65_536  # characters of such a file
@@ -182,19 +183,10 @@ def _has_password(url: str) -> bool:
 def metrics_token(environ: Mapping[str, str] = os.environ) -> str | None:
     """What opens /metrics and nothing else, if there is such a token. Raises CannotStart."""
     name = "ACTION_ASSISTANT_METRICS_TOKEN"
-    token, file = environ.get(name, ""), environ.get(f"{name}_FILE", "")
-    if token and file:
-        raise CannotStart(f"{name} and {name}_FILE are both set: say it once.")
-    if file:
-        try:
-            token = Path(file).read_text(encoding="utf-8").strip()
-        except (OSError, UnicodeDecodeError) as error:
-            why = error.strerror if isinstance(error, OSError) else "it is no text"
-            raise CannotStart(f"{name}_FILE: {file} cannot be read ({why}).") from error
-    if (token or file) and len(token) < _MIN_TOKEN:
+    token = environ.get(name, "").strip()
+    if token and len(token) < _MIN_TOKEN:
         raise CannotStart(
-            f"{name}{'_FILE' if file else ''}: a token has at least {_MIN_TOKEN} characters, this one "
-            f"has {len(token)}."
+            f"{name} has {len(token)} characters; a token must have at least {_MIN_TOKEN}."
         )
     return token or None
 

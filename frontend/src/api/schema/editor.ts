@@ -99,6 +99,25 @@ export interface EditorApi {
         named_at?: number | null;
     };
     /**
+     * BackupsShown
+     * @description The last backup that was made, and what it lacks; the last one that came to nothing since; the last
+     *     trial that restored one; and when the next one is due. Null where there was none.
+     */
+    BackupsShown: {
+        made_at: string | null;
+        bytes: number | null;
+        seconds: number | null;
+        missing: string[];
+        off_site: string | null;
+        failed_at: string | null;
+        failed_why: string | null;
+        proven_at: string | null;
+        unsound: string | null;
+        next_at: string | null;
+        keep: string | null;
+        is_late: boolean;
+    };
+    /**
      * Behaviour
      * @description One call of an action. Times are seconds.
      *
@@ -227,6 +246,19 @@ export interface EditorApi {
         name?: string | null;
         /** @default null */
         description?: string | null;
+    };
+    /**
+     * Diagnostic
+     * @description One thing that was looked at. With `error` something does not work or is not safe; `warning`
+     *     may matter or not; `fine` has neither code nor remedy. `where`: the file, variable, port or robot.
+     */
+    Diagnostic: {
+        code: string;
+        /** @enum {string} */
+        severity: "error" | "fine" | "warning";
+        where: string;
+        message: string;
+        remedy: string;
     };
     /**
      * Difference
@@ -449,17 +481,6 @@ export interface EditorApi {
         at: string;
         seq: number;
         merged?: EditorApi["MergedBy"];
-    };
-    /**
-     * Finding
-     * @description One thing that was looked at. `advice`: what mends it.
-     */
-    Finding: {
-        topic: string;
-        /** @enum {string} */
-        verdict: "fine" | "note" | "wrong";
-        what: string;
-        advice: string;
     };
     /**
      * FlatCopy
@@ -1226,7 +1247,7 @@ export interface EditorApi {
     };
     /**
      * ProcessStatus
-     * @description One of the two processes, now.
+     * @description One of the two processes, now. `backups` are the editor's to know.
      */
     ProcessStatus: {
         /** @enum {string} */
@@ -1242,6 +1263,7 @@ export interface EditorApi {
         storage: EditorApi["StorageShown"] | null;
         workers: EditorApi["LaneState"][];
         activity: EditorApi["Activity"];
+        backups: EditorApi["BackupsShown"] | null;
     };
     /**
      * Proposing

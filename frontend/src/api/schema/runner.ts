@@ -172,6 +172,25 @@ export interface RunnerApi {
         address?: string;
     };
     /**
+     * BackupsShown
+     * @description The last backup that was made, and what it lacks; the last one that came to nothing since; the last
+     *     trial that restored one; and when the next one is due. Null where there was none.
+     */
+    BackupsShown: {
+        made_at: string | null;
+        bytes: number | null;
+        seconds: number | null;
+        missing: string[];
+        off_site: string | null;
+        failed_at: string | null;
+        failed_why: string | null;
+        proven_at: string | null;
+        unsound: string | null;
+        next_at: string | null;
+        keep: string | null;
+        is_late: boolean;
+    };
+    /**
      * Beat
      * @description Once a second: the link is alive. `seen`: when each open run was last shown by its engine;
      *     `heard`: when each robot last answered.
@@ -792,7 +811,7 @@ export interface RunnerApi {
     };
     /**
      * ProcessStatus
-     * @description One of the two processes, now.
+     * @description One of the two processes, now. `backups` are the editor's to know.
      */
     ProcessStatus: {
         /** @enum {string} */
@@ -808,6 +827,7 @@ export interface RunnerApi {
         storage: RunnerApi["StorageShown"] | null;
         workers: RunnerApi["LaneState"][];
         activity: RunnerApi["Activity"];
+        backups: RunnerApi["BackupsShown"] | null;
     };
     /**
      * ProposalRequest

@@ -13,6 +13,7 @@ import msgspec
 
 from action_assistant.journal.journal import Journal
 from action_assistant.version import VERSION
+from action_assistant.web.monitoring.backups import BackupsShown
 from action_assistant.web.monitoring.readiness import Readiness
 from action_assistant.web.monitoring.storage import Storage
 from action_assistant.web.workers.lanes import Lane
@@ -92,7 +93,7 @@ class Activity(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class ProcessStatus(msgspec.Struct, frozen=True, kw_only=True):
-    """One of the two processes, now."""
+    """One of the two processes, now. `backups` are the editor's to know."""
 
     process: ProcessName
     at: datetime
@@ -104,6 +105,7 @@ class ProcessStatus(msgspec.Struct, frozen=True, kw_only=True):
     storage: StorageShown | None
     workers: Sequence[LaneState]
     activity: Activity
+    backups: BackupsShown | None = None
 
 
 def began_at() -> datetime:
