@@ -150,6 +150,12 @@ browsers: setup ## the main job in Firefox and WebKit, by keys and by touch
 newcomer: frontend/node_modules/.done ## count what eight actions cost by mouse: URL=http://127.0.0.1:8000 TOKEN=…
 	@ACTION_ASSISTANT_TOKEN="$(TOKEN)" $(NODE) node bench/newcomer.mjs "$(or $(URL),http://127.0.0.1:8000)"
 
+.PHONY: monitoring
+monitoring: setup ## check alerts, their tests and the metrics of a running product with promtool
+	@scripts/need promtool=prometheus
+	@promtool check rules docs/monitoring/alerts.yml && promtool test rules docs/monitoring/alerts_test.yml
+	@PYTHONPATH=tests $(BIN)/python bench/monitoring.py
+
 .PHONY: bench
 bench: setup ## measure speed; prints tables (ARGS="rooms" for one benchmark)
 	@$(BIN)/python bench/run.py $(ARGS)

@@ -1256,7 +1256,7 @@ export interface EditorApi {
         at: string;
         /** Format: date-time */
         began_at: string;
-        versions: EditorApi["Versions"];
+        versions: EditorApi["ProcessVersions"];
         readiness: EditorApi["Readiness"];
         load: EditorApi["Load"];
         journal: EditorApi["JournalState"];
@@ -1264,6 +1264,15 @@ export interface EditorApi {
         workers: EditorApi["LaneState"][];
         activity: EditorApi["Activity"];
         backups: EditorApi["BackupsShown"] | null;
+    };
+    /**
+     * ProcessVersions
+     * @description Of the program, of the Python under it, and of the tables in its database.
+     */
+    ProcessVersions: {
+        program: string;
+        python: string;
+        schema: string;
     };
     /**
      * Proposing
@@ -1588,15 +1597,6 @@ export interface EditorApi {
         /** @default  */
         note?: string;
         subgraphs?: EditorApi["PinnedGraph"][];
-    };
-    /**
-     * Versions
-     * @description Of the program, of the Python under it, and of the tables in its database.
-     */
-    Versions: {
-        program: string;
-        python: string;
-        schema: string;
     };
     /**
      * WantedMerge

@@ -820,7 +820,7 @@ export interface RunnerApi {
         at: string;
         /** Format: date-time */
         began_at: string;
-        versions: RunnerApi["Versions"];
+        versions: RunnerApi["ProcessVersions"];
         readiness: RunnerApi["Readiness"];
         load: RunnerApi["Load"];
         journal: RunnerApi["JournalState"];
@@ -828,6 +828,15 @@ export interface RunnerApi {
         workers: RunnerApi["LaneState"][];
         activity: RunnerApi["Activity"];
         backups: RunnerApi["BackupsShown"] | null;
+    };
+    /**
+     * ProcessVersions
+     * @description Of the program, of the Python under it, and of the tables in its database.
+     */
+    ProcessVersions: {
+        program: string;
+        python: string;
+        schema: string;
     };
     /**
      * ProposalRequest
@@ -1478,15 +1487,6 @@ export interface RunnerApi {
     Took: {
         least: number;
         most: number | null;
-    };
-    /**
-     * Versions
-     * @description Of the program, of the Python under it, and of the tables in its database.
-     */
-    Versions: {
-        program: string;
-        python: string;
-        schema: string;
     };
     /**
      * VisitShown

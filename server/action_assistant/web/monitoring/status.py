@@ -24,7 +24,7 @@ _PAGE: Final = resource.getpagesize()
 _BEGAN: Final = time.time()
 
 
-class Versions(msgspec.Struct, frozen=True):
+class ProcessVersions(msgspec.Struct, frozen=True):
     """Of the program, of the Python under it, and of the tables in its database."""
 
     program: str
@@ -98,7 +98,7 @@ class ProcessStatus(msgspec.Struct, frozen=True, kw_only=True):
     process: ProcessName
     at: datetime
     began_at: datetime
-    versions: Versions
+    versions: ProcessVersions
     readiness: Readiness
     load: Load
     journal: JournalState
@@ -126,9 +126,9 @@ def load_now(loop_lag_s: float) -> Load:
     )
 
 
-def versions(schema: str) -> Versions:
+def versions(schema: str) -> ProcessVersions:
     """Of this process."""
-    return Versions(VERSION, platform.python_version(), schema)
+    return ProcessVersions(VERSION, platform.python_version(), schema)
 
 
 def journal_state(journal: Journal) -> JournalState:

@@ -89,8 +89,11 @@ def application(
         revoked=revoked,
         scraped=scraped,
     )
-    counts = monitoring.requests if monitoring is not None else RequestCounts()
-    return _Described(Mounted(Requests(outer, counts), mount), openapi)
+    return _Described(Mounted(Requests(outer, _counts(monitoring)), mount), openapi)
+
+
+def _counts(monitoring: Monitoring | None) -> RequestCounts:
+    return RequestCounts() if monitoring is None else monitoring.requests
 
 
 def _routed(
