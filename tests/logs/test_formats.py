@@ -106,3 +106,16 @@ def test_what_nobody_caught_is_json_too() -> None:
     assert [each["level"] for each in lines] == ["warning", "critical", "info", "critical"]
     assert "ZeroDivisionError" in lines[1]["error"]
     assert "KeyError" in lines[3]["error"]
+
+
+def test_a_worker_writes_as_its_parent_does() -> None:
+    code = (
+        "import logging; from action_assistant.logs.setup import *;"
+        "from action_assistant.web.workers.child_process import child;"
+        "hand_on(LogSettings('json', 'warning'));"
+        "work = logging.getLogger('action_assistant.x').warning;"
+        "child(work, 'hello', name='files', nice=1, preloaded=[]).join()"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    (line,) = map(json.loads, done.stderr.splitlines())
+    assert (line["process"], line["message"]) == ("worker files", "hello")
