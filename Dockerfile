@@ -22,7 +22,7 @@ RUN npm run build
 FROM --platform=$BUILDPLATFORM python:3.12.11-slim-bookworm AS wheel
 WORKDIR /source
 COPY requirements/build.txt ./requirements/
-COPY scripts/image ./scripts/
+COPY scripts/image scripts/wheel_commit.py ./scripts/
 RUN scripts/image back-end /opt/back-end
 COPY --from=page /source/frontend/dist ./frontend/dist
 COPY pyproject.toml README.md LICENSE ./
