@@ -32,6 +32,20 @@ def test_the_ports_are_those_that_the_environment_says(
     assert found["base_url"] == "http://127.0.0.1:9000"
 
 
+@pytest.mark.parametrize(
+    ("said", "share", "tls"), [("", False, False), ("http", True, False), ("TLS", True, True)]
+)
+def test_who_is_let_in_is_what_the_environment_says(
+    said: str, share: bool, tls: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ACTION_ASSISTANT_SHARE", said)
+    for command in ("serve", "editor", "runner"):
+        options = parser().parse_args([command])
+        assert (options.share, options.tls) == (share, tls)
+    monkeypatch.setenv("ACTION_ASSISTANT_SHARE", "yes")
+    assert main(["serve"]) == 2
+
+
 @pytest.mark.parametrize("text", ["x", "0", "65535", "-1"])
 def test_a_port_that_is_none_is_refused(
     text: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

@@ -24,12 +24,17 @@ def page() -> Path:
 
 def page_sources() -> Path | None:
     """What the page is built of, in a checkout; None outside of one."""
-    return _CHECKOUT / "frontend" / "src" if (_CHECKOUT / "pyproject.toml").is_file() else None
+    return _CHECKOUT / "frontend" / "src" if checkout() is not None else None
+
+
+def checkout() -> Path | None:
+    """The folder of the sources, when this program runs from them."""
+    return _CHECKOUT if (_CHECKOUT / "pyproject.toml").is_file() else None
 
 
 def wheels() -> Path | None:
     """The environment that `make ros` makes in a checkout; None outside of one."""
-    return _CHECKOUT / ".venv-ros" if (_CHECKOUT / "pyproject.toml").is_file() else None
+    return _CHECKOUT / ".venv-ros" if checkout() is not None else None
 
 
 def examples() -> Path:

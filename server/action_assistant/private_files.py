@@ -30,6 +30,15 @@ def make_folder(path: Path) -> None:
         path.mkdir(mode=0o700, exist_ok=True)
 
 
+def sync(path: Path) -> None:
+    """What was written or renamed has to be found after a power cut, too."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
 def own_folder(data: Path) -> Path:
     """A data folder, made if need be, proven writable, and closed to other users as far as it is ours.
     Raises CannotStart."""
@@ -52,7 +61,10 @@ def prove_writable(data: Path) -> None:
 
 
 def open_to_others(data: Path) -> list[Path]:
-    """What other users of this computer may read or enter: the folder first, then what is ours in it."""
+    """What other users of this computer may read or enter: the folder first, then what is ours in it.
+    Not told on Windows."""
+    if not hasattr(os, "geteuid"):
+        return []  # Windows keeps rights in lists of its own, of which modes tell nothing
     return [path for path in (data, *_ours_in(data)) if _is_open(path)]
 
 

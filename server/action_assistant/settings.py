@@ -25,6 +25,7 @@ VARIABLES: Final[Mapping[str, str]] = {
     "has none; for Postgres, as PGPASSWORD",
     "ACTION_ASSISTANT_URL": "where the command line finds the editor (http://127.0.0.1:8000)",
     "ACTION_ASSISTANT_HOSTS": "more host names that may stand in the address bar, comma separated",
+    "ACTION_ASSISTANT_SHARE": "`http` as --share, `tls` as --share --tls",
     "ACTION_ASSISTANT_PUBLIC_URL": "where a proxy shows the page to others, as --public-url",
     "ACTION_ASSISTANT_TRUSTED_PROXIES": "addresses and networks of proxies that are believed about who "
     "asks, as --trusted-proxies",
@@ -147,6 +148,15 @@ def port(environ: Mapping[str, str] = os.environ) -> int:
     if not text.isdecimal() or not 0 < int(text) < 65535:
         raise CannotStart(f"ACTION_ASSISTANT_PORT is a port below 65535, not {text!r}.")
     return int(text)
+
+
+def share(environ: Mapping[str, str] = os.environ) -> str:
+    """How others on the network are let in, when the command line says nothing: "", "http" or "tls".
+    Raises CannotStart."""
+    text = environ.get("ACTION_ASSISTANT_SHARE", "").strip().lower()
+    if text not in {"", "http", "tls"}:
+        raise CannotStart(f"ACTION_ASSISTANT_SHARE is `http` or `tls`, not {text!r}.")
+    return text
 
 
 def database(environ: Mapping[str, str] = os.environ) -> str | None:

@@ -19,14 +19,14 @@ def nginx(
     name: str,
     port: int,
     editor: int,
-    without: str = "",
+    mistake: tuple[str, str] = ("", ""),
     identity: tuple[Path, Path] | None = None,
 ) -> Iterator[Path]:
-    """It runs inside the block; the file with the certificate that it shows. `without` is taken out
-    of what is documented. `identity`: key and chain, else new ones for the name."""
+    """It runs inside the block; the file with the certificate that it shows. `mistake`: what is
+    documented, and what stands there instead. `identity`: key and chain, else new ones for the name."""
     folder.mkdir()
     key, chain = identity or _identity(folder, name)
-    whole = _configured(folder, (key, chain), (name, port, editor), without)
+    whole = _configured(folder, (key, chain), (name, port, editor), mistake)
     log = folder / "log"
     with log.open("wb") as out:
         process = subprocess.Popen(
@@ -41,13 +41,14 @@ def nginx(
 
 
 def _configured(
-    folder: Path, identity: tuple[Path, Path], at: tuple[str, int, int], without: str
+    folder: Path, identity: tuple[Path, Path], at: tuple[str, int, int], mistake: tuple[str, str]
 ) -> Path:
     """The documented file for a name, a port and the editor's port, in a configuration of nginx."""
     key, chain = identity
     name, port, editor = at
     text = DOCUMENTED.read_text()
-    assert without in text
+    documented, instead = mistake
+    assert documented in text
     changes = {
         "listen 443": f"listen 127.0.0.1:{port}",
         "robots.example.org;": f"{name};",
@@ -56,7 +57,7 @@ def _configured(
         "127.0.0.1:8000": f"127.0.0.1:{editor}",
         "127.0.0.1:8001": f"127.0.0.1:{editor + 1}",
     }
-    text = text.replace(without, "") if without else text
+    text = text.replace(documented, instead) if documented else text
     for old, new in changes.items():
         assert old in text
         text = text.replace(old, new)

@@ -1,4 +1,4 @@
-"""Commands that are processes: serve, editor, runner; and migrate, which prepares their databases."""
+"""Commands that are processes: serve, editor, runner."""
 
 import argparse
 import gc
@@ -15,13 +15,18 @@ if TYPE_CHECKING:  # slow to load, and most commands do not need it
 
 def _add_serve(both: argparse.ArgumentParser) -> None:
     both.epilog = "example: action-assistant serve --data ./data --port 8000"
-    _address(both, port=settings.port())
-    _database(both, switch=True)
-    _sharing(both)
-    _behaviours(both)
-    _logging(both)
+    add_serve_options(both)
     both.add_argument("--no-open", action="store_true", help="do not open a browser")
     both.set_defaults(handler=_serve)
+
+
+def add_serve_options(parser: argparse.ArgumentParser) -> None:
+    """What `serve` takes, also as a service."""
+    _address(parser, port=settings.port())
+    _database(parser, switch=True)
+    _sharing(parser)
+    _behaviours(parser)
+    _logging(parser)
 
 
 def _add_editor(editor: argparse.ArgumentParser) -> None:
@@ -48,18 +53,10 @@ def _add_runner(runner: argparse.ArgumentParser) -> None:
     runner.set_defaults(handler=_runner)
 
 
-def _add_migrate(migrate: argparse.ArgumentParser) -> None:
-    migrate.epilog = "example: action-assistant migrate --data ./data"
-    migrate.add_argument("--data", type=Path, default=paths.data(), metavar="DIR")
-    _database(migrate)
-    migrate.set_defaults(handler=_migrate)
-
-
 COMMANDS: Final = {
     "serve": _add_serve,
     "editor": _add_editor,
     "runner": _add_runner,
-    "migrate": _add_migrate,
 }
 
 
@@ -100,11 +97,18 @@ def _database(parser: argparse.ArgumentParser, *, switch: bool = False) -> None:
 
 
 def _sharing(parser: argparse.ArgumentParser) -> None:
+    shared = settings.share()
     parser.add_argument(
-        "--share", action="store_true", help="let others on the network in, by links with a role"
+        "--share",
+        action="store_true",
+        default=bool(shared),
+        help="let others on the network in, by links with a role",
     )
     parser.add_argument(
-        "--tls", action="store_true", help="encrypt, with a certificate that is made here"
+        "--tls",
+        action="store_true",
+        default=shared == "tls",
+        help="encrypt, with a certificate that is made here",
     )
     parser.add_argument(
         "--public-url",
@@ -137,7 +141,8 @@ def _logging(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--log-level", choices=LEVELS, help="what is not told below; default: info")
 
 
-def _reached(options: argparse.Namespace) -> settings.Reachability:
+def reached(options: argparse.Namespace) -> settings.Reachability:
+    """How others come to us. Raises CannotStart."""
     return settings.reached(options.public_url, options.trusted_proxies)
 
 
@@ -146,7 +151,7 @@ def _host(options: argparse.Namespace) -> str:
     host: str = options.host or (settings.EVERYWHERE if options.share else "127.0.0.1")
     if options.share and host in {"0.0.0.0", "::"}:
         host = settings.EVERYWHERE
-    public = _reached(options).public
+    public = reached(options).public
     settings.check_host(host, settings.more_hosts(), share=options.share, public=public)
     return host
 
@@ -192,7 +197,7 @@ def _editor_settings(options: argparse.Namespace, data: Path) -> settings.Editor
         share=options.share,
         tls=options.tls,
         switch_database=options.switch_database,
-        reached=_reached(options),
+        reached=reached(options),
         metrics_token=settings.metrics_token(),
     )
 
@@ -215,7 +220,7 @@ def _serve(options: argparse.Namespace) -> int:
             port=options.port,
             share=options.share,
             tls=options.tls,
-            reached=_reached(options),
+            reached=reached(options),
             behaviours=options.behaviours,
             opens=not options.no_open,
         )
@@ -257,7 +262,7 @@ def _runner(options: argparse.Namespace) -> int:
         share=options.share,
         tls=options.tls,
         keep=settings.keep(data),
-        reached=_reached(options),
+        reached=reached(options),
         behaviours=options.behaviours,
         metrics_token=settings.metrics_token(),
     )
@@ -268,19 +273,4 @@ def _runner(options: argparse.Namespace) -> int:
         proxies=chosen.reached.proxies,
         identity=_identity(chosen, chosen.page_port),
     )
-    return 0
-
-
-def _migrate(options: argparse.Namespace) -> int:
-    from action_assistant.editor.log import database_location
-    from action_assistant.journal.database import Branch
-    from action_assistant.journal.databases import database_of, migrate
-
-    data = settings.data_folder(options.data.resolve())
-    database = options.database or database_location.of(data)
-    urls: dict[Branch, str] = {"editor": database, "runner": f"sqlite:///{data / 'runner.db'}"}
-    for branch, url in urls.items():
-        revision = migrate(url, branch)
-        name = database_of(url).name.removeprefix("The database ")
-        print(f"{branch}: {name} is at revision {revision}")
     return 0

@@ -33,6 +33,7 @@ from action_assistant.editor.services import EditorServices, EditorState
 from action_assistant.editor.watched import WatchedEditor
 from action_assistant.editor.workers import EditorWorkers
 from action_assistant.errors import BadInput
+from action_assistant.journal.copies import before_upgrade
 from action_assistant.journal.journal import Journal
 from action_assistant.settings import EditorSettings
 from action_assistant.web.auth.keys import Keys
@@ -84,7 +85,7 @@ async def open_services(
 def create_app(settings: EditorSettings) -> ASGIApp:
     """The whole editor process. Raises CannotStart."""
     database_location.check(settings.data, settings.database, switch=settings.switch_database)
-    Journal.prepare(settings.database, "editor")
+    Journal.prepare(settings.database, "editor", copies=settings.data / before_upgrade.FOLDER)
     database_location.remember(settings.data, settings.database)
     keys = Keys.of(settings.data)
     app_state = EditorState()

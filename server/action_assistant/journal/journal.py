@@ -5,6 +5,7 @@ import contextlib
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager
 from functools import partial
+from pathlib import Path
 from typing import Any, Final, TypeVar
 
 import msgspec
@@ -12,7 +13,15 @@ from sqlalchemy import Connection, delete, insert, select
 
 from action_assistant.errors import Conflict, Unavailable
 from action_assistant.journal.chain import Damage, Inspector
-from action_assistant.journal.database import Branch, Database, WriterSession, cause_of
+from action_assistant.journal.copies.before_upgrade import keep_copy
+from action_assistant.journal.database import (
+    Before,
+    Branch,
+    Database,
+    WriterSession,
+    cause_of,
+    no_copy,
+)
 from action_assistant.journal.databases import database_of
 from action_assistant.journal.events import Addition, Draft, Event, Fold
 from action_assistant.journal.follower import Follower
@@ -33,6 +42,11 @@ _PAGE: Final = 500  # events that a follower reads at once
 _head, _snapshot = editor_head.c, editor_snapshot.c
 
 
+def _before(copies: Path | None) -> Before:
+    """Keep a copy in that folder before tables change."""
+    return no_copy if copies is None else partial(keep_copy, copies)
+
+
 class Journal(JournalReader):
     """The log of one process. The only writer of its database; readers never wait for it."""
 
@@ -49,28 +63,33 @@ class Journal(JournalReader):
         self._probe = JournalProbe(branch, self.derive, self._ask, lambda: self._writer.is_alive)
 
     @staticmethod
-    def prepare(url: str, branch: Branch) -> None:
+    def prepare(url: str, branch: Branch, *, copies: Path | None = None) -> None:
         """Raise CannotStart if `open` would: to be called before a server is begun."""
         database = database_of(url)
         try:
-            database.open(branch).close()
+            database.open(branch, _before(copies)).close()
         finally:
             database.disown()
 
     @classmethod
-    async def open(cls, url: str, *, branch: Branch, fold: Fold) -> "Journal":
+    async def open(
+        cls, url: str, *, branch: Branch, fold: Fold, copies: Path | None = None
+    ) -> "Journal":
         """Open, and bring the tables to this version. `url`: sqlite:///PATH or postgresql://…
+        `copies`: the folder where a copy goes before; without it none is made.
 
         Raises CannotStart: newer or foreign database, not to be reached or written, in use, or not
         set up to keep what it was told.
         """
-        return await cls.on(database_of(url), branch=branch, fold=fold)
+        return await cls.on(database_of(url), branch=branch, fold=fold, copies=copies)
 
     @classmethod
-    async def on(cls, database: Database, *, branch: Branch, fold: Fold) -> "Journal":
+    async def on(
+        cls, database: Database, *, branch: Branch, fold: Fold, copies: Path | None = None
+    ) -> "Journal":
         """Open a journal in a database. Raises CannotStart."""
         try:
-            session = await asyncio.to_thread(database.open, branch)
+            session = await asyncio.to_thread(database.open, branch, _before(copies))
         except BaseException:
             await database.close()
             database.disown()

@@ -16,7 +16,7 @@ from sqlalchemy.util import await_only
 
 from action_assistant.errors import CannotStart
 from action_assistant.journal.chain import Head
-from action_assistant.journal.database import Branch, cause_of
+from action_assistant.journal.database import Before, Branch, cause_of, no_copy
 from action_assistant.journal.events import Event
 from action_assistant.journal.migrate import upgrade_to
 from action_assistant.schema.editor_tables import editor_event
@@ -151,20 +151,24 @@ class Postgres:
             pool_pre_ping=True,
         )
 
-    def open(self, branch: Branch) -> PostgresSession:
+    def open(self, branch: Branch, before: Before = no_copy) -> PostgresSession:
         """Lock the database for this process, check that it keeps what it confirms, migrate."""
-        mark = hashlib.sha256(f"action-assistant journal {branch}".encode()).digest()
-        self._key = int.from_bytes(mark[:8], "big", signed=True)
+        session = self.own(branch)
         try:
-            session = self.connect()
-        except self.faults as error:
-            raise CannotStart(f"Cannot use {self._the}: {cause_of(error)}.") from error
-        try:
-            self.migrate(upgrade_to(branch))
+            self.migrate(upgrade_to(branch, before=before))
         except BaseException:
             session.close()
             raise
         return session
+
+    def own(self, branch: Branch) -> PostgresSession:
+        """Lock the database for this process, whatever is in it. Raises CannotStart."""
+        mark = hashlib.sha256(f"action-assistant journal {branch}".encode()).digest()
+        self._key = int.from_bytes(mark[:8], "big", signed=True)
+        try:
+            return self.connect()
+        except self.faults as error:
+            raise CannotStart(f"Cannot use {self._the}: {cause_of(error)}.") from error
 
     def look(self, question: Callable[[Connection], object]) -> None:
         """Nothing: whoever changes tables asks in the same transaction, and nothing else alters any."""

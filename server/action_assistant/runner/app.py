@@ -14,6 +14,7 @@ import anyio
 from litestar import Litestar
 from litestar.types import ASGIApp
 
+from action_assistant.journal.copies import before_upgrade
 from action_assistant.journal.journal import Journal
 from action_assistant.public_url import RUNNER
 from action_assistant.runner import projection
@@ -156,7 +157,7 @@ def create_app(settings: RunnerSettings) -> ASGIApp:
     """The runner as an ASGI application. Raises CannotStart."""
     if settings.behaviours is not None:
         BehaviourFolder.opened(settings.behaviours)
-    Journal.prepare(_database(settings), "runner")
+    Journal.prepare(_database(settings), "runner", copies=settings.data / before_upgrade.FOLDER)
     revoked = Revocations(settings.data)
     services = RunnerServices()
     public = settings.reached.public

@@ -24,3 +24,14 @@ def mine() -> str:
     """The user of this process, for people."""
     uid = me()
     return name_of(uid) if uid is not None else os.environ.get("USERNAME", "this user")
+
+
+def exists(name: str) -> bool:
+    """Whether this computer has a user of this name."""
+    if pwd is None:
+        return False
+    try:
+        pwd.getpwnam(name)
+    except KeyError:
+        return False
+    return True

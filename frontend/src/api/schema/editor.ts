@@ -205,12 +205,14 @@ export interface EditorApi {
     };
     /**
      * Config
-     * @description What a page has to know. `runner_url` has no slash at its end.
+     * @description What a page has to know. `runner_url` has no slash at its end. `commit`: of this program, null
+     *     when nobody knows.
      */
     Config: {
         mode: string;
         version: string;
         runner_url: string;
+        commit: string | null;
     };
     /**
      * Counts
@@ -644,6 +646,15 @@ export interface EditorApi {
         node?: string;
         /** @default  */
         message?: string;
+    };
+    /**
+     * Health
+     * @description The process answers. `commit`: of this program, null when nobody knows.
+     */
+    Health: {
+        status: string;
+        version: string;
+        commit: string | null;
     };
     /**
      * HierarchyLevel

@@ -495,6 +495,15 @@ export interface RunnerApi {
         };
     };
     /**
+     * Health
+     * @description The process answers. `commit`: of this program, null when nobody knows.
+     */
+    Health: {
+        status: string;
+        version: string;
+        commit: string | null;
+    };
+    /**
      * HeldGraph
      * @description A graph that an engine holds, ended ones too. `run`: the run of ours that it is.
      *

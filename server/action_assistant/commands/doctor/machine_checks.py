@@ -14,7 +14,7 @@ from action_assistant import paths
 from action_assistant.commands.doctor.installation import Installation
 from action_assistant.system import limits
 from action_assistant.system.diagnostics import Diagnostic, fine, found
-from action_assistant.version import VERSION
+from action_assistant.version import described
 
 _DESCRIPTORS: Final = 1024
 _SHM: Final = Path("/dev/shm")
@@ -28,7 +28,7 @@ def program(place: Installation) -> Iterator[Diagnostic]:
     python = f"{sys.version_info.major}.{sys.version_info.minor}.{sys.version_info.micro}"
     yield fine(
         "program",
-        f"Version {VERSION} on Python {python} with SQLite {sqlite3.sqlite_version}.",
+        f"Version {described()} on Python {python} with SQLite {sqlite3.sqlite_version}.",
     )
 
 
@@ -75,7 +75,7 @@ def _newer_source(built: float) -> Path | None:
     if sources is None:
         return None
     for folder, _, names in os.walk(sources):
-        for each in (Path(folder, name) for name in names):
+        for each in (Path(folder, name) for name in names if ".test." not in name):
             if each.stat().st_mtime > built + 1:
                 return each.relative_to(sources.parent)
     return None

@@ -36,7 +36,7 @@ def proxy_leads_here(place: Installation) -> Iterator[Diagnostic]:
         return
     trust = Certificate(place.data).trusting_too()
     if public.is_secure:
-        problems = [*certificate_fits(public.page, f"{public.origin}:{public.port}", trust)]
+        problems = [*certificate_fits(public.page, public.origin, trust)]
         yield from problems
         if problems:
             return

@@ -9,7 +9,7 @@ from sqlalchemy import Connection, func, inspect, select, text
 from action_assistant.journal.chain import NOTHING, Head, link
 from action_assistant.journal.database import Database
 from action_assistant.journal.events import Event
-from action_assistant.schema.editor_tables import editor_event, editor_head
+from action_assistant.schema.editor_tables import editor_event, editor_head, graph
 
 _EVENTS: Final = 2000
 _SECONDS: Final = 1.5
@@ -92,4 +92,17 @@ def _wrong_ends(connection: Connection, heads: dict[str, Head]) -> str:
     for row in connection.execute(chosen):
         if Head(row.seq, bytes(row.chain)) != heads[row.stream]:
             return f"{row.stream} is written down to end at {row.seq}, and ends at {heads[row.stream].seq}"
-    return ""
+    return _cut_off(connection)
+
+
+def _cut_off(connection: Connection) -> str:
+    """A stream of graphs whose last event is not there. Those of runs may be in archives."""
+    if not inspect(connection).has_table(graph.name):
+        return ""
+    last = select(_event.seq).where(_event.stream == _head.stream, _event.seq == _head.seq)
+    found = connection.execute(
+        select(_head.stream, _head.seq).where(~last.exists()).limit(1)
+    ).first()
+    return (
+        f"{found.stream} is written down to end at {found.seq}, which is missing" if found else ""
+    )

@@ -6,6 +6,7 @@ from contextlib import AbstractAsyncContextManager
 from pathlib import Path
 from typing import Annotated, Any, Final
 
+import msgspec
 from litestar import Litestar, MediaType, Request, Response, get
 from litestar.connection import ASGIConnection
 from litestar.handlers.base import BaseRouteHandler
@@ -14,7 +15,7 @@ from litestar.routes import HTTPRoute
 from litestar.types import ASGIApp, ControllerRouterHandler, HTTPScope, Receive, Scope, Send
 
 from action_assistant.errors import NotFound
-from action_assistant.version import VERSION
+from action_assistant.version import VERSION, commit
 from action_assistant.web.auth.access import Access, Needs, require
 from action_assistant.web.auth.keys import Keys, ServerProof
 from action_assistant.web.auth.revocations import Revocations
@@ -37,6 +38,14 @@ _OPEN: Final = frozenset(
     {"/healthz", "/readyz", "/api/session", "/api/session/invitation", "/api/server"}
 )
 _SAFE: Final = frozenset({"GET", "HEAD", "OPTIONS"})
+
+
+class Health(msgspec.Struct, frozen=True):
+    """The process answers. `commit`: of this program, null when nobody knows."""
+
+    status: str
+    version: str
+    commit: str | None
 
 
 Lifespan = Callable[[Litestar], AbstractAsyncContextManager[None]]
@@ -218,9 +227,11 @@ def _proving(keys: Keys) -> ControllerRouterHandler:
 
 
 def _health(monitoring: Monitoring | None) -> list[ControllerRouterHandler]:
+    health = Health("ok", VERSION, commit())
+
     @get("/healthz", summary="Whether the process answers")
-    async def healthz() -> dict[str, str]:
-        return {"status": "ok", "version": VERSION}
+    async def healthz() -> Health:
+        return health
 
     @get("/readyz", summary="Whether the process can do its work, and which part of it cannot")
     async def readyz() -> Response[Readiness]:

@@ -12,37 +12,44 @@ import pickle
 import signal
 import threading
 from collections.abc import Callable, Sequence
+from functools import cache
 from multiprocessing.connection import Connection
-from multiprocessing.context import ForkServerProcess
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from action_assistant.errors import TooLarge
 from action_assistant.logs.setup import set_up_worker
 from action_assistant.safe_text import make_streams_printable
 from action_assistant.system import limits
 
+if TYPE_CHECKING:  # not on Windows
+    from multiprocessing.context import ForkServerContext, ForkServerProcess
+
 _MEMORY: Final = 768 << 20  # bytes that a worker may take beyond what it begins with
 _TIRED: Final = 256 << 20  # bytes in use after which a worker makes room for a fresh one
 
-_context: Final = multiprocessing.get_context("forkserver")
+
+@cache
+def _context() -> "ForkServerContext":
+    """Where processes are forked from one that has nothing but what they need. Not on Windows."""
+    return multiprocessing.get_context("forkserver")
 
 
 def wire() -> tuple[Connection, Connection]:
     """Two ends, ours and that of a worker."""
-    ours, theirs = _context.Pipe()
+    ours, theirs = _context().Pipe()
     return ours, theirs
 
 
 def child(
     work: Callable[..., None], *args: Any, name: str, nice: int, preloaded: Sequence[str]
-) -> ForkServerProcess:
+) -> "ForkServerProcess":
     """A process of low priority that ends with this one, in which `work(*args)` runs. Waits for it
     to exist. `preloaded`: the modules that the server process imports before it forks the first one.
     Raises OSError, EOFError."""
-    _context.set_forkserver_preload(list(preloaded))
+    _context().set_forkserver_preload(list(preloaded))
     told = (name, work, args, nice)
-    process = _context.Process(target=_humbly, args=told, name=name, daemon=True)
+    process = _context().Process(target=_humbly, args=told, name=name, daemon=True)
     process.start()
     return process
 

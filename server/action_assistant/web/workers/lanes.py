@@ -13,8 +13,7 @@ import signal
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Sequence
 from contextlib import asynccontextmanager, contextmanager
 from multiprocessing.connection import Connection
-from multiprocessing.context import ForkServerProcess
-from typing import Any, Final, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Final, Protocol, TypeVar
 
 import anyio
 from anyio import CapacityLimiter, to_thread
@@ -22,6 +21,9 @@ from anyio import CapacityLimiter, to_thread
 from action_assistant.errors import TooLarge, TooMany, Unavailable
 from action_assistant.web.auth.caller import Caller, caller
 from action_assistant.web.workers.child_process import LAST, child, serve, wire
+
+if TYPE_CHECKING:  # not on Windows
+    from multiprocessing.context import ForkServerProcess
 
 __all__ = [
     "HOPELESS",
@@ -257,7 +259,7 @@ async def _keep_warm(lane: Lane) -> None:
 class _Worker:
     """A process, as whoever asks it sees it."""
 
-    def __init__(self, process: ForkServerProcess, wire: Connection) -> None:
+    def __init__(self, process: "ForkServerProcess", wire: Connection) -> None:
         self._process = process
         self._wire = wire
 
