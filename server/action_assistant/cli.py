@@ -23,7 +23,7 @@ from action_assistant.settings import (
 class CommandEntry(NamedTuple):
     """One word of the command line. Its `module` names it in COMMANDS, with the function that gives
     a parser its arguments and its handler. `described`: its own help begins with the same words.
-    `diagnoses`: it tells wrong settings itself. `posix`: it needs Linux or macOS."""
+    `diagnoses`: it looks at settings itself. `posix`: it needs Linux or macOS."""
 
     module: str
     help: str
@@ -102,6 +102,7 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
     "service": CommandEntry(
         "services.service",
         "serve whenever the computer runs, by systemd: install, uninstall, status, upgrade",
+        diagnoses=True,
         posix=True,
     ),
     "verify": CommandEntry(

@@ -1,5 +1,5 @@
 """Runs this program as if the system were another: without the modules, functions and constants that it
-lacks there. Started as a process of its own: `python elsewhere.py win32|darwin [COMMAND …]`.
+lacks there. Started as a process of its own: `python elsewhere.py win32|darwin [COMMAND … [+ COMMAND …]]`.
 
 What other people's packages do there is theirs: they are imported before. All of ours is imported anew.
 """
@@ -116,13 +116,31 @@ def move_to(system: str) -> None:
     Path.read_text = read_text  # type: ignore[method-assign]
 
 
+def commands(words: Sequence[str]) -> int:
+    """Run commands one after the other, with a line after each that says its exit code; or one alone,
+    as it is."""
+    from action_assistant.cli import main as command
+
+    if "+" not in words:
+        return command(words)
+    given: list[list[str]] = [[]]
+    for word in words:
+        if word == "+":
+            given.append([])
+        else:
+            given[-1].append(word)
+    for each in given:
+        code = command(each)
+        sys.stdout.write(f"\n+ {code}\n")
+        sys.stdout.flush()
+    return 0
+
+
 def main() -> int:
     """Import all of ours there; with arguments, run a command."""
     move_to(sys.argv[1])
     if len(sys.argv) > 2:
-        from action_assistant.cli import main as command
-
-        return command(sys.argv[2:])
+        return commands(sys.argv[2:])
     failed = {}
     for name in ours():
         try:

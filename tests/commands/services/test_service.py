@@ -1,5 +1,6 @@
 """`service` on an image below a folder, by the real systemctl; nothing of this computer is touched."""
 
+import argparse
 import shutil
 import sys
 from collections.abc import Callable
@@ -8,7 +9,9 @@ from pathlib import Path
 import pytest
 
 from action_assistant.cli import main
+from action_assistant.commands.processes import add_serve_options
 from action_assistant.commands.services import systemd
+from action_assistant.commands.services.service import _FLAGS, _VALUES
 from action_assistant.commands.services.unit import is_untouched
 
 pytestmark = pytest.mark.skipif(
@@ -118,7 +121,8 @@ def test_what_the_shell_says_of_ros_goes_in_and_secrets_do_not(
     monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp")
     monkeypatch.setenv("ACTION_ASSISTANT_HOSTS", "lab.local")
     monkeypatch.setenv("ACTION_ASSISTANT_ARCHIVE", "/srv/archive")
-    monkeypatch.setenv("ACTION_ASSISTANT_TOKEN", "secret-" * 8)
+    monkeypatch.setenv("ACTION_ASSISTANT_METRICS_TOKEN", "secret-" * 8)
+    monkeypatch.setenv("ACTION_ASSISTANT_TOKEN_FILE", "/run/secrets/token")
     monkeypatch.setenv("PYTHONPATH", "/opt/ros/jazzy/lib/python3.12/site-packages")
     assert service("install", "--as", "robot") == 0
     text = unit.read_text()
@@ -126,8 +130,22 @@ def test_what_the_shell_says_of_ros_goes_in_and_secrets_do_not(
     assert "Environment=RMW_IMPLEMENTATION=rmw_cyclonedds_cpp" in text
     assert "Environment=ACTION_ASSISTANT_HOSTS=lab.local" in text
     assert "ReadWritePaths=/srv/archive" in text
+    assert "Environment=ACTION_ASSISTANT_TOKEN_FILE=/run/secrets/token" in text
     assert "secret-" not in text
     assert "PYTHONPATH=" not in text
+
+
+def test_every_option_of_serve_reaches_it_or_has_a_reason_not_to() -> None:
+    parser = argparse.ArgumentParser()
+    add_serve_options(parser)
+    known = {each.dest for each in parser._actions} - {"help"}
+    left_out = {
+        "data": "it has a place of its own",
+        "port": "the usual one is left out",
+        "database": "one with a password is refused",
+        "switch_database": "it is meant for one start",
+    }
+    assert known == {*_VALUES, *_FLAGS, *left_out}
 
 
 def test_what_cannot_be_meant_is_refused_before_anything_is_written(

@@ -179,6 +179,7 @@ def _status(options: argparse.Namespace) -> int:
 
 def _plan(options: argparse.Namespace, systemd: Systemd) -> ServicePlan:
     """What these options mean. Raises CannotStart."""
+    settings.check_environment()  # files of secrets stay named, and are read by the service
     if options.database and ("@" in options.database or "password" in options.database):
         raise CannotStart(
             "A unit is read by everybody, and this --database may hold a password. Write "
@@ -215,9 +216,13 @@ def _plan(options: argparse.Namespace, systemd: Systemd) -> ServicePlan:
 def _data(options: argparse.Namespace) -> Path | None:
     """The folder; None for the one that systemd keeps."""
     given: Path = options.data
-    if options.scope == "system" and given == paths.data():
+    if options.scope == "system" and given == paths.data() and not _named_data():
         return None
     return given.absolute()
+
+
+def _named_data() -> bool:
+    return bool(os.environ.get("ACTION_ASSISTANT_DATA"))
 
 
 def _archive() -> tuple[Path, ...]:
@@ -258,13 +263,16 @@ def _program() -> tuple[str, ...]:
 
 def _sourced(environ: Mapping[str, str]) -> dict[str, str]:
     """What this shell says of ROS 2 and of settings; secrets stay out of a file that all can read."""
-    plain = [name for name in settings.VARIABLES if name not in _SECRET]
+    plain = [name for name in settings.VARIABLES if name not in _SECRET | _SAID]
     return {name: environ[name] for name in (*SOURCED, *plain) if environ.get(name)}
 
 
 _SECRET: Final = frozenset(
     name for name in settings.VARIABLES if name.rpartition("_")[2] in {"TOKEN", "DATABASE", "URL"}
 ) - {"ACTION_ASSISTANT_PUBLIC_URL"}
+
+#: What the unit's command says.
+_SAID: Final = frozenset({"ACTION_ASSISTANT_DATA", "ACTION_ASSISTANT_PORT"})
 
 
 def _there(systemd: Systemd) -> str:

@@ -2,16 +2,16 @@
 
 import os
 import platform
-import resource
 import time
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
-from pathlib import Path
 from typing import Final, Literal, TypeAlias
 
 import msgspec
 
 from action_assistant.journal.journal import Journal
+from action_assistant.system import limits
+from action_assistant.system.posix import resource
 from action_assistant.version import VERSION
 from action_assistant.web.monitoring.backups import BackupsShown
 from action_assistant.web.monitoring.readiness import Readiness
@@ -20,7 +20,6 @@ from action_assistant.web.workers.lanes import Lane
 
 ProcessName: TypeAlias = Literal["editor", "runner"]
 
-_PAGE: Final = resource.getpagesize()
 _BEGAN: Final = time.time()
 
 
@@ -119,7 +118,7 @@ def load_now(loop_lag_s: float) -> Load:
     soft, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     return Load(
         cpu_s=used.ru_utime + used.ru_stime,
-        memory=_memory(),
+        memory=limits.memory_in_use() or None,
         open_files=_open_files(),
         most_files=soft,
         loop_lag_s=loop_lag_s,
@@ -150,13 +149,6 @@ def lane_states(lanes: Sequence[Lane]) -> list[LaneState]:
     return [
         LaneState(each.name, each.waiting, each.busy, each.deaths, each.given_up) for each in lanes
     ]
-
-
-def _memory() -> int | None:
-    try:
-        return int(Path("/proc/self/statm").read_text().split()[1]) * _PAGE
-    except OSError:
-        return None
 
 
 def _open_files() -> int | None:
