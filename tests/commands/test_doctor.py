@@ -46,8 +46,11 @@ def contents(folder: Path) -> dict[str, bytes]:
     }
 
 
-def test_a_healthy_installation_that_runs_is_called_so(tmp_path: Path) -> None:
-    with running(tmp_path / "data") as product:
+@pytest.mark.parametrize("flags", [(), ("--share", "--tls")])
+def test_a_healthy_installation_that_runs_is_called_so(
+    flags: tuple[str, ...], tmp_path: Path
+) -> None:
+    with running(tmp_path / "data", *flags) as product:
         code, found = machine(product.data, "--port", str(product.port))
     assert code == 0, found
     assert found["editor"][0]["what"] == f"It runs on port {product.port}."

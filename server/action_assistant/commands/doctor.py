@@ -110,8 +110,8 @@ def _machine(options: argparse.Namespace) -> Iterator[Diagnostic]:
     yield _graphs(options)
     yield _database("runs", f"sqlite:///{options.data / 'runner.db'}")
     yield from _sqlite()
-    yield _port("editor", options.host, options.port)
-    yield _port("runner", options.host, options.port + 1)
+    yield _port("editor", options.host, options.port, options.data)
+    yield _port("runner", options.host, options.port + 1, options.data)
     yield from _public(options)
     yield _clock()
 
@@ -222,21 +222,23 @@ def _sqlite() -> Iterator[Diagnostic]:
         )
 
 
-def _port(name: str, host: str, port: int) -> Diagnostic:
+def _port(name: str, host: str, port: int, data: Path) -> Diagnostic:
     try:
         for probe in bound(host, port):
             probe.close()
     except CannotStart as error:
-        if _ours(host, port):
+        if _ours(host, port, data):
             return _fine(name, f"It runs on port {port}.")
         return _wrong(name, str(error), "Something else listens there.")
     return _fine(name, f"Port {port} is free; nothing runs there.")
 
 
-def _ours(host: str, port: int) -> bool:
+def _ours(host: str, port: int, data: Path) -> bool:
+    trust = Certificate(data).trusting_too()
     for scheme in ("http", "https"):
         try:
-            with urllib.request.urlopen(f"{scheme}://{host}:{port}/healthz", timeout=2) as answer:
+            url = f"{scheme}://{host}:{port}/healthz"
+            with urllib.request.urlopen(url, timeout=2, context=trust) as answer:
                 return bool(answer.status == 200)
         except (urllib.error.URLError, OSError):
             continue
