@@ -129,6 +129,7 @@ soak-ros: ros ## the same over real rclpy: 200 histories, hundreds of stops
 
 .PHONY: containers
 containers: setup ## build the images and drive docker-compose.yml with podman, as root on Debian (ARGS="-k proxy")
+	@$(BROWSER)
 	@scripts/containers $(ARGS)
 
 .PHONY: workspace
