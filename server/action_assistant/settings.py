@@ -27,6 +27,11 @@ VARIABLES: Final[Mapping[str, str]] = {
     "ACTION_ASSISTANT_KEEP_RAW": "days after which raw messages of robots go into archives; without "
     "it they are deleted after 7 days or beyond 500 MB",
     "ACTION_ASSISTANT_ARCHIVE": "the folder of archives (`archive` in the data folder)",
+    "ACTION_ASSISTANT_BACKUP_TO": "the folder of regular backups, as --backup-to of serve and --into of "
+    "backup",
+    "ACTION_ASSISTANT_BACKUP_EVERY": "how often `serve` makes one (24h), as --backup-every",
+    "ACTION_ASSISTANT_BACKUP_KEEP": "how many stay (7d,4w,6m), as --backup-keep",
+    "ACTION_ASSISTANT_BACKUP_AFTER": "the command that takes a finished one elsewhere, as --backup-after",
     "ACTION_ASSISTANT_LIMITS": "`off` lifts rate and socket limits, for load tests",
 }
 #: The folder of archives, inside the data folder.
@@ -126,6 +131,11 @@ def _is_database(name: str) -> bool:
 def _has_password(url: str) -> bool:
     """Or may have: SQLAlchemy allows characters in it that others take for its end."""
     return "@" in url or "password=" in url
+
+
+def backup_rule(name: str, environ: Mapping[str, str] = os.environ) -> str | None:
+    """What the environment says of backups: TO, EVERY, KEEP or AFTER."""
+    return environ.get(f"ACTION_ASSISTANT_BACKUP_{name}", "").strip() or None
 
 
 def limits(environ: Mapping[str, str] = os.environ) -> bool:

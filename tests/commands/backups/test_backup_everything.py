@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import os
+import re
 import subprocess
 import threading
 import time
@@ -105,6 +106,13 @@ def test_everything_is_there_again_on_an_empty_machine(tmp_path: Path, postgres:
         assert "whoever reads it can sign in" in made.stdout
     assert file.stat().st_mode & 0o777 == 0o600
     before = asyncio.run(events(urls[0], old))
+    rehearsed = command("restore", "--rehearse", file, "--data", old)
+    assert rehearsed.returncode == 0, rehearsed.stdout
+    assert re.search(
+        r"graphs, [1-9]\d* versions, [1-9]\d* links, [1-9]\d* people", rehearsed.stdout
+    )
+    assert re.search(r"runs, [1-9]\d* of them in archives, 1 robots", rehearsed.stdout)
+    assert [path for path in old.iterdir() if path.name.startswith(".")] == []
 
     back = command("restore", file, "--data", new, *flags[1])
     assert back.returncode == 0, back.stderr

@@ -5,12 +5,10 @@ Most hold them themselves, in `editor.db`, and remember nothing. A folder that i
 graphs that are elsewhere, and nobody finds an empty catalogue by leaving out an option.
 """
 
-import asyncio
 import logging
 import os
-from collections.abc import Callable
 from pathlib import Path
-from typing import Final, TypeVar
+from typing import Final
 
 import msgspec
 from sqlalchemy import URL, Connection, func, inspect, make_url, select
@@ -18,13 +16,10 @@ from sqlalchemy.exc import ArgumentError
 
 from action_assistant.editor.log.epochs import MARK, EpochMark
 from action_assistant.errors import CannotStart
-from action_assistant.journal.database import cause_of
-from action_assistant.journal.databases import database_of
+from action_assistant.journal.databases import ask_once, database_of
 from action_assistant.schema import editor_tables
 
 log: Final = logging.getLogger(__name__)
-
-T = TypeVar("T")
 
 FILE: Final = "editor.database"
 #: The journal of a folder that holds its graphs itself.
@@ -169,7 +164,7 @@ def _graphs(url: str) -> int | None:
     if _is_nowhere(url):
         return None
     try:
-        return _asked(url, count)
+        return ask_once(url, count)
     except CannotStart:
         return None
 
@@ -191,23 +186,7 @@ def _holds(url: str, mark: Path) -> bool:
         chain = connection.execute(found).scalar()
         return chain is not None and bytes(chain).hex() == last.chain
 
-    return _asked(url, look)
-
-
-def _asked(url: str, question: Callable[[Connection], T]) -> T:
-    """An answer for which nothing is made or changed. Raises CannotStart."""
-    database = database_of(url)
-
-    async def ask() -> T:
-        try:
-            return await database.at_one_moment(question)
-        finally:
-            await database.close()
-
-    try:
-        return asyncio.run(ask())
-    except database.faults as error:
-        raise CannotStart(f"{database.name} cannot be read: {cause_of(error)}.") from error
+    return ask_once(url, look)
 
 
 def _is_nowhere(url: str) -> bool:
