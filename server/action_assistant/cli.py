@@ -12,7 +12,7 @@ from typing import Any, Final, NamedTuple
 
 from action_assistant.errors import CannotStart
 from action_assistant.safe_text import make_streams_printable
-from action_assistant.settings import check_environment, hide_password
+from action_assistant.settings import check_environment, hide_password, hide_target_password
 
 
 class CommandEntry(NamedTuple):
@@ -95,6 +95,10 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
     "restore": CommandEntry(
         "backups.backup", "put a backup in the place of what is there; open pages notice and ask"
     ),
+    "move": CommandEntry(
+        "databases.move",
+        "take the graphs of a data folder to Postgres, or back; the runs stay where they are",
+    ),
     "doctor": CommandEntry(
         "doctor", "look what is wrong: ROS 2, robots, folders, databases, ports, the page"
     ),
@@ -169,6 +173,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     make_streams_printable()
     if arguments is None:
         hide_password()
+        hide_target_password()
     options = parser().parse_args(_with_ids_last(sys.argv[1:] if arguments is None else arguments))
     try:
         check_environment()

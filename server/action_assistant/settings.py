@@ -123,6 +123,26 @@ def hide_password() -> None:
             os.execv(sys.executable, [sys.orig_argv[0], *rest])
 
 
+def hide_target_password() -> None:
+    """The same for what `move --to` and `runs copy --to` say: the driver finds the password in the
+    environment."""
+    for at, word in enumerate(sys.orig_argv):
+        name, sign, url = word.partition("=")
+        if not sign:
+            url = next(iter(sys.orig_argv[at + 1 : at + 2]), "")
+        if name == "--to" and "://" in url and _has_password(url):
+            from sqlalchemy import make_url
+
+            parsed = make_url(url)
+            if parsed.password is None:
+                return
+            os.environ["PGPASSWORD"] = str(parsed.password)
+            plain = parsed._replace(password=None).render_as_string()
+            rest = [*sys.orig_argv[1:at], "--to", plain, *sys.orig_argv[at + (1 if sign else 2) :]]
+            sys.stderr.flush()
+            os.execv(sys.executable, [sys.orig_argv[0], *rest])
+
+
 def _is_database(name: str) -> bool:
     """Also as far as argparse takes it for that; `--data` is an option of its own."""
     return len(name) > len("--data") and "--database".startswith(name)

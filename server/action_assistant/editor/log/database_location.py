@@ -61,7 +61,7 @@ def journal_of(data: Path, given: str | None) -> str | None:
 
 def is_own(data: Path, url: str) -> bool:
     """Whether a URL names the file in the folder itself."""
-    return _same(url, _own(data))
+    return same(url, _own(data))
 
 
 def remembered(data: Path) -> str | None:
@@ -87,14 +87,14 @@ def check(data: Path, url: str, *, switch: bool) -> None:
     known = remembered(data)
     if known is None and not (data / JOURNAL).exists():
         # An older version did not write down which one it was; that it was another one is known.
-        if (data / MARK).exists() and _same(url, _own(data)):
+        if (data / MARK).exists() and same(url, _own(data)):
             raise CannotStart(
                 f"The graphs of {data} are in a database that this folder does not remember: name "
                 "it by --database URL, or begin without them by --switch-database."
             )
         return
     known = known or _own(data)
-    if _same(known, url) or (count := _graphs(known)) == 0 or _holds(url, data / MARK):
+    if same(known, url) or (count := _graphs(known)) == 0 or _holds(url, data / MARK):
         return
     raise CannotStart(_refusal(data, known, url, count))
 
@@ -106,7 +106,7 @@ def remember(data: Path, url: str) -> None:
     if parsed.get_backend_name() == "sqlite":  # wherever commands are started
         url = f"sqlite:///{Path(parsed.database or '').resolve()}"
     try:
-        if _same(url, _own(data)):
+        if same(url, _own(data)):
             path.unlink(missing_ok=True)
             return
         part = path.with_name(f".{FILE}.part")
@@ -138,7 +138,8 @@ def _own(data: Path) -> str:
     return f"sqlite:///{data / JOURNAL}"
 
 
-def _same(one: str, other: str) -> bool:
+def same(one: str, other: str) -> bool:
+    """Whether two URLs name one database."""
     return _address(one) == _address(other)
 
 
@@ -201,7 +202,7 @@ def _refusal(data: Path, known: str, url: str, count: int | None) -> str:
     many = "The graphs" if count is None else f"{count} graph{'s' * (count != 1)}"
     where = str(data / JOURNAL) if known == own else shown(known)
     asked, before = (
-        "without --database" if _same(each, own) else f"with --database {shown(each)}"
+        "without --database" if same(each, own) else f"with --database {shown(each)}"
         for each in (url, known)
     )
     return (
