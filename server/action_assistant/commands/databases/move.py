@@ -70,6 +70,7 @@ def _move(options: argparse.Namespace) -> int:
     known = database_location.of(data)
     if database_location.same(known, target):
         print(f"The graphs of {data} are there already.")
+        _tidy(data, target)
         return 0
     source = _source(data, known, options.database)
     if not (source.startswith("sqlite:") or target.startswith("sqlite:")):
@@ -148,9 +149,7 @@ def _into_folder(
     """The same, into a file that is made beside its place; also where a file is that was there."""
     with workshop(data, _WORK) as folder, ExitStack() as locks:
         locks.callback(os.close, own(data / "editor.db"))
-        for left in data.glob(f"{_WORK}*"):  # of one that was killed
-            if left != folder:
-                shutil.rmtree(left, ignore_errors=True)
+        _sweep(data, but=folder)
         _check_room(folder, source)
         file = folder / "editor.db"
         events = copy(
@@ -166,6 +165,25 @@ def _into_folder(
         aside = _put_aside(data)
         _switch(data, source, f"sqlite:///{file}", target, progress, file)
     return events, aside
+
+
+def _tidy(data: Path, target: str) -> None:
+    """What a move leaves that was killed after the folder remembered the other database."""
+    try:
+        lock = own(data / "editor.db")
+    except CannotStart:
+        return  # somebody works in it
+    try:
+        _sweep(data)
+        _put_aside(data, keep=target)
+    finally:
+        os.close(lock)
+
+
+def _sweep(data: Path, but: Path | None = None) -> None:
+    for left in data.glob(f"{_WORK}*"):
+        if left != but:
+            shutil.rmtree(left, ignore_errors=True)
 
 
 def _check_room(folder: Path, source: str) -> None:
