@@ -38,6 +38,11 @@ VARIABLES: Final[Mapping[str, str]] = {
     "ACTION_ASSISTANT_LOG_LEVEL": "`debug`, `info`, `warning` or `error`, as --log-level",
     "ACTION_ASSISTANT_METRICS_TOKEN": "a token that opens /metrics and nothing else",
     "ACTION_ASSISTANT_METRICS_TOKEN_FILE": "a file with that token",
+    "ACTION_ASSISTANT_BACKUP_TO": "the folder of regular backups, as --backup-to of serve and --into of "
+    "backup",
+    "ACTION_ASSISTANT_BACKUP_EVERY": "how often `serve` makes one (24h), as --backup-every",
+    "ACTION_ASSISTANT_BACKUP_KEEP": "how many stay (7d,4w,6m), as --backup-keep",
+    "ACTION_ASSISTANT_BACKUP_AFTER": "the command that takes a finished one elsewhere, as --backup-after",
     "ACTION_ASSISTANT_LIMITS": "`off` lifts rate and socket limits, for load tests",
 }
 #: Where a secret may be that stands in a file, and which variable it is then.
@@ -180,6 +185,26 @@ def hide_password() -> None:
             os.execv(sys.executable, [sys.orig_argv[0], *rest])
 
 
+def hide_target_password() -> None:
+    """The same for what `move --to` and `runs copy --to` say: the driver finds the password in the
+    environment."""
+    for at, word in enumerate(sys.orig_argv):
+        name, sign, url = word.partition("=")
+        if not sign:
+            url = next(iter(sys.orig_argv[at + 1 : at + 2]), "")
+        if name == "--to" and "://" in url and _has_password(url):
+            from sqlalchemy import make_url
+
+            parsed = make_url(url)
+            if parsed.password is None:
+                return
+            os.environ["PGPASSWORD"] = str(parsed.password)
+            plain = parsed._replace(password=None).render_as_string()
+            rest = [*sys.orig_argv[1:at], "--to", plain, *sys.orig_argv[at + (1 if sign else 2) :]]
+            sys.stderr.flush()
+            os.execv(sys.executable, [sys.orig_argv[0], *rest])
+
+
 def _is_database(name: str) -> bool:
     """Also as far as argparse takes it for that; `--data` is an option of its own."""
     return len(name) > len("--data") and "--database".startswith(name)
@@ -199,6 +224,11 @@ def metrics_token(environ: Mapping[str, str] = os.environ) -> str | None:
             f"{name} has {len(token)} characters; a token must have at least {_MIN_TOKEN}."
         )
     return token or None
+
+
+def backup_rule(name: str, environ: Mapping[str, str] = os.environ) -> str | None:
+    """What the environment says of backups: TO, EVERY, KEEP or AFTER."""
+    return environ.get(f"ACTION_ASSISTANT_BACKUP_{name}", "").strip() or None
 
 
 def limits(environ: Mapping[str, str] = os.environ) -> bool:

@@ -30,6 +30,15 @@ _TICK: Final = 0.1
 _ENDING: Final = 8.0  # seconds that a process gets to end by itself
 
 
+class BackupPlan(msgspec.Struct, frozen=True):
+    """Backups into a folder, every so many seconds; `keep` and `after` as `backup` takes them."""
+
+    into: Path
+    every: float
+    keep: str
+    after: str | None
+
+
 class ServePlan(msgspec.Struct, frozen=True, kw_only=True):
     """What to serve, and where. The runner listens on the port after the editor's."""
 
@@ -43,6 +52,7 @@ class ServePlan(msgspec.Struct, frozen=True, kw_only=True):
     opens: bool
     reached: Reachability = Reachability()
     behaviours: Path | None = None
+    backups: BackupPlan | None = None
 
 
 class EndSignal:
@@ -69,7 +79,7 @@ class EndSignal:
 
 
 class Child:
-    """One of the two processes, as often as it takes."""
+    """One of the processes, as often as it takes."""
 
     def __init__(
         self,
@@ -149,6 +159,7 @@ def serve(plan: ServePlan) -> int:
     # The writing end is never written to: it closes when this process dies, however it dies.
     reading, _writing = os.pipe()
     children = _children(plan)
+    keeper = _keeper(plan)
     say("starting …")
     for child in children:
         child.start(reading)
@@ -161,10 +172,13 @@ def serve(plan: ServePlan) -> int:
                 code = child.tend(reading)
                 if code is not None:
                     return code
+            if keeper is not None and keeper.tend(reading) is not None:
+                say("no backups are made; the message above says why")
+                keeper = None
         return 0
     finally:
         say("ending …")
-        for child in children:
+        for child in [*children, *([keeper] if keeper is not None else [])]:
             child.end()
 
 
@@ -197,6 +211,20 @@ def _children(plan: ServePlan) -> list[Child]:
             settings,
         ),
     ]
+
+
+def _keeper(plan: ServePlan) -> Child | None:
+    """Who makes backups: a process of its own, of low priority, for which nobody waits."""
+    if plan.backups is None:
+        return None
+    keeps = plan.backups
+    into = ["--data", str(plan.data), "--into", str(keeps.into), "--keep", keeps.keep]
+    after = ["--after", keeps.after] if keeps.after is not None else []
+    database = {"ACTION_ASSISTANT_DATABASE": plan.database} if plan.database else {}
+    this = Interpreter(path=Path(sys.executable), origin="this")
+    return Child(
+        "backup", ["backup", *into, *after, "--every", f"{keeps.every:g}s"], 0, this, database
+    )
 
 
 def _as_settings(reached: Reachability) -> dict[str, str]:

@@ -6,10 +6,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from action_assistant import paths, settings
+from action_assistant.commands.backups.options import add_rules, span
 from action_assistant.errors import CannotStart
 from action_assistant.logs.setup import FORMS, LEVELS, hand_on, log_settings, set_up
 
 if TYPE_CHECKING:  # slow to load, and most commands do not need it
+    from action_assistant.supervisor import BackupPlan
     from action_assistant.web.server.listen import TlsIdentity
 
 
@@ -26,6 +28,7 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
     _database(parser, switch=True)
     _sharing(parser)
     _behaviours(parser)
+    _backups(parser)
     _logging(parser)
 
 
@@ -65,6 +68,24 @@ def port_number(text: str) -> int:
     if not 0 < number < 65536:
         raise ValueError
     return number
+
+
+def _backups(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--backup-to",
+        type=Path,
+        default=settings.backup_rule("TO"),
+        metavar="DIR",
+        help="make backups into this folder, by a process of their own",
+    )
+    parser.add_argument(
+        "--backup-every",
+        type=span,
+        default=settings.backup_rule("EVERY") or "24h",
+        metavar="TIME",
+        help="how often (30m, 24h, 7d); default: %(default)s",
+    )
+    add_rules(parser, "--backup-")
 
 
 def _address(parser: argparse.ArgumentParser, *, port: int) -> None:
@@ -223,7 +244,21 @@ def _serve(options: argparse.Namespace) -> int:
             reached=reached(options),
             behaviours=options.behaviours,
             opens=not options.no_open,
+            backups=_backup_plan(options),
         )
+    )
+
+
+def _backup_plan(options: argparse.Namespace) -> "BackupPlan | None":
+    from action_assistant.supervisor import BackupPlan
+
+    if options.backup_to is None:
+        return None
+    return BackupPlan(
+        into=options.backup_to.resolve(),
+        every=options.backup_every,
+        keep=options.backup_keep,
+        after=options.backup_after,
     )
 
 
