@@ -21,6 +21,7 @@ def _add_serve(both: argparse.ArgumentParser) -> None:
     _database(both, switch=True)
     _sharing(both)
     _behaviours(both)
+    _index_folders(both)
     both.add_argument("--no-open", action="store_true", help="do not open a browser")
     both.set_defaults(handler=_serve)
 
@@ -41,6 +42,7 @@ def _add_runner(runner: argparse.ArgumentParser) -> None:
     _address(runner, port=8001)
     _sharing(runner)
     _behaviours(runner)
+    _index_folders(runner)
     runner.add_argument(
         "--page-port", type=port_number, metavar="N", help="default: the port before"
     )
@@ -129,6 +131,17 @@ def _behaviours(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _index_folders(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--index-folder",
+        action="append",
+        default=[],
+        metavar="ROBOT=DIR",
+        help="the --actions-path of that robot's engine, where it is on this computer, too: operators may "
+        "have graphs written into it. May be given several times",
+    )
+
+
 def _reached(options: argparse.Namespace) -> settings.Reachability:
     return settings.reached(options.public_url, options.trusted_proxies)
 
@@ -203,6 +216,7 @@ def _serve(options: argparse.Namespace) -> int:
             tls=options.tls,
             reached=_reached(options),
             behaviours=options.behaviours,
+            index_folders=settings.index_folders(options.index_folder),
             opens=not options.no_open,
         )
     )
@@ -245,6 +259,7 @@ def _runner(options: argparse.Namespace) -> int:
         keep=settings.keep(data),
         reached=_reached(options),
         behaviours=options.behaviours,
+        index_folders=settings.index_folders(options.index_folder),
     )
     listen(
         lambda: create_app(chosen),

@@ -1,5 +1,7 @@
 """What the routes of the runner work on."""
 
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Final
 from weakref import WeakKeyDictionary
 
@@ -12,6 +14,7 @@ from action_assistant.runner.links.behaviours.folder import BehaviourFolder
 from action_assistant.runner.review.service import ReviewService
 from action_assistant.runner.review.worker_queries import WorkerQueries
 from action_assistant.runner.runs.sent_views import Sent
+from action_assistant.runner.start.index_writer import IndexWriter
 from action_assistant.web.network.connection_limits import ConcurrencyLimit, ConnectionLimits
 from action_assistant.web.workers.lanes import RunInWorker
 
@@ -31,9 +34,12 @@ class RunnerServices:
     body_limit: ConcurrencyLimit
     run_in_worker: RunInWorker
     behaviours: BehaviourFolder | None
+    index_folders: Mapping[str, Path]
+    index_writer: IndexWriter
     sent: WeakKeyDictionary[OpenRun, Sent]
 
     def __init__(self) -> None:
         self.behaviours = None
+        self.index_folders = {}
         self.sent = WeakKeyDictionary()
         self.body_limit = ConcurrencyLimit(_BODIES)
