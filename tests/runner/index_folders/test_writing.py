@@ -86,6 +86,8 @@ def test_where_an_engine_would_take_either_of_two_nothing_is_written(
     with pytest.raises(Conflict, match=r"2 files define leg.*a/leg.*b/leg|b/leg.*a/leg"):
         put(tmp_path, sequence("round"), sequence("leg", 2), replace=replace)
     assert held(tmp_path) == before
+    add(tmp_path, "b/leg.graph.json", sequence("leg", 2))
+    assert put(tmp_path, sequence("leg", 2)).written == ()
 
 
 def test_an_action_of_that_name_comes_first_so_nothing_is_written(tmp_path: Path) -> None:

@@ -87,13 +87,15 @@ def held_against(
         unread = "; ".join(files.unread[:_TOLD])
         return Hindered(f"Whether another file defines {name} is not known: {unread}.")
     found = files.graphs.get(name, ())
+    if found and all(_is_same(graph, each, facts) for each in found):
+        return There()
     if len(found) > 1:
         return Hindered(
             f"{len(found)} files define {name}, and nobody knows which of them is taken: "
             f"{_listed(found)}. Leave one of them."
         )
     if found:
-        return _held_against_file(graph, found[0], facts)
+        return _of_another(name, found[0])
     known = graphs.get(name)
     if known is None:
         return Lacking()
@@ -104,18 +106,21 @@ def held_against(
     )
 
 
-def _held_against_file(graph: Graph, file: DefiningFile, facts: EngineFacts) -> FileState:
+def _is_same(graph: Graph, file: DefiningFile, facts: EngineFacts) -> bool:
+    """Whether an engine reads just this graph from the file."""
     try:
         reading = codec.read(file.text)
     except codec.Unreadable:
-        reading = None
-    is_read = reading is not None and reading.dialect == "D3" and not refused_by_parser(reading)
-    if reading is not None and is_read and same_to_engine(graph, reading.graph, facts):
-        return There()
+        return False
+    is_read = reading.dialect == "D3" and not refused_by_parser(reading)
+    return is_read and same_to_engine(graph, reading.graph, facts)
+
+
+def _of_another(name: str, file: DefiningFile) -> FileState:
     if file.linked:
         return Hindered(
-            f"{file.shown} defines another {graph.name} and is a link, or behind one: what it leads to "
-            "is not touched."
+            f"{file.shown} defines another {name} and is a link, or behind one: what it leads to is not "
+            "touched."
         )
     return Differing(file)
 

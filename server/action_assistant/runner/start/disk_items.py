@@ -57,15 +57,15 @@ def _with_folder(item: Item, view: EngineView, pinned: Mapping[str, Graph]) -> I
     if item.verdict != "blocked" or view.index_folder is None:
         return item
     folder = view.index_folder
-    wanted = [name for names in unlike(view, pinned) for name in names]
-    files = scanned(folder, wanted)
+    lacking, other = unlike(view, pinned)
+    files = scanned(folder, pinned.keys())
     writable: list[WritableGraph] = []
     waiting: list[str] = []
     hindered: dict[str, str] = {}
-    for name in wanted:
+    for name in sorted(pinned):  # all of them are written or none
         match of_index(pinned[name], files, view.index, view.facts):
             case There():
-                waiting.append(name)
+                waiting += [name] if name in lacking or name in other else []
             case Lacking():
                 writable.append(WritableGraph(name))
             case Differing(file):
