@@ -127,6 +127,10 @@ soak-ros: ros ## the same over real rclpy: 200 histories, hundreds of stops
 	TEST_ROS_HISTORIES=200 TEST_ROS_AT_ONCE=4 TEST_STOP_CLICKS=50 $(BARE) $(ROS)/python -m pytest -q -s \
 		--timeout=0 tests/ros/test_false_confirmations.py tests/ros/test_stop_latency.py
 
+.PHONY: containers
+containers: setup ## build the images and drive docker-compose.yml with podman, as root on Debian (ARGS="-k proxy")
+	@scripts/containers $(ARGS)
+
 .PHONY: workspace
 workspace: setup ## a sourced ROS 2 as Ubuntu 24.04 lays it out, in a root of its own (PYTHON312=…, FOLDER=…)
 	@scripts/try-workspace "$(or $(PYTHON312),python3.12)" "$(or $(FOLDER),/var/tmp/action-assistant-workspace)"

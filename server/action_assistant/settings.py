@@ -2,7 +2,7 @@
 
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, MutableMapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -14,11 +14,18 @@ from action_assistant.public_url import LOOPBACK_PROXIES, Network, PublicUrl, pr
 
 #: Every variable that this program reads, and what it is for.
 VARIABLES: Final[Mapping[str, str]] = {
+    "ACTION_ASSISTANT_DATA": "the data folder, where --data names none",
+    "ACTION_ASSISTANT_PORT": "the editor's port, where --port names none (8000); the runner has the next",
     "ACTION_ASSISTANT_TOKEN": "the token programs present; instead of the file in the data folder",
+    "ACTION_ASSISTANT_TOKEN_FILE": "a file with that token",
     "ACTION_ASSISTANT_DATABASE": "the editor's database; where --database would show its password to "
     "everybody on this computer",
+    "ACTION_ASSISTANT_DATABASE_FILE": "a file with that URL",
+    "ACTION_ASSISTANT_DATABASE_PASSWORD_FILE": "a file with the password of the database, where its URL "
+    "has none; for Postgres, as PGPASSWORD",
     "ACTION_ASSISTANT_URL": "where the command line finds the editor (http://127.0.0.1:8000)",
     "ACTION_ASSISTANT_HOSTS": "more host names that may stand in the address bar, comma separated",
+    "ACTION_ASSISTANT_SHARE": "`http` as --share, `tls` as --share --tls",
     "ACTION_ASSISTANT_PUBLIC_URL": "where a proxy shows the page to others, as --public-url",
     "ACTION_ASSISTANT_TRUSTED_PROXIES": "addresses and networks of proxies that are believed about who "
     "asks, as --trusted-proxies",
@@ -29,15 +36,27 @@ VARIABLES: Final[Mapping[str, str]] = {
     "ACTION_ASSISTANT_ARCHIVE": "the folder of archives (`archive` in the data folder)",
     "ACTION_ASSISTANT_INDEX_FOLDERS": "folders that robots index and the runner may write graphs into, as "
     f"--index-folder, separated by `{os.pathsep}`",
+    "ACTION_ASSISTANT_LOG_FORMAT": "`json` for programs, `console` for people, as --log-format",
+    "ACTION_ASSISTANT_LOG_LEVEL": "`debug`, `info`, `warning` or `error`, as --log-level",
+    "ACTION_ASSISTANT_METRICS_TOKEN": "a token that opens /metrics and nothing else",
+    "ACTION_ASSISTANT_METRICS_TOKEN_FILE": "the file that has it",
     "ACTION_ASSISTANT_LIMITS": "`off` lifts rate and socket limits, for load tests",
 }
 INDEX_FOLDERS: Final = "ACTION_ASSISTANT_INDEX_FOLDERS"
+#: Where a secret may be that stands in a file, and which variable it is then.
+_FILES: Final[Mapping[str, str]] = {
+    "ACTION_ASSISTANT_TOKEN_FILE": "ACTION_ASSISTANT_TOKEN",
+    "ACTION_ASSISTANT_DATABASE_FILE": "ACTION_ASSISTANT_DATABASE",
+    "ACTION_ASSISTANT_DATABASE_PASSWORD_FILE": "PGPASSWORD",
+}
+_SECRET: Final = 65_536  # characters of such a file
 #: The folder of archives, inside the data folder.
 ARCHIVE: Final = "archive"
 #: Stands in a data folder while `restore` puts things into it.
 RESTORING: Final = "restore.unfinished"
 #: The host that stands for every address of this computer, of both families.
 EVERYWHERE: Final = "*"
+_MIN_TOKEN: Final = 32  # characters, as of the token that programs present
 LOOPBACK: Final = frozenset({"127.0.0.1", "::1", "localhost"})
 
 
@@ -63,6 +82,7 @@ class EditorSettings(msgspec.Struct, frozen=True, kw_only=True):
     tls: bool = False
     switch_database: bool = False
     reached: Reachability = Reachability()
+    metrics_token: str | None = None
 
 
 class Keep(msgspec.Struct, frozen=True, kw_only=True):
@@ -91,6 +111,7 @@ class RunnerSettings(msgspec.Struct, frozen=True, kw_only=True):
     reached: Reachability = Reachability()
     behaviours: Path | None = None
     index_folders: Mapping[str, Path] = {}
+    metrics_token: str | None = None
 
 
 def check_environment(environ: Mapping[str, str] = os.environ) -> None:
@@ -101,6 +122,45 @@ def check_environment(environ: Mapping[str, str] = os.environ) -> None:
     if unknown:
         known = ", ".join(VARIABLES)
         raise CannotStart(f"Unknown setting {', '.join(unknown)}. Known are: {known}.")
+
+
+def take_secrets_from_files(environ: MutableMapping[str, str] = os.environ) -> None:
+    """Put the secrets of files that the environment names into it, for this process and what it starts.
+    Raises CannotStart: a secret that is named and not there is not done without."""
+    for name, secret in _FILES.items():
+        path = environ.get(name, "")
+        if not path:
+            environ.pop(name, None)
+            continue
+        if environ.get(secret):
+            raise CannotStart(f"{name} and {secret} are both set; keep one of them.")
+        try:
+            with Path(path).open(encoding="utf-8") as file:
+                text = file.read(_SECRET).strip()
+        except (OSError, UnicodeDecodeError) as error:
+            why = error.strerror if isinstance(error, OSError) else "it is no text"
+            raise CannotStart(f"{name} is {path!r}, which cannot be read: {why}.") from error
+        if not text or len(text.splitlines()) > 1:
+            raise CannotStart(f"{name} is {path!r}, which has to hold one line.")
+        environ[secret] = text
+        del environ[name]  # a process that we start would find both
+
+
+def port(environ: Mapping[str, str] = os.environ) -> int:
+    """The editor's, when the command line names none. Raises CannotStart."""
+    text = environ.get("ACTION_ASSISTANT_PORT", "").strip() or "8000"
+    if not text.isdecimal() or not 0 < int(text) < 65535:
+        raise CannotStart(f"ACTION_ASSISTANT_PORT is a port below 65535, not {text!r}.")
+    return int(text)
+
+
+def share(environ: Mapping[str, str] = os.environ) -> str:
+    """How others on the network are let in, when the command line says nothing: "", "http" or "tls".
+    Raises CannotStart."""
+    text = environ.get("ACTION_ASSISTANT_SHARE", "").strip().lower()
+    if text not in {"", "http", "tls"}:
+        raise CannotStart(f"ACTION_ASSISTANT_SHARE is `http` or `tls`, not {text!r}.")
+    return text
 
 
 def database(environ: Mapping[str, str] = os.environ) -> str | None:
@@ -119,6 +179,7 @@ def hide_password() -> None:
         if _is_database(name) and _has_password(url):
             rest = [*sys.orig_argv[1:at], *sys.orig_argv[at + taken :]]
             os.environ["ACTION_ASSISTANT_DATABASE"] = url
+            os.environ.pop("ACTION_ASSISTANT_DATABASE_FILE", None)
             sys.stderr.flush()
             os.execv(sys.executable, [sys.orig_argv[0], *rest])
 
@@ -131,6 +192,26 @@ def _is_database(name: str) -> bool:
 def _has_password(url: str) -> bool:
     """Or may have: SQLAlchemy allows characters in it that others take for its end."""
     return "@" in url or "password=" in url
+
+
+def metrics_token(environ: Mapping[str, str] = os.environ) -> str | None:
+    """What opens /metrics and nothing else, if there is such a token. Raises CannotStart."""
+    name = "ACTION_ASSISTANT_METRICS_TOKEN"
+    token, file = environ.get(name, ""), environ.get(f"{name}_FILE", "")
+    if token and file:
+        raise CannotStart(f"{name} and {name}_FILE are both set: say it once.")
+    if file:
+        try:
+            token = Path(file).read_text(encoding="utf-8").strip()
+        except (OSError, UnicodeDecodeError) as error:
+            why = error.strerror if isinstance(error, OSError) else "it is no text"
+            raise CannotStart(f"{name}_FILE: {file} cannot be read ({why}).") from error
+    if (token or file) and len(token) < _MIN_TOKEN:
+        raise CannotStart(
+            f"{name}{'_FILE' if file else ''}: a token has at least {_MIN_TOKEN} characters, this one "
+            f"has {len(token)}."
+        )
+    return token or None
 
 
 def limits(environ: Mapping[str, str] = os.environ) -> bool:

@@ -91,6 +91,12 @@ class Server:
                   "-U", "aa", "-d", url.rpartition("/")[2], "-f", str(dump))  # fmt: skip
         return url
 
+    def demand_password(self, role: str) -> None:
+        """Let a role in by its password only; others need none."""
+        rules = self._data / "pg_hba.conf"
+        rules.write_text(f"host all {role} 127.0.0.1/32 scram-sha-256\n{rules.read_text()}")
+        self._ctl("reload")
+
     def _ctl(self, command: str, *options: str) -> None:
         self._run("pg_ctl", command, "-w", "-s", "-t", "60", "-D", str(self._data), *options)
 

@@ -4,7 +4,7 @@ from sqlalchemy import make_url
 from sqlalchemy.exc import ArgumentError
 
 from action_assistant.errors import CannotStart
-from action_assistant.journal.database import Branch, Database
+from action_assistant.journal.database import Before, Branch, Database, no_copy
 from action_assistant.journal.migrate import recognize, upgrade_to
 
 
@@ -26,11 +26,11 @@ def database_of(url: str) -> Database:
     raise CannotStart(f"Databases of the kind {parsed.drivername!r} are not supported.")
 
 
-def migrate(url: str, branch: Branch, revision: str = "head") -> str:
+def migrate(url: str, branch: Branch, revision: str = "head", *, before: Before = no_copy) -> str:
     """Upgrade the database and return its revision. Raises CannotStart.
 
     All of it is one transaction: killed half-way, the database is as it was.
     """
     database = database_of(url)
     database.look(recognize)
-    return database.migrate(upgrade_to(branch, revision))
+    return database.migrate(upgrade_to(branch, revision, before=before))

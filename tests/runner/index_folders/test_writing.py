@@ -2,6 +2,7 @@
 
 import json
 import multiprocessing
+import os
 import resource
 import shutil
 import tempfile
@@ -64,6 +65,17 @@ def test_another_file_of_that_name_is_replaced_only_where_that_is_said(tmp_path:
     assert not any(mark in leg.kept.rpartition("/")[2] for mark in ("graph.json", "umrf.json"))
     assert mine.stat().st_mode & 0o777 == 0o640
     assert is_there(tmp_path, sequence("leg", 2))
+
+
+@pytest.mark.parametrize(("folder", "file"), [(0o755, 0o644), (0o700, 0o600), (0o775, 0o664)])
+def test_whoever_reads_the_folder_reads_the_file(tmp_path: Path, folder: int, file: int) -> None:
+    tmp_path.chmod(folder)
+    before = os.umask(0o077)  # as a service of systemd has it
+    try:
+        put(tmp_path, sequence("leg"))
+    finally:
+        os.umask(before)
+    assert (tmp_path / "leg.umrf.graph.json").stat().st_mode & 0o777 == file
 
 
 def test_a_file_of_an_older_form_is_none_that_an_engine_reads(tmp_path: Path) -> None:

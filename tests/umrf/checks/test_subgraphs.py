@@ -180,7 +180,7 @@ def test_sub_graphs_that_double_with_each_level_are_looked_at_for_a_moment_only(
 def test_an_action_comes_before_a_graph_of_its_name_and_a_graph_before_the_unknown() -> None:
     inner = graph("Inner", action("A"), exits=False)
     outer = graph("outer", action("Inner"))
-    assert found(outer, inner, library={"Inner": Signature()}) == {}
+    assert found(outer, inner, library={"Inner": Signature()}) == {"subgraph-hidden": "warning"}
     assert found(outer, library={}) == {"unknown-action": "warning"}
     assert "unknown-action" not in found(outer, inner, library={})
 
@@ -215,6 +215,15 @@ def test_a_name_of_several_graphs_is_told_at_each_action_that_uses_it() -> None:
     (problem,) = check(outer, graphs=graphs, resolution=resolution)
     assert (problem.code, problem.severity) == ("subgraph-ambiguous", "warning")
     assert problem.where.path == "/actions/0/name"
+
+
+def test_an_action_of_the_library_hides_a_graph_of_its_name_and_that_is_told() -> None:
+    outer, inner = graph("outer", action("Inner")), graph("Inner", action("A"), exits=False)
+    told = [("subgraph-hidden", "warning")]
+    hidden = check(outer, resolution=Resolution(hidden=frozenset({"Inner"})))
+    assert [(each.code, each.severity) for each in hidden] == told
+    known = check(outer, {"Inner": Signature()}, graphs={"Inner": inner})
+    assert [(each.code, each.severity) for each in known] == told
 
 
 def test_more_graphs_inside_than_are_looked_at_are_told() -> None:

@@ -48,6 +48,17 @@ export interface EditorApi {
         uses: EditorApi["ActionUse"][];
     };
     /**
+     * Activity
+     * @description What goes on in a process: open sockets; rooms of an editor; runs and robots of a runner.
+     */
+    Activity: {
+        sockets: number;
+        rooms: number | null;
+        runs: number | null;
+        stops_unconfirmed: number | null;
+        robots: EditorApi["RobotLink"][];
+    };
+    /**
      * Answering
      * @description Yes or no to a proposal, of somebody who has seen the draft after its change `seq`.
      */
@@ -175,12 +186,14 @@ export interface EditorApi {
     };
     /**
      * Config
-     * @description What a page has to know. `runner_url` has no slash at its end.
+     * @description What a page has to know. `runner_url` has no slash at its end. `commit`: of this program, null
+     *     when nobody knows.
      */
     Config: {
         mode: string;
         version: string;
         runner_url: string;
+        commit: string | null;
     };
     /**
      * Counts
@@ -440,6 +453,17 @@ export interface EditorApi {
         merged?: EditorApi["MergedBy"];
     };
     /**
+     * Finding
+     * @description One thing that was looked at. `advice`: what mends it.
+     */
+    Finding: {
+        topic: string;
+        /** @enum {string} */
+        verdict: "fine" | "note" | "wrong";
+        what: string;
+        advice: string;
+    };
+    /**
      * FlatCopy
      * @description Which moment of a graph to make flat, and what to call the new graph.
      */
@@ -603,6 +627,15 @@ export interface EditorApi {
         message?: string;
     };
     /**
+     * Health
+     * @description The process answers. `commit`: of this program, null when nobody knows.
+     */
+    Health: {
+        status: string;
+        version: string;
+        commit: string | null;
+    };
+    /**
      * HierarchyLevel
      * @description One step of the way down to an action: a graph, and an action of it by key and full name.
      */
@@ -725,6 +758,16 @@ export interface EditorApi {
         label?: string;
     };
     /**
+     * JournalState
+     * @description What the writer of the journal does. `failing`: why the newest transaction was not stored.
+     */
+    JournalState: {
+        database: string;
+        waiting: number;
+        busy_s: number;
+        failing: string | null;
+    };
+    /**
      * KeyChange
      * @description One key of the document. A value that is left out: the key is not there.
      */
@@ -735,6 +778,17 @@ export interface EditorApi {
         before?: unknown;
         /** @description Any JSON value */
         after?: unknown;
+    };
+    /**
+     * LaneState
+     * @description A queue for workers. `deaths` and `given_up` since the process began.
+     */
+    LaneState: {
+        name: string;
+        waiting: number;
+        busy: number;
+        deaths: number;
+        given_up: number;
     };
     /**
      * LastBuild
@@ -787,6 +841,18 @@ export interface EditorApi {
         pvf_type: string | null;
         required: boolean;
         text: string;
+    };
+    /**
+     * Load
+     * @description What a process takes: seconds of a processor, bytes of memory, descriptors; and how late its loop
+     *     was at worst, in the last minute. Null where the system does not say.
+     */
+    Load: {
+        cpu_s: number;
+        memory: number | null;
+        open_files: number | null;
+        most_files: number;
+        loop_lag_s: number;
     };
     /**
      * MadeGraph
@@ -1145,7 +1211,8 @@ export interface EditorApi {
     };
     /**
      * ProblemDetails
-     * @description What a client is told about a refusal. `type` is stable; `detail` is for people.
+     * @description What a client is told about a refusal. `type` is stable; `detail` is for people. By `request_id`
+     *     the lines of the log are found.
      */
     ProblemDetails: {
         type: string;
@@ -1158,6 +1225,7 @@ export interface EditorApi {
             line?: number;
             column?: number;
         };
+        request_id?: string | null;
     };
     /**
      * Problems
@@ -1166,6 +1234,25 @@ export interface EditorApi {
     Problems: {
         seq: number;
         problems: EditorApi["Problem"][];
+    };
+    /**
+     * ProcessStatus
+     * @description One of the two processes, now.
+     */
+    ProcessStatus: {
+        /** @enum {string} */
+        process: "editor" | "runner";
+        /** Format: date-time */
+        at: string;
+        /** Format: date-time */
+        began_at: string;
+        versions: EditorApi["Versions"];
+        readiness: EditorApi["Readiness"];
+        load: EditorApi["Load"];
+        journal: EditorApi["JournalState"];
+        storage: EditorApi["StorageShown"] | null;
+        workers: EditorApi["LaneState"][];
+        activity: EditorApi["Activity"];
     };
     /**
      * Proposing
@@ -1190,11 +1277,15 @@ export interface EditorApi {
     };
     /**
      * Readiness
-     * @description Whether the process can do its work, and what stands in the way.
+     * @description Whether the process can do its work, and what stands in the way. `parts`: what each lacks, null
+     *     where it works. Without `rclpy` a process is ready.
      */
     Readiness: {
         ready: boolean;
         problems: string[];
+        parts?: {
+            [key: string]: string | null;
+        };
     };
     /**
      * Rehearsal
@@ -1275,6 +1366,16 @@ export interface EditorApi {
         seq: number;
     };
     /**
+     * RobotLink
+     * @description How a robot is, and when it last answered.
+     */
+    RobotLink: {
+        name: string;
+        state: string;
+        why: string;
+        heard_at: string | null;
+    };
+    /**
      * Script
      * @description Behaviours by key: one entry per call, the last repeats.
      */
@@ -1341,6 +1442,21 @@ export interface EditorApi {
         exact: boolean;
         looked: number;
         partings: EditorApi["CourseChange"][];
+    };
+    /**
+     * StorageShown
+     * @description Bytes: what the disk of the data folder has left, and what is in use.
+     */
+    StorageShown: {
+        /** Format: date-time */
+        at: string;
+        free: number;
+        size: number;
+        database: number | null;
+        wal: number | null;
+        folders: {
+            [key: string]: number;
+        };
     };
     /**
      * StoredEvent
@@ -1461,6 +1577,15 @@ export interface EditorApi {
         /** @default  */
         note?: string;
         subgraphs?: EditorApi["PinnedGraph"][];
+    };
+    /**
+     * Versions
+     * @description Of the program, of the Python under it, and of the tables in its database.
+     */
+    Versions: {
+        program: string;
+        python: string;
+        schema: string;
     };
     /**
      * WantedMerge

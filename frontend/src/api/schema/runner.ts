@@ -63,6 +63,17 @@ export interface RunnerApi {
         spans: RunnerApi["Spans"];
     };
     /**
+     * Activity
+     * @description What goes on in a process: open sockets; rooms of an editor; runs and robots of a runner.
+     */
+    Activity: {
+        sockets: number;
+        rooms: number | null;
+        runs: number | null;
+        stops_unconfirmed: number | null;
+        robots: RunnerApi["RobotLink"][];
+    };
+    /**
      * AlarmShown
      * @description Something that a person must know now.
      */
@@ -490,6 +501,15 @@ export interface RunnerApi {
         };
     };
     /**
+     * Health
+     * @description The process answers. `commit`: of this program, null when nobody knows.
+     */
+    Health: {
+        status: string;
+        version: string;
+        commit: string | null;
+    };
+    /**
      * HeldGraph
      * @description A graph that an engine holds, ended ones too. `run`: the run of ours that it is.
      *
@@ -564,6 +584,16 @@ export interface RunnerApi {
         folder: RunnerApi["FolderLook"] | null;
     };
     /**
+     * JournalState
+     * @description What the writer of the journal does. `failing`: why the newest transaction was not stored.
+     */
+    JournalState: {
+        database: string;
+        waiting: number;
+        busy_s: number;
+        failing: string | null;
+    };
+    /**
      * KnownAction
      * @description An action that a robot has indexed.
      */
@@ -575,6 +605,17 @@ export interface RunnerApi {
         outputs: {
             [key: string]: string;
         };
+    };
+    /**
+     * LaneState
+     * @description A queue for workers. `deaths` and `given_up` since the process began.
+     */
+    LaneState: {
+        name: string;
+        waiting: number;
+        busy: number;
+        deaths: number;
+        given_up: number;
     };
     /**
      * Listed
@@ -616,6 +657,18 @@ export interface RunnerApi {
         note: string;
         labels: string[];
         archived: RunnerApi["ArchivedShown"] | null;
+    };
+    /**
+     * Load
+     * @description What a process takes: seconds of a processor, bytes of memory, descriptors; and how late its loop
+     *     was at worst, in the last minute. Null where the system does not say.
+     */
+    Load: {
+        cpu_s: number;
+        memory: number | null;
+        open_files: number | null;
+        most_files: number;
+        loop_lag_s: number;
     };
     /**
      * MarkShown
@@ -780,7 +833,8 @@ export interface RunnerApi {
     };
     /**
      * ProblemDetails
-     * @description What a client is told about a refusal. `type` is stable; `detail` is for people.
+     * @description What a client is told about a refusal. `type` is stable; `detail` is for people. By `request_id`
+     *     the lines of the log are found.
      */
     ProblemDetails: {
         type: string;
@@ -793,6 +847,26 @@ export interface RunnerApi {
             line?: number;
             column?: number;
         };
+        request_id?: string | null;
+    };
+    /**
+     * ProcessStatus
+     * @description One of the two processes, now.
+     */
+    ProcessStatus: {
+        /** @enum {string} */
+        process: "editor" | "runner";
+        /** Format: date-time */
+        at: string;
+        /** Format: date-time */
+        began_at: string;
+        versions: RunnerApi["Versions"];
+        readiness: RunnerApi["Readiness"];
+        load: RunnerApi["Load"];
+        journal: RunnerApi["JournalState"];
+        storage: RunnerApi["StorageShown"] | null;
+        workers: RunnerApi["LaneState"][];
+        activity: RunnerApi["Activity"];
     };
     /**
      * ProposalRequest
@@ -840,11 +914,15 @@ export interface RunnerApi {
     };
     /**
      * Readiness
-     * @description Whether the process can do its work, and what stands in the way.
+     * @description Whether the process can do its work, and what stands in the way. `parts`: what each lacks, null
+     *     where it works. Without `rclpy` a process is ready.
      */
     Readiness: {
         ready: boolean;
         problems: string[];
+        parts?: {
+            [key: string]: string | null;
+        };
     };
     /**
      * Recorded
@@ -1009,6 +1087,16 @@ export interface RunnerApi {
         actions: RunnerApi["KnownAction"][];
         graphs: string[];
         unread: number;
+    };
+    /**
+     * RobotLink
+     * @description How a robot is, and when it last answered.
+     */
+    RobotLink: {
+        name: string;
+        state: string;
+        why: string;
+        heard_at: string | null;
     };
     /**
      * RobotLogLine
@@ -1375,6 +1463,21 @@ export interface RunnerApi {
         runs: string[];
     };
     /**
+     * StorageShown
+     * @description Bytes: what the disk of the data folder has left, and what is in use.
+     */
+    StorageShown: {
+        /** Format: date-time */
+        at: string;
+        free: number;
+        size: number;
+        database: number | null;
+        wal: number | null;
+        folders: {
+            [key: string]: number;
+        };
+    };
+    /**
      * SubgraphShown
      * @description A graph inside of the one that was started, as it was sent along, by the name of the actions that
      *     stand for it. `graph`: its id; `version`: of it, where there was one.
@@ -1417,6 +1520,15 @@ export interface RunnerApi {
     Took: {
         least: number;
         most: number | null;
+    };
+    /**
+     * Versions
+     * @description Of the program, of the Python under it, and of the tables in its database.
+     */
+    Versions: {
+        program: string;
+        python: string;
+        schema: string;
     };
     /**
      * VisitShown

@@ -40,7 +40,9 @@ from action_assistant.web.auth.keys import TOKEN_FILE
 #: What archives are of, in their folder.
 _ARCHIVES: Final = ("runs", "raw")
 #: Of the environment, and never in what a backup says of itself.
-_SECRET: Final = frozenset({"ACTION_ASSISTANT_TOKEN", "ACTION_ASSISTANT_DATABASE"})
+_SECRET: Final = frozenset(
+    {"ACTION_ASSISTANT_TOKEN", "ACTION_ASSISTANT_DATABASE", "ACTION_ASSISTANT_METRICS_TOKEN"}
+)
 
 
 def _add_backup(backup: argparse.ArgumentParser) -> None:
@@ -118,7 +120,7 @@ def _backup(options: argparse.Namespace) -> int:
 
 def _copied(source: str, branch: Branch, target: Path, progress: Progress) -> int:
     """A journal as it is at one moment, in a SQLite file; its events, all of which are sound."""
-    from action_assistant.journal.copying import copy
+    from action_assistant.journal.copies.copying import copy
 
     target.touch(mode=0o600)
     if source.startswith("sqlite:"):

@@ -19,7 +19,11 @@ import msgspec
 from action_assistant.commands.backups.progress import Progress
 from action_assistant.errors import CannotStart
 from action_assistant.journal.database import Branch
-from action_assistant.version import VERSION
+from action_assistant.journal.migrate import revisions_of
+from action_assistant.journal.program_version import ProgramVersion
+from action_assistant.private_files import sync
+from action_assistant.schema.branches import BRANCHES
+from action_assistant.version import VERSION, commit, described
 
 FORMAT: Final = 2
 FILES: Final = "files"
@@ -51,12 +55,15 @@ class BackupPart(msgspec.Struct, frozen=True):
 
 class BackupManifest(msgspec.Struct, frozen=True, kw_only=True):
     """What a backup says of itself. `database`: where the graphs were, without a password; None in
-    the data folder. `settings`: of the environment, without the token. `missing`: sentences."""
+    the data folder. `commit`: of the version, None when not known; `schemas`: revisions of the tables.
+    `settings`: of the environment, without the token. `missing`: sentences."""
 
     format: int
     version: str
     made_at: float
     journals: dict[Branch, JournalCopy]
+    commit: str | None = None
+    schemas: dict[str, str] = {}
     files: dict[str, BackupPart] = {}
     database: str | None = None
     settings: dict[str, str] = {}
@@ -163,8 +170,19 @@ class Package:
         except (zipfile.BadZipFile, msgspec.DecodeError, zlib.error, EOFError) as error:
             raise self._no_backup(error) from error
         if about.format > FORMAT:
-            raise CannotStart(f"{self._source} was made by a newer version, {about.version}.")
+            raise self._newer(about, f"format {about.format}", f"{FORMAT}")
+        for branch, schema in about.schemas.items():
+            ours = revisions_of(branch)
+            if schema not in ours:
+                raise self._newer(about, f"schema {schema}", ours[-1])
         return about
+
+    def _newer(self, about: BackupManifest, what: str, known: str) -> CannotStart:
+        made = ProgramVersion(about.version, about.commit or "", "")
+        return CannotStart(
+            f"{self._source} was made by a newer version, {made} ({what}); this is version "
+            f"{described()}, which knows up to {known}. Restore it by version {about.version} or newer."
+        )
 
     def _parts(self) -> dict[str, tuple[zipfile.ZipInfo, str]]:
         """Every file that belongs to it, as it lies in the zip, and its SHA-256."""
@@ -207,16 +225,13 @@ class Package:
 
 def about_now(**fields: object) -> BackupManifest:
     """What this version says."""
-    return msgspec.convert({"format": FORMAT, "version": VERSION, **fields}, type=BackupManifest)
-
-
-def sync(path: Path) -> None:
-    """What was written or renamed has to be found after a power cut, too."""
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+    own = {
+        "format": FORMAT,
+        "version": VERSION,
+        "commit": commit(),
+        "schemas": {branch: revisions_of(branch)[-1] for branch in BRANCHES},
+    }
+    return msgspec.convert({**own, **fields}, type=BackupManifest)
 
 
 def sha256_of(path: Path) -> str:

@@ -9,9 +9,7 @@ import argparse
 import asyncio
 import os
 import shutil
-import time
 from contextlib import ExitStack
-from itertools import count
 from pathlib import Path
 from typing import Final
 
@@ -24,13 +22,12 @@ from action_assistant.commands.backups.backup_file import (
     BackupManifest,
     Package,
     sha256_of,
-    sync,
 )
 from action_assistant.commands.backups.data_folder import (
-    ASIDE,
     BRANCHES,
     MERGED,
     WHOLE,
+    aside_folder,
     checked,
     fold_of,
     left_out,
@@ -41,6 +38,7 @@ from action_assistant.commands.backups.progress import Progress
 from action_assistant.errors import CannotStart
 from action_assistant.journal.database import Branch, cause_of
 from action_assistant.journal.databases import database_of
+from action_assistant.private_files import sync
 from action_assistant.schema.editor_tables import editor_event
 from action_assistant.web.auth.keys import TOKEN_FILE
 
@@ -136,7 +134,7 @@ def _put(
     old = [f"{branch}.db" for branch in about.journals if branch == "runner" or is_own]
     aside: Path | None = None
     if any((data / name).exists() for name in old):
-        aside = _aside(data)
+        aside = aside_folder(data)
     kept = [name for name in about.files if not _placed(folder, name, data)]
     for name in old:
         _exchange(folder / name, data / name, aside)
@@ -159,7 +157,7 @@ def _begin(
 ) -> None:
     """Mark the folder; and bring the graphs into a database `elsewhere`, where one transaction does
     it. Raises CannotStart, and then the folder is as before."""
-    from action_assistant.journal.copying import copy
+    from action_assistant.journal.copies.copying import copy
 
     before = _under(mark)
     if elsewhere and before is not None and _is_there(url, before, about):
@@ -177,19 +175,6 @@ def _begin(
         else:
             _write(mark, before)
         raise
-
-
-def _aside(data: Path) -> Path:
-    """A new folder for what was there before."""
-    name = time.strftime(f"{ASIDE}%Y%m%d-%H%M%S")
-    for number in count(1):
-        path = data / (name if number == 1 else f"{name}-{number}")
-        try:
-            path.mkdir(mode=0o700)
-        except FileExistsError:
-            continue
-        return path
-    raise AssertionError
 
 
 def _under(mark: Path) -> Under | None:

@@ -15,6 +15,7 @@ from action_assistant.editor.rooms.rate_limits import ByteRateLimits
 from action_assistant.editor.rooms.room import Room
 from action_assistant.editor.services import EditorState
 from action_assistant.errors import Refused
+from action_assistant.logs.context import about
 from action_assistant.web.auth.access import person_of, plain, refuse
 from action_assistant.web.auth.roles import allowed
 
@@ -47,7 +48,9 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
                     with services.colours.held(person.id) as colour:
                         member = Member(person, edits=edits, acks=acks, colour=colour)
                         member.post_epoch(services.epoch)
-                        await _converse(socket, found, member, services.rate_limits)
+                        with about("graph", graph_id):
+                            code = await _converse(socket, found, member, services.rate_limits)
+                        services.rooms.metrics.closed[code] += 1
         except Refused as refused:
             await _refuse(socket, refused)
 
@@ -76,10 +79,8 @@ async def _part(socket: Socket, epoch: str) -> None:
         await socket.close(messages.OTHER_EPOCH, messages.REASONS[messages.OTHER_EPOCH])
 
 
-async def _converse(
-    socket: Socket, room: Room, member: Member, rate_limits: ByteRateLimits
-) -> None:
-    """Until one side ends it."""
+async def _converse(socket: Socket, room: Room, member: Member, rate_limits: ByteRateLimits) -> int:
+    """Until one side ends it; the close code."""
     receive, send = plain(socket)
     room.join(member)
     # Two plain tasks: a thousand idle sockets are a thousand times what stands around each.
@@ -102,6 +103,7 @@ async def _converse(
     if code != _NORMAL:
         with anyio.move_on_after(_GOODBYE):
             await socket.close(code, member.said or messages.REASONS.get(code))
+    return code
 
 
 async def _listen(

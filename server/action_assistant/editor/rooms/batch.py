@@ -1,6 +1,7 @@
 """What enters a room, and the outcome of a batch of it."""
 
 import asyncio
+import time
 from collections.abc import Callable, Sequence
 from typing import Any, Final, TypeAlias
 
@@ -27,12 +28,14 @@ _MERGED_BYTES: Final = 128 * 1024
 
 
 class Offer(msgspec.Struct, frozen=True):
-    """An edit on its way in: from a socket, or from the server itself (`done` is told)."""
+    """An edit on its way in: from a socket, or from the server itself (`done` is told). `at`: when it
+    came, by the clock of performance counters."""
 
     update: bytes
     author: str
     member: Member | None = None
     done: "asyncio.Future[int] | None" = None
+    at: float = msgspec.field(default_factory=time.perf_counter)
 
 
 class Ask(msgspec.Struct, frozen=True):
@@ -95,6 +98,18 @@ Objection: TypeAlias = (
     | NotAllowed
     | TooSlow
     | NotNow
+)
+
+#: All of them, to be caught.
+OBJECTIONS: Final = (
+    Malformed,
+    ForeignClient,
+    QuotaExceeded,
+    TooMuchWaits,
+    Panicked,
+    NotAllowed,
+    TooSlow,
+    NotNow,
 )
 
 

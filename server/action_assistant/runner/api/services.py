@@ -1,6 +1,6 @@
 """What the routes of the runner work on."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
 from weakref import WeakKeyDictionary
@@ -16,7 +16,7 @@ from action_assistant.runner.review.worker_queries import WorkerQueries
 from action_assistant.runner.runs.sent_views import Sent
 from action_assistant.runner.start.index_writer import IndexWriter
 from action_assistant.web.network.connection_limits import ConcurrencyLimit, ConnectionLimits
-from action_assistant.web.workers.lanes import RunInWorker
+from action_assistant.web.workers.lanes import Lane, RunInWorker
 
 _BODIES: Final = 4  # large ones of a person at a time
 
@@ -33,6 +33,7 @@ class RunnerServices:
     retention: Retention
     body_limit: ConcurrencyLimit
     run_in_worker: RunInWorker
+    lanes: Sequence[Lane]
     behaviours: BehaviourFolder | None
     index_folders: Mapping[str, Path]
     index_writer: IndexWriter

@@ -117,10 +117,11 @@ def _entered(top: int, path: str) -> Iterator[int]:
         os.close(found)
 
 
-def _mode(folder: int, path: str) -> int | None:
-    """The permissions of the file that is replaced. Raises OSError, _Changed."""
+def _mode(folder: int, path: str) -> int:
+    """The permissions of the file that is replaced; of a new one those of its folder, which the engine
+    reads, whatever this process keeps to itself. Raises OSError, _Changed."""
     if not path:
-        return None
+        return os.fstat(folder).st_mode & 0o666
     try:
         found = os.stat(_base(path), dir_fd=folder, follow_symlinks=False)
     except FileNotFoundError as gone:
@@ -129,17 +130,16 @@ def _mode(folder: int, path: str) -> int | None:
 
 
 @contextmanager
-def _fresh(folder: int, text: bytes, mode: int | None) -> Iterator[str]:
+def _fresh(folder: int, text: bytes, mode: int) -> Iterator[str]:
     """A file with this text, on the disk, under a name that is gone afterwards. Raises OSError."""
     name = f".action-assistant-{secrets.token_hex(8)}.new"
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
-    opened = os.open(name, flags, 0o666, dir_fd=folder)  # the engine's user reads it: as umask says
+    opened = os.open(name, flags, 0o600, dir_fd=folder)
     try:
         with os.fdopen(opened, "wb") as file:
             file.write(text)
             file.flush()
-            if mode is not None:
-                os.fchmod(file.fileno(), mode)
+            os.fchmod(file.fileno(), mode)
             os.fsync(file.fileno())
         yield name
     finally:

@@ -215,6 +215,11 @@ class RobotLog:
         await appender.find_end()
         await appender.run()
 
+    @property
+    def waiting(self) -> int:
+        """How much is not stored."""
+        return sum(each.waiting for each in self._pens.values())
+
     async def newest(self, robot: str, most: int) -> list[tuple[int, RobotEvent]]:
         """The newest events of a robot, oldest first, with their seqs. Raises Unavailable."""
         stream = stream_of_robot(robot)

@@ -60,10 +60,12 @@ class _Inner:
 @dataclass(frozen=True)
 class Resolution:
     """How names were resolved to graphs. `several`: names of more than one graph, of which the oldest
-    was taken; `cut`: there are more graphs inside than were looked at."""
+    was taken; `cut`: there are more graphs inside than were looked at; `hidden`: names of a graph that an
+    action of the library has, too."""
 
     several: Container[str] = frozenset()
     cut: bool = False
+    hidden: Container[str] = frozenset()
 
 
 #: Each name is that of one graph, and all were looked at.
@@ -82,6 +84,10 @@ class _Graphs:
 
     def of(self, name: str) -> Graph | None:
         return None if name in self.known else self.by_name.get(name)
+
+    def is_hidden(self, name: str) -> bool:
+        """Whether an action comes before a graph of that name."""
+        return name in self.resolution.hidden or (name in self.known and name in self.by_name)
 
     def recurs(self, name: str, within: str) -> bool:
         """Whether the graph of an action of that name contains itself, or the graph that it is in.
@@ -148,6 +154,12 @@ def _check_each(subject: Subject, within: str, graphs: _Graphs) -> None:
     for action in subject.real:
         graph = graphs.of(action.name)
         if graph is None:
+            if action.name != within and graphs.is_hidden(action.name):
+                message = (
+                    f"“{action.name}” is an action of the library and a graph, too: the action is taken, "
+                    "never the graph. Rename one of them where the graph is meant."
+                )
+                subject.report("subgraph-hidden", "warning", message, action=action, member="/name")
             continue
         if action.name in graphs.resolution.several:
             message = (

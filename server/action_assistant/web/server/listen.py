@@ -20,8 +20,9 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from action_assistant.errors import BadInput, CannotStart
 from action_assistant.public_url import Network
+from action_assistant.system import limits
 from action_assistant.web.auth.access import KNOWN
-from action_assistant.web.network.connections import Connections, raise_limit
+from action_assistant.web.network.connections import Connections
 from action_assistant.web.server.proxy import ASKED, Forwarded
 from action_assistant.web.server.sockets import bound
 
@@ -71,7 +72,7 @@ def serve(
             listener.close()
         raise
     forwarded = Forwarded(endings, proxies)
-    connections = Connections(raise_limit(), forwarded.is_proxy)
+    connections = Connections(limits.raise_descriptors(), forwarded.is_proxy)
     app = ActivityTracker(forwarded, connections)
     config = _configured(app, identity)
     logging.getLogger("uvicorn.error").addFilter(_in_one_line)
