@@ -2,7 +2,7 @@
 
 import os
 import sys
-from collections.abc import Mapping, MutableMapping
+from collections.abc import Mapping, MutableMapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -34,6 +34,8 @@ VARIABLES: Final[Mapping[str, str]] = {
     "ACTION_ASSISTANT_KEEP_RAW": "days after which raw messages of robots go into archives; without "
     "it they are deleted after 7 days or beyond 500 MB",
     "ACTION_ASSISTANT_ARCHIVE": "the folder of archives (`archive` in the data folder)",
+    "ACTION_ASSISTANT_INDEX_FOLDERS": "folders that robots index and the runner may write graphs into, as "
+    f"--index-folder, separated by `{os.pathsep}`",
     "ACTION_ASSISTANT_LOG_FORMAT": "`json` for programs, `console` for people, as --log-format",
     "ACTION_ASSISTANT_LOG_LEVEL": "`debug`, `info`, `warning` or `error`, as --log-level",
     "ACTION_ASSISTANT_METRICS_TOKEN": "a token that opens /metrics and nothing else",
@@ -45,6 +47,7 @@ VARIABLES: Final[Mapping[str, str]] = {
     "ACTION_ASSISTANT_BACKUP_AFTER": "the command that takes a finished one elsewhere, as --backup-after",
     "ACTION_ASSISTANT_LIMITS": "`off` lifts rate and socket limits, for load tests",
 }
+INDEX_FOLDERS: Final = "ACTION_ASSISTANT_INDEX_FOLDERS"
 #: Where a secret may be that stands in a file, and which variable it is then.
 _FILES: Final[Mapping[str, str]] = {
     "ACTION_ASSISTANT_TOKEN_FILE": "ACTION_ASSISTANT_TOKEN",
@@ -99,7 +102,8 @@ class Keep(msgspec.Struct, frozen=True, kw_only=True):
 
 class RunnerSettings(msgspec.Struct, frozen=True, kw_only=True):
     """How the runner runs. `page_port` is the port of the page that may talk to it, `behaviours` the
-    folder of Python files that simulated actions may be run with."""
+    folder of Python files that simulated actions may be run with, `index_folders` those that robots
+    index, by their names."""
 
     data: Path
     host: str = "127.0.0.1"
@@ -112,6 +116,7 @@ class RunnerSettings(msgspec.Struct, frozen=True, kw_only=True):
     keep: Keep | None = None
     reached: Reachability = Reachability()
     behaviours: Path | None = None
+    index_folders: Mapping[str, Path] = {}
     metrics_token: str | None = None
 
 
@@ -256,6 +261,28 @@ def _days(name: str, environ: Mapping[str, str]) -> float | None:
     if not 0 <= days < 1e6:
         raise CannotStart(f"{name} is a number of days, not {text!r}.")
     return days
+
+
+def index_folders(
+    given: Sequence[str] = (), environ: Mapping[str, str] = os.environ
+) -> dict[str, Path]:
+    """The folders that robots index, each as ROBOT=DIR: what the command line says, else the
+    environment. Raises CannotStart."""
+    written = given or environ.get(INDEX_FOLDERS, "").split(os.pathsep)
+    found: dict[str, Path] = {}
+    for each in filter(str.strip, written):
+        robot, sign, folder = (part.strip() for part in each.partition("="))
+        if not (robot and sign and folder) or os.pathsep in folder:
+            raise CannotStart(f"A folder that a robot indexes is written ROBOT=DIR, not {each!r}.")
+        if robot in found:
+            raise CannotStart(f"Two folders are named for {robot}: an engine indexes one.")
+        found[robot] = Path(folder).expanduser().absolute()
+    return found
+
+
+def as_index_folders(folders: Mapping[str, Path]) -> str:
+    """The same as the environment has it."""
+    return os.pathsep.join(f"{robot}={folder}" for robot, folder in folders.items())
 
 
 def more_hosts(environ: Mapping[str, str] = os.environ) -> tuple[str, ...]:

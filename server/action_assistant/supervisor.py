@@ -17,7 +17,13 @@ import msgspec
 from action_assistant.interpreter import Interpreter, for_runner
 from action_assistant.logs.setup import say, writes_json
 from action_assistant.private_files import opener
-from action_assistant.settings import EVERYWHERE, Reachability, more_hosts
+from action_assistant.settings import (
+    EVERYWHERE,
+    INDEX_FOLDERS,
+    Reachability,
+    as_index_folders,
+    more_hosts,
+)
 from action_assistant.share_links import invitations_as_text, is_ours
 from action_assistant.web.auth.keys import Keys
 from action_assistant.web.network.addresses import addresses_of
@@ -53,6 +59,7 @@ class ServePlan(msgspec.Struct, frozen=True, kw_only=True):
     reached: Reachability = Reachability()
     behaviours: Path | None = None
     backups: BackupPlan | None = None
+    index_folders: Mapping[str, Path] = {}
 
 
 class EndSignal:
@@ -208,7 +215,7 @@ def _children(plan: ServePlan) -> list[Child]:
             ["runner", *address, *behaviours, "--port", ports[1], "--page-port", ports[0]],
             plan.port + 1,
             speaking,
-            settings,
+            {**settings, INDEX_FOLDERS: as_index_folders(plan.index_folders)},
         ),
     ]
 

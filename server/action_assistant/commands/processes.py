@@ -29,6 +29,7 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
     _sharing(parser)
     _behaviours(parser)
     _backups(parser)
+    _index_folders(parser)
     _logging(parser)
 
 
@@ -49,6 +50,7 @@ def _add_runner(runner: argparse.ArgumentParser) -> None:
     _address(runner, port=settings.port() + 1)
     _sharing(runner)
     _behaviours(runner)
+    _index_folders(runner)
     _logging(runner)
     runner.add_argument(
         "--page-port", type=port_number, metavar="N", help="default: the port before"
@@ -155,6 +157,17 @@ def _behaviours(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _index_folders(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--index-folder",
+        action="append",
+        default=[],
+        metavar="ROBOT=DIR",
+        help="the --actions-path of that robot's engine, where it is on this computer, too: operators may "
+        "have graphs written into it. May be given several times",
+    )
+
+
 def _logging(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--log-format", choices=FORMS, help="how lines of the log look; default: console"
@@ -243,6 +256,7 @@ def _serve(options: argparse.Namespace) -> int:
             tls=options.tls,
             reached=reached(options),
             behaviours=options.behaviours,
+            index_folders=settings.index_folders(options.index_folder),
             opens=not options.no_open,
             backups=_backup_plan(options),
         )
@@ -299,6 +313,7 @@ def _runner(options: argparse.Namespace) -> int:
         keep=settings.keep(data),
         reached=reached(options),
         behaviours=options.behaviours,
+        index_folders=settings.index_folders(options.index_folder),
         metrics_token=settings.metrics_token(),
     )
     listen(

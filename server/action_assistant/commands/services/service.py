@@ -196,6 +196,8 @@ def _plan(options: argparse.Namespace, systemd: Systemd) -> ServicePlan:
         if value is not None:
             shown = value.absolute() if isinstance(value, Path) else value
             words += [f"--{name.replace('_', '-')}", str(shown)]
+    for robot, folder in settings.index_folders(options.index_folder, {}).items():
+        words += ["--index-folder", f"{robot}={folder}"]
     words += [f"--{name}" for name in _FLAGS if getattr(options, name)]
     user = _user(options) if options.scope == "system" else ""
     data = _data(options)
@@ -209,7 +211,7 @@ def _plan(options: argparse.Namespace, systemd: Systemd) -> ServicePlan:
         user=user,
         environment=_sourced(os.environ),
         settings=systemd.settings,
-        writes=_archive(),
+        writes=(*_archive(), *settings.index_folders(options.index_folder).values()),
     )
 
 
