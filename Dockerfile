@@ -15,6 +15,16 @@ RUN npm ci --no-audit --no-fund
 COPY frontend ./
 RUN npm run build
 
+FROM python:3.12.11-slim-bookworm AS help
+WORKDIR /source
+COPY requirements ./requirements
+COPY scripts ./scripts
+COPY README.md CONTRIBUTING.md CHANGELOG.md ./
+COPY frontend/public ./frontend/public
+COPY frontend/src/api/schema ./frontend/src/api/schema
+COPY docs ./docs
+RUN scripts/image help /out
+
 FROM python:3.12.11-slim-bookworm AS wheel
 WORKDIR /source
 COPY pyproject.toml README.md LICENSE ./
@@ -23,6 +33,7 @@ COPY scripts ./scripts
 COPY migrations ./migrations
 COPY server ./server
 COPY --from=page /source/frontend/dist ./frontend/dist
+COPY --from=help /out ./build/help
 RUN scripts/image wheel /out
 
 FROM python:3.12.11-slim-bookworm AS editor-environment

@@ -118,6 +118,7 @@ def create_app(settings: EditorSettings) -> ASGIApp:
         ready=ready,
         measures=lambda: _measures(app_state.services),
         page=paths.page(),
+        help_site=paths.help_site(),
         runner_port=settings.runner_port,
         mount=settings.reached.public.path if settings.reached.public is not None else "",
         body_limit=SMALL,
