@@ -23,7 +23,7 @@ from action_assistant.editor.crdt.replica import (
     UpdateEffect,
 )
 from action_assistant.editor.crdt.trial import TooSlow
-from action_assistant.editor.crdt.update_scan import UpdateOutline
+from action_assistant.editor.crdt.update_outline import UpdateOutline
 from action_assistant.editor.log.graph_events import DEFERRED, UPDATED
 from action_assistant.editor.rooms.batch import (
     Ask,
