@@ -28,6 +28,8 @@ VARIABLES: Final[Mapping[str, str]] = {
     "it they are deleted after 7 days or beyond 500 MB",
     "ACTION_ASSISTANT_ARCHIVE": "the folder of archives (`archive` in the data folder)",
     "ACTION_ASSISTANT_LIMITS": "`off` lifts rate and socket limits, for load tests",
+    "ACTION_ASSISTANT_SOCKETS": "`asgi` has the messages of rooms go the long way through ASGI, should the "
+    "direct one fail",
 }
 #: The folder of archives, inside the data folder.
 ARCHIVE: Final = "archive"
@@ -131,6 +133,14 @@ def _has_password(url: str) -> bool:
 def limits(environ: Mapping[str, str] = os.environ) -> bool:
     """Whether rate and socket limits hold."""
     return environ.get("ACTION_ASSISTANT_LIMITS", "").lower() != "off"
+
+
+def direct_sockets(environ: Mapping[str, str] = os.environ) -> bool:
+    """Whether rooms take their sockets over from the server below. Raises CannotStart."""
+    way = environ.get("ACTION_ASSISTANT_SOCKETS", "").strip().lower()
+    if way not in {"", "direct", "asgi"}:
+        raise CannotStart(f"ACTION_ASSISTANT_SOCKETS is direct or asgi, not {way!r}.")
+    return way != "asgi"
 
 
 def keep(data: Path, environ: Mapping[str, str] = os.environ) -> Keep:
