@@ -46,6 +46,8 @@ VARIABLES: Final[Mapping[str, str]] = {
     "ACTION_ASSISTANT_BACKUP_KEEP": "how many stay (7d,4w,6m), as --backup-keep",
     "ACTION_ASSISTANT_BACKUP_AFTER": "the command that takes a finished one elsewhere, as --backup-after",
     "ACTION_ASSISTANT_LIMITS": "`off` lifts rate and socket limits, for load tests",
+    "ACTION_ASSISTANT_SOCKETS": "`asgi` has the messages of rooms go the long way through ASGI, should the "
+    "direct one fail",
 }
 INDEX_FOLDERS: Final = "ACTION_ASSISTANT_INDEX_FOLDERS"
 #: Where a secret may be that stands in a file, and which variable it is then.
@@ -239,6 +241,14 @@ def backup_rule(name: str, environ: Mapping[str, str] = os.environ) -> str | Non
 def limits(environ: Mapping[str, str] = os.environ) -> bool:
     """Whether rate and socket limits hold."""
     return environ.get("ACTION_ASSISTANT_LIMITS", "").lower() != "off"
+
+
+def direct_sockets(environ: Mapping[str, str] = os.environ) -> bool:
+    """Whether rooms take their sockets over from the server below. Raises CannotStart."""
+    way = environ.get("ACTION_ASSISTANT_SOCKETS", "").strip().lower()
+    if way not in {"", "direct", "asgi"}:
+        raise CannotStart(f"ACTION_ASSISTANT_SOCKETS is direct or asgi, not {way!r}.")
+    return way != "asgi"
 
 
 def keep(data: Path, environ: Mapping[str, str] = os.environ) -> Keep:

@@ -290,6 +290,7 @@ def _editor(options: argparse.Namespace) -> int:
         port=chosen.port,
         proxies=chosen.reached.proxies,
         identity=_identity(chosen, chosen.port),
+        direct=settings.direct_sockets(),
     )
     return 0
 
