@@ -16,6 +16,7 @@ from action_assistant.safe_text import make_streams_printable
 from action_assistant.settings import (
     check_environment,
     hide_password,
+    hide_target_password,
     take_secrets_from_files,
 )
 
@@ -123,6 +124,11 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
         "put a backup in the place of what is there; open pages notice and ask",
         posix=True,
     ),
+    "move": CommandEntry(
+        "databases.move",
+        "take the graphs of a data folder to Postgres, or back; the runs stay where they are",
+        posix=True,
+    ),
     "doctor": CommandEntry(
         "doctor.doctor",
         "look what is wrong: ROS 2, robots, folders, databases, ports, the page",
@@ -212,6 +218,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     make_streams_printable()
     if arguments is None:
         hide_password()
+        hide_target_password()
     words = _with_ids_last(sys.argv[1:] if arguments is None else arguments)
     try:
         if words and words[0] in COMMANDS:

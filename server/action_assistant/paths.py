@@ -32,6 +32,11 @@ def checkout() -> Path | None:
     return _CHECKOUT if (_CHECKOUT / "pyproject.toml").is_file() else None
 
 
+def help_site() -> Path:
+    """The built documentation; the folder is missing when nobody has built it."""
+    return _carried("help", _CHECKOUT / "build" / "help")
+
+
 def wheels() -> Path | None:
     """The environment that `make ros` makes in a checkout; None outside of one."""
     return _CHECKOUT / ".venv-ros" if checkout() is not None else None

@@ -2,7 +2,7 @@
 
 import os
 import sys
-from collections.abc import Mapping, MutableMapping
+from collections.abc import Mapping, MutableMapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -34,16 +34,27 @@ VARIABLES: Final[Mapping[str, str]] = {
     "ACTION_ASSISTANT_KEEP_RAW": "days after which raw messages of robots go into archives; without "
     "it they are deleted after 7 days or beyond 500 MB",
     "ACTION_ASSISTANT_ARCHIVE": "the folder of archives (`archive` in the data folder)",
+    "ACTION_ASSISTANT_INDEX_FOLDERS": "folders that robots index and the runner may write graphs into, as "
+    f"--index-folder, separated by `{os.pathsep}`",
     "ACTION_ASSISTANT_LOG_FORMAT": "`json` for programs, `console` for people, as --log-format",
     "ACTION_ASSISTANT_LOG_LEVEL": "`debug`, `info`, `warning` or `error`, as --log-level",
     "ACTION_ASSISTANT_METRICS_TOKEN": "a token that opens /metrics and nothing else",
-    "ACTION_ASSISTANT_METRICS_TOKEN_FILE": "the file that has it",
+    "ACTION_ASSISTANT_METRICS_TOKEN_FILE": "a file with that token",
+    "ACTION_ASSISTANT_BACKUP_TO": "the folder of regular backups, as --backup-to of serve and --into of "
+    "backup",
+    "ACTION_ASSISTANT_BACKUP_EVERY": "how often `serve` makes one (24h), as --backup-every",
+    "ACTION_ASSISTANT_BACKUP_KEEP": "how many stay (7d,4w,6m), as --backup-keep",
+    "ACTION_ASSISTANT_BACKUP_AFTER": "the command that takes a finished one elsewhere, as --backup-after",
     "ACTION_ASSISTANT_LIMITS": "`off` lifts rate and socket limits, for load tests",
+    "ACTION_ASSISTANT_SOCKETS": "`asgi` has the messages of rooms go the long way through ASGI, should the "
+    "direct one fail",
 }
+INDEX_FOLDERS: Final = "ACTION_ASSISTANT_INDEX_FOLDERS"
 #: Where a secret may be that stands in a file, and which variable it is then.
 _FILES: Final[Mapping[str, str]] = {
     "ACTION_ASSISTANT_TOKEN_FILE": "ACTION_ASSISTANT_TOKEN",
     "ACTION_ASSISTANT_DATABASE_FILE": "ACTION_ASSISTANT_DATABASE",
+    "ACTION_ASSISTANT_METRICS_TOKEN_FILE": "ACTION_ASSISTANT_METRICS_TOKEN",
     "ACTION_ASSISTANT_DATABASE_PASSWORD_FILE": "PGPASSWORD",
 }
 _SECRET: Final = 65_536  # characters of such a file
@@ -93,7 +104,8 @@ class Keep(msgspec.Struct, frozen=True, kw_only=True):
 
 class RunnerSettings(msgspec.Struct, frozen=True, kw_only=True):
     """How the runner runs. `page_port` is the port of the page that may talk to it, `behaviours` the
-    folder of Python files that simulated actions may be run with."""
+    folder of Python files that simulated actions may be run with, `index_folders` those that robots
+    index, by their names."""
 
     data: Path
     host: str = "127.0.0.1"
@@ -106,6 +118,7 @@ class RunnerSettings(msgspec.Struct, frozen=True, kw_only=True):
     keep: Keep | None = None
     reached: Reachability = Reachability()
     behaviours: Path | None = None
+    index_folders: Mapping[str, Path] = {}
     metrics_token: str | None = None
 
 
@@ -179,6 +192,26 @@ def hide_password() -> None:
             os.execv(sys.executable, [sys.orig_argv[0], *rest])
 
 
+def hide_target_password() -> None:
+    """The same for what `move --to` and `runs copy --to` say: the driver finds the password in the
+    environment."""
+    for at, word in enumerate(sys.orig_argv):
+        name, sign, url = word.partition("=")
+        if not sign:
+            url = next(iter(sys.orig_argv[at + 1 : at + 2]), "")
+        if name == "--to" and "://" in url and _has_password(url):
+            from sqlalchemy import make_url
+
+            parsed = make_url(url)
+            if parsed.password is None:
+                return
+            os.environ["PGPASSWORD"] = str(parsed.password)
+            plain = parsed._replace(password=None).render_as_string()
+            rest = [*sys.orig_argv[1:at], "--to", plain, *sys.orig_argv[at + (1 if sign else 2) :]]
+            sys.stderr.flush()
+            os.execv(sys.executable, [sys.orig_argv[0], *rest])
+
+
 def _is_database(name: str) -> bool:
     """Also as far as argparse takes it for that; `--data` is an option of its own."""
     return len(name) > len("--data") and "--database".startswith(name)
@@ -192,26 +225,30 @@ def _has_password(url: str) -> bool:
 def metrics_token(environ: Mapping[str, str] = os.environ) -> str | None:
     """What opens /metrics and nothing else, if there is such a token. Raises CannotStart."""
     name = "ACTION_ASSISTANT_METRICS_TOKEN"
-    token, file = environ.get(name, ""), environ.get(f"{name}_FILE", "")
-    if token and file:
-        raise CannotStart(f"{name} and {name}_FILE are both set: say it once.")
-    if file:
-        try:
-            token = Path(file).read_text(encoding="utf-8").strip()
-        except (OSError, UnicodeDecodeError) as error:
-            why = error.strerror if isinstance(error, OSError) else "it is no text"
-            raise CannotStart(f"{name}_FILE: {file} cannot be read ({why}).") from error
-    if (token or file) and len(token) < _MIN_TOKEN:
+    token = environ.get(name, "").strip()
+    if token and len(token) < _MIN_TOKEN:
         raise CannotStart(
-            f"{name}{'_FILE' if file else ''}: a token has at least {_MIN_TOKEN} characters, this one "
-            f"has {len(token)}."
+            f"{name} has {len(token)} characters; a token must have at least {_MIN_TOKEN}."
         )
     return token or None
+
+
+def backup_rule(name: str, environ: Mapping[str, str] = os.environ) -> str | None:
+    """What the environment says of backups: TO, EVERY, KEEP or AFTER."""
+    return environ.get(f"ACTION_ASSISTANT_BACKUP_{name}", "").strip() or None
 
 
 def limits(environ: Mapping[str, str] = os.environ) -> bool:
     """Whether rate and socket limits hold."""
     return environ.get("ACTION_ASSISTANT_LIMITS", "").lower() != "off"
+
+
+def direct_sockets(environ: Mapping[str, str] = os.environ) -> bool:
+    """Whether rooms take their sockets over from the server below. Raises CannotStart."""
+    way = environ.get("ACTION_ASSISTANT_SOCKETS", "").strip().lower()
+    if way not in {"", "direct", "asgi"}:
+        raise CannotStart(f"ACTION_ASSISTANT_SOCKETS is direct or asgi, not {way!r}.")
+    return way != "asgi"
 
 
 def keep(data: Path, environ: Mapping[str, str] = os.environ) -> Keep:
@@ -234,6 +271,28 @@ def _days(name: str, environ: Mapping[str, str]) -> float | None:
     if not 0 <= days < 1e6:
         raise CannotStart(f"{name} is a number of days, not {text!r}.")
     return days
+
+
+def index_folders(
+    given: Sequence[str] = (), environ: Mapping[str, str] = os.environ
+) -> dict[str, Path]:
+    """The folders that robots index, each as ROBOT=DIR: what the command line says, else the
+    environment. Raises CannotStart."""
+    written = given or environ.get(INDEX_FOLDERS, "").split(os.pathsep)
+    found: dict[str, Path] = {}
+    for each in filter(str.strip, written):
+        robot, sign, folder = (part.strip() for part in each.partition("="))
+        if not (robot and sign and folder) or os.pathsep in folder:
+            raise CannotStart(f"A folder that a robot indexes is written ROBOT=DIR, not {each!r}.")
+        if robot in found:
+            raise CannotStart(f"Two folders are named for {robot}: an engine indexes one.")
+        found[robot] = Path(folder).expanduser().absolute()
+    return found
+
+
+def as_index_folders(folders: Mapping[str, Path]) -> str:
+    """The same as the environment has it."""
+    return os.pathsep.join(f"{robot}={folder}" for robot, folder in folders.items())
 
 
 def more_hosts(environ: Mapping[str, str] = os.environ) -> tuple[str, ...]:

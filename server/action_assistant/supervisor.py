@@ -17,7 +17,13 @@ import msgspec
 from action_assistant.interpreter import Interpreter, for_runner
 from action_assistant.logs.setup import say, writes_json
 from action_assistant.private_files import opener
-from action_assistant.settings import EVERYWHERE, Reachability, more_hosts
+from action_assistant.settings import (
+    EVERYWHERE,
+    INDEX_FOLDERS,
+    Reachability,
+    as_index_folders,
+    more_hosts,
+)
 from action_assistant.share_links import invitations_as_text, is_ours
 from action_assistant.web.auth.keys import Keys
 from action_assistant.web.network.addresses import addresses_of
@@ -28,6 +34,15 @@ _STEADY: Final = 30.0  # seconds after which a process counts as healthy again
 _BACK_OFF: Final = (0.2, 0.5, 1.0, 2.0, 5.0, 10.0)  # seconds before the n-th restart in a row
 _TICK: Final = 0.1
 _ENDING: Final = 8.0  # seconds that a process gets to end by itself
+
+
+class BackupPlan(msgspec.Struct, frozen=True):
+    """Backups into a folder, every so many seconds; `keep` and `after` as `backup` takes them."""
+
+    into: Path
+    every: float
+    keep: str
+    after: str | None
 
 
 class ServePlan(msgspec.Struct, frozen=True, kw_only=True):
@@ -43,6 +58,8 @@ class ServePlan(msgspec.Struct, frozen=True, kw_only=True):
     opens: bool
     reached: Reachability = Reachability()
     behaviours: Path | None = None
+    backups: BackupPlan | None = None
+    index_folders: Mapping[str, Path] = {}
 
 
 class EndSignal:
@@ -69,7 +86,7 @@ class EndSignal:
 
 
 class Child:
-    """One of the two processes, as often as it takes."""
+    """One of the processes, as often as it takes."""
 
     def __init__(
         self,
@@ -149,6 +166,7 @@ def serve(plan: ServePlan) -> int:
     # The writing end is never written to: it closes when this process dies, however it dies.
     reading, _writing = os.pipe()
     children = _children(plan)
+    keeper = _keeper(plan)
     say("starting …")
     for child in children:
         child.start(reading)
@@ -161,10 +179,13 @@ def serve(plan: ServePlan) -> int:
                 code = child.tend(reading)
                 if code is not None:
                     return code
+            if keeper is not None and keeper.tend(reading) is not None:
+                say("no backups are made; the message above says why")
+                keeper = None
         return 0
     finally:
         say("ending …")
-        for child in children:
+        for child in [*children, *([keeper] if keeper is not None else [])]:
             child.end()
 
 
@@ -194,9 +215,23 @@ def _children(plan: ServePlan) -> list[Child]:
             ["runner", *address, *behaviours, "--port", ports[1], "--page-port", ports[0]],
             plan.port + 1,
             speaking,
-            settings,
+            {**settings, INDEX_FOLDERS: as_index_folders(plan.index_folders)},
         ),
     ]
+
+
+def _keeper(plan: ServePlan) -> Child | None:
+    """Who makes backups: a process of its own, of low priority, for which nobody waits."""
+    if plan.backups is None:
+        return None
+    keeps = plan.backups
+    into = ["--data", str(plan.data), "--into", str(keeps.into), "--keep", keeps.keep]
+    after = ["--after", keeps.after] if keeps.after is not None else []
+    database = {"ACTION_ASSISTANT_DATABASE": plan.database} if plan.database else {}
+    this = Interpreter(path=Path(sys.executable), origin="this")
+    return Child(
+        "backup", ["backup", *into, *after, "--every", f"{keeps.every:g}s"], 0, this, database
+    )
 
 
 def _as_settings(reached: Reachability) -> dict[str, str]:

@@ -3,8 +3,10 @@
 import json
 import os
 import subprocess
+from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
-from typing import Any, Final
+from typing import IO, Any, Final
 
 ROOT: Final = Path(__file__).parents[2]
 #: Images, containers and volumes; some gigabytes.
@@ -21,6 +23,8 @@ cgroup_manager = "cgroupfs"
 events_logger = "file"
 [containers]
 default_ulimits = ["nofile=4096:4096", "nproc=4096:4096"]
+[network]
+network_config_dir = "{folder}/networks"
 """
 _STORAGE: Final = """
 [storage]
@@ -30,12 +34,19 @@ runroot = "{folder}/run"
 """
 
 
-def environment() -> dict[str, str]:
-    """With which every podman here works on our folder."""
+@cache
+def _configured() -> tuple[Path, Path]:
+    """Written once: several podmans may read them at any moment."""
     FOLDER.mkdir(parents=True, exist_ok=True)
     configuration, storage = FOLDER / "containers.conf", FOLDER / "storage.conf"
-    configuration.write_text(_CONFIGURATION)
+    configuration.write_text(_CONFIGURATION.format(folder=FOLDER))
     storage.write_text(_STORAGE.format(folder=FOLDER))
+    return configuration, storage
+
+
+def environment() -> dict[str, str]:
+    """With which every podman here works on our folder."""
+    configuration, storage = _configured()
     kept = {
         name: value
         for name, value in os.environ.items()
@@ -50,18 +61,23 @@ def environment() -> dict[str, str]:
 
 
 def run(
-    *words: str | Path, check: bool = True, timeout: float = 600, cwd: Path = ROOT, **more: Any
+    *words: str | Path,
+    check: bool = True,
+    timeout: float = 600,
+    cwd: Path = ROOT,
+    more: Mapping[str, str] | None = None,
+    stdin: IO[bytes] | None = None,
 ) -> "subprocess.CompletedProcess[str]":
-    """A program with this engine. What it said is shown when it fails."""
+    """A program with this engine, and `more` settings. What it said is shown when it fails."""
     answer = subprocess.run(
         [str(word) for word in words],
-        env=environment(),
+        env=environment() | dict(more or {}),
+        stdin=stdin,
         cwd=cwd,
         capture_output=True,
         text=True,
         timeout=timeout,
         check=False,
-        **more,
     )
     if check and answer.returncode:
         said = (answer.stdout + answer.stderr)[-6000:]

@@ -41,13 +41,13 @@ class Stack:
             self._files.append("docker-compose.override.yml")
 
     def compose(
-        self, *words: str, podman_run: str = "", check: bool = True
+        self, *words: str, podman_run: str = "", **more: Any
     ) -> "subprocess.CompletedProcess[str]":
         """`docker compose …`, of all profiles."""
         files = [word for name in self._files for word in ("--file", name)]
         profiles = [word for name in PROFILES for word in ("--profile", name)]
         also = [f"--podman-run-args={podman_run}"] if podman_run else []
-        return run("podman-compose", *also, *files, *profiles, *words, cwd=self.folder, check=check)
+        return run("podman-compose", *also, *files, *profiles, *words, cwd=self.folder, **more)
 
     def up(self, *services: str) -> None:
         """Start them, and wait until they are ready."""
@@ -116,7 +116,9 @@ class Stack:
 
     def down(self, *, volumes: bool = True) -> None:
         """End it; with what it kept."""
-        self.compose("down", *(["--volumes"] if volumes else []), check=False)
+        self.compose("down", check=False)
+        if volumes:  # podman-compose leaves one that several services share
+            podman("volume", "rm", "--all", "--force")
 
 
 @contextmanager

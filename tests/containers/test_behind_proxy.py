@@ -21,7 +21,7 @@ from pycrdt import Doc, Map, Provider
 from pycrdt.websocket.websocket import HttpxWebsocket
 from websockets.sync.client import connect
 
-from containers.engine import podman
+from containers.engine import podman, run
 from containers.images import say
 from containers.stack import Stack, client, command, findings, running, state
 from editor.test_kill import Writer
@@ -34,6 +34,22 @@ GRAPH = {
     "actions": [
         {"name": "A", "type": "sync", "children": [{"name": "B"}]},
         {"name": "B", "type": "sync", "parents": [{"name": "A"}]},
+    ],
+}
+#: Long enough for hands in a browser.
+CHAIN = {
+    "graph_name": "chain",
+    "graph_entry": [{"name": "Wait", "instance_id": 0}],
+    "graph_exit": [{"name": "Wait", "instance_id": 59}],
+    "actions": [
+        {
+            "name": "Wait",
+            "instance_id": number,
+            "type": "sync",
+            "parents": [{"name": "Wait", "instance_id": number - 1}] if number > 0 else [],
+            "children": [{"name": "Wait", "instance_id": number + 1}] if number < 59 else [],
+        }
+        for number in range(60)
     ],
 }
 SLOW = {"behaviours": {"A": [{"after_s": 0.3}], "B": [{"after_s": 3}]}}
@@ -98,6 +114,11 @@ def proxied(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Proxied]:
         stack.up("robot")
         time.sleep(1)  # for the authority of the proxy
         yield Proxied(stack, tmp_path_factory.mktemp("proxy"))
+
+
+def sorted_by_id(things: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """In an order that no change of a moment makes another one."""
+    return sorted(things, key=lambda each: str(each["id"]))
 
 
 def until(true: Callable[[], Any], seconds: float = 60) -> Any:
@@ -193,6 +214,21 @@ def test_stop_is_proven_whichever_way_it_comes(proxied: Proxied, way: str) -> No
         assert found["proof_at"]
 
 
+def test_a_browser_does_the_main_job_and_stops(proxied: Proxied) -> None:
+    with proxied.asked() as editor:
+        made = editor.post("/api/graphs", json=CHAIN)
+        assert made.is_success, made.text
+    browser = run(
+        "scripts/with-node",
+        *("npm", "--prefix", "frontend", "run", "--silent", "e2e", "--", "e2e/containers.spec.ts"),
+        more={
+            "CONTAINERS_LINK": proxied.stack.said("editor", "link").split()[0],
+            "CONTAINERS_GRAPH": made.json()["id"],
+        },
+    )
+    assert "1 passed" in browser.stdout
+
+
 def test_stop_needs_neither_the_editor_nor_the_database(proxied: Proxied) -> None:
     run = proxied.cli("run", "pair", "--engine", "David", "--no-wait").strip()
     podman("pause", proxied.stack.container("editor"))
@@ -215,7 +251,7 @@ async def test_nothing_acknowledged_or_seen_is_lost_when_the_editor_is_killed(
         graph = editor.post("/api/graphs", json={"name": "load"}).json()["id"]
     writers = [Writer(name) for name in "abc"]
     for _ in range(KILLS):
-        tasks = [asyncio.create_task(writer.write(proxied, graph)) for writer in writers]  # type: ignore[arg-type]
+        tasks = [asyncio.create_task(writer.write(proxied, graph)) for writer in writers]
         await asyncio.sleep(random.uniform(1, 3))
         proxied.stack.kill("editor")
         await asyncio.wait_for(asyncio.gather(*tasks), 30)
@@ -235,6 +271,29 @@ async def test_nothing_acknowledged_or_seen_is_lost_when_the_editor_is_killed(
             assert writer.seen <= there
     say(f"{KILLS} kills of the editor: {sum(each.acknowledged for each in writers)} edits "
         "acknowledged, 0 lost")  # fmt: skip
+
+
+def test_a_backup_is_restored_into_empty_volumes_as_documented(
+    proxied: Proxied, tmp_path: Path
+) -> None:
+    stack, file = proxied.stack, tmp_path / "monday.zip"
+    stack.said("editor", "backup", "/data/monday.zip")
+    podman("cp", f"{stack.container('editor')}:/data/monday.zip", file)
+    with proxied.asked() as editor, proxied.asked("/runner") as runner:
+        before = sorted_by_id(editor.get("/api/graphs").json()), runner.get("/api/runs").json()
+    stack.down()
+    stack.up("db")
+    with file.open("rb") as backup:
+        into = ("--entrypoint", "sh", "editor", "-c", "cat >/data/monday.zip")
+        stack.compose("run", "--rm", "-T", *into, stdin=backup)
+    stack.compose("run", "--rm", "editor", "restore", "/data/monday.zip")
+    stack.up("editor", "runner", "proxy", "robot")
+    again = Proxied(stack, tmp_path)
+    assert again.token == proxied.token
+    proxied.trust, proxied.authority = again.trust, again.authority
+    with proxied.asked() as editor, proxied.asked("/runner") as runner:
+        assert sorted_by_id(editor.get("/api/graphs").json()) == before[0]
+        assert runner.get("/api/runs").json() == before[1]
 
 
 def test_hardening_holds(proxied: Proxied) -> None:

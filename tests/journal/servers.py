@@ -10,6 +10,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
+import psutil
+
 NOBODY: Final = 65534
 _SETTINGS: Final = {
     "listen_addresses": "127.0.0.1",
@@ -68,6 +70,12 @@ class Server:
     def stop(self, mode: str = "immediate") -> None:
         """Stop; `immediate` is what a crash of the server is."""
         self._ctl("stop", "-m", mode)
+
+    def processes(self) -> list[psutil.Process]:
+        """All of this server, to be frozen or killed."""
+        number = (self._data / "postmaster.pid").read_text().splitlines()[0]
+        first = psutil.Process(int(number))
+        return [first, *first.children(recursive=True)]
 
     def sql(self, text: str, database: str = "postgres") -> None:
         """Run SQL as the owner."""

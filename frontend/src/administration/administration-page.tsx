@@ -4,6 +4,7 @@ import { useLive } from "../api/live/use-live";
 import { useMay } from "../api/use-person";
 import { Empty } from "../ui/empty";
 import style from "./administration.module.css";
+import { BackupsCard } from "./backups-card";
 import { Findings } from "./findings";
 import { ProcessCard } from "./process-card";
 import { RobotLinks } from "./robot-links";
@@ -20,6 +21,9 @@ function Inside() {
         <ProcessCard title="Runner" asked={ofRunner} />
       </div>
       {ofRunner.data && <RobotLinks status={ofRunner.data} />}
+      {ofEditor.data && (
+        <BackupsCard backups={ofEditor.data.backups ?? null} at={ofEditor.data.at} />
+      )}
       <Findings />
     </>
   );

@@ -8,25 +8,37 @@ import style from "./administration.module.css";
 import { type Finding, useFindings } from "./status";
 
 const SIGNS = {
-  wrong: { icon: IconAlertTriangle, word: "Wrong" },
-  note: { icon: IconInfoCircle, word: "Note" },
+  error: { icon: IconAlertTriangle, word: "Wrong" },
+  warning: { icon: IconInfoCircle, word: "May matter" },
   fine: { icon: IconCheck, word: "Fine" },
 } as const;
 
-const ORDER = ["wrong", "note", "fine"] as const;
+const ORDER = ["error", "warning", "fine"] as const;
 
-function Found({ topic, verdict, what, advice }: Finding) {
-  const { icon: Icon, word } = SIGNS[verdict];
+function Found({ code, severity, where, message, remedy }: Finding) {
+  const { icon: Icon, word } = SIGNS[severity];
   return (
-    <li data-verdict={verdict}>
+    <li data-severity={severity}>
       <Icon size={16} aria-hidden />
       <div>
         <span className="visually-hidden">{word}: </span>
-        <b>{topic}</b> {what}
-        {advice && <p>{advice}</p>}
+        <b>
+          <bdi>{where}</bdi>
+        </b>{" "}
+        {message} {code && <code>{code}</code>}
+        {remedy && <p>{remedy}</p>}
       </div>
     </li>
   );
+}
+
+/** What there is of it, in a few words. */
+function summary(found: readonly Finding[]): string {
+  const wrong = found.filter(({ severity }) => severity === "error").length;
+  const notes = found.filter(({ severity }) => severity === "warning").length;
+  if (wrong + notes === 0) return "Nothing is wrong.";
+  const said = wrong === 1 ? "1 thing is wrong" : `${wrong || "No"} things are wrong`;
+  return notes === 0 ? `${said}.` : `${said}, ${notes} may matter.`;
 }
 
 function Looking() {
@@ -42,15 +54,16 @@ function Looking() {
 
 export function Findings() {
   const { data, error, isFetching, refetch } = useFindings();
-  const sorted = ORDER.flatMap((verdict) => data?.filter((each) => each.verdict === verdict) ?? []);
-  const wrong = data?.filter(({ verdict }) => verdict === "wrong").length;
+  const sorted = ORDER.flatMap(
+    (severity) => data?.filter((each) => each.severity === severity) ?? [],
+  );
   return (
     <section className={style.card} aria-label="Doctor">
       <div className={style.cardHead}>
         <h3>Doctor</h3>
-        {wrong !== undefined && !isFetching && (
-          <span className={style.version}>
-            {wrong === 0 ? "Nothing is wrong." : `${wrong} ${wrong === 1 ? "is" : "are"} wrong.`}
+        {data && !isFetching && (
+          <span className={style.version} role="status">
+            {summary(data)}
           </span>
         )}
         <Button
@@ -72,7 +85,7 @@ export function Findings() {
       {data !== undefined && (
         <ul className={style.findings}>
           {sorted.map((each) => (
-            <Found key={`${each.topic} ${each.what}`} {...each} />
+            <Found key={`${each.code} ${each.where} ${each.message}`} {...each} />
           ))}
         </ul>
       )}

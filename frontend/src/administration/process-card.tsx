@@ -1,9 +1,9 @@
 /** One of the two processes: whether it can do its work, and what it takes. */
-import { Alert, Badge } from "@mantine/core";
-import type { ReactNode } from "react";
+import { Alert } from "@mantine/core";
 import { errorText } from "../api/http";
 import { ago, instant } from "../ui/times";
 import style from "./administration.module.css";
+import { type Fact, Facts } from "./facts";
 import { bytes, type ProcessStatus, span, type useStatus } from "./status";
 
 /** Bytes of the disk below which somebody should make room. */
@@ -18,34 +18,14 @@ const PARTS: Readonly<Record<string, string>> = {
   rclpy: "Way to robots",
 };
 
-export interface Fact {
-  readonly name: string;
-  readonly value: ReactNode;
-  /** Somebody should look at it. */
-  readonly isBad?: boolean;
-}
-
-export function Facts({ facts }: { facts: readonly Fact[] }) {
-  return (
-    <dl className={style.facts}>
-      {facts.map(({ name, value, isBad }) => (
-        <div key={name} data-bad={isBad || undefined}>
-          <dt>{name}</dt>
-          <dd>{value}</dd>
-        </div>
-      ))}
-    </dl>
-  );
-}
-
 function loadFacts({ load, at, began_at }: ProcessStatus): Fact[] {
   const files = load.open_files === null ? "not known" : `${load.open_files}`;
   const lag = Math.round(1000 * load.loop_lag_s);
   return [
-    { name: "Runs for", value: span(Date.parse(at) - Date.parse(began_at)) },
+    { name: "Up for", value: span(Date.parse(at) - Date.parse(began_at)) },
     { name: "Memory", value: load.memory === null ? "not known" : bytes(load.memory) },
     { name: "Processor time", value: span(1000 * load.cpu_s) },
-    { name: "Latest by", value: `${lag} ms in the last minute`, isBad: lag > 500 },
+    { name: "Loop lag", value: `at most ${lag} ms in the last minute`, isBad: lag > 500 },
     { name: "Open files", value: `${files} of ${load.most_files}` },
   ];
 }
@@ -55,12 +35,12 @@ function storageFacts({ storage, journal }: ProcessStatus): Fact[] {
   const stored = failing ?? (waiting === 0 ? "nothing waits" : `${waiting} wait`);
   const facts: Fact[] = [
     { name: "Database", value: <bdi>{journal.database.replace(/^The database /, "")}</bdi> },
-    { name: "Being stored", value: stored, isBad: failing !== null || busy_s > 2 },
+    { name: "Journal", value: stored, isBad: failing !== null || busy_s > 2 },
   ];
   if (storage === null) return [...facts, { name: "Disk", value: "not looked at yet" }];
   const { database, wal, free, size, folders } = storage;
-  if (database !== null) facts.push({ name: "Its size", value: bytes(database) });
-  if (wal !== null) facts.push({ name: "Its log", value: bytes(wal) });
+  if (database !== null) facts.push({ name: "Database size", value: bytes(database) });
+  if (wal !== null) facts.push({ name: "Write-ahead log", value: bytes(wal) });
   for (const [name, count] of Object.entries(folders)) {
     facts.push({ name: `Folder ${name}`, value: bytes(count) });
   }
@@ -100,22 +80,31 @@ function Lacking({ status }: { status: ProcessStatus }) {
   );
 }
 
+const WORDS = {
+  ready: "Ready",
+  lacking: "Not ready",
+  silent: "No answer",
+  unknown: "Not known yet",
+} as const;
+
+function readinessOf({ readiness }: ProcessStatus): "ready" | "lacking" {
+  return readiness.ready ? "ready" : "lacking";
+}
+
 interface Props {
   title: string;
   asked: ReturnType<typeof useStatus>;
 }
 
 export function ProcessCard({ title, asked: { data, error } }: Props) {
-  const isReady = data?.readiness.ready ?? false;
-  const known = error === null && data !== undefined;
-  const word = known ? (isReady ? "Ready" : "Not ready") : error ? "No answer" : "Not known yet";
+  const state = error ? "silent" : data === undefined ? "unknown" : readinessOf(data);
   return (
     <section className={style.card} aria-label={title}>
       <div className={style.cardHead}>
         <h3>{title}</h3>
-        <Badge variant="light" color={known ? (isReady ? "teal" : "red") : error ? "red" : "gray"}>
-          {word}
-        </Badge>
+        <span className={style.state} data-state={state}>
+          {WORDS[state]}
+        </span>
         {data && (
           <span className={style.version}>
             Version {data.versions.program}, tables {data.versions.schema}, Python{" "}

@@ -4,8 +4,9 @@ import { fetchJson } from "../api/http";
 import type { EditorApi } from "../api/schema/editor";
 
 export type ProcessStatus = EditorApi["ProcessStatus"];
-/** One thing that was looked at; `advice` says what mends it. */
-export type Finding = EditorApi["Finding"];
+export type Backups = EditorApi["BackupsShown"];
+/** One thing that was looked at; `remedy` says what mends it. */
+export type Finding = EditorApi["Diagnostic"];
 
 const EACH_MS = 5_000;
 
@@ -13,7 +14,8 @@ const EACH_MS = 5_000;
 export function useStatus(name: string, at: string | undefined) {
   return useQuery({
     queryKey: ["status", name, at],
-    queryFn: ({ signal }) => fetchJson<ProcessStatus>(`${at}/api/status`, { signal }),
+    queryFn: ({ signal }) =>
+      fetchJson<ProcessStatus>(`${at}/api/status`, { signal, timeoutMs: 6_000 }),
     enabled: at !== undefined,
     refetchInterval: EACH_MS,
     retry: false,
@@ -24,7 +26,7 @@ export function useStatus(name: string, at: string | undefined) {
 export function useFindings() {
   return useQuery({
     queryKey: ["doctor"],
-    queryFn: ({ signal }) => fetchJson<Finding[]>("/api/doctor", { signal }),
+    queryFn: ({ signal }) => fetchJson<Finding[]>("/api/doctor", { signal, timeoutMs: 120_000 }),
     enabled: false,
     retry: false,
   });

@@ -6,10 +6,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from action_assistant import paths, settings
+from action_assistant.commands.backups.options import add_rules, span
 from action_assistant.errors import CannotStart
 from action_assistant.logs.setup import FORMS, LEVELS, hand_on, log_settings, set_up
 
 if TYPE_CHECKING:  # slow to load, and most commands do not need it
+    from action_assistant.supervisor import BackupPlan
     from action_assistant.web.server.listen import TlsIdentity
 
 
@@ -26,6 +28,8 @@ def add_serve_options(parser: argparse.ArgumentParser) -> None:
     _database(parser, switch=True)
     _sharing(parser)
     _behaviours(parser)
+    _backups(parser)
+    _index_folders(parser)
     _logging(parser)
 
 
@@ -46,6 +50,7 @@ def _add_runner(runner: argparse.ArgumentParser) -> None:
     _address(runner, port=settings.port() + 1)
     _sharing(runner)
     _behaviours(runner)
+    _index_folders(runner)
     _logging(runner)
     runner.add_argument(
         "--page-port", type=port_number, metavar="N", help="default: the port before"
@@ -65,6 +70,24 @@ def port_number(text: str) -> int:
     if not 0 < number < 65536:
         raise ValueError
     return number
+
+
+def _backups(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--backup-to",
+        type=Path,
+        default=settings.backup_rule("TO"),
+        metavar="DIR",
+        help="make backups into this folder, by a process of their own",
+    )
+    parser.add_argument(
+        "--backup-every",
+        type=span,
+        default=settings.backup_rule("EVERY") or "24h",
+        metavar="TIME",
+        help="how often (30m, 24h, 7d); default: %(default)s",
+    )
+    add_rules(parser, "--backup-")
 
 
 def _address(parser: argparse.ArgumentParser, *, port: int) -> None:
@@ -131,6 +154,17 @@ def _behaviours(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="of Python files with which simulated runs may carry actions out; whoever may start a "
         "simulation runs them as this user",
+    )
+
+
+def _index_folders(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--index-folder",
+        action="append",
+        default=[],
+        metavar="ROBOT=DIR",
+        help="the --actions-path of that robot's engine, where it is on this computer, too: operators may "
+        "have graphs written into it. May be given several times",
     )
 
 
@@ -222,8 +256,23 @@ def _serve(options: argparse.Namespace) -> int:
             tls=options.tls,
             reached=reached(options),
             behaviours=options.behaviours,
+            index_folders=settings.index_folders(options.index_folder),
             opens=not options.no_open,
+            backups=_backup_plan(options),
         )
+    )
+
+
+def _backup_plan(options: argparse.Namespace) -> "BackupPlan | None":
+    from action_assistant.supervisor import BackupPlan
+
+    if options.backup_to is None:
+        return None
+    return BackupPlan(
+        into=options.backup_to.resolve(),
+        every=options.backup_every,
+        keep=options.backup_keep,
+        after=options.backup_after,
     )
 
 
@@ -241,6 +290,7 @@ def _editor(options: argparse.Namespace) -> int:
         port=chosen.port,
         proxies=chosen.reached.proxies,
         identity=_identity(chosen, chosen.port),
+        direct=settings.direct_sockets(),
     )
     return 0
 
@@ -264,6 +314,7 @@ def _runner(options: argparse.Namespace) -> int:
         keep=settings.keep(data),
         reached=reached(options),
         behaviours=options.behaviours,
+        index_folders=settings.index_folders(options.index_folder),
         metrics_token=settings.metrics_token(),
     )
     listen(

@@ -122,6 +122,7 @@ def create_app(settings: EditorSettings) -> ASGIApp:
         monitoring=monitoring,
         scraped=ScrapeToken(settings.metrics_token),
         page=paths.page(),
+        help_site=paths.help_site(),
         runner_port=settings.runner_port,
         mount=settings.reached.public.path if settings.reached.public is not None else "",
         body_limit=SMALL,

@@ -34,6 +34,7 @@ from action_assistant.runner.review.service import ReviewService
 from action_assistant.runner.review.worker_queries import StoragePaths, WorkerQueries
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.robots.registry import Robots
+from action_assistant.runner.start.index_writer import IndexWriter, require_folder
 from action_assistant.runner.start.start_checks import StartSources
 from action_assistant.runner.watched import WatchedRunner
 from action_assistant.runner.workers import RunnerWorkers
@@ -59,6 +60,7 @@ async def open_services(
     services = services or RunnerServices()
     if settings.behaviours is not None:
         services.behaviours = BehaviourFolder.opened(settings.behaviours)
+    services.index_folders = settings.index_folders
     sys.setswitchinterval(_SWITCH_S)
     journal = await Journal.open(_database(settings), branch="runner", fold=projection.fold)
     try:
@@ -115,6 +117,7 @@ async def _executing(
                 sources=StartSources(
                     services.behaviours,
                     lambda *of: asked.value(ReviewService.checked_courses, *of),
+                    services.index_folders,
                 ),
                 # What moves again is read whole.
                 past=lambda run, whole: (ours if whole else asked).past(run, whole),
@@ -123,6 +126,13 @@ async def _executing(
             asked.opened = ours.opened = control.open
             services.asked, services.control = asked, control
             services.hub = Hub(control, utc_us)
+            services.index_writer = IndexWriter(
+                control.robots,
+                services.index_folders,
+                clock_us=utc_us,
+                run_in_worker=workers.starts,
+                on_disk=anyio.to_thread.run_sync,
+            )
             yield control
 
 
@@ -157,6 +167,8 @@ def create_app(settings: RunnerSettings) -> ASGIApp:
     """The runner as an ASGI application. Raises CannotStart."""
     if settings.behaviours is not None:
         BehaviourFolder.opened(settings.behaviours)
+    for robot, folder in settings.index_folders.items():
+        require_folder(robot, folder)
     Journal.prepare(_database(settings), "runner", copies=settings.data / before_upgrade.FOLDER)
     revoked = Revocations(settings.data)
     services = RunnerServices()

@@ -102,6 +102,7 @@ def test_an_upgrade_keeps_the_options_and_writes_what_this_version_would(
     service: Service, unit: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     words = ("--as", "robot", "--port", "9000", "--share", "--data", "/srv/lab data")
+    words += ("--index-folder", "David=/ws/install", "--index-folder", "Eve=/mnt/eve")
     with monkeypatch.context() as earlier:
         earlier.setattr("action_assistant.commands.services.unit.VERSION", "0.0.9")
         assert service("install", *words) == 0
@@ -112,6 +113,9 @@ def test_an_upgrade_keeps_the_options_and_writes_what_this_version_would(
     assert "version 0.0.9" not in after
     assert before.splitlines()[3:] == after.splitlines()[3:]
     assert 'ReadWritePaths="/srv/lab data"' in after
+    assert "--index-folder David=/ws/install --index-folder Eve=/mnt/eve" in after
+    assert "ReadWritePaths=/ws/install" in after
+    assert "ReadWritePaths=/mnt/eve" in after
 
 
 def test_what_the_shell_says_of_ros_goes_in_and_secrets_do_not(
@@ -144,6 +148,11 @@ def test_every_option_of_serve_reaches_it_or_has_a_reason_not_to() -> None:
         "port": "the usual one is left out",
         "database": "one with a password is refused",
         "switch_database": "it is meant for one start",
+        "index_folder": "there may be several",
+        "backup_to": "backups have a rule of their own",
+        "backup_every": "the same",
+        "backup_keep": "the same",
+        "backup_after": "the same",
     }
     assert known == {*_VALUES, *_FLAGS, *left_out}
 

@@ -99,6 +99,25 @@ export interface EditorApi {
         named_at?: number | null;
     };
     /**
+     * BackupsShown
+     * @description The last backup that was made, and what it lacks; the last one that came to nothing since; the last
+     *     trial that restored one; and when the next one is due. Null where there was none.
+     */
+    BackupsShown: {
+        made_at: string | null;
+        bytes: number | null;
+        seconds: number | null;
+        missing: string[];
+        off_site: string | null;
+        failed_at: string | null;
+        failed_why: string | null;
+        proven_at: string | null;
+        unsound: string | null;
+        next_at: string | null;
+        keep: string | null;
+        is_late: boolean;
+    };
+    /**
      * Behaviour
      * @description One call of an action. Times are seconds.
      *
@@ -229,6 +248,19 @@ export interface EditorApi {
         name?: string | null;
         /** @default null */
         description?: string | null;
+    };
+    /**
+     * Diagnostic
+     * @description One thing that was looked at. With `error` something does not work or is not safe; `warning`
+     *     may matter or not; `fine` has neither code nor remedy. `where`: the file, variable, port or robot.
+     */
+    Diagnostic: {
+        code: string;
+        /** @enum {string} */
+        severity: "error" | "fine" | "warning";
+        where: string;
+        message: string;
+        remedy: string;
     };
     /**
      * Difference
@@ -451,17 +483,6 @@ export interface EditorApi {
         at: string;
         seq: number;
         merged?: EditorApi["MergedBy"];
-    };
-    /**
-     * Finding
-     * @description One thing that was looked at. `advice`: what mends it.
-     */
-    Finding: {
-        topic: string;
-        /** @enum {string} */
-        verdict: "fine" | "note" | "wrong";
-        what: string;
-        advice: string;
     };
     /**
      * FlatCopy
@@ -1237,7 +1258,7 @@ export interface EditorApi {
     };
     /**
      * ProcessStatus
-     * @description One of the two processes, now.
+     * @description One of the two processes, now. `backups` are the editor's to know.
      */
     ProcessStatus: {
         /** @enum {string} */
@@ -1246,13 +1267,23 @@ export interface EditorApi {
         at: string;
         /** Format: date-time */
         began_at: string;
-        versions: EditorApi["Versions"];
+        versions: EditorApi["ProcessVersions"];
         readiness: EditorApi["Readiness"];
         load: EditorApi["Load"];
         journal: EditorApi["JournalState"];
         storage: EditorApi["StorageShown"] | null;
         workers: EditorApi["LaneState"][];
         activity: EditorApi["Activity"];
+        backups: EditorApi["BackupsShown"] | null;
+    };
+    /**
+     * ProcessVersions
+     * @description Of the program, of the Python under it, and of the tables in its database.
+     */
+    ProcessVersions: {
+        program: string;
+        python: string;
+        schema: string;
     };
     /**
      * Proposing
@@ -1577,15 +1608,6 @@ export interface EditorApi {
         /** @default  */
         note?: string;
         subgraphs?: EditorApi["PinnedGraph"][];
-    };
-    /**
-     * Versions
-     * @description Of the program, of the Python under it, and of the tables in its database.
-     */
-    Versions: {
-        program: string;
-        python: string;
-        schema: string;
     };
     /**
      * WantedMerge

@@ -172,6 +172,25 @@ export interface RunnerApi {
         address?: string;
     };
     /**
+     * BackupsShown
+     * @description The last backup that was made, and what it lacks; the last one that came to nothing since; the last
+     *     trial that restored one; and when the next one is due. Null where there was none.
+     */
+    BackupsShown: {
+        made_at: string | null;
+        bytes: number | null;
+        seconds: number | null;
+        missing: string[];
+        off_site: string | null;
+        failed_at: string | null;
+        failed_why: string | null;
+        proven_at: string | null;
+        unsound: string | null;
+        next_at: string | null;
+        keep: string | null;
+        is_late: boolean;
+    };
+    /**
      * Beat
      * @description Once a second: the link is alive. `seen`: when each open run was last shown by its engine;
      *     `heard`: when each robot last answered.
@@ -435,6 +454,31 @@ export interface RunnerApi {
         fault?: ("error" | "false" | "hang" | "init_error") | null;
     };
     /**
+     * FolderLook
+     * @description The folder that the robot's engine indexes, as the runner has it. `writable`: what can be written
+     *     there; `waiting`: graphs that are there as they shall be, and that the engine has not indexed;
+     *     `hindered`: why others cannot be written, as sentences by graph.
+     */
+    FolderLook: {
+        path: string;
+        writable: RunnerApi["WritableGraph"][];
+        waiting: string[];
+        hindered: {
+            [key: string]: string;
+        };
+    };
+    /**
+     * GraphFile
+     * @description A file that was written there. `kept`: where the one that it replaced is now.
+     */
+    GraphFile: {
+        graph: string;
+        path: string;
+        digest: string;
+        /** @default  */
+        kept?: string;
+    };
+    /**
      * GroupRequest
      * @description One version for several robots at once. Without version, digest and `request_id` it can only
      *     be looked at.
@@ -520,9 +564,33 @@ export interface RunnerApi {
         body: unknown;
     };
     /**
+     * IndexWriteAnswer
+     * @description What is in the folder now: files that were `written` anew, that `replaced` others, and graphs that
+     *     were `there` as they shall be.
+     */
+    IndexWriteAnswer: {
+        folder: string;
+        written: RunnerApi["WrittenFile"][];
+        replaced: RunnerApi["WrittenFile"][];
+        there: string[];
+    };
+    /**
+     * IndexWriteRequest
+     * @description The graphs inside of a graph, as a start of it has them: `digest` is that graph's, `tree_digest` of
+     *     all together. `replace`: those that may take the place of another file.
+     */
+    IndexWriteRequest: {
+        subgraphs: RunnerApi["SentSubgraph"][];
+        digest: string;
+        /** @default null */
+        tree_digest?: string | null;
+        /** @default [] */
+        replace?: string[];
+    };
+    /**
      * Item
      * @description One thing that was looked at. A person may override a blocked one where `overridable`, with
-     *     the codes in `codes` and a reason.
+     *     the codes in `codes` and a reason. `folder`: where graphs could be written that the robot lacks.
      */
     Item: {
         code: string;
@@ -532,6 +600,7 @@ export interface RunnerApi {
         codes: string[];
         overridable: boolean;
         problems: RunnerApi["Problem"][];
+        folder: RunnerApi["FolderLook"] | null;
     };
     /**
      * JournalState
@@ -801,7 +870,7 @@ export interface RunnerApi {
     };
     /**
      * ProcessStatus
-     * @description One of the two processes, now.
+     * @description One of the two processes, now. `backups` are the editor's to know.
      */
     ProcessStatus: {
         /** @enum {string} */
@@ -810,13 +879,23 @@ export interface RunnerApi {
         at: string;
         /** Format: date-time */
         began_at: string;
-        versions: RunnerApi["Versions"];
+        versions: RunnerApi["ProcessVersions"];
         readiness: RunnerApi["Readiness"];
         load: RunnerApi["Load"];
         journal: RunnerApi["JournalState"];
         storage: RunnerApi["StorageShown"] | null;
         workers: RunnerApi["LaneState"][];
         activity: RunnerApi["Activity"];
+        backups: RunnerApi["BackupsShown"] | null;
+    };
+    /**
+     * ProcessVersions
+     * @description Of the program, of the Python under it, and of the tables in its database.
+     */
+    ProcessVersions: {
+        program: string;
+        python: string;
+        schema: string;
     };
     /**
      * ProposalRequest
@@ -1050,14 +1129,15 @@ export interface RunnerApi {
     };
     /**
      * RobotLogLine
-     * @description A line of a robot's flight record. `has_graph`: its graph can be fetched.
+     * @description A line of a robot's flight record. `has_graph`: its graph can be fetched; `graphs`: names of graphs
+     *     for its index; `files`: what was written for it.
      */
     RobotLogLine: {
         seq: number;
         /** Format: date-time */
         at: string;
         /** @enum {string} */
-        kind: "became" | "commanded" | "stop_asked" | "stop_proven" | "stop_unproven";
+        kind: "became" | "commanded" | "index_write_asked" | "index_written" | "stop_asked" | "stop_proven" | "stop_unproven";
         command: string;
         graph: string;
         sender: string;
@@ -1066,6 +1146,8 @@ export interface RunnerApi {
         run: string | null;
         number: number | null;
         has_graph: boolean;
+        graphs: string[];
+        files: RunnerApi["GraphFile"][];
     };
     /**
      * RobotStopped
@@ -1469,15 +1551,6 @@ export interface RunnerApi {
         most: number | null;
     };
     /**
-     * Versions
-     * @description Of the program, of the Python under it, and of the tables in its database.
-     */
-    Versions: {
-        program: string;
-        python: string;
-        schema: string;
-    };
-    /**
      * VisitShown
      * @description One visit of an action. It began between `not_before` and `from`, and ended between `until`
      *     (null: no end was seen) and `not_after` (null: it may go on still); where `until` lies before
@@ -1512,5 +1585,24 @@ export interface RunnerApi {
         relation?: string;
         line?: number;
         column?: number;
+    };
+    /**
+     * WritableGraph
+     * @description A graph that can be written. `replaces`: the path of the file that would be put aside, from the
+     *     folder; "" for none.
+     */
+    WritableGraph: {
+        graph: string;
+        replaces: string;
+    };
+    /**
+     * WrittenFile
+     * @description A file that was written, and where the one that it replaced is kept.
+     */
+    WrittenFile: {
+        graph: string;
+        path: string;
+        /** @default  */
+        kept?: string;
     };
 }

@@ -11,6 +11,7 @@ import shutil
 import stat
 import zipfile
 import zlib
+from collections.abc import Callable
 from pathlib import Path, PurePosixPath
 from typing import IO, Final
 
@@ -36,6 +37,10 @@ _LEVEL: Final = 1
 _TIGHTEST: Final = 300
 _ROOM: Final = 64 << 20  # bytes that have to be left on the disk
 _MODE: Final = 0o600
+
+
+class NoRoom(CannotStart):
+    """What is packed is larger than what is left of the disk."""
 
 
 class JournalCopy(msgspec.Struct, frozen=True):
@@ -96,13 +101,14 @@ class Packer:
         self._zip.writestr(name, content)
         self.files[name] = BackupPart(len(content), hashlib.sha256(content).hexdigest())
 
-    def close(self, about: BackupManifest, target: Path) -> None:
-        """Say what it is, and put it into its place."""
+    def close(self, about: BackupManifest, target: Path, prove: Callable[[Path], None]) -> None:
+        """Say what it is, have it proven, and put it into its place."""
         self._zip.writestr(_ABOUT, msgspec.json.format(msgspec.json.encode(about)))
         self._zip.close()
         self._raw.flush()
         os.fsync(self._raw.fileno())
         self._raw.close()
+        prove(self._part)
         self._part.replace(target)
         sync(target.parent)
 
@@ -135,27 +141,45 @@ class Package:
             self._zip.close()
             raise
 
+    def prove(self, progress: Progress) -> None:
+        """Read all its parts, and keep none. Raises CannotStart."""
+        self._check_total()
+        for name in self.parts:
+            with Path(os.devnull).open("wb") as nowhere:
+                self._pour(name, nowhere, f"reading back {name}", progress)
+
     def unpack(self, folder: Path, progress: Progress) -> None:
         """All its parts into a folder, each proven. Raises CannotStart."""
+        total = self._check_total()
+        free = shutil.disk_usage(folder).free
+        if total + _ROOM > free:
+            raise NoRoom(
+                f"{self._source} needs {total >> 20} MiB, and {folder} has {free >> 20} MiB left."
+            )
+        for name in self.parts:
+            path = folder / name
+            path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, _MODE)
+            with os.fdopen(descriptor, "wb") as here:
+                self._pour(name, here, f"unpacking {name}", progress)
+
+    def _check_total(self) -> int:
+        """The size of all parts. Raises CannotStart."""
         total = sum(entry.file_size for entry, _ in self.parts.values())
         if total > _TIGHTEST * self._source.stat().st_size + _CHUNK:
             raise self._damaged("its parts lie over each other")
-        free = shutil.disk_usage(folder).free
-        if total + _ROOM > free:
-            raise CannotStart(
-                f"{self._source} needs {total >> 20} MiB, and {folder} has {free >> 20} MiB left."
-            )
-        for name, (entry, sha256) in self.parts.items():
-            path = folder / name
-            path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            try:
-                descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, _MODE)
-                with self._zip.open(entry) as there, os.fdopen(descriptor, "wb") as here:
-                    _, digest = _poured(there, here, f"unpacking {name}", progress)
-            except (zipfile.BadZipFile, zlib.error, EOFError) as error:
-                raise self._damaged(f"{name} cannot be read ({error})") from error
-            if digest != sha256:
-                raise self._damaged(f"{name} is not what was written")
+        return total
+
+    def _pour(self, name: str, here: IO[bytes], text: str, progress: Progress) -> None:
+        """One part, proven. Raises CannotStart."""
+        entry, sha256 = self.parts[name]
+        try:
+            with self._zip.open(entry) as there:
+                _, digest = _poured(there, here, text, progress)
+        except (zipfile.BadZipFile, zlib.error, EOFError) as error:
+            raise self._damaged(f"{name} cannot be read ({error})") from error
+        if digest != sha256:
+            raise self._damaged(f"{name} is not what was written")
 
     def close(self) -> None:
         """Let go of the file."""

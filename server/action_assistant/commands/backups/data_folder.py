@@ -44,6 +44,8 @@ _OWN: Final = frozenset(
 )
 _PASSING: Final = (".lock", ".lock.new", "-wal", "-shm", "-journal", ".part")
 ASIDE: Final = "before-restore-"
+#: What `move` leaves behind.
+MOVED: Final = "before-move-"
 _MAGIC: Final = b"SQLite format 3\0"
 _PAGES: Final = 5_000  # copied between two words about it
 
@@ -65,7 +67,9 @@ def left_out(data: Path) -> list[Path]:
     return sorted(
         path
         for path in data.iterdir()
-        if path.name not in known and not _is_passing(path) and not path.name.startswith(ASIDE)
+        if path.name not in known
+        and not _is_passing(path)
+        and not path.name.startswith((ASIDE, MOVED))
     )
 
 
@@ -133,9 +137,9 @@ def checked(path: Path, branch: Branch, progress: Progress, *, anew: bool = Fals
     return events
 
 
-def aside_folder(data: Path) -> Path:
+def aside_folder(data: Path, prefix: str = ASIDE) -> Path:
     """A new folder for what was there before."""
-    name = time.strftime(f"{ASIDE}%Y%m%d-%H%M%S")
+    name = time.strftime(f"{prefix}%Y%m%d-%H%M%S")
     for number in count(1):
         path = data / (name if number == 1 else f"{name}-{number}")
         try:

@@ -6,7 +6,6 @@ or marked.
 """
 
 import argparse
-import asyncio
 import os
 import shutil
 from contextlib import ExitStack
@@ -36,8 +35,8 @@ from action_assistant.commands.backups.data_folder import (
 )
 from action_assistant.commands.backups.progress import Progress
 from action_assistant.errors import CannotStart
-from action_assistant.journal.database import Branch, cause_of
-from action_assistant.journal.databases import database_of
+from action_assistant.journal.database import Branch
+from action_assistant.journal.databases import ask_once, database_of
 from action_assistant.private_files import sync
 from action_assistant.schema.editor_tables import editor_event
 from action_assistant.web.auth.keys import TOKEN_FILE
@@ -67,7 +66,7 @@ def restore(options: argparse.Namespace) -> int:
     package = Package(source)
     try:
         about = package.about
-        _check_names(about, source)
+        check_names(about, source)
         _check_folder(data, source)
         url = (
             options.database
@@ -97,7 +96,7 @@ def _make(data: Path) -> None:
         raise CannotStart(f"Cannot make {data}: {error.strerror}.") from error
 
 
-def _check_names(about: BackupManifest, source: Path) -> None:
+def check_names(about: BackupManifest, source: Path) -> None:
     """A backup may write what belongs to a data folder, and nothing else there."""
     for name in about.files:
         top, inner = name.split("/")[:2]
@@ -197,7 +196,6 @@ def _is_there(url: str, under: Under, about: BackupManifest) -> bool:
     """Whether a database holds the same backup already. Raises CannotStart."""
     if "editor" not in about.journals or under.sha256 != about.journals["editor"].sha256:
         return False
-    database = database_of(url)
 
     def last(connection: Connection) -> tuple[int, str] | None:
         if not inspect(connection).has_table(editor_event.name):
@@ -205,16 +203,7 @@ def _is_there(url: str, under: Under, about: BackupManifest) -> bool:
         row = connection.execute(_LAST).first()
         return None if row is None else (row.position, bytes(row.chain).hex())
 
-    async def ask() -> tuple[int, str] | None:
-        try:
-            return await database.at_one_moment(last)
-        finally:
-            await database.close()
-
-    try:
-        return asyncio.run(ask()) == (under.position, under.chain)
-    except database.faults as error:
-        raise CannotStart(f"{database.name} cannot be read: {cause_of(error)}.") from error
+    return ask_once(url, last) == (under.position, under.chain)
 
 
 def _placed(folder: Path, name: str, data: Path) -> bool:

@@ -3,7 +3,7 @@
 import os
 import subprocess
 import sys
-from typing import Final, Literal
+from typing import Final
 
 import anyio
 import msgspec
@@ -13,6 +13,7 @@ from litestar.types import ControllerRouterHandler
 from action_assistant.errors import Unavailable
 from action_assistant.journal.health.shared_check import SharedCheck
 from action_assistant.settings import EditorSettings
+from action_assistant.system.diagnostics import Diagnostic
 from action_assistant.web.auth.access import Needs
 
 _PATIENCE_S: Final = 90.0  # it looks for robots, too
@@ -20,19 +21,10 @@ _FRESH_S: Final = 5.0
 _NICE: Final = 10
 
 
-class Finding(msgspec.Struct, frozen=True):
-    """One thing that was looked at. `advice`: what mends it."""
-
-    topic: str
-    verdict: Literal["fine", "note", "wrong"]
-    what: str
-    advice: str = ""
-
-
 def routes(settings: EditorSettings) -> list[ControllerRouterHandler]:
     """The route. However many ask, it is looked once at a time."""
 
-    async def look() -> list[Finding]:
+    async def look() -> list[Diagnostic]:
         return await _examined(settings)
 
     examination = SharedCheck(look, patience=_PATIENCE_S, fresh=_FRESH_S)
@@ -40,9 +32,9 @@ def routes(settings: EditorSettings) -> list[ControllerRouterHandler]:
     @get(
         "/api/doctor",
         guards=[Needs("restore")],
-        summary="What is wrong with this installation, and what mends it; takes some seconds",
+        summary="What `doctor` finds wrong with this installation; takes some seconds",
     )
-    async def doctor() -> list[Finding]:
+    async def doctor() -> list[Diagnostic]:
         found = await examination.answer()
         if found is None:
             raise Unavailable(f"It has not looked at everything within {_PATIENCE_S:g} s.")
@@ -51,7 +43,7 @@ def routes(settings: EditorSettings) -> list[ControllerRouterHandler]:
     return [doctor]
 
 
-async def _examined(settings: EditorSettings) -> list[Finding]:
+async def _examined(settings: EditorSettings) -> list[Diagnostic]:
     """The command itself, in a process that gives way: it loads much, and may hang on what is wrong."""
     command = [sys.executable, "-m", "action_assistant", "doctor", "--json"]
     command += ["--data", str(settings.data), "--port", str(settings.port)]
@@ -63,6 +55,6 @@ async def _examined(settings: EditorSettings) -> list[Finding]:
         said = b"".join([piece async for piece in process.stdout])
         code = await process.wait()
     try:
-        return msgspec.json.decode(said, type=list[Finding])
+        return msgspec.json.decode(said, type=list[Diagnostic])
     except msgspec.DecodeError as error:
         raise Unavailable(f"`action-assistant doctor` ended with exit code {code}.") from error

@@ -13,7 +13,8 @@ from action_assistant.editor.crdt.document_quota import QuotaExceeded
 from action_assistant.editor.crdt.messages import Malformed
 from action_assistant.editor.crdt.replica import ForeignClient, Panicked, Replica, TooMuchWaits
 from action_assistant.editor.crdt.trial import OVERLONG, TooSlow, TriedOutline, tried
-from action_assistant.editor.crdt.update_scan import UpdateOutline, outline
+from action_assistant.editor.crdt.update_outline import UpdateOutline
+from action_assistant.editor.crdt.update_scan import outline
 from action_assistant.editor.rooms.member import Member
 from action_assistant.errors import BadInput, Refused, TooLarge
 from action_assistant.web.auth.caller import acting_for

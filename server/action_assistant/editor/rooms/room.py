@@ -14,7 +14,7 @@ from action_assistant.editor.crdt import messages
 from action_assistant.editor.crdt.loading import Loaded, load
 from action_assistant.editor.crdt.messages import Malformed
 from action_assistant.editor.crdt.replica import Panicked, Replica, ReplicaState, UpdateEffect
-from action_assistant.editor.crdt.update_scan import UpdateOutline
+from action_assistant.editor.crdt.update_outline import UpdateOutline
 from action_assistant.editor.log.graph_events import DEFERRED, UPDATED
 from action_assistant.editor.rooms.batch import (
     OBJECTIONS,

@@ -5,10 +5,11 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from prometheus_client import Histogram, Metric
+from prometheus_client import Metric
 from prometheus_client.registry import Collector
 
 from action_assistant.editor.rooms.batch import Objection, Offer
+from action_assistant.web.monitoring.loop_histogram import LoopHistogram
 
 _BUCKETS: Final = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 30)
 
@@ -21,18 +22,16 @@ class RoomMetrics(Collector):
         self.unloaded = 0
         self.refused: Final[Counter[str]] = Counter()  # edits, by why
         self.closed: Final[Counter[int]] = Counter()  # sockets, by close code
-        self._acks = Histogram(
+        self._acks = LoopHistogram(
             "action_assistant_ack_seconds",
             "Time from an edit's arrival at its room until it was durable and acknowledged.",
-            registry=None,
-            buckets=_BUCKETS,
+            _BUCKETS,
         )
 
     def acknowledged(self, offers: Sequence[Offer]) -> None:
         """Edits are durable, or have brought nothing."""
         now = time.perf_counter()
-        for offer in offers:
-            self._acks.observe(now - offer.at)
+        self._acks.observe([now - offer.at for offer in offers])
 
     def objected(self, error: Objection) -> None:
         """An edit was refused."""

@@ -42,6 +42,7 @@ _SAFE: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 _STOPS: Final = re.compile(r"/api/stop|/api/(runs|robots)/[^/]+/stop")
 _LIVE: Final = "/api/live"
 _GOODBYE: Final = 1.0  # seconds that a close frame gets
+_POLICY: Final = b"content-security-policy"
 _HEADERS: Final = (
     (b"x-content-type-options", b"nosniff"),
     (b"referrer-policy", b"no-referrer"),
@@ -292,11 +293,14 @@ class Access:
         if name is not None:
             extra.append((b"x-request-id", name.encode()))
         policy = self._policy(headers.get("host", "")).encode("latin-1", "replace")
-        extra.append((b"content-security-policy", policy))
 
         async def dressed(message: Message) -> None:
             if message["type"] in {"http.response.start", "websocket.http.response.start"}:
-                message["headers"] = [*message.get("headers", []), *extra]
+                own = list(message.get("headers", []))
+                # The documentation has a stricter one.
+                if all(name != _POLICY for name, _ in own):
+                    own.append((_POLICY, policy))
+                message["headers"] = [*own, *extra]
             await send(message)
 
         return dressed

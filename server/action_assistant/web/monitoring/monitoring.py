@@ -13,6 +13,7 @@ from prometheus_client.exposition import generate_latest
 from action_assistant.journal.migrate import revisions_of
 from action_assistant.version import VERSION
 from action_assistant.web.http.requests import RequestCounts
+from action_assistant.web.monitoring.backups import backups_shown
 from action_assistant.web.monitoring.gauges import Family, Looked
 from action_assistant.web.monitoring.loop_lag import LoopLag
 from action_assistant.web.monitoring.readiness import Check, DiskCheck, Parts, Readiness
@@ -56,7 +57,11 @@ class Monitoring:
         """Look at these services, as long as you are inside."""
         self._watched = watched
         storage = self._storage = StorageWatch(
-            self._data, watched.journal.bytes_in_use, watched.folders, watched.lanes[-1]
+            self._data,
+            watched.journal.bytes_in_use,
+            watched.folders,
+            watched.lanes[-1],
+            backups=self._process == "editor",
         )
         for each in (watched.journal.metrics, *watched.collectors):
             self._registry.register(each)
@@ -94,8 +99,8 @@ class Monitoring:
 
     async def status(self) -> ProcessStatus:
         """How the process is, for whoever looks after it."""
-        watched = self._watched
-        if watched is None:
+        watched, storage = self._watched, self._storage
+        if watched is None or storage is None:
             raise RuntimeError("the process is not open yet")
         return ProcessStatus(
             process=self._process,
@@ -105,9 +110,10 @@ class Monitoring:
             readiness=await self.readiness(),
             load=load_now(self._lag.worst_s),
             journal=journal_state(watched.journal),
-            storage=storage_shown(self._storage.found if self._storage is not None else None),
+            storage=storage_shown(storage.found),
             workers=lane_states(watched.lanes),
             activity=watched.activity(),
+            backups=backups_shown(storage.backups),
         )
 
     def _families(self) -> Iterator[Family]:

@@ -14,7 +14,7 @@ from action_assistant.journal.health.shared_check import SharedCheck
 Parts: TypeAlias = Mapping[str, str | None]
 Check: TypeAlias = Callable[[], Awaitable[Parts]]
 
-_ROOM: Final = 16 << 20  # bytes; a room that is closed writes as much at once
+_ROOM: Final = 4 << 20  # bytes: what a log beside a database grows by, as a rule
 _PATIENCE_S: Final = 1.0
 
 

@@ -13,6 +13,7 @@ from action_assistant.journal.journal import Journal
 from action_assistant.system import limits
 from action_assistant.system.posix import resource
 from action_assistant.version import VERSION
+from action_assistant.web.monitoring.backups import BackupsShown
 from action_assistant.web.monitoring.readiness import Readiness
 from action_assistant.web.monitoring.storage import Storage
 from action_assistant.web.workers.lanes import Lane
@@ -22,7 +23,7 @@ ProcessName: TypeAlias = Literal["editor", "runner"]
 _BEGAN: Final = time.time()
 
 
-class Versions(msgspec.Struct, frozen=True):
+class ProcessVersions(msgspec.Struct, frozen=True):
     """Of the program, of the Python under it, and of the tables in its database."""
 
     program: str
@@ -91,18 +92,19 @@ class Activity(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class ProcessStatus(msgspec.Struct, frozen=True, kw_only=True):
-    """One of the two processes, now."""
+    """One of the two processes, now. `backups` are the editor's to know."""
 
     process: ProcessName
     at: datetime
     began_at: datetime
-    versions: Versions
+    versions: ProcessVersions
     readiness: Readiness
     load: Load
     journal: JournalState
     storage: StorageShown | None
     workers: Sequence[LaneState]
     activity: Activity
+    backups: BackupsShown | None = None
 
 
 def began_at() -> datetime:
@@ -123,9 +125,9 @@ def load_now(loop_lag_s: float) -> Load:
     )
 
 
-def versions(schema: str) -> Versions:
+def versions(schema: str) -> ProcessVersions:
     """Of this process."""
-    return Versions(VERSION, platform.python_version(), schema)
+    return ProcessVersions(VERSION, platform.python_version(), schema)
 
 
 def journal_state(journal: Journal) -> JournalState:

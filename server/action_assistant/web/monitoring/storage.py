@@ -13,6 +13,8 @@ import msgspec
 from anyio import to_thread
 
 from action_assistant.errors import Refused
+from action_assistant.journal.copies.backup_state import BackupState, backup_state
+from action_assistant.web.monitoring.backups import families
 from action_assistant.web.monitoring.gauges import Family
 from action_assistant.web.workers.lanes import RunInWorker
 
@@ -35,7 +37,8 @@ class Storage(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class StorageWatch:
-    """Looks again and again. `folders` by what people call them; they are counted `run_in_worker`."""
+    """Looks again and again. `folders` by what people call them; they are counted `run_in_worker`. With
+    `backups` also at what is known of these; None while that cannot be read."""
 
     def __init__(
         self,
@@ -43,8 +46,12 @@ class StorageWatch:
         database: Callable[[], Awaitable[Mapping[str, int]]],
         folders: Mapping[str, Path],
         run_in_worker: RunInWorker,
+        *,
+        backups: bool,
     ) -> None:
         self.found: Storage | None = None
+        self.backups: BackupState | None = None
+        self._reads_backups = backups
         self._data = data
         self._database = database
         self._folders = folders
@@ -66,6 +73,8 @@ class StorageWatch:
         except OSError as error:
             log.warning("the disk of %s cannot be looked at: %s", self._data, error.strerror)
             return
+        if self._reads_backups:
+            self.backups = await to_thread.run_sync(backup_state, self._data)
         used: Mapping[str, int] = {}
         try:
             with anyio.move_on_after(_LOOK_S):
@@ -94,6 +103,7 @@ class StorageWatch:
         found = self.found
         if found is None:
             return
+        yield from families(self.backups)
         yield Family("disk_free_bytes", "Room left on the disk of the data folder.", found.free)
         yield Family("disk_size_bytes", "Size of the disk of the data folder.", found.size)
         if found.database is not None:

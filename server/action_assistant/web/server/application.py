@@ -21,6 +21,7 @@ from action_assistant.web.auth.keys import Keys, ServerProof
 from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.auth.roles import Permission
 from action_assistant.web.auth.scrape_token import METRICS, ScrapeToken
+from action_assistant.web.http.help_site import HelpSite
 from action_assistant.web.http.page import Page
 from action_assistant.web.http.problems import problem_handlers
 from action_assistant.web.http.requests import RequestCounts, Requests
@@ -63,14 +64,15 @@ def application(
     monitoring: Monitoring | None = None,
     scraped: ScrapeToken | None = None,
     page: Path | None = None,
+    help_site: Path | None = None,
     runner_port: int | None = None,
     mount: str = "",
     body_limit: int = BODY_LIMIT,
 ) -> ASGIApp:
-    """The whole application. Routes may read less or more than `body_limit` bytes. `page` and
-    `runner_port` are the editor's: it serves the page, whose Content-Security-Policy names the
-    runner. `mount` is the path at which a proxy shows this process; `scraped` the token that opens
-    /metrics alone."""
+    """The whole application. Routes may read less or more than `body_limit` bytes. `page`, `help_site`
+    and `runner_port` are the editor's: it serves the built page, whose Content-Security-Policy names
+    the runner, and the documentation. `mount` is the path at which a proxy shows this process;
+    `scraped` the token that opens /metrics alone."""
     handlers = [
         *route_handlers,
         *_health(monitoring),
@@ -85,21 +87,40 @@ def application(
         public = addresses.public_at(_host(scope))
         return str(state.get(MOUNT) or (public.path if public is not None else ""))
 
-    shown = Page(inner, page, root_of) if page is not None else None
+    built, is_public = _with_built(inner, page, help_site, root_of)
     outer: ASGIApp = Access(
-        shown or inner,
+        built,
         keys=keys,
         addresses=addresses,
         page_port=page_port,
-        is_open=lambda path, html: (
-            _answers_strangers(path) or (shown is not None and shown.knows(path, html))
-        ),
+        is_open=lambda path, html: _answers_strangers(path) or is_public(path, html),
         policy=lambda host: _policy(addresses, host, page_port, runner_port),
         revoked=revoked,
         scraped=scraped,
     )
-    counts = monitoring.requests if monitoring is not None else RequestCounts()
-    return _Described(Mounted(Requests(outer, counts), mount), openapi)
+    return _Described(Mounted(Requests(outer, _counts(monitoring)), mount), openapi)
+
+
+def _counts(monitoring: Monitoring | None) -> RequestCounts:
+    return RequestCounts() if monitoring is None else monitoring.requests
+
+
+def _with_built(
+    inner: ASGIApp,
+    page: Path | None,
+    help_site: Path | None,
+    root_of: Callable[[HTTPScope], str],
+) -> tuple[ASGIApp, Callable[[str, bool], bool]]:
+    """The routes with the built page and documentation before them, and which paths are those'."""
+    shown = Page(inner, page, root_of) if page is not None else None
+    helped = HelpSite(shown or inner, help_site) if help_site is not None else None
+
+    def is_public(path: str, accepts_html: bool) -> bool:
+        if helped is not None and helped.knows(path):
+            return True
+        return shown is not None and shown.knows(path, accepts_html)
+
+    return helped or shown or inner, is_public
 
 
 def _routed(
