@@ -19,15 +19,27 @@ RUN npm ci --no-audit --no-fund
 COPY frontend ./
 RUN npm run build
 
+FROM --platform=$BUILDPLATFORM python:3.12.11-slim-bookworm AS help
+WORKDIR /source
+COPY requirements/site.txt ./requirements/
+COPY scripts/image ./scripts/
+COPY README.md CONTRIBUTING.md CHANGELOG.md ./
+COPY frontend/public ./frontend/public
+COPY frontend/src/api/schema ./frontend/src/api/schema
+COPY docs ./docs
+RUN scripts/image help /out
+
 FROM --platform=$BUILDPLATFORM python:3.12.11-slim-bookworm AS wheel
 WORKDIR /source
 COPY requirements/build.txt ./requirements/
-COPY scripts/image ./scripts/
+COPY scripts/image scripts/wheel_commit.py ./scripts/
 RUN scripts/image back-end /opt/back-end
 COPY --from=page /source/frontend/dist ./frontend/dist
+COPY --from=help /out ./build/help
 COPY pyproject.toml README.md LICENSE ./
 COPY migrations ./migrations
 COPY server ./server
+ARG SOURCE_COMMIT=
 RUN scripts/image wheel /opt/back-end /out
 
 FROM python:3.12.11-slim-bookworm AS editor-dependencies

@@ -37,7 +37,8 @@ def tools_in(environment: Path) -> set[str]:
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The wheel of this checkout, with the page that was built last."""
-    if not (ROOT / "frontend" / "dist" / "index.html").is_file():
+    built = [ROOT / each / "index.html" for each in ("frontend/dist", "build/help")]
+    if not all(each.is_file() for each in built):
         pytest.skip("the page is not built; `make setup` builds it")
     folder = tmp_path_factory.mktemp("wheel")
     back_end = tmp_path_factory.mktemp("back-end")
@@ -47,25 +48,37 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return found
 
 
-def test_the_wheel_carries_page_and_migrations_and_nothing_foreign(wheel: Path) -> None:
+def test_the_wheel_carries_page_help_and_migrations_and_nothing_foreign(wheel: Path) -> None:
     names = zipfile.ZipFile(wheel).namelist()
     assert "action_assistant/static/index.html" in names
+    assert "action_assistant/help/operators-guide.html" in names
     assert "action_assistant/migrations/env.py" in names
     assert any(name.startswith("action_assistant/examples/") for name in names)
     tops = {name.split("/")[0] for name in names}
     assert {top for top in tops if not top.endswith(".dist-info")} == {"action_assistant"}
 
 
+def test_the_wheel_says_which_commit_it_was_built_from(wheel: Path) -> None:
+    """With a plus where files had been changed since."""
+    carried = zipfile.ZipFile(wheel).read("action_assistant/commit.txt").decode().strip()
+    asked = ["git", "-C", str(ROOT), "rev-parse", "HEAD"]
+    head = subprocess.run(asked, capture_output=True, text=True, check=True).stdout.strip()
+    assert carried.removesuffix("+") == head
+
+
 def test_the_wheel_carries_neither_tests_nor_what_builds(wheel: Path) -> None:
     names = [Path(name) for name in zipfile.ZipFile(wheel).namelist()]
     outside = [
-        each for each in names if "static" not in each.parts and "dist-info" not in str(each)
+        each
+        for each in names
+        if not {"static", "help"} & {*each.parts} and "dist-info" not in str(each)
     ]
     assert {each.suffix for each in outside} == {
         ".py",
         ".json",
         ".jsonl",
         ".typed",
+        ".txt",
         ".jinja",
     }
     assert {each.parts[1] for each in outside if each.suffix in {".json", ".jsonl"}} == {"examples"}
@@ -118,6 +131,9 @@ def test_an_installed_wheel_serves_the_page_without_node(wheel: Path, tmp_path: 
                 break
         page = httpx.get(product.url, headers={"accept": "text/html"}, trust_env=False)
         assert '<div id="root">' in page.text
+        told = httpx.get(f"{product.url}/help/", trust_env=False)
+        assert told.status_code == 200
+        assert "Search" in told.text
         with product.editor() as editor:
             assert editor.get("/api/graphs").json()
         assert all(healthy(part, product.port) for part in ("editor", "runner", "serve"))

@@ -22,9 +22,24 @@ def page() -> Path:
     return _carried("static", _CHECKOUT / "frontend" / "dist")
 
 
+def page_sources() -> Path | None:
+    """What the page is built of, in a checkout; None outside of one."""
+    return _CHECKOUT / "frontend" / "src" if checkout() is not None else None
+
+
+def checkout() -> Path | None:
+    """The folder of the sources, when this program runs from them."""
+    return _CHECKOUT if (_CHECKOUT / "pyproject.toml").is_file() else None
+
+
+def help_site() -> Path:
+    """The built documentation; the folder is missing when nobody has built it."""
+    return _carried("help", _CHECKOUT / "build" / "help")
+
+
 def wheels() -> Path | None:
     """The environment that `make ros` makes in a checkout; None outside of one."""
-    return _CHECKOUT / ".venv-ros" if (_CHECKOUT / "pyproject.toml").is_file() else None
+    return _CHECKOUT / ".venv-ros" if checkout() is not None else None
 
 
 def examples() -> Path:

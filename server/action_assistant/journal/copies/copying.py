@@ -1,0 +1,137 @@
+"""Copies the log of one journal into another one that is empty: event for event, of either database."""
+
+import asyncio
+from collections.abc import Callable, Sequence
+from typing import Any, Final
+
+from sqlalchemy import Connection, Table, insert, select
+
+from action_assistant.errors import CannotStart
+from action_assistant.journal.chain import Damage, Inspector
+from action_assistant.journal.database import Branch, Database, cause_of
+from action_assistant.journal.events import Event, Fold
+from action_assistant.journal.migrate import recognize
+from action_assistant.journal.removal import taken_out
+from action_assistant.schema import editor_tables
+from action_assistant.schema.branches import BRANCHES
+from action_assistant.schema.editor_tables import editor_event, editor_head, editor_snapshot
+
+_COMPARED: Final = 1_000  # events at once
+_AT_ONCE: Final = 64  # rows in memory: an event has up to a MiB, a snapshot several
+
+# The tables of the log are the same for both branches, and in every version there was.
+_ROWS: Final = select(*(editor_event.c[name] for name in (*Event.__struct_fields__, "chain")))
+
+
+def copy(
+    source: Database,
+    target: Database,
+    *,
+    branch: Branch,
+    fold: Fold,
+    tell: Callable[[int], None] = lambda _: None,
+    over_older: bool = False,
+    then: Callable[[], None] = lambda: None,
+) -> int:
+    """Copy everything as it is at one moment, while others may write; how many events. The tables are
+    folded anew, in the same transaction: whatever ends it, all is there or nothing.
+
+    `tell` hears how many events have been copied so far. With `over_older` the target may hold an
+    earlier state of the very same log, which is replaced. `then` is done before anybody else may write
+    to the target. To be called where no loop runs; not from one server to another. Raises CannotStart:
+    damaged, not to be reached, or the target holds something else.
+    """
+
+    def pour(here: Connection) -> int:
+        recognize(here)
+        return target.migrate(lambda there: _pour(here, there, branch, fold, tell, over_older))
+
+    try:
+        session = target.open(branch)
+    except BaseException:
+        target.disown()
+        raise
+    try:
+        copied = asyncio.run(_read(source, pour))
+        then()
+        return copied
+    except source.faults as error:
+        raise CannotStart(f"{source.name} cannot be read: {cause_of(error)}.") from error
+    finally:
+        session.close()
+        target.disown()
+
+
+def sentence(damage: Damage) -> str:
+    """What is wrong, for people."""
+    return f"{damage.stream or 'the file'}, event {damage.seq}: {damage.why}"
+
+
+async def _read(source: Database, question: Callable[[Connection], int]) -> int:
+    try:
+        return await source.at_one_moment(question)
+    finally:
+        await source.close()
+
+
+def _pour(
+    here: Connection,
+    there: Connection,
+    branch: Branch,
+    fold: Fold,
+    tell: Callable[[int], None],
+    over_older: bool,
+) -> int:
+    if there.execute(select(editor_event.c.position).limit(1)).first() is None:
+        pass
+    elif over_older and _is_older(there, here):
+        for table in BRANCHES[branch].sorted_tables:
+            if table.name != editor_tables.written_by.name:
+                there.execute(table.delete())
+    else:
+        raise CannotStart(
+            f"The database {there.engine.url.database} holds events already; "
+            "what is copied goes into an empty one."
+        )
+    inspector = Inspector(taken_out)
+    streamed = here.execution_options(yield_per=_AT_ONCE)
+    for rows in streamed.execute(_ROWS.order_by(editor_event.c.position)).partitions():
+        for row in rows:
+            inspector.see(tuple(row))
+            if inspector.damage is not None:
+                raise _damaged(inspector.damage)
+        _insert(there, editor_event, rows)
+        for row in rows:
+            for statement in fold(Event(*row[:7])):
+                there.execute(statement)
+        tell(inspector.seen)
+    ends = here.execute(select(editor_head)).all()
+    for damage in inspector.findings((row.stream, row.seq, row.chain) for row in ends):
+        raise _damaged(damage)
+    for table in (editor_head, editor_snapshot):
+        for rows in streamed.execute(select(table)).partitions():
+            _insert(there, table, rows)
+    return inspector.seen
+
+
+def _is_older(old: Connection, new: Connection) -> bool:
+    """Whether all events of a log are those of another, which may have gone on since. A link of the
+    chain stands for all that an event says."""
+    event = editor_event.c
+    chosen = select(event.position, event.stream, event.seq, event.chain).order_by(event.position)
+    after = 0
+    while rows := old.execute(chosen.where(event.position > after).limit(_COMPARED)).all():
+        last = rows[-1].position
+        same = new.execute(chosen.where(event.position > after, event.position <= last)).all()
+        if [tuple(row) for row in rows] != [tuple(row) for row in same]:
+            return False
+        after = last
+    return True
+
+
+def _insert(there: Connection, table: Table, rows: Sequence[Any]) -> None:
+    there.execute(insert(table), [row._asdict() for row in rows])
+
+
+def _damaged(damage: Damage) -> CannotStart:
+    return CannotStart(f"The journal is damaged: {sentence(damage)}. `verify` tells more.")
