@@ -15,7 +15,7 @@ SECTIONS: Final = (
     ("UMRF", ("umrf", "umrf-and-the-engine")),
     (
         "Administration",
-        ("administration", "installing", "containers", "network", "backups", "monitoring"),
+        ("administration", "installing", "doctor", "containers", "network", "backups", "monitoring"),
     ),
     ("For programs", ("api/editor", "api/runner", "contracts", "room-protocol")),
     (
