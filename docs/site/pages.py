@@ -75,7 +75,7 @@ def place_of(path: Path) -> str | None:
 def relinked(text: str, document: Path) -> tuple[str, set[str]]:
     """The text with links that lead where things lie in the help, and which files it needs beside it.
 
-    What the help has no place for stays as words.
+    What the help has no place for stays as words. Fails for what the repository does not have.
     """
     own = place_of(document)
     assert own is not None
@@ -88,7 +88,10 @@ def relinked(text: str, document: Path) -> tuple[str, set[str]]:
         if not sign:
             words, inside = relinked(words, document)
             needed.update(inside)
-        place = own if not target else place_of((document.parent / target).resolve())
+        there = (document.parent / target).resolve()
+        if target and not there.exists():
+            raise ValueError(f"{document} leads to {target}, which is not there")
+        place = own if not target else place_of(there)
         if place is None:
             return words
         if not place.endswith(".md"):

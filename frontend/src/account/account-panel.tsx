@@ -1,9 +1,17 @@
 /** One's own name, light or dark, and the way out. */
 import { Button, Group, Stack, Text, TextInput, useMantineColorScheme } from "@mantine/core";
-import { IconDeviceDesktop, IconLogout, IconMoon, IconShare, IconSun } from "@tabler/icons-react";
+import {
+  IconDeviceDesktop,
+  IconHelp,
+  IconLogout,
+  IconMoon,
+  IconShare,
+  IconSun,
+} from "@tabler/icons-react";
 import { useState } from "react";
 import { errorText } from "../api/http";
 import { useLive } from "../api/live/use-live";
+import { helpUrl } from "../api/page-url";
 import { ROLE_WORDS, rememberedName, signOut } from "../api/session";
 import { usePerson } from "../api/use-person";
 import { Segments } from "../ui/segments";
@@ -101,6 +109,16 @@ export function AccountPanel({ onShare, onClose, onLeave }: Props) {
           </Text>
         )}
         <Appearance />
+        <Button
+          component="a"
+          href={helpUrl("")}
+          target="_blank"
+          rel="noopener"
+          variant="default"
+          leftSection={<IconHelp size={15} aria-hidden />}
+        >
+          Help
+        </Button>
         <Button
           variant="default"
           leftSection={<IconLogout size={15} aria-hidden />}
