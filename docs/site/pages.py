@@ -47,7 +47,8 @@ CARRIED: Final = ("pictures", "proxy")
 #: Where a document wants the list of the other pages of its section.
 LIST: Final = "<!-- the pages of this section -->"
 
-_LINK: Final = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s#]*)(#[^)\s]*)?\)")
+#: A span of code, which stays as it is, or a link.
+_LINK: Final = re.compile(r"`[^`\n]+`|(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s#]*)(#[^)\s]*)?\)")
 _CODE: Final = re.compile(r"(^```[^`]*^```|^(?: {4}[^\n]*\n)+)", re.MULTILINE)
 _TITLE: Final = re.compile(r"^# (.+)$", re.MULTILINE)
 _FIRST: Final = re.compile(r"^# .+\n+([^#\n|!>`].+)$", re.MULTILINE)
@@ -83,7 +84,7 @@ def relinked(text: str, document: Path) -> tuple[str, set[str]]:
 
     def lead(match: re.Match[str]) -> str:
         sign, words, target, anchor = match[1], match[2], match[3], match[4] or ""
-        if "://" in target or target.startswith("mailto:"):
+        if target is None or "://" in target or target.startswith("mailto:"):
             return match[0]
         if not sign:
             words, inside = relinked(words, document)
@@ -102,7 +103,6 @@ def relinked(text: str, document: Path) -> tuple[str, set[str]]:
     def prose(part: str) -> str:
         return _LINK.sub(lead, part)
 
-    # Words of a link may be code, so code within a line is looked at with its prose.
     parts = _CODE.split(text)
     return "".join(part if n % 2 else prose(part) for n, part in enumerate(parts)), needed
 
@@ -127,7 +127,7 @@ def listed(places: list[str], texts: dict[str, str], own: str) -> str:
         found = _FIRST.search(text)
         first = re.split(r"(?<=\.) ", found[1])[0] if found else ""
         # A link in it would lead from another folder.
-        first = _LINK.sub(lambda match: match[2], first)
+        first = _LINK.sub(lambda match: match[2] or match[0], first)
         way = "../" * own.count("/") + place
         lines.append(f"- [{titled(text, place)}]({way}.md){': ' if first else ''}{first}")
     return "\n".join(lines)
