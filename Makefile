@@ -132,6 +132,11 @@ soak-ros: ros ## the same over real rclpy: 200 histories, hundreds of stops
 	TEST_ROS_HISTORIES=200 TEST_ROS_AT_ONCE=4 TEST_STOP_CLICKS=50 $(BARE) $(ROS)/python -m pytest -q -s \
 		--timeout=0 tests/ros/test_false_confirmations.py tests/ros/test_stop_latency.py
 
+.PHONY: containers
+containers: setup ## build the images and drive docker-compose.yml with podman, as root on Debian (ARGS="-k proxy")
+	@$(BROWSER)
+	@scripts/containers $(ARGS)
+
 .PHONY: workspace
 workspace: setup ## a sourced ROS 2 as Ubuntu 24.04 lays it out, in a root of its own (PYTHON312=…, FOLDER=…)
 	@scripts/try-workspace "$(or $(PYTHON312),python3.12)" "$(or $(FOLDER),/var/tmp/action-assistant-workspace)"
@@ -154,6 +159,12 @@ browsers: setup ## the main job in Firefox and WebKit, by keys and by touch
 .PHONY: newcomer
 newcomer: frontend/node_modules/.done ## count what eight actions cost by mouse: URL=http://127.0.0.1:8000 TOKEN=…
 	@ACTION_ASSISTANT_TOKEN="$(TOKEN)" $(NODE) node bench/newcomer.mjs "$(or $(URL),http://127.0.0.1:8000)"
+
+.PHONY: monitoring
+monitoring: setup ## check alerts, their tests and the metrics of a running product with promtool
+	@scripts/need promtool=prometheus
+	@promtool check rules docs/monitoring/alerts.yml && promtool test rules docs/monitoring/alerts_test.yml
+	@PYTHONPATH=tests $(BIN)/python bench/monitoring.py
 
 .PHONY: bench
 bench: setup ## measure speed; prints tables (ARGS="rooms" for one benchmark)

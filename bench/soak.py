@@ -29,6 +29,23 @@ PARTS: Final[dict[str, Part]] = {
         {"SOAK_IMAGES": "10000"},
         ("tests/journal/test_power.py", "-k", "power_cut"),
     ),
+    "moves": Part(
+        "50 × kill -9 in a move, one in a migration each; 20 who write before and after a move",
+        {
+            "TEST_MOVE_KILLS": "50",
+            "TEST_MIGRATION_KILLS": "50",
+            "TEST_BACKUP_KILLS": "50",
+            "TEST_WRITERS": "20",
+            "TEST_WRITING_S": "10",
+        },
+        (
+            "tests/commands/databases",
+            "tests/commands/backups/test_kills.py",
+            "tests/test_upgrades.py",
+            "-k",
+            "killed or many_wrote",
+        ),
+    ),
     "faults": Part(
         "500 writes that fail, full disks",
         {"SOAK_FAULTS": "500"},

@@ -11,7 +11,7 @@ from alembic import command
 from alembic.autogenerate import compare_metadata
 from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from sqlalchemy import JSON, Column, Connection, MetaData, insert, inspect, select, text
+from sqlalchemy import Connection, MetaData, inspect, select, text
 
 from action_assistant import paths
 from action_assistant.errors import CannotStart
@@ -20,6 +20,7 @@ from action_assistant.journal.database import Branch
 from action_assistant.journal.databases import database_of, migrate
 from action_assistant.journal.migrate import revisions_of
 from action_assistant.schema.branches import BRANCHES, VERSIONS
+from support.rows import contents, fill
 
 branches = pytest.mark.parametrize("branch", ["editor", "runner"])
 Step: TypeAlias = Callable[[Connection], Any]
@@ -177,37 +178,6 @@ def test_from_every_earlier_revision_what_is_stored_comes_along(empty: Empty) ->
         empty.do(lambda c: command.downgrade(config_for(c, empty.branch), f"{empty.branch}@base"))
 
 
-def fill(connection: Connection) -> dict[str, list[dict[str, Any]]]:
-    """Put two rows into each table as it is at this revision; what they are."""
-    metadata = MetaData()
-    metadata.reflect(connection)
-    tables = [table for table in metadata.sorted_tables if table.name != "alembic_version"]
-    for table in tables:
-        for n in (1, 2):
-            connection.execute(insert(table).values({c.name: value(c, n) for c in table.columns}))
-    return contents(connection, [table.name for table in tables])
-
-
-def value(column: Column[Any], n: int) -> Any:
-    """Something that fits a column, and that no other row has."""
-    kind = column.type.as_generic().python_type
-    values = {int: n, str: f"{column.name} {n}", bytes: bytes([n, 0, 255]), bool: n == 1}
-    return {"n": n} if isinstance(column.type.as_generic(), JSON) else values.get(kind, float(n))
-
-
-def contents(connection: Connection, names: list[str]) -> dict[str, list[dict[str, Any]]]:
-    """The rows of some tables."""
-    metadata = MetaData()
-    metadata.reflect(connection, only=names)
-    return {
-        name: sorted(
-            (dict(row) for row in connection.execute(select(metadata.tables[name])).mappings()),
-            key=repr,
-        )
-        for name in names
-    }
-
-
 def test_migrating_twice_changes_nothing(empty: Empty) -> None:
     assert empty.migrate() == empty.migrate()
 
@@ -236,7 +206,7 @@ def test_scripts_are_found_also_where_the_path_is_unusual(
     strange.mkdir()
     (strange / "migrations").symlink_to(paths.migrations())
     monkeypatch.setattr(paths, "migrations", lambda: strange / "migrations")
-    assert migrate(f"sqlite:///{tmp_path / 'editor.db'}", "editor") == "editor_0007"
+    assert migrate(f"sqlite:///{tmp_path / 'editor.db'}", "editor") == "editor_0008"
 
 
 @branches

@@ -31,7 +31,6 @@ LONG_FILES: Final = {
 LONG_FUNCTIONS: Final = {
     "migrations/editor/editor_0001_log_and_catalogue.py upgrade": "migrations never change again",
     "migrations/runner/runner_0001_log_and_runs.py upgrade": "migrations never change again",
-    "server/action_assistant/commands/backups/backup.py _backup": "the steps of a backup in order",
 }
 #: Class names that stand in several modules, and why they may.
 SHARED: Final[dict[str, str]] = {}

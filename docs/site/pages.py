@@ -15,7 +15,10 @@ SECTIONS: Final = (
     ("UMRF", ("umrf", "umrf-and-the-engine")),
     (
         "Administration",
-        ("administration", "installing", "containers", "network", "backups", "monitoring"),
+        (
+            *("administration", "installing", "containers", "network"),
+            *("backups", "monitoring", "doctor"),
+        ),
     ),
     ("For programs", ("api/editor", "api/runner", "contracts", "room-protocol")),
     (

@@ -12,7 +12,8 @@ from action_assistant.errors import CannotStart
 #: What this program puts into a data folder.
 _OURS: Final = re.compile(
     r"(editor|runner)\.(database|db|mark).*|restore\.unfinished|token|\.token-.*|\.probe-.*|open\.html"
-    r"|revoked|sessions|tls|archive|recordings|before-restore-.*|\.backup-.*"
+    r"|revoked|sessions|tls|archive|recordings|before-(restore-|move-|upgrade).*|\.(backup|restore|rehearsal|move)-.*"
+    r"|backups\.json.*|\.backups\.json\.part"
 )
 _OTHERS: Final = stat.S_IRWXG | stat.S_IRWXO
 
@@ -27,6 +28,15 @@ def make_folder(path: Path) -> None:
     if not path.is_dir():
         make_folder(path.parent)
         path.mkdir(mode=0o700, exist_ok=True)
+
+
+def sync(path: Path) -> None:
+    """What was written or renamed has to be found after a power cut, too."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def own_folder(data: Path) -> Path:
@@ -51,7 +61,10 @@ def prove_writable(data: Path) -> None:
 
 
 def open_to_others(data: Path) -> list[Path]:
-    """What other users of this computer may read or enter: the folder first, then what is ours in it."""
+    """What other users of this computer may read or enter: the folder first, then what is ours in it.
+    Not told on Windows."""
+    if not hasattr(os, "geteuid"):
+        return []  # Windows keeps rights in lists of its own, of which modes tell nothing
     return [path for path in (data, *_ours_in(data)) if _is_open(path)]
 
 
@@ -84,3 +97,16 @@ def _close(path: Path) -> None:
         path.chmod(0o700 if path.is_dir() else 0o600)
     except OSError:  # somebody else's; `doctor` tells
         return
+
+
+def of_others(data: Path) -> list[Path]:
+    """What is ours in it, yet belongs to another user than the folder does."""
+    owner = data.stat().st_uid
+    found: list[Path] = []
+    for path in _ours_in(data):
+        try:
+            if path.lstat().st_uid != owner:
+                found.append(path)
+        except OSError:  # gone meanwhile
+            continue
+    return found

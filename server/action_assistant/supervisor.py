@@ -15,8 +15,15 @@ from typing import Final
 import msgspec
 
 from action_assistant.interpreter import Interpreter, for_runner
+from action_assistant.logs.setup import say, writes_json
 from action_assistant.private_files import opener
-from action_assistant.settings import EVERYWHERE, Reachability, more_hosts
+from action_assistant.settings import (
+    EVERYWHERE,
+    INDEX_FOLDERS,
+    Reachability,
+    as_index_folders,
+    more_hosts,
+)
 from action_assistant.share_links import invitations_as_text, is_ours
 from action_assistant.web.auth.keys import Keys
 from action_assistant.web.network.addresses import addresses_of
@@ -27,6 +34,15 @@ _STEADY: Final = 30.0  # seconds after which a process counts as healthy again
 _BACK_OFF: Final = (0.2, 0.5, 1.0, 2.0, 5.0, 10.0)  # seconds before the n-th restart in a row
 _TICK: Final = 0.1
 _ENDING: Final = 8.0  # seconds that a process gets to end by itself
+
+
+class BackupPlan(msgspec.Struct, frozen=True):
+    """Backups into a folder, every so many seconds; `keep` and `after` as `backup` takes them."""
+
+    into: Path
+    every: float
+    keep: str
+    after: str | None
 
 
 class ServePlan(msgspec.Struct, frozen=True, kw_only=True):
@@ -42,6 +58,8 @@ class ServePlan(msgspec.Struct, frozen=True, kw_only=True):
     opens: bool
     reached: Reachability = Reachability()
     behaviours: Path | None = None
+    backups: BackupPlan | None = None
+    index_folders: Mapping[str, Path] = {}
 
 
 class EndSignal:
@@ -68,7 +86,7 @@ class EndSignal:
 
 
 class Child:
-    """One of the two processes, as often as it takes."""
+    """One of the processes, as often as it takes."""
 
     def __init__(
         self,
@@ -120,7 +138,7 @@ class Child:
         self._deaths = 1 if now - self._born > _STEADY else self._deaths + 1
         wait = _BACK_OFF[min(self._deaths, len(_BACK_OFF)) - 1]
         self._again = now + wait
-        _say(f"{self.name} died ({_cause(code)}); starting it again in {wait:g} s")
+        say(f"{self.name} died ({_cause(code)}); starting it again in {wait:g} s")
         return None
 
     def end(self) -> None:
@@ -131,7 +149,7 @@ class Child:
         try:
             self._process.wait(_ENDING)
         except subprocess.TimeoutExpired:
-            _say(f"{self.name} does not end; killing it")
+            say(f"{self.name} does not end; killing it")
             self._process.kill()
             self._process.wait()
         self._process = None
@@ -148,7 +166,8 @@ def serve(plan: ServePlan) -> int:
     # The writing end is never written to: it closes when this process dies, however it dies.
     reading, _writing = os.pipe()
     children = _children(plan)
-    _say("starting …")
+    keeper = _keeper(plan)
+    say("starting …")
     for child in children:
         child.start(reading)
     threading.Thread(
@@ -160,10 +179,13 @@ def serve(plan: ServePlan) -> int:
                 code = child.tend(reading)
                 if code is not None:
                     return code
+            if keeper is not None and keeper.tend(reading) is not None:
+                say("no backups are made; the message above says why")
+                keeper = None
         return 0
     finally:
-        _say("ending …")
-        for child in children:
+        say("ending …")
+        for child in [*children, *([keeper] if keeper is not None else [])]:
             child.end()
 
 
@@ -179,7 +201,7 @@ def _children(plan: ServePlan) -> list[Child]:
     this = Interpreter(path=Path(sys.executable), origin="this")
     speaking = for_runner()
     if speaking.remark:
-        _say(speaking.remark)
+        say(speaking.remark)
     return [
         Child(
             "editor",
@@ -193,9 +215,23 @@ def _children(plan: ServePlan) -> list[Child]:
             ["runner", *address, *behaviours, "--port", ports[1], "--page-port", ports[0]],
             plan.port + 1,
             speaking,
-            settings,
+            {**settings, INDEX_FOLDERS: as_index_folders(plan.index_folders)},
         ),
     ]
+
+
+def _keeper(plan: ServePlan) -> Child | None:
+    """Who makes backups: a process of its own, of low priority, for which nobody waits."""
+    if plan.backups is None:
+        return None
+    keeps = plan.backups
+    into = ["--data", str(plan.data), "--into", str(keeps.into), "--keep", keeps.keep]
+    after = ["--after", keeps.after] if keeps.after is not None else []
+    database = {"ACTION_ASSISTANT_DATABASE": plan.database} if plan.database else {}
+    this = Interpreter(path=Path(sys.executable), origin="this")
+    return Child(
+        "backup", ["backup", *into, *after, "--every", f"{keeps.every:g}s"], 0, this, database
+    )
 
 
 def _as_settings(reached: Reachability) -> dict[str, str]:
@@ -218,7 +254,7 @@ def _certified(plan: ServePlan) -> ssl.SSLContext | None:
     )
     certificate = Certificate(plan.data)
     certificate.renew(addresses.certified())
-    _say(
+    say(
         "browsers warn until they trust the authority that signs for this computer: import\n"
         f"    {certificate.authority}\n    SHA-256 {certificate.fingerprint()}"
     )
@@ -247,17 +283,17 @@ def _greet(
         with open(redirect, "w", opener=opener) as out:
             out.write(f'<!doctype html><meta http-equiv="refresh" content="0;url={url}">')
     except OSError as error:
-        _say(f"{redirect} cannot be written: {error.strerror}")
+        say(f"{redirect} cannot be written: {error.strerror}")
         opens = False
-    at_terminal = sys.stderr.isatty()  # a log is kept, and read by others
+    at_terminal = sys.stderr.isatty() and not writes_json()  # a log is kept, and read by others
     if at_terminal:
-        _say(f"ready. Open this link (it signs you in, keep it to yourself):\n\n    {shown_at}\n")
+        say(f"ready. Open this link (it signs you in, keep it to yourself):\n\n    {shown_at}\n")
         if shown_at != url:
-            _say(f"or, on this computer and without the proxy:\n\n    {url}\n")
+            say(f"or, on this computer and without the proxy:\n\n    {url}\n")
     else:
-        _say(f"ready at {base}. {redirect} signs you in; the link is shown at a terminal only.")
+        say(f"ready at {base}. {redirect} signs you in; the link is shown at a terminal only.")
     if plan.share:
-        _say(invitations_as_text(base, keys, trust, secret=not at_terminal))
+        say(invitations_as_text(base, keys, trust, secret=not at_terminal))
     if opens:
         webbrowser.open(redirect.as_uri())
 
@@ -276,7 +312,7 @@ def _answer(
             if enough.within(_TICK):
                 return False
             if time.monotonic() > deadline:
-                _say(f"{child.name} does not answer yet; the messages above may say why")
+                say(f"{child.name} does not answer yet; the messages above may say why")
                 deadline = float("inf")
     return True
 
@@ -289,8 +325,3 @@ def _has_screen() -> bool:
 
 def _cause(code: int) -> str:
     return signal.Signals(-code).name if code < 0 else f"exit code {code}"
-
-
-def _say(text: str) -> None:
-    sys.stderr.write(f"action-assistant: {text}\n")
-    sys.stderr.flush()

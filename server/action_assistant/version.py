@@ -1,8 +1,64 @@
-"""The version of this program, as installed."""
+"""Which program this is: its version, and the commit that it comes from as far as that is known.
 
+The version stands in pyproject.toml alone. A wheel carries the commit that it was built from
+(scripts/wheel_commit.py); in a checkout git is asked. Neither is guessed.
+"""
+
+import subprocess
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Final
+
+from action_assistant import paths
 
 try:
-    VERSION = version("temoto-action-assistant")
+    VERSION: Final = version("temoto-action-assistant")
 except PackageNotFoundError:  # run from a folder that was never installed
-    VERSION = "0.0.0"
+    VERSION = "0.0.0"  # type: ignore[misc]
+
+_CARRIED: Final = Path(__file__).with_name("commit.txt")
+_PATIENCE: Final = 2.0  # seconds for git
+_SHORT: Final = 8
+
+
+@cache
+def commit() -> str | None:
+    """The commit of this program, 40 hex digits; with `+` behind it if the wheel was built from files
+    that had been changed since. None when nobody knows."""
+    try:
+        return _CARRIED.read_text().strip() or None
+    except OSError:
+        return _checked_out()
+
+
+def described() -> str:
+    """For people: `0.1.0 (commit 1a2b3c4d)`, and whether it runs from a checkout, where files may have
+    been changed since."""
+    known = commit()
+    if known is None:
+        return f"{VERSION} (commit not known)"
+    short = known[:_SHORT] + "+" * known.endswith("+")
+    return f"{VERSION} (commit {short}{'' if _CARRIED.exists() else ', a checkout'})"
+
+
+def _checked_out() -> str | None:
+    """What git says of the checkout that this is. A copy that lies in another repository is none."""
+    folder = paths.checkout()
+    if folder is None or not (folder / ".git").exists():
+        return None
+    try:
+        asked = subprocess.run(
+            ["git", "-C", str(folder), "rev-parse", "--show-toplevel", "HEAD"],
+            capture_output=True,
+            text=True,
+            timeout=_PATIENCE,
+            stdin=subprocess.DEVNULL,
+            check=False,
+        )
+    except (OSError, subprocess.SubprocessError):
+        return None
+    said = asked.stdout.split("\n")
+    if asked.returncode or Path(said[0]).resolve() != folder.resolve():
+        return None
+    return said[1]

@@ -50,7 +50,7 @@ class Command(NamedTuple):
     @property
     def is_placeholder(self) -> bool:
         """Whether somebody has to fill something in first."""
-        return bool(_PLACEHOLDER.search(self.text))
+        return bool(_PLACEHOLDER.search(self.text.replace("--data DIR", "")))
 
 
 def _words(text: str) -> list[list[str]]:

@@ -55,6 +55,6 @@ def fill(folder: Path, home: Path) -> None:
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(json.dumps(value))
-    for name in ("graphs", "behaviours", "ws/src"):
+    for name in ("graphs", "behaviours", "ws/src", "workspace/install"):
         (home / name).mkdir(parents=True, exist_ok=True)
     (home / "behaviours" / "drive.py").write_text(_BEHAVIOUR)

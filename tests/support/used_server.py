@@ -97,20 +97,20 @@ async def live(product: Product, token: str) -> list[str]:
             Guest(product, "Eve", {"invitation": proofs["gone"]}),
         ):
             editor.post(f"/api/invitations/{links['gone']['id']}/revoke").raise_for_status()
-            graphs = _made(editor)
-            await _draw(editor, graphs, ann, ben)
-            _published(editor, graphs, ann, ben)
+            graphs = made(editor)
+            await draw(editor, graphs, ann, ben)
+            published(editor, graphs, ann, ben)
         _run(editor, runner)
     return [proofs["team"], proofs["visitors"]]
 
 
-def _made(editor: httpx.Client) -> list[str]:
+def made(editor: httpx.Client) -> list[str]:
     """Three graphs."""
     bodies: tuple[dict[str, Any], ...] = (_PATROL, {"name": "dock 🤖"}, {"name": "forgotten"})
     return [editor.post("/api/graphs", json=body).json()["id"] for body in bodies]
 
 
-async def _draw(editor: httpx.Client, graphs: list[str], ann: Guest, ben: Guest) -> None:
+async def draw(editor: httpx.Client, graphs: list[str], ann: Guest, ben: Guest) -> None:
     for number, (guest, graph) in enumerate(((ann, graphs[0]), (ben, graphs[0]), (ben, graphs[1]))):
         async with guest.drawing(graph) as doc:
             actions = doc.get("actions", type=Map)
@@ -118,10 +118,10 @@ async def _draw(editor: httpx.Client, graphs: list[str], ann: Guest, ben: Guest)
                 aid = f"aid{number}{n}".ljust(12, "x")
                 actions[aid] = f"Work{number}"
                 doc.get("comments", type=Map)[f"t{number}/m{n}"] = f'"comment {n} of {number}"'
-        _eventually(partial(_has, editor, graph, f"Work{number}"))
+        eventually(partial(_has, editor, graph, f"Work{number}"))
 
 
-def _published(editor: httpx.Client, graphs: list[str], ann: Guest, ben: Guest) -> None:
+def published(editor: httpx.Client, graphs: list[str], ann: Guest, ben: Guest) -> None:
     """Two versions, another name, and one graph less."""
     ann.http.post(f"/api/graphs/{graphs[0]}/versions", json={"label": "first"}).raise_for_status()
     editor.patch(f"/api/graphs/{graphs[0]}", json={"name": "patrol north"}).raise_for_status()
@@ -158,9 +158,9 @@ def _run(editor: httpx.Client, runner: httpx.Client) -> None:
         assert started.status_code == 201, started.text
         run = runs[name] = started.json()["id"]
         if name == "slow":
-            _eventually(partial(_says, runner, run, "started_at"))
+            eventually(partial(says, runner, run, "started_at"))
             runner.post(f"/api/runs/{run}/stop").raise_for_status()
-        _eventually(partial(_says, runner, run, "ended_at"))
+        eventually(partial(says, runner, run, "ended_at"))
     marks = {"pinned": True, "note": "look here", "labels": ["demo"]}
     for name in _NOTED:
         runner.patch(f"/api/runs/{runs[name]}/marks", json=marks).raise_for_status()
@@ -168,10 +168,10 @@ def _run(editor: httpx.Client, runner: httpx.Client) -> None:
     runner.post("/api/expectations", json=kept).raise_for_status()
     robot = {"name": "Marian", "domain": 139}
     runner.post("/api/robots", json=robot).raise_for_status()
-    _eventually(lambda: runner.post("/api/archive", json={"runs": _LONG_AGO}).json()["runs"] >= 2)
+    eventually(lambda: runner.post("/api/archive", json={"runs": _LONG_AGO}).json()["runs"] >= 2)
 
 
-def _says(runner: httpx.Client, run: str, what: str) -> bool:
+def says(runner: httpx.Client, run: str, what: str) -> bool:
     return runner.get(f"/api/runs/{run}").json()[what] is not None
 
 
@@ -236,7 +236,7 @@ def _owner(url: str, token: str) -> Iterator[httpx.Client]:
         yield client
 
 
-def _eventually(holds: Callable[[], Any], patience: float = 30.0) -> None:
+def eventually(holds: Callable[[], Any], patience: float = 30.0) -> None:
     deadline = time.monotonic() + patience
     while not holds():
         assert time.monotonic() < deadline

@@ -5,15 +5,17 @@ import {
   IconHelp,
   IconLogout,
   IconMoon,
+  IconServerCog,
   IconShare,
   IconSun,
 } from "@tabler/icons-react";
 import { useState } from "react";
+import { Link } from "wouter";
 import { errorText } from "../api/http";
 import { useLive } from "../api/live/use-live";
 import { helpUrl } from "../api/page-url";
 import { ROLE_WORDS, rememberedName, signOut } from "../api/session";
-import { usePerson } from "../api/use-person";
+import { useMay, usePerson } from "../api/use-person";
 import { Segments } from "../ui/segments";
 
 const schemes = [
@@ -45,6 +47,7 @@ interface Props {
 export function AccountPanel({ onShare, onClose, onLeave }: Props) {
   const { person, rename } = usePerson();
   const { runner } = useLive();
+  const mayLook = useMay("restore");
   const [name, setName] = useState(rememberedName() || person.name);
   const [problem, setProblem] = useState("");
   const save = async () => {
@@ -100,6 +103,17 @@ export function AccountPanel({ onShare, onClose, onLeave }: Props) {
             }}
           >
             Share with others …
+          </Button>
+        )}
+        {mayLook && (
+          <Button
+            component={Link}
+            to="/admin"
+            variant="default"
+            leftSection={<IconServerCog size={15} aria-hidden />}
+            onClick={onClose}
+          >
+            Administration
           </Button>
         )}
         {!window.isSecureContext && (

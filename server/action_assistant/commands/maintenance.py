@@ -9,6 +9,7 @@ from typing import Final
 from action_assistant import paths, settings
 from action_assistant.errors import CannotStart, Unavailable
 from action_assistant.journal.chain import Damage
+from action_assistant.journal.copies.before_upgrade import FOLDER
 from action_assistant.journal.database import Branch
 from action_assistant.journal.events import Fold
 from action_assistant.journal.journal import Journal
@@ -83,7 +84,7 @@ def _for_each(
         raise CannotStart(f"There is no journal in {data}.")
 
     async def one(branch: Branch, url: str, fold: Fold) -> bool:
-        journal = await Journal.open(url, branch=branch, fold=fold)
+        journal = await Journal.open(url, branch=branch, fold=fold, copies=data / FOLDER)
         try:
             return await handler(branch, journal)
         except Unavailable as error:

@@ -19,6 +19,7 @@ from action_assistant.commands.client import (
     refused,
     running,
 )
+from action_assistant.commands.databases import runs_copy
 from action_assistant.errors import CannotStart
 from action_assistant.safe_text import one_line
 
@@ -47,7 +48,9 @@ def _add_runs(runs: argparse.ArgumentParser) -> None:
     runs.add_argument("--graph", metavar="GRAPH", help="id or name")
     runs.add_argument("--json", action="store_true", help="as JSON, for programs")
     runs.set_defaults(handler=_runs)
-    more = runs.add_subparsers(metavar="at-rest | since | verify | archive | restore | examples")
+    more = runs.add_subparsers(
+        metavar="at-rest | since | verify | archive | restore | copy | examples"
+    )
     rests = command(
         more,
         "at-rest",
@@ -58,6 +61,7 @@ def _add_runs(runs: argparse.ArgumentParser) -> None:
     rests.add_argument("--how", required=True, help="how you have seen that nothing moves")
     rests.set_defaults(handler=_at_rest)
     archives.add_to(more)
+    runs_copy.add_to(more)
     since.add_to(more)
     brought = command(
         more,
@@ -182,6 +186,8 @@ def _run(options: argparse.Namespace) -> int:
                 "request_id": str(uuid.uuid4()),
                 "graph": graph,
             }
+            if version.get("subgraphs"):
+                order |= {name: version[name] for name in ("subgraphs", "tree_digest")}
             if script is not None:
                 order["script"] = script
             run = server.runner("POST", "/api/runs", json=order).json()

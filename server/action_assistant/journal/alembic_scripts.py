@@ -1,7 +1,5 @@
 """Alembic, with the scripts of this program: from one revision of a database to another."""
 
-import logging
-
 from alembic import command
 from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
@@ -9,8 +7,6 @@ from sqlalchemy import Connection
 
 from action_assistant import paths
 from action_assistant.schema.branches import BRANCHES
-
-logging.getLogger("alembic.runtime").setLevel(logging.WARNING)  # we say it in one line
 
 
 def config_for(connection: Connection, branch: str) -> Config:

@@ -15,6 +15,15 @@ T = TypeVar("T")
 Branch: TypeAlias = Literal["editor", "runner"]
 
 
+#: What comes before the tables of a database change: called with its connection, whose it is, and its
+#: revision, in the transaction of the change. Raises CannotStart, and then there is none.
+Before: TypeAlias = Callable[[Connection, Branch, str], object]
+
+
+def no_copy(connection: Connection, branch: Branch, revision: str) -> None:
+    """Nothing comes before: of what is a copy itself, or is new."""
+
+
 class WriterSession(Protocol):
     """The connection that writes. Used by one thread at a time; everything only inside `run`."""
 
@@ -54,8 +63,9 @@ class Database(Protocol):
     def faults(self) -> tuple[type[Exception], ...]:
         """Everything that its driver raises."""
 
-    def open(self, branch: Branch) -> WriterSession:
-        """Become the only writer, migrate, connect. Raises CannotStart."""
+    def open(self, branch: Branch, before: Before = no_copy) -> WriterSession:
+        """Become the only writer, migrate, connect. `before` is called where tables are about to
+        change. Raises CannotStart."""
 
     def look(self, question: Callable[[Connection], object]) -> None:
         """Ask what is there already, before anything is made or altered. Raises CannotStart."""
@@ -78,6 +88,9 @@ class Database(Protocol):
 
     def scan(self, connection: Connection, after: int) -> tuple[list[Sequence[Any]], int]:
         """Some stored events with their chain as they stand, and from where to go on."""
+
+    def bytes_in_use(self, connection: Connection) -> dict[str, int]:
+        """Bytes of the database, and of a log beside it, by `database` and `wal`. Raises OSError."""
 
     def complaints(self, connection: Connection) -> list[str]:
         """What the database itself finds wrong with its files."""

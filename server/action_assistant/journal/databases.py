@@ -1,11 +1,17 @@
 """Which database a URL names, SQLite or Postgres, and bringing it to this version."""
 
-from sqlalchemy import make_url
+import asyncio
+from collections.abc import Callable
+from typing import TypeVar
+
+from sqlalchemy import Connection, make_url
 from sqlalchemy.exc import ArgumentError
 
 from action_assistant.errors import CannotStart
-from action_assistant.journal.database import Branch, Database
+from action_assistant.journal.database import Before, Branch, Database, cause_of, no_copy
 from action_assistant.journal.migrate import recognize, upgrade_to
+
+T = TypeVar("T")
 
 
 def database_of(url: str) -> Database:
@@ -26,11 +32,28 @@ def database_of(url: str) -> Database:
     raise CannotStart(f"Databases of the kind {parsed.drivername!r} are not supported.")
 
 
-def migrate(url: str, branch: Branch, revision: str = "head") -> str:
+def migrate(url: str, branch: Branch, revision: str = "head", *, before: Before = no_copy) -> str:
     """Upgrade the database and return its revision. Raises CannotStart.
 
     All of it is one transaction: killed half-way, the database is as it was.
     """
     database = database_of(url)
     database.look(recognize)
-    return database.migrate(upgrade_to(branch, revision))
+    return database.migrate(upgrade_to(branch, revision, before=before))
+
+
+def ask_once(url: str, question: Callable[[Connection], T]) -> T:
+    """An answer as of one moment, for which nothing is made or changed. To be called where no loop runs.
+    Raises CannotStart."""
+    database = database_of(url)
+
+    async def ask() -> T:
+        try:
+            return await database.at_one_moment(question)
+        finally:
+            await database.close()
+
+    try:
+        return asyncio.run(ask())
+    except database.faults as error:
+        raise CannotStart(f"{database.name} cannot be read: {cause_of(error)}.") from error

@@ -2,9 +2,10 @@
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager
 from functools import partial
+from pathlib import Path
 from typing import Any, Final, TypeVar
 
 import msgspec
@@ -12,10 +13,20 @@ from sqlalchemy import Connection, delete, insert, select
 
 from action_assistant.errors import Conflict, Unavailable
 from action_assistant.journal.chain import Damage, Inspector
-from action_assistant.journal.database import Branch, Database, WriterSession, cause_of
+from action_assistant.journal.copies.before_upgrade import keep_copy
+from action_assistant.journal.database import (
+    Before,
+    Branch,
+    Database,
+    WriterSession,
+    cause_of,
+    no_copy,
+)
 from action_assistant.journal.databases import database_of
 from action_assistant.journal.events import Addition, Draft, Event, Fold
 from action_assistant.journal.follower import Follower
+from action_assistant.journal.health.commits import CommitMetrics
+from action_assistant.journal.health.probe import JournalProbe
 from action_assistant.journal.reader import JournalReader, body_of, following, seal_of
 from action_assistant.journal.removal import STREAM, StreamRemoved, delete_some, taken_out
 from action_assistant.journal.writer import Job, Outcome, Transaction, Writer
@@ -31,6 +42,11 @@ _PAGE: Final = 500  # events that a follower reads at once
 _head, _snapshot = editor_head.c, editor_snapshot.c
 
 
+def _before(copies: Path | None) -> Before:
+    """Keep a copy in that folder before tables change."""
+    return no_copy if copies is None else partial(keep_copy, copies)
+
+
 class Journal(JournalReader):
     """The log of one process. The only writer of its database; readers never wait for it."""
 
@@ -44,30 +60,36 @@ class Journal(JournalReader):
         self._jobs: list[Job[Any]] = []  # of this turn of the loop, for one transaction
         self._followers: set[Follower] = set()
         self._closed = False
+        self._probe = JournalProbe(branch, self.derive, self._ask, lambda: self._writer.is_alive)
 
     @staticmethod
-    def prepare(url: str, branch: Branch) -> None:
+    def prepare(url: str, branch: Branch, *, copies: Path | None = None) -> None:
         """Raise CannotStart if `open` would: to be called before a server is begun."""
         database = database_of(url)
         try:
-            database.open(branch).close()
+            database.open(branch, _before(copies)).close()
         finally:
             database.disown()
 
     @classmethod
-    async def open(cls, url: str, *, branch: Branch, fold: Fold) -> "Journal":
+    async def open(
+        cls, url: str, *, branch: Branch, fold: Fold, copies: Path | None = None
+    ) -> "Journal":
         """Open, and bring the tables to this version. `url`: sqlite:///PATH or postgresql://…
+        `copies`: the folder where a copy goes before; without it none is made.
 
         Raises CannotStart: newer or foreign database, not to be reached or written, in use, or not
         set up to keep what it was told.
         """
-        return await cls.on(database_of(url), branch=branch, fold=fold)
+        return await cls.on(database_of(url), branch=branch, fold=fold, copies=copies)
 
     @classmethod
-    async def on(cls, database: Database, *, branch: Branch, fold: Fold) -> "Journal":
+    async def on(
+        cls, database: Database, *, branch: Branch, fold: Fold, copies: Path | None = None
+    ) -> "Journal":
         """Open a journal in a database. Raises CannotStart."""
         try:
-            session = await asyncio.to_thread(database.open, branch)
+            session = await asyncio.to_thread(database.open, branch, _before(copies))
         except BaseException:
             await database.close()
             database.disown()
@@ -180,11 +202,30 @@ class Journal(JournalReader):
             return error.detail
         return None
 
+    async def parts(self) -> Mapping[str, str | None]:
+        """What of it works (None), or why it does not: tried by writing, and said within seconds."""
+        return await self._probe.parts()
+
+    @property
+    def metrics(self) -> CommitMetrics:
+        """What the writer has done."""
+        return self._writer.metrics
+
+    @property
+    def database_name(self) -> str:
+        """What people may read: without a password."""
+        return self._database.name
+
+    async def bytes_in_use(self) -> dict[str, int]:
+        """Bytes of the database and of what waits beside it, by name. Raises Unavailable, OSError."""
+        return await self._ask(self._database.bytes_in_use)
+
     async def close(self) -> None:
         """Finish what was appended, then let go of the file. Followers end."""
         if self._closed:
             return
         self._closed = True
+        self._probe.close()
         self._submit()
         await asyncio.to_thread(self._writer.close)
         await asyncio.sleep(0)  # let the last outcomes arrive

@@ -8,14 +8,18 @@ from typing import Final
 from sqlalchemy import Connection, insert, inspect, select
 
 from action_assistant import paths
-from action_assistant.errors import CannotStart
+from action_assistant.errors import AnothersDatabase, CannotStart, NewerSchema
+from action_assistant.journal.database import Before, no_copy
 from action_assistant.journal.database import Branch as Branch
 from action_assistant.journal.events import Event
+from action_assistant.journal.program_version import last_writer, sign
 from action_assistant.schema.branches import BRANCHES, VERSIONS
+from action_assistant.version import described
 
 #: How our revisions are named, also those of versions to come; a script's file begins with its name.
 _OURS: Final = re.compile(rf"({'|'.join(BRANCHES)})_\d+")
 log: Final = logging.getLogger(__name__)
+logging.getLogger("alembic.runtime").setLevel(logging.WARNING)  # we say it in one line
 
 
 def revisions_of(branch: str) -> list[str]:
@@ -26,8 +30,11 @@ def revisions_of(branch: str) -> list[str]:
     )
 
 
-def upgrade_to(branch: Branch, revision: str = "head") -> Callable[[Connection], str]:
-    """A change of the schema that ends at a revision, and returns it. Raises CannotStart."""
+def upgrade_to(
+    branch: Branch, revision: str = "head", *, before: Before = no_copy
+) -> Callable[[Connection], str]:
+    """A change of the schema that ends at a revision, and returns it. `before` is called first where
+    there are tables already that change. Raises CannotStart."""
 
     def upgrade(connection: Connection) -> str:
         name = _name_of(connection)
@@ -35,7 +42,11 @@ def upgrade_to(branch: Branch, revision: str = "head") -> Callable[[Connection],
         ours = revisions_of(branch)
         if current - set(ours):
             raise CannotStart(f"The database {name} is not the {branch}'s.")
-        now = _upgraded(connection, branch, current, ours[-1] if revision == "head" else revision)
+        wanted = ours[-1] if revision == "head" else revision
+        if current - {wanted}:
+            before(connection, branch, max(current))
+        now = _upgraded(connection, branch, current, wanted)
+        sign(connection, now)
         if {now} != current:
             log.info("%s: the tables are those of %s now", name, now)
         return now
@@ -66,17 +77,27 @@ def recognize(connection: Connection) -> set[str]:
     name = _name_of(connection)
     current = _current(connection)
     if _is_foreign(connection, current):
-        raise CannotStart(
+        raise AnothersDatabase(
             f"The database {name} is another program's: it is left as it is. Choose another one, "
             "or an empty one."
         )
     known = {revision for branch in BRANCHES for revision in revisions_of(branch)}
     if current - known:
-        raise CannotStart(
-            f"The database {name} was made by a newer version of this program "
-            f"({', '.join(sorted(current - known))}): install that version, or choose another."
-        )
+        raise NewerSchema(_newer(connection, name, max(current - known)))
     return current
+
+
+def _newer(connection: Connection, name: str, revision: str) -> str:
+    """Who made a database that this version does not know, what this version is, and the ways out."""
+    writer = last_writer(connection)
+    newest = revisions_of(revision.partition("_")[0])[-1]
+    return (
+        f"The database {name} was made by a newer version of this program"
+        f"{f', {writer}' if writer is not None else ''} (schema {revision}); this is version "
+        f"{described()}, which knows up to {newest}. Install {writer.version if writer else 'that'} or "
+        "newer; or go back to a copy from before its tables changed: `action-assistant migrate --back` "
+        "lists them."
+    )
 
 
 def _current(connection: Connection) -> set[str]:

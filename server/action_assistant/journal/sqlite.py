@@ -23,11 +23,12 @@ from sqlalchemy.exc import (
 )
 
 from action_assistant.errors import CannotStart
-from action_assistant.journal.chain import Head
-from action_assistant.journal.database import Branch, cause_of
+from action_assistant.journal.chain import Damage, Head, Inspector
+from action_assistant.journal.database import Before, Branch, cause_of, no_copy
 from action_assistant.journal.events import Event
 from action_assistant.journal.lock import own as own
 from action_assistant.journal.migrate import recognize, upgrade_to
+from action_assistant.journal.removal import taken_out
 from action_assistant.private_files import opener
 
 T = TypeVar("T")
@@ -136,11 +137,11 @@ class Sqlite:
         self._threads = ThreadPoolExecutor(_READERS, thread_name_prefix=f"{self._path.name} reader")
         self.name: Final = f"The database {path}"
 
-    def open(self, branch: Branch) -> SqliteSession:
+    def open(self, branch: Branch, before: Before = no_copy) -> SqliteSession:
         """Lock the file for this process, since two writers of one log would tear it; migrate."""
         self.look(recognize)
         self._lock = own(self._path)
-        self.migrate(upgrade_to(branch))
+        self.migrate(upgrade_to(branch, before=before))
         try:
             return self.connect()
         except self.faults as error:
@@ -157,7 +158,7 @@ class Sqlite:
                 with engine.connect() as connection:
                     question(connection)
             except CannotStart as error:  # of the file that it is, also where a copy was read
-                raise CannotStart(str(error).replace(str(path), str(self._path))) from error
+                raise type(error)(str(error).replace(str(path), str(self._path))) from error
             except self.faults as error:
                 raise CannotStart(f"Cannot open {self._the}: {cause_of(error)}.") from error
             finally:
@@ -224,6 +225,15 @@ class Sqlite:
             raw.text_factory = plain
         return [row[:8] for row in rows], rows[-1][8] if rows else after
 
+    def bytes_in_use(self, connection: Connection) -> dict[str, int]:
+        """Bytes of the file, and of the log beside it."""
+        del connection
+        log = self._path.with_name(f"{self._path.name}-wal")
+        return {
+            "database": self._path.stat().st_size,
+            "wal": log.stat().st_size if log.exists() else 0,
+        }
+
     def complaints(self, connection: Connection) -> list[str]:
         """What SQLite finds wrong with the file."""
         found = connection.exec_driver_sql("PRAGMA integrity_check").scalars().all()
@@ -279,6 +289,23 @@ def _readable(path: Path) -> Iterator[Path]:
         with closing(sqlite3.connect(copy)) as database:
             database.execute("SELECT count(*) FROM sqlite_master").fetchone()
         yield copy
+
+
+def inspected(path: Path, tell: Callable[[int], None] = lambda _: None) -> tuple[int, list[Damage]]:
+    """How many events a file holds, and what is wrong with them; at whatever revision its tables are.
+    Changes nothing. Raises sqlite3.Error."""
+    inspector, after = Inspector(taken_out), 0
+    with closing(sqlite3.connect(f"{path.as_uri()}?mode=ro", uri=True)) as database:
+        database.execute("BEGIN")
+        database.execute("SELECT count(*) FROM sqlite_master").fetchone()
+        database.text_factory = _lenient
+        while rows := database.execute(_SCAN, (after,)).fetchall():
+            for row in rows:
+                inspector.see(row[:8])
+            after = rows[-1][8]
+            tell(inspector.seen)
+        ends = database.execute("SELECT stream, seq, chain FROM head").fetchall()
+    return inspector.seen, inspector.findings(ends)
 
 
 def unchanged(path: Path) -> str:

@@ -4,10 +4,11 @@ from typing import Final
 
 from sqlalchemy import BigInteger, Column, Index, LargeBinary, MetaData, Table, Text
 
-from action_assistant.schema.log_tables import NAMES, log_tables
+from action_assistant.schema.log_tables import NAMES, log_tables, written_by_table
 
 EDITOR: Final = MetaData(naming_convention=NAMES)
 editor_event, editor_head, editor_snapshot = log_tables(EDITOR)
+written_by: Final = written_by_table(EDITOR)
 #: A graph of the catalogue, or an action of the library (`kind`). `name` and `description` follow the
 #: document. A draft was made of the graph `draft_of` after its change `drafted_seq`; what both are compared
 #: with is `base_graph` after its change `base_seq`; `merged_seq` is the change up to which the draft was

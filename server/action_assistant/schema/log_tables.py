@@ -1,6 +1,6 @@
 """The tables of a log, which both databases have.
 
-`event`, `head` (where each stream ends) and `snapshot` are in both. Everything else is a fold of the
+`event`, `head` (where each stream ends), `snapshot` and `written_by` are in both. Everything else is a fold of the
 events: it can be thrown away and made again. Times are microseconds since 1970, UTC.
 """
 
@@ -56,5 +56,18 @@ def log_tables(metadata: MetaData) -> tuple[Table, Table, Table]:
     return event, head, snapshot
 
 
+def written_by_table(metadata: MetaData) -> Table:
+    """Which versions of this program have written to a database, since when (a new row for each), and
+    at which revision of the tables. Older versions read its last row, so it stays as it is."""
+    return Table(
+        "written_by",
+        metadata,
+        Column("since", BigInteger, primary_key=True, autoincrement=False),
+        Column("version", Text, nullable=False),
+        Column("build", Text, nullable=False),
+        Column("revision", Text, nullable=False),
+    )
+
+
 #: What is not a fold.
-LOG: Final = frozenset({"event", "head", "snapshot"})
+LOG: Final = frozenset({"event", "head", "snapshot", "written_by"})

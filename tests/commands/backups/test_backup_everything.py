@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import os
+import re
 import subprocess
 import threading
 import time
@@ -85,6 +86,16 @@ def let_in(product: Product, links: list[str], mia: str | None) -> None:
         assert answer["person"]["name"] == "Mia"
 
 
+def assert_rehearsed(file: Path, data: Path) -> None:
+    """A trial of it finds everything, and leaves nothing behind."""
+    done = command("restore", "--rehearse", file, "--data", data)
+    assert done.returncode == 0, done.stdout
+    some = r"[1-9]\d*"
+    assert re.search(rf"graphs, {some} versions, {some} links, {some} people", done.stdout)
+    assert re.search(rf"runs, {some} of them in archives, 1 robots", done.stdout)
+    assert [path for path in data.iterdir() if path.name.startswith(".")] == []
+
+
 def test_everything_is_there_again_on_an_empty_machine(tmp_path: Path, postgres: Server) -> None:
     """Events, answers, archived runs, keys, links, sessions, certificates."""
     old, new = tmp_path / "old", tmp_path / "new"
@@ -105,6 +116,7 @@ def test_everything_is_there_again_on_an_empty_machine(tmp_path: Path, postgres:
         assert "whoever reads it can sign in" in made.stdout
     assert file.stat().st_mode & 0o777 == 0o600
     before = asyncio.run(events(urls[0], old))
+    assert_rehearsed(file, old)
 
     back = command("restore", file, "--data", new, *flags[1])
     assert back.returncode == 0, back.stderr

@@ -11,6 +11,7 @@ import shutil
 import stat
 import zipfile
 import zlib
+from collections.abc import Callable
 from pathlib import Path, PurePosixPath
 from typing import IO, Final
 
@@ -19,7 +20,11 @@ import msgspec
 from action_assistant.commands.backups.progress import Progress
 from action_assistant.errors import CannotStart
 from action_assistant.journal.database import Branch
-from action_assistant.version import VERSION
+from action_assistant.journal.migrate import revisions_of
+from action_assistant.journal.program_version import ProgramVersion
+from action_assistant.private_files import sync
+from action_assistant.schema.branches import BRANCHES
+from action_assistant.version import VERSION, commit, described
 
 FORMAT: Final = 2
 FILES: Final = "files"
@@ -32,6 +37,10 @@ _LEVEL: Final = 1
 _TIGHTEST: Final = 300
 _ROOM: Final = 64 << 20  # bytes that have to be left on the disk
 _MODE: Final = 0o600
+
+
+class NoRoom(CannotStart):
+    """What is packed is larger than what is left of the disk."""
 
 
 class JournalCopy(msgspec.Struct, frozen=True):
@@ -51,12 +60,15 @@ class BackupPart(msgspec.Struct, frozen=True):
 
 class BackupManifest(msgspec.Struct, frozen=True, kw_only=True):
     """What a backup says of itself. `database`: where the graphs were, without a password; None in
-    the data folder. `settings`: of the environment, without the token. `missing`: sentences."""
+    the data folder. `commit`: of the version, None when not known; `schemas`: revisions of the tables.
+    `settings`: of the environment, without the token. `missing`: sentences."""
 
     format: int
     version: str
     made_at: float
     journals: dict[Branch, JournalCopy]
+    commit: str | None = None
+    schemas: dict[str, str] = {}
     files: dict[str, BackupPart] = {}
     database: str | None = None
     settings: dict[str, str] = {}
@@ -89,13 +101,14 @@ class Packer:
         self._zip.writestr(name, content)
         self.files[name] = BackupPart(len(content), hashlib.sha256(content).hexdigest())
 
-    def close(self, about: BackupManifest, target: Path) -> None:
-        """Say what it is, and put it into its place."""
+    def close(self, about: BackupManifest, target: Path, prove: Callable[[Path], None]) -> None:
+        """Say what it is, have it proven, and put it into its place."""
         self._zip.writestr(_ABOUT, msgspec.json.format(msgspec.json.encode(about)))
         self._zip.close()
         self._raw.flush()
         os.fsync(self._raw.fileno())
         self._raw.close()
+        prove(self._part)
         self._part.replace(target)
         sync(target.parent)
 
@@ -128,27 +141,45 @@ class Package:
             self._zip.close()
             raise
 
+    def prove(self, progress: Progress) -> None:
+        """Read all its parts, and keep none. Raises CannotStart."""
+        self._check_total()
+        for name in self.parts:
+            with Path(os.devnull).open("wb") as nowhere:
+                self._pour(name, nowhere, f"reading back {name}", progress)
+
     def unpack(self, folder: Path, progress: Progress) -> None:
         """All its parts into a folder, each proven. Raises CannotStart."""
+        total = self._check_total()
+        free = shutil.disk_usage(folder).free
+        if total + _ROOM > free:
+            raise NoRoom(
+                f"{self._source} needs {total >> 20} MiB, and {folder} has {free >> 20} MiB left."
+            )
+        for name in self.parts:
+            path = folder / name
+            path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, _MODE)
+            with os.fdopen(descriptor, "wb") as here:
+                self._pour(name, here, f"unpacking {name}", progress)
+
+    def _check_total(self) -> int:
+        """The size of all parts. Raises CannotStart."""
         total = sum(entry.file_size for entry, _ in self.parts.values())
         if total > _TIGHTEST * self._source.stat().st_size + _CHUNK:
             raise self._damaged("its parts lie over each other")
-        free = shutil.disk_usage(folder).free
-        if total + _ROOM > free:
-            raise CannotStart(
-                f"{self._source} needs {total >> 20} MiB, and {folder} has {free >> 20} MiB left."
-            )
-        for name, (entry, sha256) in self.parts.items():
-            path = folder / name
-            path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            try:
-                descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, _MODE)
-                with self._zip.open(entry) as there, os.fdopen(descriptor, "wb") as here:
-                    _, digest = _poured(there, here, f"unpacking {name}", progress)
-            except (zipfile.BadZipFile, zlib.error, EOFError) as error:
-                raise self._damaged(f"{name} cannot be read ({error})") from error
-            if digest != sha256:
-                raise self._damaged(f"{name} is not what was written")
+        return total
+
+    def _pour(self, name: str, here: IO[bytes], text: str, progress: Progress) -> None:
+        """One part, proven. Raises CannotStart."""
+        entry, sha256 = self.parts[name]
+        try:
+            with self._zip.open(entry) as there:
+                _, digest = _poured(there, here, text, progress)
+        except (zipfile.BadZipFile, zlib.error, EOFError) as error:
+            raise self._damaged(f"{name} cannot be read ({error})") from error
+        if digest != sha256:
+            raise self._damaged(f"{name} is not what was written")
 
     def close(self) -> None:
         """Let go of the file."""
@@ -163,8 +194,19 @@ class Package:
         except (zipfile.BadZipFile, msgspec.DecodeError, zlib.error, EOFError) as error:
             raise self._no_backup(error) from error
         if about.format > FORMAT:
-            raise CannotStart(f"{self._source} was made by a newer version, {about.version}.")
+            raise self._newer(about, f"format {about.format}", f"{FORMAT}")
+        for branch, schema in about.schemas.items():
+            ours = revisions_of(branch)
+            if schema not in ours:
+                raise self._newer(about, f"schema {schema}", ours[-1])
         return about
+
+    def _newer(self, about: BackupManifest, what: str, known: str) -> CannotStart:
+        made = ProgramVersion(about.version, about.commit or "", "")
+        return CannotStart(
+            f"{self._source} was made by a newer version, {made} ({what}); this is version "
+            f"{described()}, which knows up to {known}. Restore it by version {about.version} or newer."
+        )
 
     def _parts(self) -> dict[str, tuple[zipfile.ZipInfo, str]]:
         """Every file that belongs to it, as it lies in the zip, and its SHA-256."""
@@ -207,16 +249,13 @@ class Package:
 
 def about_now(**fields: object) -> BackupManifest:
     """What this version says."""
-    return msgspec.convert({"format": FORMAT, "version": VERSION, **fields}, type=BackupManifest)
-
-
-def sync(path: Path) -> None:
-    """What was written or renamed has to be found after a power cut, too."""
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+    own = {
+        "format": FORMAT,
+        "version": VERSION,
+        "commit": commit(),
+        "schemas": {branch: revisions_of(branch)[-1] for branch in BRANCHES},
+    }
+    return msgspec.convert({**own, **fields}, type=BackupManifest)
 
 
 def sha256_of(path: Path) -> str:

@@ -3,8 +3,10 @@
 import asyncio
 import sqlite3
 import tempfile
+import time
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
+from itertools import count
 from pathlib import Path
 from typing import Any, Final
 
@@ -13,7 +15,8 @@ from sqlalchemy import Row, Select, select
 
 from action_assistant.commands.backups.progress import Progress
 from action_assistant.errors import CannotStart
-from action_assistant.journal.copying import sentence
+from action_assistant.journal.copies import backup_state, before_upgrade
+from action_assistant.journal.copies.copying import sentence
 from action_assistant.journal.database import Branch
 from action_assistant.journal.databases import database_of
 from action_assistant.journal.events import Fold
@@ -36,10 +39,13 @@ _OWN: Final = frozenset(
     {
         *(f"{branch}.db" for branch in BRANCHES),
         *("editor.mark", "editor.database", "open.html", ARCHIVE, RESTORING),
+        *(backup_state.FILE, before_upgrade.FOLDER),
     }
 )
 _PASSING: Final = (".lock", ".lock.new", "-wal", "-shm", "-journal", ".part")
 ASIDE: Final = "before-restore-"
+#: What `move` leaves behind.
+MOVED: Final = "before-move-"
 _MAGIC: Final = b"SQLite format 3\0"
 _PAGES: Final = 5_000  # copied between two words about it
 
@@ -61,7 +67,9 @@ def left_out(data: Path) -> list[Path]:
     return sorted(
         path
         for path in data.iterdir()
-        if path.name not in known and not _is_passing(path) and not path.name.startswith(ASIDE)
+        if path.name not in known
+        and not _is_passing(path)
+        and not path.name.startswith((ASIDE, MOVED))
     )
 
 
@@ -127,6 +135,19 @@ def checked(path: Path, branch: Branch, progress: Progress, *, anew: bool = Fals
     events = asyncio.run(look())
     path.with_name(f"{path.name}.lock").unlink(missing_ok=True)
     return events
+
+
+def aside_folder(data: Path, prefix: str = ASIDE) -> Path:
+    """A new folder for what was there before."""
+    name = time.strftime(f"{prefix}%Y%m%d-%H%M%S")
+    for number in count(1):
+        path = data / (name if number == 1 else f"{name}-{number}")
+        try:
+            path.mkdir(mode=0o700)
+        except FileExistsError:
+            continue
+        return path
+    raise AssertionError
 
 
 def rows_of(path: Path, question: Select[Any]) -> list[Row[Any]]:

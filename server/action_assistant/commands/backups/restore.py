@@ -6,12 +6,9 @@ or marked.
 """
 
 import argparse
-import asyncio
 import os
 import shutil
-import time
 from contextlib import ExitStack
-from itertools import count
 from pathlib import Path
 from typing import Final
 
@@ -24,13 +21,12 @@ from action_assistant.commands.backups.backup_file import (
     BackupManifest,
     Package,
     sha256_of,
-    sync,
 )
 from action_assistant.commands.backups.data_folder import (
-    ASIDE,
     BRANCHES,
     MERGED,
     WHOLE,
+    aside_folder,
     checked,
     fold_of,
     left_out,
@@ -39,8 +35,9 @@ from action_assistant.commands.backups.data_folder import (
 )
 from action_assistant.commands.backups.progress import Progress
 from action_assistant.errors import CannotStart
-from action_assistant.journal.database import Branch, cause_of
-from action_assistant.journal.databases import database_of
+from action_assistant.journal.database import Branch
+from action_assistant.journal.databases import ask_once, database_of
+from action_assistant.private_files import sync
 from action_assistant.schema.editor_tables import editor_event
 from action_assistant.web.auth.keys import TOKEN_FILE
 
@@ -69,7 +66,7 @@ def restore(options: argparse.Namespace) -> int:
     package = Package(source)
     try:
         about = package.about
-        _check_names(about, source)
+        check_names(about, source)
         _check_folder(data, source)
         url = (
             options.database
@@ -99,7 +96,7 @@ def _make(data: Path) -> None:
         raise CannotStart(f"Cannot make {data}: {error.strerror}.") from error
 
 
-def _check_names(about: BackupManifest, source: Path) -> None:
+def check_names(about: BackupManifest, source: Path) -> None:
     """A backup may write what belongs to a data folder, and nothing else there."""
     for name in about.files:
         top, inner = name.split("/")[:2]
@@ -136,7 +133,7 @@ def _put(
     old = [f"{branch}.db" for branch in about.journals if branch == "runner" or is_own]
     aside: Path | None = None
     if any((data / name).exists() for name in old):
-        aside = _aside(data)
+        aside = aside_folder(data)
     kept = [name for name in about.files if not _placed(folder, name, data)]
     for name in old:
         _exchange(folder / name, data / name, aside)
@@ -159,7 +156,7 @@ def _begin(
 ) -> None:
     """Mark the folder; and bring the graphs into a database `elsewhere`, where one transaction does
     it. Raises CannotStart, and then the folder is as before."""
-    from action_assistant.journal.copying import copy
+    from action_assistant.journal.copies.copying import copy
 
     before = _under(mark)
     if elsewhere and before is not None and _is_there(url, before, about):
@@ -177,19 +174,6 @@ def _begin(
         else:
             _write(mark, before)
         raise
-
-
-def _aside(data: Path) -> Path:
-    """A new folder for what was there before."""
-    name = time.strftime(f"{ASIDE}%Y%m%d-%H%M%S")
-    for number in count(1):
-        path = data / (name if number == 1 else f"{name}-{number}")
-        try:
-            path.mkdir(mode=0o700)
-        except FileExistsError:
-            continue
-        return path
-    raise AssertionError
 
 
 def _under(mark: Path) -> Under | None:
@@ -212,7 +196,6 @@ def _is_there(url: str, under: Under, about: BackupManifest) -> bool:
     """Whether a database holds the same backup already. Raises CannotStart."""
     if "editor" not in about.journals or under.sha256 != about.journals["editor"].sha256:
         return False
-    database = database_of(url)
 
     def last(connection: Connection) -> tuple[int, str] | None:
         if not inspect(connection).has_table(editor_event.name):
@@ -220,16 +203,7 @@ def _is_there(url: str, under: Under, about: BackupManifest) -> bool:
         row = connection.execute(_LAST).first()
         return None if row is None else (row.position, bytes(row.chain).hex())
 
-    async def ask() -> tuple[int, str] | None:
-        try:
-            return await database.at_one_moment(last)
-        finally:
-            await database.close()
-
-    try:
-        return asyncio.run(ask()) == (under.position, under.chain)
-    except database.faults as error:
-        raise CannotStart(f"{database.name} cannot be read: {cause_of(error)}.") from error
+    return ask_once(url, last) == (under.position, under.chain)
 
 
 def _placed(folder: Path, name: str, data: Path) -> bool:

@@ -17,7 +17,7 @@ from action_assistant.editor.services import EditorState
 from action_assistant.errors import BadInput
 from action_assistant.journal.events import Event
 from action_assistant.umrf.json.embedded import UmrfGraph
-from action_assistant.version import VERSION
+from action_assistant.version import VERSION, commit
 from action_assistant.web.auth.access import person_of
 from action_assistant.web.auth.keys import PersonRef
 from action_assistant.web.network.addresses import Addresses
@@ -27,11 +27,13 @@ _SILENCE: Final = 10.0  # seconds after which a listener is told that we are sti
 
 
 class Config(msgspec.Struct, frozen=True):
-    """What a page has to know. `runner_url` has no slash at its end."""
+    """What a page has to know. `runner_url` has no slash at its end. `commit`: of this program, null
+    when nobody knows."""
 
     mode: str
     version: str
     runner_url: str
+    commit: str | None = None
 
 
 class StoredEvent(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -64,12 +66,14 @@ class Participant(msgspec.Struct, frozen=True):
 def routes(app_state: EditorState, addresses: Addresses) -> list[ControllerRouterHandler]:
     """Everything that is about no single graph."""
 
+    known = commit()
+
     @get("/api/config", summary="What a page has to know", operation_id="getConfig")
     async def get_config(request: Request[Any, Any, Any]) -> Config:
         runner = addresses.runner_at(
             request.headers.get("host", ""), app_state.services.settings.runner_port
         )
-        return Config("local", VERSION, runner)
+        return Config("local", VERSION, runner, known)
 
     @get("/api/people", summary="Everyone who acted here, and who asks", operation_id="listPeople")
     async def list_people(request: Request[Any, Any, Any]) -> list[Participant]:

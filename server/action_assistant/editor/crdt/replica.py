@@ -4,7 +4,7 @@ import itertools
 import logging
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, suppress
 from enum import Enum
 from typing import Any, Final, Literal
 
@@ -15,7 +15,8 @@ from action_assistant.editor.crdt.document_quota import DocumentQuota
 from action_assistant.editor.crdt.messages import NOTHING_NEW, ByteReader, Malformed
 from action_assistant.editor.crdt.nesting import Nesting
 from action_assistant.editor.crdt.opening_time import OpeningTime
-from action_assistant.editor.crdt.update_scan import UpdateOutline, outline
+from action_assistant.editor.crdt.update_outline import UpdateOutline
+from action_assistant.editor.crdt.update_scan import outline
 from action_assistant.editor.log.document_events import DEFERRED, UPDATED
 from action_assistant.journal.events import Event
 
@@ -77,19 +78,24 @@ class Replica:
 
         Raises Malformed, Foreign, Full, TooMuchWaits, Panicked; the document is then as before.
         """
-        if update in self._waiting:
+        if self._waiting and update in self._waiting:
             return UpdateEffect.NOTHING
         read = read or outline(update)
-        new = {client for client, _, end in read.brings if end > self._known.get(client, 0)}
+        known = self._known
+        new = [client for client, _, end in read.brings if end > known.get(client, 0)]
         for client in new:
             if (self.owners.get(client) or holder(client) or author) != author:
                 raise ForeignClient(f"client {client} is not {author}'s")
         if new:  # what is known is echoed by stock clients, and adds nothing
             self._quota.check(update, read)
-        if not read.ready(self._known):
+        if read.ready(known):
+            brought = self._grew(update, read)
+        else:
             self._check_patience(update, author)
-        brought = self._took(update, read, author)
-        self.owners.update(dict.fromkeys(new, author))
+            self._waiting[update] = read, author
+            brought = UpdateEffect.WAITS
+        for client in new:
+            self.owners[client] = author
         return brought
 
     def replay(self, events: Sequence[Event], *, learn: bool = True) -> None:
@@ -137,7 +143,10 @@ class Replica:
             if event.kind == DEFERRED or self._waiting or not read.ready(self._known):
                 self._apply(*together)
                 together = []
-                self._took(event.body, read, event.author)
+                if read.ready(self._known):
+                    self._grew(event.body, read)
+                else:
+                    self._waiting[event.body] = read, event.author
             else:
                 self._learn(read, len(event.body))
                 together.append(event.body)
@@ -155,10 +164,8 @@ class Replica:
         if len(sizes) >= WAITING_UPDATES or sum(sizes) + len(update) > WAITING_BYTES:
             raise TooMuchWaits
 
-    def _took(self, update: bytes, read: UpdateOutline, author: str) -> UpdateEffect:
-        if not read.ready(self._known):
-            self._waiting[update] = read, author
-            return UpdateEffect.WAITS
+    def _grew(self, update: bytes, read: UpdateOutline) -> UpdateEffect:
+        """Apply what is ready, and what waited for it."""
         if not self._applied(update, read):
             return UpdateEffect.NOTHING
         while self._waiting and self._release():
@@ -231,9 +238,13 @@ class Replica:
     def _apply(self, *updates: bytes) -> None:
         if not updates:
             return
-        with applying(), self.doc.transaction():
-            for update in updates:
-                self.doc.apply_update(update)
+        with applying():
+            if len(updates) == 1:
+                self.doc.apply_update(updates[0])
+                return
+            with self.doc.transaction():
+                for update in updates:
+                    self.doc.apply_update(update)
 
     def adds_nothing(self, update: bytes) -> bool:
         """Whether an update that was not applied would leave the document as it is."""
@@ -260,17 +271,29 @@ class Replica:
             self._fired = True
 
 
-@contextmanager
-def applying() -> Iterator[None]:
-    """Around a call of the CRDT library with foreign bytes, and nothing else."""
-    try:
-        yield
-    except (ValueError, RuntimeError) as error:
-        raise Malformed(f"not a Yjs update: {error}") from error
-    except BaseException as error:
-        if type(error).__name__ != "PanicException":  # pyo3's, derived from BaseException
-            raise
-        raise Panicked(str(error)) from error
+class _Applying:
+    """Tells the failures of the CRDT library from all others. Holds nothing: one serves for all."""
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        match error:
+            case None:
+                return
+            case ValueError() | RuntimeError():
+                raise Malformed(f"not a Yjs update: {error}") from error
+            case _ if type(error).__name__ == "PanicException":  # pyo3's, of BaseException
+                raise Panicked(str(error)) from error
+
+
+_APPLYING: Final = _Applying()
+
+
+def applying() -> AbstractContextManager[None]:
+    """Around a call of the CRDT library with foreign bytes, and nothing else. Raises Malformed,
+    Panicked."""
+    return _APPLYING
 
 
 class ReplicaState(msgspec.Struct, frozen=True, array_like=True):

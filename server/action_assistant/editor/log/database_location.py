@@ -5,12 +5,10 @@ Most hold them themselves, in `editor.db`, and remember nothing. A folder that i
 graphs that are elsewhere, and nobody finds an empty catalogue by leaving out an option.
 """
 
-import asyncio
 import logging
 import os
-from collections.abc import Callable
 from pathlib import Path
-from typing import Final, TypeVar
+from typing import Final
 
 import msgspec
 from sqlalchemy import URL, Connection, func, inspect, make_url, select
@@ -18,13 +16,10 @@ from sqlalchemy.exc import ArgumentError
 
 from action_assistant.editor.log.epochs import MARK, EpochMark
 from action_assistant.errors import CannotStart
-from action_assistant.journal.database import cause_of
-from action_assistant.journal.databases import database_of
+from action_assistant.journal.databases import ask_once, database_of
 from action_assistant.schema import editor_tables
 
 log: Final = logging.getLogger(__name__)
-
-T = TypeVar("T")
 
 FILE: Final = "editor.database"
 #: The journal of a folder that holds its graphs itself.
@@ -66,7 +61,7 @@ def journal_of(data: Path, given: str | None) -> str | None:
 
 def is_own(data: Path, url: str) -> bool:
     """Whether a URL names the file in the folder itself."""
-    return _same(url, _own(data))
+    return same(url, _own(data))
 
 
 def remembered(data: Path) -> str | None:
@@ -92,14 +87,14 @@ def check(data: Path, url: str, *, switch: bool) -> None:
     known = remembered(data)
     if known is None and not (data / JOURNAL).exists():
         # An older version did not write down which one it was; that it was another one is known.
-        if (data / MARK).exists() and _same(url, _own(data)):
+        if (data / MARK).exists() and same(url, _own(data)):
             raise CannotStart(
                 f"The graphs of {data} are in a database that this folder does not remember: name "
                 "it by --database URL, or begin without them by --switch-database."
             )
         return
     known = known or _own(data)
-    if _same(known, url) or (count := _graphs(known)) == 0 or _holds(url, data / MARK):
+    if same(known, url) or (count := _graphs(known)) == 0 or _holds(url, data / MARK):
         return
     raise CannotStart(_refusal(data, known, url, count))
 
@@ -111,7 +106,7 @@ def remember(data: Path, url: str) -> None:
     if parsed.get_backend_name() == "sqlite":  # wherever commands are started
         url = f"sqlite:///{Path(parsed.database or '').resolve()}"
     try:
-        if _same(url, _own(data)):
+        if same(url, _own(data)):
             path.unlink(missing_ok=True)
             return
         part = path.with_name(f".{FILE}.part")
@@ -143,7 +138,8 @@ def _own(data: Path) -> str:
     return f"sqlite:///{data / JOURNAL}"
 
 
-def _same(one: str, other: str) -> bool:
+def same(one: str, other: str) -> bool:
+    """Whether two URLs name one database."""
     return _address(one) == _address(other)
 
 
@@ -169,7 +165,7 @@ def _graphs(url: str) -> int | None:
     if _is_nowhere(url):
         return None
     try:
-        return _asked(url, count)
+        return ask_once(url, count)
     except CannotStart:
         return None
 
@@ -191,23 +187,7 @@ def _holds(url: str, mark: Path) -> bool:
         chain = connection.execute(found).scalar()
         return chain is not None and bytes(chain).hex() == last.chain
 
-    return _asked(url, look)
-
-
-def _asked(url: str, question: Callable[[Connection], T]) -> T:
-    """An answer for which nothing is made or changed. Raises CannotStart."""
-    database = database_of(url)
-
-    async def ask() -> T:
-        try:
-            return await database.at_one_moment(question)
-        finally:
-            await database.close()
-
-    try:
-        return asyncio.run(ask())
-    except database.faults as error:
-        raise CannotStart(f"{database.name} cannot be read: {cause_of(error)}.") from error
+    return ask_once(url, look)
 
 
 def _is_nowhere(url: str) -> bool:
@@ -222,7 +202,7 @@ def _refusal(data: Path, known: str, url: str, count: int | None) -> str:
     many = "The graphs" if count is None else f"{count} graph{'s' * (count != 1)}"
     where = str(data / JOURNAL) if known == own else shown(known)
     asked, before = (
-        "without --database" if _same(each, own) else f"with --database {shown(each)}"
+        "without --database" if same(each, own) else f"with --database {shown(each)}"
         for each in (url, known)
     )
     return (

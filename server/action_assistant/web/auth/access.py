@@ -23,10 +23,12 @@ from action_assistant.errors import (
     WrongHost,
     WrongOrigin,
 )
+from action_assistant.logs.context import request_id
 from action_assistant.web.auth.caller import Caller, asked_by
 from action_assistant.web.auth.keys import Keys, Person, Session
 from action_assistant.web.auth.revocations import SESSION_ENDED, Revocations, SessionGuards
 from action_assistant.web.auth.roles import OWNER, Permission, allowed, may
+from action_assistant.web.auth.scrape_token import ScrapeToken
 from action_assistant.web.http import cookies
 from action_assistant.web.http.problems import problem_of
 from action_assistant.web.network.addresses import Addresses
@@ -135,8 +137,10 @@ class Access:
         is_open: Callable[[str, bool], bool],
         policy: Callable[[str], str],
         revoked: Revocations,
+        scraped: ScrapeToken | None = None,
     ) -> None:
         self._app = app
+        self._scraped = scraped or ScrapeToken()
         self._keys = keys
         self._addresses = addresses
         self._cookie = cookie_name(page_port)
@@ -240,6 +244,8 @@ class Access:
         if scheme.lower() == "bearer" and self._keys.opens(token.strip()):
             state["person"] = self._local
             return
+        if scheme.lower() == "bearer" and self._scraped.opens(method, path, token.strip()):
+            return  # as nobody: there is nothing else to be found out
         genuine = self._sessions(headers)
         state["sessions"] = genuine
         session = self._lasting(genuine)
@@ -279,10 +285,13 @@ class Access:
                 (b"access-control-allow-credentials", b"true"),
                 (b"access-control-allow-methods", b"GET, POST, PATCH, PUT, DELETE"),
                 (b"access-control-allow-headers", b"content-type, last-event-id"),
-                (b"access-control-expose-headers", b"location"),
+                (b"access-control-expose-headers", b"location, x-request-id"),
                 (b"access-control-max-age", b"600"),
                 (b"vary", b"origin"),
             ]
+        name = request_id()
+        if name is not None:
+            extra.append((b"x-request-id", name.encode()))
         policy = self._policy(headers.get("host", "")).encode("latin-1", "replace")
 
         async def dressed(message: Message) -> None:

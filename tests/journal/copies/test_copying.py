@@ -12,7 +12,7 @@ from sqlalchemy import select, text
 
 from action_assistant.editor.log import graph_events as h
 from action_assistant.errors import CannotStart
-from action_assistant.journal.copying import copy
+from action_assistant.journal.copies.copying import copy
 from action_assistant.journal.databases import database_of
 from action_assistant.journal.events import Addition, Event
 from action_assistant.journal.journal import Journal

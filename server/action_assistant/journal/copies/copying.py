@@ -12,8 +12,11 @@ from action_assistant.journal.database import Branch, Database, cause_of
 from action_assistant.journal.events import Event, Fold
 from action_assistant.journal.migrate import recognize
 from action_assistant.journal.removal import taken_out
+from action_assistant.schema import editor_tables
+from action_assistant.schema.branches import BRANCHES
 from action_assistant.schema.editor_tables import editor_event, editor_head, editor_snapshot
 
+_COMPARED: Final = 1_000  # events at once
 _AT_ONCE: Final = 64  # rows in memory: an event has up to a MiB, a snapshot several
 
 # The tables of the log are the same for both branches, and in every version there was.
@@ -27,18 +30,21 @@ def copy(
     branch: Branch,
     fold: Fold,
     tell: Callable[[int], None] = lambda _: None,
+    over_older: bool = False,
+    then: Callable[[], None] = lambda: None,
 ) -> int:
     """Copy everything as it is at one moment, while others may write; how many events. The tables are
     folded anew, in the same transaction: whatever ends it, all is there or nothing.
 
-    `tell` hears how many events have been copied so far. To be called where no loop runs; not from
-    one server to another. Raises CannotStart: damaged, not to be reached, or the target holds
-    something.
+    `tell` hears how many events have been copied so far. With `over_older` the target may hold an
+    earlier state of the very same log, which is replaced. `then` is done before anybody else may write
+    to the target. To be called where no loop runs; not from one server to another. Raises CannotStart:
+    damaged, not to be reached, or the target holds something else.
     """
 
     def pour(here: Connection) -> int:
         recognize(here)
-        return target.migrate(lambda there: _pour(here, there, fold, tell))
+        return target.migrate(lambda there: _pour(here, there, branch, fold, tell, over_older))
 
     try:
         session = target.open(branch)
@@ -46,7 +52,9 @@ def copy(
         target.disown()
         raise
     try:
-        return asyncio.run(_read(source, pour))
+        copied = asyncio.run(_read(source, pour))
+        then()
+        return copied
     except source.faults as error:
         raise CannotStart(f"{source.name} cannot be read: {cause_of(error)}.") from error
     finally:
@@ -66,8 +74,21 @@ async def _read(source: Database, question: Callable[[Connection], int]) -> int:
         await source.close()
 
 
-def _pour(here: Connection, there: Connection, fold: Fold, tell: Callable[[int], None]) -> int:
-    if there.execute(select(editor_event.c.position).limit(1)).first() is not None:
+def _pour(
+    here: Connection,
+    there: Connection,
+    branch: Branch,
+    fold: Fold,
+    tell: Callable[[int], None],
+    over_older: bool,
+) -> int:
+    if there.execute(select(editor_event.c.position).limit(1)).first() is None:
+        pass
+    elif over_older and _is_older(there, here):
+        for table in BRANCHES[branch].sorted_tables:
+            if table.name != editor_tables.written_by.name:
+                there.execute(table.delete())
+    else:
         raise CannotStart(
             f"The database {there.engine.url.database} holds events already; "
             "what is copied goes into an empty one."
@@ -91,6 +112,21 @@ def _pour(here: Connection, there: Connection, fold: Fold, tell: Callable[[int],
         for rows in streamed.execute(select(table)).partitions():
             _insert(there, table, rows)
     return inspector.seen
+
+
+def _is_older(old: Connection, new: Connection) -> bool:
+    """Whether all events of a log are those of another, which may have gone on since. A link of the
+    chain stands for all that an event says."""
+    event = editor_event.c
+    chosen = select(event.position, event.stream, event.seq, event.chain).order_by(event.position)
+    after = 0
+    while rows := old.execute(chosen.where(event.position > after).limit(_COMPARED)).all():
+        last = rows[-1].position
+        same = new.execute(chosen.where(event.position > after, event.position <= last)).all()
+        if [tuple(row) for row in rows] != [tuple(row) for row in same]:
+            return False
+        after = last
+    return True
 
 
 def _insert(there: Connection, table: Table, rows: Sequence[Any]) -> None:

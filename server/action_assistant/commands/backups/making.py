@@ -1,0 +1,233 @@
+"""Makes a backup: copies what there is, proves it, packs it, and reads back what was packed."""
+
+import os
+import shutil
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Final
+
+import msgspec
+from sqlalchemy import make_url, select, text
+
+from action_assistant import settings
+from action_assistant.commands.backups.backup_file import (
+    ARCHIVE,
+    FILES,
+    BackupPart,
+    JournalCopy,
+    Package,
+    Packer,
+    about_now,
+)
+from action_assistant.commands.backups.data_folder import (
+    archived,
+    belongings,
+    checked,
+    fold_of,
+    is_database,
+    rows_of,
+    tables_copied,
+    workshop,
+)
+from action_assistant.commands.backups.progress import Progress
+from action_assistant.errors import CannotStart
+from action_assistant.journal.copies.backup_state import BackupMade
+from action_assistant.journal.database import Branch
+from action_assistant.journal.databases import ask_once, database_of
+from action_assistant.schema.editor_tables import invitation
+from action_assistant.version import VERSION
+from action_assistant.web.auth.keys import TOKEN_FILE
+
+#: What archives are of, in their folder.
+_ARCHIVES: Final = ("runs", "raw")
+#: Of the environment, and never in what a backup says of itself.
+_SECRET: Final = frozenset(
+    {"ACTION_ASSISTANT_TOKEN", "ACTION_ASSISTANT_DATABASE", "ACTION_ASSISTANT_METRICS_TOKEN"}
+)
+_ROOM: Final = 64 << 20  # bytes that have to be left on the disk
+
+
+class FinishedBackup(msgspec.Struct, frozen=True):
+    """What was made, and what stands in it."""
+
+    made: BackupMade
+    journals: Mapping[Branch, JournalCopy]
+    files: Mapping[str, BackupPart]
+
+
+def make_backup(
+    data: Path, database: str | None, target: Path, progress: Progress
+) -> FinishedBackup:
+    """Write a backup of a data folder to a file. Raises CannotStart, and then there is none."""
+    begun, at, sources = time.monotonic(), time.time(), _sources(data, database)
+    _check_room(data, sources, target.parent)
+    with workshop(target.parent, ".backup-") as folder:
+        events = {
+            branch: _copied(source, branch, folder / f"{branch}.db", progress)
+            for branch, source in sources.items()
+        }
+        packer = Packer(folder, progress)
+        try:
+            journals = {
+                branch: packer.journal(branch, folder / f"{branch}.db", count)
+                for branch, count in events.items()
+            }
+            missing = _fill(packer, data, folder, progress)
+            about = about_now(
+                made_at=at,
+                journals=journals,
+                files=packer.files,
+                database=_elsewhere(data, sources),
+                settings=_settings(),
+                missing=missing,
+            )
+            packer.close(about, target, lambda part: _read_back(part, progress))
+        finally:
+            packer.abandon()
+    made = BackupMade(
+        at=at,
+        file=str(target),
+        bytes=target.stat().st_size,
+        seconds=round(time.monotonic() - begun, 3),
+        version=VERSION,
+        events={str(branch): count for branch, count in events.items()},
+        missing=missing,
+        proven=True,
+    )
+    return FinishedBackup(made, journals, packer.files)
+
+
+def _sources(data: Path, database: str | None) -> dict[Branch, str]:
+    from action_assistant.editor.log import database_location
+
+    settings.settled(data)
+    url = database_location.journal_of(data, database)
+    sources: dict[Branch, str] = {} if url is None else {"editor": url}
+    if (data / "runner.db").is_file():
+        sources["runner"] = f"sqlite:///{data / 'runner.db'}"
+    if not sources:
+        raise CannotStart(f"There is no journal in {data}.")
+    return sources
+
+
+def _elsewhere(data: Path, sources: Mapping[Branch, str]) -> str | None:
+    from action_assistant.editor.log import database_location
+
+    url = sources.get("editor")
+    if url is None or database_location.is_own(data, url):
+        return None
+    return database_location.shown(url)
+
+
+def _check_room(data: Path, sources: Mapping[Branch, str], folder: Path) -> None:
+    """A copy of each journal, and all of it packed, at worst as large as it is. Raises CannotStart."""
+    journals = sum(_size(source) for source in sources.values())
+    kept = settings.keep(data).folder
+    files = [path for top in _ARCHIVES for path in (kept / top).rglob("*.gz")]
+    packed = sum(path.stat().st_size for path in (*files, *(path for _, path in belongings(data))))
+    need = 2 * journals + packed + _ROOM
+    try:
+        free = shutil.disk_usage(folder).free
+    except OSError as error:
+        raise CannotStart(f"Cannot work in {folder}: {error.strerror}.") from error
+    if need > free:
+        raise CannotStart(
+            f"A backup may need {need >> 20} MiB while it is made, and {folder} has {free >> 20} MiB "
+            "left."
+        )
+
+
+def _size(source: str) -> int:
+    if source.startswith("sqlite:"):
+        path = Path(make_url(source).database or "")
+        beside = path.with_name(f"{path.name}-wal")
+        return sum(each.stat().st_size for each in (path, beside) if each.exists())
+    whole = text("SELECT pg_database_size(current_database())")
+    return int(ask_once(source, lambda connection: connection.execute(whole).scalar_one()))
+
+
+def _read_back(part: Path, progress: Progress) -> None:
+    """Whether a file is what was written. Raises CannotStart."""
+    package = Package(part)
+    try:
+        package.prove(progress)
+    finally:
+        package.close()
+
+
+def _copied(source: str, branch: Branch, target: Path, progress: Progress) -> int:
+    """A journal as it is at one moment, in a SQLite file; its events, all of which are sound."""
+    from action_assistant.journal.copies.copying import copy
+
+    target.touch(mode=0o600)
+    if source.startswith("sqlite:"):
+        tables_copied(Path(make_url(source).database or ""), target, branch, progress)
+    else:
+        copy(
+            database_of(source),
+            database_of(f"sqlite:///{target}"),
+            branch=branch,
+            fold=fold_of(branch),
+            tell=lambda count: progress.tell(f"{branch}: {count} events read"),
+        )
+    return checked(target, branch, progress)
+
+
+def _fill(packer: Packer, data: Path, folder: Path, progress: Progress) -> tuple[str, ...]:
+    """Everything beside the journals, whose copies are in `folder`; what is missing, in sentences.
+    Archives come after the journals: a run that goes into one meanwhile is in both."""
+    missing = []
+    given = os.environ.get("ACTION_ASSISTANT_TOKEN")
+    for name, path in belongings(data):
+        if name == TOKEN_FILE and given:
+            continue
+        try:
+            if is_database(path):
+                copy = folder / "other.db"
+                tables_copied(path, copy, name, progress)
+                packer.file(f"{FILES}/{name}", copy)
+                copy.unlink()
+            else:
+                packer.file(f"{FILES}/{name}", path)
+        except FileNotFoundError:
+            continue  # it went into an archive, or was kept long enough
+    if given:
+        packer.text(f"{FILES}/{TOKEN_FILE}", f"{given}\n".encode())
+    if f"{FILES}/{TOKEN_FILE}" not in packer.files and _links(folder / "editor.db"):
+        missing.append(
+            f"the token, by which links sign in: there is none in {data}. Set "
+            "ACTION_ASSISTANT_TOKEN as for the server."
+        )
+    return (*missing, *_archives(packer, settings.keep(data).folder, folder / "runner.db"))
+
+
+def _archives(packer: Packer, kept: Path, runner: Path) -> list[str]:
+    """Take in all archives; those that the journal names and that are not as it says."""
+    for path in sorted(path for top in _ARCHIVES for path in (kept / top).rglob("*.gz")):
+        packer.file(f"{ARCHIVE}/{path.relative_to(kept).as_posix()}", path)
+    missing = []
+    for place, sha256 in archived(runner).items():
+        held = packer.files.get(f"{ARCHIVE}/{place}")
+        if held is None:
+            missing.append(f"{place}, an archive: it is not in {kept}")
+        elif held.sha256 != sha256:
+            missing.append(f"{place}, an archive: it is not what was put into it")
+    return missing
+
+
+def _links(editor: Path) -> bool:
+    """Whether there are links that let people in."""
+    if not editor.exists():
+        return False
+    open_ = select(invitation.c.id).where(invitation.c.revoked_at.is_(None)).limit(1)
+    return bool(rows_of(editor, open_))
+
+
+def _settings() -> dict[str, str]:
+    """What the environment says, but for what is secret."""
+    return {
+        name: value
+        for name in settings.VARIABLES
+        if name not in _SECRET and (value := os.environ.get(name))
+    }

@@ -1,0 +1,182 @@
+"""Backups into a folder: once, as cron calls it, or again and again beside the processes. Old ones go by a
+rule, a command takes each finished one elsewhere, and what became of it is written down."""
+
+import contextlib
+import fcntl
+import os
+import select
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+from action_assistant.commands.backups.making import FinishedBackup, make_backup
+from action_assistant.commands.backups.progress import Progress
+from action_assistant.commands.backups.rotation import keeping, name_at, superfluous
+from action_assistant.errors import CannotStart
+from action_assistant.journal.copies import backup_state
+from action_assistant.journal.copies.backup_state import BackupSchedule, OffSite
+from action_assistant.private_files import make_folder, opener
+
+_LOCK: Final = ".action-assistant.lock"
+_PATIENCE: Final = 6 * 3600.0  # seconds that a command may take
+_SOON: Final = 15 * 60.0  # seconds after which a backup that failed is tried again
+_NEW: Final = 10.0  # seconds after which a folder without journals is looked at again
+_JOURNALS: Final = ("editor.db", "editor.database", "runner.db")
+_LINE: Final = 500  # characters of what a command said
+_NICE: Final = 19  # the least of a processor
+
+
+class RegularBackups(msgspec.Struct, frozen=True):
+    """Whose backups go where, how many stay, and the command that takes them elsewhere."""
+
+    data: Path
+    database: str | None
+    into: Path
+    keep: str
+    after: str | None
+
+
+def back_up(plan: RegularBackups, progress: Progress) -> tuple[FinishedBackup, OffSite | None]:
+    """Make one, write down what became of it, and let old ones go. Raises CannotStart."""
+    try:
+        with _alone(plan.into):
+            target = plan.into / name_at(datetime.now(UTC))
+            done = make_backup(plan.data, plan.database, target, progress)
+            progress.end()
+            off_site = _taken_away(plan.after, target)
+            backup_state.made(plan.data, msgspec.structs.replace(done.made, off_site=off_site))
+            if not done.made.missing:  # else an older one may have what this one lacks
+                for path in superfluous(plan.into.iterdir(), keeping(plan.keep)):
+                    path.unlink(missing_ok=True)
+    except (CannotStart, OSError) as error:
+        why = str(error) if isinstance(error, CannotStart) else f"{plan.into}: {error.strerror}."
+        backup_state.failed(plan.data, why)
+        raise CannotStart(why) from error
+    return done, off_site
+
+
+def keep_making(plan: RegularBackups, every: float) -> int:
+    """Make one every so many seconds, until told to end or the process that started us dies. Nothing
+    else waits for it: it takes what others leave of processor and disk."""
+    os.nice(_NICE)
+    signal.signal(signal.SIGTERM, _end)
+    parent = os.environ.pop("_ACTION_ASSISTANT_PARENT", None)
+    due = _first(plan, every)
+    try:
+        while True:
+            backup_state.scheduled(
+                plan.data,
+                BackupSchedule(into=str(plan.into), every=every, keep=plan.keep, next=due),
+            )
+            if not _wait_until(due, parent):
+                return 0
+            begun = time.time()
+            if not any((plan.data / name).exists() for name in _JOURNALS):
+                due = begun + min(every, _NEW)  # the processes are only just starting
+                continue
+            try:
+                done, off_site = back_up(plan, Progress())
+            except CannotStart as error:
+                due = time.time() + min(every, _SOON)
+                _say(f"no backup was made: {error} It is tried again in {due - time.time():.0f} s.")
+                continue
+            due = max(begun + every, time.time())
+            _say(told(done, off_site))
+    except KeyboardInterrupt:
+        return 0
+
+
+def told(done: FinishedBackup, off_site: OffSite | None) -> str:
+    """One line about a backup."""
+    made = done.made
+    text = f"backup {made.file}: {made.bytes / 2**20:.1f} MiB in {made.seconds:.1f} s, proven"
+    if made.missing:
+        text += f"; {len(made.missing)} missing: {' '.join(made.missing)}"
+    if off_site is not None:
+        text += f"; NOT taken elsewhere: {off_site.why}" if off_site.why else "; taken elsewhere"
+    return text
+
+
+@contextlib.contextmanager
+def _alone(into: Path) -> Iterator[None]:
+    """One backup into a folder at a time; what is left of one that was killed goes."""
+    make_folder(into)
+    lock = opener(str(into / _LOCK), os.O_RDWR | os.O_CREAT)
+    try:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            raise CannotStart(f"Another backup is just being made into {into}.") from error
+        for left in into.glob(".backup-*"):
+            shutil.rmtree(left, ignore_errors=True)
+        yield
+    finally:
+        os.close(lock)
+
+
+def _taken_away(command: str | None, path: Path) -> OffSite | None:
+    """Run the command with the path as its last argument. What it says goes to where we say things."""
+    if not command:
+        return None
+    begun = time.monotonic()
+    why: str | None = None
+    try:
+        process = subprocess.Popen(
+            [*shlex.split(command), str(path)],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )
+        try:
+            said, _ = process.communicate(timeout=_PATIENCE)
+        except BaseException:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+            raise
+        if process.returncode:
+            lines = said.decode(errors="replace").strip().splitlines()
+            last = f": {lines[-1][:_LINE]}" if lines else " and said nothing"
+            why = f"`{command}` ended with {process.returncode}{last}"
+    except subprocess.TimeoutExpired:
+        why = f"`{command}` did not end within {_PATIENCE / 3600:.0f} hours"
+    except (OSError, ValueError) as error:
+        why = f"`{command}` cannot be run: {error}"
+    return OffSite(round(time.monotonic() - begun, 3), why)
+
+
+def _first(plan: RegularBackups, every: float) -> float:
+    """When the first one is due: now, unless one was made not long ago."""
+    state = backup_state.backup_state(plan.data)
+    last = state.last if state is not None else None
+    if last is None or Path(last.file).parent != plan.into or not Path(last.file).exists():
+        return time.time()
+    return max(time.time(), min(last.at, time.time()) + every)
+
+
+def _wait_until(due: float, parent: str | None) -> bool:
+    """False when the process that started us has died meanwhile: its end of the pipe is closed. In
+    slices, since clocks are set."""
+    while (left := due - time.time()) > 0:
+        ends = [] if parent is None else [int(parent)]
+        if select.select(ends, [], [], min(left, 60.0))[0]:
+            return False
+    return True
+
+
+def _end(*_: object) -> None:
+    raise KeyboardInterrupt
+
+
+def _say(text: str) -> None:
+    sys.stderr.write(f"action-assistant: {text}\n")
+    sys.stderr.flush()

@@ -1,0 +1,64 @@
+"""Which backups of a folder stay: the newest of each of so many days, weeks and months."""
+
+import re
+from collections.abc import Iterable
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+#: As scheduled backups are named; others in the folder are nobody's business here.
+_NAME: Final = re.compile(r"action-assistant-(\d{8}-\d{6})Z\.zip")
+_STAMP: Final = "%Y%m%d-%H%M%S"
+_PART: Final = re.compile(r"(\d{1,4})([dwm])")
+DEFAULT: Final = "7d,4w,6m"
+
+
+class Keeping(msgspec.Struct, frozen=True):
+    """How many days, weeks and months of which there is a backup keep their newest one. All None: every
+    backup stays."""
+
+    days: int | None = 0
+    weeks: int | None = 0
+    months: int | None = 0
+
+
+def keeping(text: str) -> Keeping:
+    """`7d,4w,6m`, or `all`. Raises ValueError."""
+    if text == "all":
+        return Keeping(None, None, None)
+    counts = {"d": 0, "w": 0, "m": 0}
+    for part in text.split(","):
+        found = _PART.fullmatch(part.strip())
+        if found is None:
+            raise ValueError(text)
+        counts[found[2]] = int(found[1])
+    if not any(counts.values()):
+        raise ValueError(text)
+    return Keeping(counts["d"], counts["w"], counts["m"])
+
+
+def name_at(moment: datetime) -> str:
+    """What a backup of that moment is called."""
+    return f"action-assistant-{moment.astimezone(UTC).strftime(_STAMP)}Z.zip"
+
+
+def superfluous(paths: Iterable[Path], keep: Keeping) -> list[Path]:
+    """Those that may go. The newest one always stays."""
+    dated = []
+    for path in paths:
+        found = _NAME.fullmatch(path.name)
+        if found is not None:
+            dated.append((datetime.strptime(found[1], _STAMP).replace(tzinfo=UTC), path))
+    if keep.days is None:
+        return []
+    dated.sort(reverse=True)
+    stays = {path for _, path in dated[:1]}
+    periods = ((keep.days, "%Y-%m-%d"), (keep.weeks, "%G-%V"), (keep.months, "%Y-%m"))
+    for count, form in periods:
+        newest: dict[str, Path] = {}
+        for moment, path in dated:
+            newest.setdefault(moment.strftime(form), path)
+        stays |= set(list(newest.values())[:count])
+    return [path for _, path in dated if path not in stays]

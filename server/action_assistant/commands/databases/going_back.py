@@ -1,0 +1,215 @@
+"""`migrate --back`: puts a copy from before an upgrade into the place of what there is now.
+
+What is there now goes aside first, as a whole. In a file one rename makes the change, in Postgres one
+transaction. Until then nothing has changed, whatever ends this.
+"""
+
+import os
+import shutil
+import sqlite3
+from collections.abc import Iterator
+from contextlib import ExitStack, closing, contextmanager
+from pathlib import Path
+from typing import Final
+
+from sqlalchemy import Connection, MetaData, NullPool, create_engine, insert, select
+
+from action_assistant import settings
+from action_assistant.commands.backups.data_folder import aside_folder
+from action_assistant.commands.backups.progress import Progress
+from action_assistant.errors import CannotStart
+from action_assistant.journal.copies.before_upgrade import (
+    FOLDER,
+    UpgradeCopy,
+    copies_in,
+    copy_at,
+    keep_copy,
+)
+from action_assistant.journal.copies.copying import sentence
+from action_assistant.journal.databases import database_of
+from action_assistant.journal.lock import own
+from action_assistant.journal.migrate import recognize, revisions_of
+from action_assistant.journal.program_version import last_writer
+from action_assistant.journal.sqlite import inspected, unchanged
+from action_assistant.private_files import sync
+from action_assistant.schema.branches import BRANCHES, VERSIONS
+
+_ROWS: Final = 500  # in memory
+
+
+def go_back(data: Path, database: str | None, files: list[Path]) -> int:
+    """The command. Raises CannotStart."""
+    settings.settled(data)
+    if not files:
+        return _list(data)
+    copies = [_copy(data, file) for file in files]
+    progress = Progress()
+    with ExitStack() as locks:
+        for copy in copies:
+            url = _url(data, database, copy)
+            if url.startswith("sqlite:"):
+                path = Path(url.removeprefix("sqlite:///"))
+                locks.callback(os.close, own(path))
+                _put_file(data, copy, path, progress)
+            else:
+                _put_rows(data, copy, url, progress)
+    return 0
+
+
+def _list(data: Path) -> int:
+    copies = copies_in(data / FOLDER)
+    if not copies:
+        print(f"There is no copy from before an upgrade in {data / FOLDER}.")
+        return 1
+    for copy in copies:
+        when = copy.made_at.astimezone().strftime("%Y-%m-%d %H:%M:%S")
+        writer = _asked(copy.path)
+        by = f", written by version {writer}" if writer else ""
+        size = copy.path.stat().st_size / 2**20
+        print(f"{copy.path}  {copy.branch}, {when}, schema {copy.revision}, {size:.1f} MiB{by}")
+    print("Put back those that you want by: action-assistant migrate --back FILE …")
+    return 0
+
+
+def _asked(path: Path) -> str:
+    """Which version wrote a file last, if it says so; nothing is changed by asking."""
+    engine = create_engine(unchanged(path), poolclass=NullPool)
+    try:
+        with engine.connect() as connection:
+            return str(last_writer(connection) or "")
+    finally:
+        engine.dispose()
+
+
+def _copy(data: Path, file: Path) -> UpgradeCopy:
+    path = file.resolve()
+    copy = copy_at(path)
+    if copy is None or not path.is_file():
+        raise CannotStart(
+            f"{file} is no copy from before an upgrade. Those of {data} are in {data / FOLDER}: "
+            "`migrate --back` lists them."
+        )
+    try:
+        _, damages = inspected(path)
+    except sqlite3.Error as error:
+        raise CannotStart(f"{file} cannot be read: {error}.") from error
+    if damages:
+        raise CannotStart(f"{file} is damaged: {sentence(damages[0])}. Nothing was changed.")
+    return copy
+
+
+def _url(data: Path, database: str | None, copy: UpgradeCopy) -> str:
+    from action_assistant.editor.log import database_location
+
+    if copy.branch == "runner":
+        return f"sqlite:///{data / 'runner.db'}"
+    return database or database_location.of(data)
+
+
+def _put_file(data: Path, copy: UpgradeCopy, path: Path, progress: Progress) -> None:
+    part = path.with_name(f".{path.name}.part")
+    with _told(path.parent):
+        progress.tell(f"{copy.path.name} is copied")
+        shutil.copyfile(copy.path, part)
+        part.chmod(0o600)
+        sync(part)
+        now = _emptied(path)
+        aside = aside_folder(data)
+        beside = [path.with_name(f"{path.name}{suffix}") for suffix in ("-wal", "-shm")]
+        for each in (path, *beside):
+            if each.exists():
+                os.link(each, aside / each.name)
+        sync(aside)
+        for each in beside:  # empty by now, unless the file is damaged
+            each.unlink(missing_ok=True)
+        part.replace(path)
+        sync(path.parent)
+    progress.end()
+    _tell(copy, str(path), inspected(path)[0], now, aside)
+
+
+def _emptied(path: Path) -> int | None:
+    """How many events are in what there is now; what waits in the log beside it goes into the file, so
+    that at no moment there is a file without it. None when it cannot be read."""
+    if not path.exists():
+        return 0
+    try:
+        with closing(sqlite3.connect(path)) as database:
+            database.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()
+            (events,) = database.execute("SELECT count(*) FROM event").fetchone()
+    except sqlite3.Error:
+        return None
+    return int(events)
+
+
+def _put_rows(data: Path, copy: UpgradeCopy, url: str, progress: Progress) -> None:
+    from action_assistant.editor.log import database_location
+    from action_assistant.journal.postgres import Postgres
+
+    database = database_of(url)
+    assert isinstance(database, Postgres)
+    session = database.own(copy.branch)
+    aside = aside_folder(data)
+    try:
+        with _told(data):
+            then, now = database.migrate(
+                lambda connection: _exchanged(connection, copy, aside, progress)
+            )
+    finally:
+        session.close()
+    progress.end()
+    _tell(copy, database_location.shown(url), then, now, aside)
+
+
+def _exchanged(
+    connection: Connection, copy: UpgradeCopy, aside: Path, progress: Progress
+) -> tuple[int, int]:
+    """All tables of ours are those of the copy; how many events there are, and were."""
+    current = recognize(connection)
+    now = 0
+    if current:
+        progress.tell("what is there now is copied aside")
+        now = inspected(keep_copy(aside, connection, copy.branch, max(current)))[0]
+    names = {*BRANCHES[copy.branch].tables, VERSIONS.name}
+    there = MetaData()
+    there.reflect(connection, only=lambda name, _: name in names)
+    there.drop_all(connection)
+    from action_assistant.journal import alembic_scripts
+
+    alembic_scripts.upgrade(connection, copy.branch, copy.revision)
+    engine = create_engine(unchanged(copy.path), poolclass=NullPool)
+    tables, events = MetaData(), 0
+    try:
+        with engine.connect() as here:
+            tables.reflect(here, only=lambda name, _: name in names - {VERSIONS.name})
+            for table in tables.sorted_tables:
+                chosen = here.execution_options(yield_per=_ROWS).execute(select(table))
+                for rows in chosen.mappings().partitions():
+                    connection.execute(insert(table), [dict(row) for row in rows])
+                    events += len(rows) * (table.name == "event")
+                    progress.tell(f"{table.name}: rows are put back, {events} events so far")
+    finally:
+        engine.dispose()
+    return events, now
+
+
+def _tell(copy: UpgradeCopy, place: str, then: int, now: int | None, aside: Path) -> None:
+    print(f"{copy.branch}: {place} is as it was at schema {copy.revision}, with {then} events")
+    if now is None:
+        print("What was there could not be read, and so it is not known what came after.")
+    elif now > then:
+        print(f"{now - then} events that came after are not in it.")
+    print(f"What was there is in {aside}.")
+    if copy.revision != revisions_of(copy.branch)[-1]:
+        print(
+            "Start it with the version that the copy is of; this one would change the tables again."
+        )
+
+
+@contextmanager
+def _told(folder: Path) -> Iterator[None]:
+    """Faults of the disk, in a sentence."""
+    try:
+        yield
+    except OSError as error:
+        raise CannotStart(f"Cannot write to {folder}: {error.strerror}.") from error

@@ -1,0 +1,1 @@
+"""Copies of journals: into another database, before their tables change, and what is known of backups."""

@@ -1,0 +1,148 @@
+"""What is known of the backups of a data folder: kept in a small file in it, for everybody who asks.
+
+Whoever makes or rehearses a backup writes it down; doctor, metrics and pages read it. Nothing here
+fails a backup: what cannot be written down is logged.
+"""
+
+import logging
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+from action_assistant.private_files import opener
+from action_assistant.system import file_locks
+
+log: Final = logging.getLogger(__name__)
+
+FILE: Final = "backups.json"
+_LATE: Final = 3600.0  # seconds beyond the time of the next one, at least
+
+
+class OffSite(msgspec.Struct, frozen=True):
+    """What became of the command that takes a finished backup elsewhere. `why`: it failed."""
+
+    seconds: float
+    why: str | None = None
+
+
+class BackupMade(msgspec.Struct, frozen=True, kw_only=True):
+    """A finished backup. `at`: when it was begun, seconds since 1970. `events` of each journal.
+    `missing`: sentences. `proven`: its file was read back and is what was written. `off_site`: None
+    when no command is set for that."""
+
+    at: float
+    file: str
+    bytes: int
+    seconds: float
+    version: str
+    events: dict[str, int]
+    missing: tuple[str, ...] = ()
+    proven: bool = False
+    off_site: OffSite | None = None
+
+
+class BackupFailed(msgspec.Struct, frozen=True):
+    """A backup that came to nothing, after the last one that did not."""
+
+    at: float
+    why: str
+
+
+class BackupRehearsed(msgspec.Struct, frozen=True, kw_only=True):
+    """A backup that was restored into a scratch place and looked at. `made_at`: when it was made, None
+    when that cannot be read. `why`: it is not sound."""
+
+    at: float
+    file: str
+    bytes: int
+    seconds: float
+    made_at: float | None = None
+    why: str | None = None
+
+
+class BackupSchedule(msgspec.Struct, frozen=True, kw_only=True):
+    """Backups go into the folder `into` every so many seconds; `keep` says how many stay. `next`: when
+    the next one is due, seconds since 1970."""
+
+    into: str
+    every: float
+    keep: str
+    next: float
+
+
+class BackupState(msgspec.Struct, frozen=True, kw_only=True):
+    """All of it. `failed`: since the last one that was made. `proven`: the last rehearsal that found a
+    backup sound; `rehearsed`: the last of all. `schedule`: None when nobody makes them regularly."""
+
+    last: BackupMade | None = None
+    failed: BackupFailed | None = None
+    rehearsed: BackupRehearsed | None = None
+    proven: BackupRehearsed | None = None
+    schedule: BackupSchedule | None = None
+
+    def is_late(self, now: float) -> bool:
+        """Whether a backup should have been made by now: whoever makes them does not run, or fails."""
+        if self.schedule is None:
+            return False
+        return now > self.schedule.next + max(_LATE, self.schedule.every / 4)
+
+
+def backup_state(data: Path) -> BackupState | None:
+    """What is known of the backups of a data folder; None when it cannot be read, which is not the
+    same as that there are none."""
+    try:
+        return msgspec.json.decode((data / FILE).read_bytes(), type=BackupState)
+    except FileNotFoundError:
+        return BackupState()
+    except (OSError, msgspec.DecodeError):
+        return None
+
+
+def note(data: Path, change: Callable[[BackupState], BackupState]) -> None:
+    """Write down what has become known."""
+    path = data / FILE
+    try:
+        guard = opener(str(path.with_name(f"{FILE}.lock")), os.O_RDWR | os.O_CREAT)
+        try:
+            file_locks.wait_for(guard)
+            state = change(backup_state(data) or BackupState())
+            part = path.with_name(f".{FILE}.part")
+            with open(part, "wb", opener=opener) as out:
+                out.write(msgspec.json.format(msgspec.json.encode(state)))
+                out.flush()
+                os.fsync(out.fileno())
+            part.replace(path)
+        finally:
+            os.close(guard)
+    except OSError as error:
+        log.warning("cannot write %s: %s", path, error.strerror)
+
+
+def made(data: Path, backup: BackupMade) -> None:
+    """A backup is there."""
+    note(data, lambda state: msgspec.structs.replace(state, last=backup, failed=None))
+
+
+def failed(data: Path, why: str) -> None:
+    """A backup came to nothing."""
+    said = BackupFailed(time.time(), why)
+    note(data, lambda state: msgspec.structs.replace(state, failed=said))
+
+
+def scheduled(data: Path, schedule: BackupSchedule) -> None:
+    """The next backup is due then."""
+    note(data, lambda state: msgspec.structs.replace(state, schedule=schedule))
+
+
+def rehearsed(data: Path, rehearsal: BackupRehearsed) -> None:
+    """A backup was restored for a trial."""
+
+    def change(state: BackupState) -> BackupState:
+        proven = rehearsal if rehearsal.why is None else state.proven
+        return msgspec.structs.replace(state, rehearsed=rehearsal, proven=proven)
+
+    note(data, change)

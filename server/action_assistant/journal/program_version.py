@@ -1,0 +1,44 @@
+"""Which versions of this program have written to a database: its last lines say who made it what it is."""
+
+import time
+from typing import Final, NamedTuple
+
+from sqlalchemy import Connection, insert, inspect, select
+
+from action_assistant.schema.editor_tables import written_by
+from action_assistant.version import VERSION, commit
+
+# The table is the same for both branches.
+_LAST: Final = select(written_by).order_by(written_by.c.since.desc()).limit(1)
+_SHORT: Final = 8
+
+
+class ProgramVersion(NamedTuple):
+    """A version that wrote, and the revision of the tables then. `build`: its commit, "" if unknown."""
+
+    version: str
+    build: str
+    revision: str
+
+    def __str__(self) -> str:
+        return f"{self.version} (commit {self.build[:_SHORT]})" if self.build else self.version
+
+
+def last_writer(connection: Connection) -> ProgramVersion | None:
+    """Who wrote last; None where versions did not say so yet."""
+    if not inspect(connection).has_table(written_by.name):
+        return None
+    row = connection.execute(_LAST).first()
+    return None if row is None else ProgramVersion(row.version, row.build, row.revision)
+
+
+def sign(connection: Connection, revision: str) -> None:
+    """This program writes from now on. Nothing is written where it was the last one before, too."""
+    if not inspect(connection).has_table(written_by.name):
+        return  # brought to an earlier revision, by a test
+    row = connection.execute(_LAST).first()
+    mine = ProgramVersion(VERSION, commit() or "", revision)
+    if row is not None and (row.version, row.build, row.revision) == mine:
+        return
+    since = max(time.time_ns() // 1000, 0 if row is None else row.since + 1)
+    connection.execute(insert(written_by).values(since=since, **mine._asdict()))

@@ -1,0 +1,69 @@
+"""Which backups stay: the newest of each of so many days, weeks and months."""
+
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from action_assistant.commands.backups.rotation import keeping, name_at, superfluous
+
+NOW = datetime(2026, 11, 24, 12, tzinfo=UTC)
+
+
+def paths(*ages: timedelta) -> list[Path]:
+    return [Path("/b") / name_at(NOW - age) for age in ages]
+
+
+def left(found: list[Path], rule: str) -> list[Path]:
+    return sorted(set(found) - set(superfluous(found, keeping(rule))), reverse=True)
+
+
+def test_a_year_of_nights_leaves_seventeen_at_most() -> None:
+    nights = paths(*(timedelta(days=n) for n in range(365)))
+    kept = left(nights, "7d,4w,6m")
+    assert kept[:7] == nights[:7]
+    assert 13 <= len(kept) <= 17
+    months = {path.name[17:23] for path in kept}
+    assert months == {"202606", "202607", "202608", "202609", "202610", "202611"}
+
+
+def test_of_one_day_the_newest_stays() -> None:
+    hours = paths(*(timedelta(hours=n) for n in range(30)))
+    assert left(hours, "2d") == [hours[0], hours[13]]
+
+
+def test_nights_without_a_backup_use_up_none_of_those_that_stay() -> None:
+    found = paths(timedelta(days=0), timedelta(days=40), timedelta(days=90))
+    assert left(found, "3d") == found
+
+
+@pytest.mark.parametrize("name", ["monday.zip", "action-assistant-2026.zip", "notes.txt"])
+def test_other_files_are_left_alone(name: str) -> None:
+    old = [Path("/b") / name, *paths(timedelta(0), timedelta(hours=1))]
+    assert superfluous(old, keeping("1d")) == old[2:]
+
+
+def test_all_stay_if_somebody_says_so() -> None:
+    assert superfluous(paths(*(timedelta(hours=n) for n in range(99))), keeping("all")) == []
+
+
+@pytest.mark.parametrize("rule", ["", "0d", "7", "7x", "d", "7d 4w", "-1d"])
+def test_what_is_no_rule_is_refused(rule: str) -> None:
+    with pytest.raises(ValueError):
+        keeping(rule)
+
+
+@given(
+    st.lists(st.integers(0, 10_000_000), min_size=1, max_size=40, unique=True),
+    st.tuples(st.integers(0, 9), st.integers(0, 9), st.integers(1, 9)),
+)
+def test_the_newest_always_stays_and_going_on_loses_nothing_more(
+    ages: list[int], counts: tuple[int, int, int]
+) -> None:
+    rule = "{}d,{}w,{}m".format(*counts)
+    found = paths(*(timedelta(seconds=each) for each in sorted(ages)))
+    kept = left(found, rule)
+    assert kept[0] == found[0]
+    assert left(kept, rule) == kept

@@ -1,0 +1,116 @@
+"""`runs copy`: runs in Postgres for a team's queries, once each, and the runner knows nothing of it."""
+
+import asyncio
+import subprocess
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from sqlalchemy import text
+
+from action_assistant.journal.databases import ask_once, database_of
+from journal.servers import Server
+from support.product import COMMAND, TOKEN, running
+from support.used_server import live
+
+
+def command(*arguments: "str | Path") -> "subprocess.CompletedProcess[str]":
+    return subprocess.run(
+        [*COMMAND, *map(str, arguments)], capture_output=True, text=True, check=False, timeout=60
+    )
+
+
+def rows(url: str, question: str) -> list[tuple[Any, ...]]:
+    return ask_once(url, lambda c: [tuple(row) for row in c.execute(text(question))])
+
+
+def until(holds: Callable[[], Any]) -> None:
+    deadline = time.monotonic() + 60
+    while not holds():
+        assert time.monotonic() < deadline
+        time.sleep(0.1)
+
+
+@pytest.fixture
+def data(tmp_path: Path) -> Path:
+    """A folder with runs, some of them in archives."""
+    folder = tmp_path / "data"
+    with running(folder) as product:
+        asyncio.run(live(product, TOKEN))
+    return folder
+
+
+def test_every_event_is_there_once_however_often_it_is_copied(data: Path, postgres: Server) -> None:
+    url = postgres.new_database()
+    for _ in range(2):
+        done = command("runs", "copy", "--to", url, "--data", data)
+        assert done.returncode == 0, done.stderr
+    own = f"sqlite:///{data / 'runner.db'}"
+    log = rows(own, "SELECT stream, seq, kind, body, position, chain FROM event ORDER BY position")
+    copied = rows(
+        url,
+        "SELECT stream, seq, kind, body, position, chain FROM action_assistant_runs.event "
+        "WHERE chain IS NOT NULL ORDER BY position",
+    )
+    assert copied == log
+    runs = rows(own, "SELECT id, number, state, result, archived_as FROM run ORDER BY number")
+    assert runs == rows(
+        url,
+        "SELECT id, number, state, result, archived_as FROM action_assistant_runs.run ORDER BY number",
+    )
+    archived = [each[0] for each in runs if each[4] is not None]
+    assert archived
+    with_events = rows(url, "SELECT DISTINCT run FROM action_assistant_runs.run_event")
+    assert {each[0] for each in runs} == {each[0] for each in with_events}
+    (asked,) = rows(
+        url,
+        "SELECT data->>'graph_name' FROM action_assistant_runs.run_event "
+        f"WHERE run = '{archived[0]}' AND seq = 1",
+    )
+    assert asked[0].startswith("patrol")
+
+
+def test_another_log_is_not_mixed_in(data: Path, tmp_path: Path, postgres: Server) -> None:
+    url = postgres.new_database()
+    assert command("runs", "copy", "--to", url, "--data", data).returncode == 0
+    change = text("UPDATE action_assistant_runs.event SET chain = '\\x00' WHERE chain IS NOT NULL")
+    database_of(url).migrate(lambda c: c.execute(change))
+    refused = command("runs", "copy", "--to", url, "--data", data)
+    assert refused.returncode == 2
+    assert "is a copy of another log" in refused.stderr
+
+
+def test_what_comes_is_copied_also_after_the_database_was_away(
+    data: Path, tmp_path: Path, postgres: Server
+) -> None:
+    url = postgres.new_database()
+    away = url.rsplit("/", 1)[0] + "/postgres"
+    with running(data) as product, product.runner() as runner:
+        log = (tmp_path / "copy.log").open("wb")
+        copying = subprocess.Popen(
+            [*COMMAND, "runs", "copy", "--to", url, "--data", str(data), "--follow"], stderr=log
+        )
+        try:
+            until(lambda: b"events copied" in (tmp_path / "copy.log").read_bytes())
+            end = "SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE datname = '{}'"
+            rows(away, end.format(url.rsplit("/", 1)[1]))
+            robot = {"name": "Later", "domain": 77}
+            runner.post("/api/robots", json=robot).raise_for_status()
+            found = "SELECT name FROM action_assistant_runs.robot WHERE name = 'Later'"
+            until(lambda: rows(url, found))
+        finally:
+            copying.terminate()
+            copying.wait(20)
+            log.close()
+
+
+def test_what_cannot_be_copied_to_is_said(data: Path) -> None:
+    for to, told in (
+        ("nonsense", "is not a URL"),
+        ("sqlite:///x.db", "is a Postgres database"),
+        ("postgresql://aa@127.0.0.1:1/x", "cannot be used"),
+    ):
+        refused = command("runs", "copy", "--to", to, "--data", data)
+        assert (refused.returncode, told in refused.stderr) == (2, True), refused.stderr

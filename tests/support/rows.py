@@ -1,0 +1,62 @@
+"""Rows for tables of any revision, and what tables hold."""
+
+import json
+from typing import Any
+
+from sqlalchemy import JSON, Column, Connection, MetaData, insert, select
+
+from action_assistant.journal.chain import NOTHING, Head, link
+from action_assistant.journal.events import Event
+from action_assistant.schema.editor_tables import editor_event, editor_head
+
+
+def fill(
+    connection: Connection, but: frozenset[str] = frozenset()
+) -> dict[str, list[dict[str, Any]]]:
+    """Put two rows into each table as it is at this revision, `but` some; what they are."""
+    metadata = MetaData()
+    metadata.reflect(connection)
+    own = {"alembic_version", "written_by"} | but  # what the program says of itself
+    tables = [table for table in metadata.sorted_tables if table.name not in own]
+    for table in tables:
+        for n in (1, 2):
+            connection.execute(insert(table).values({c.name: value(c, n) for c in table.columns}))
+    return contents(connection, [table.name for table in tables])
+
+
+def value(column: Column[Any], n: int) -> Any:
+    """Something that fits a column, and that no other row has."""
+    kind = column.type.as_generic().python_type
+    values = {int: n, str: f"{column.name} {n}", bytes: bytes([n, 0, 255]), bool: n == 1}
+    return {"n": n} if isinstance(column.type.as_generic(), JSON) else values.get(kind, float(n))
+
+
+def contents(connection: Connection, names: list[str]) -> dict[str, list[dict[str, Any]]]:
+    """The rows of some tables."""
+    metadata = MetaData()
+    metadata.reflect(connection, only=names)
+    return {
+        name: sorted(
+            (dict(row) for row in connection.execute(select(metadata.tables[name])).mappings()),
+            key=repr,
+        )
+        for name in names
+    }
+
+
+def write_events(connection: Connection, streams: int = 3, each: int = 4) -> list[Event]:
+    """Events with their chain, as a writer would store them; at whatever revision the tables are."""
+    event, head = editor_event, editor_head
+    heads, written = dict.fromkeys((f"stream/{n}" for n in range(streams)), NOTHING), []
+    for position in range(1, streams * each + 1):
+        stream = f"stream/{position % streams}"
+        before = heads[stream]
+        body = json.dumps({"n": position, "text": "ä🤖"}).encode()
+        one = Event(stream, before.seq + 1, "it.happened.v1", "ann", 7 * position, body, position)
+        heads[stream] = Head(one.seq, link(before.chain, one))
+        row = {name: getattr(one, name) for name in Event.__struct_fields__}
+        connection.execute(insert(event).values(**row, chain=heads[stream].chain))
+        written.append(one)
+    for stream, end in heads.items():
+        connection.execute(insert(head).values(stream=stream, seq=end.seq, chain=end.chain))
+    return written
