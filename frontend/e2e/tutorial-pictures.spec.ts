@@ -41,7 +41,7 @@ async function chosen(page: Page, name: string): Promise<void> {
   await expect(page.locator(".react-flow__node.selected")).toContainText(name);
 }
 
-async function fit(page: Page): Promise<void> {
+async function showAll(page: Page): Promise<void> {
   await page.getByRole("button", { name: "Fit", exact: true }).click();
   await page.waitForTimeout(600);
 }
@@ -90,7 +90,7 @@ test("start it, and draw", async ({ browser }) => {
       "entry > GoToPlant_0",
     ]);
   await page.keyboard.press("Escape");
-  await fit(page);
+  await showAll(page);
   await picture(page, "graph");
   expect(failures).toEqual([]);
   await context.close();
@@ -104,13 +104,13 @@ test("try it, run it and stop it in the simulator", async ({ browser }) => {
   const bar = page.getByRole("region", { name: "Dry-run" });
   await bar.getByRole("button", { name: /^true/ }).click();
   await expect(bar).toContainText("GoToPlant ends true");
-  await fit(page);
+  await showAll(page);
   await picture(page, "dry-run");
   await bar.getByRole("button", { name: "Close the dry-run" }).click();
 
   await hold(page, /^Start v1 in the simulator/);
   await expect(card(page, "Water").getByText("running")).toBeVisible({ timeout: 20_000 });
-  await fit(page);
+  await showAll(page);
   await picture(page, "run");
   await hold(page, /^Start v1 in the simulator/);
   await page.keyboard.press("Control+.");
