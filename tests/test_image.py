@@ -149,7 +149,7 @@ def test_a_service_is_bounded_has_no_rights_and_is_not_open_to_the_network(name:
     assert service["pids_limit"]
     assert service["logging"]["options"] == {"max-size": "10m", "max-file": "5"}
     assert "mem_limit" in service or name == "runner", "nothing ends what stops robots"
-    assert service["healthcheck"].get("test") or name in {"robot", "proxy"}
+    assert service["healthcheck"].get("test") or name in {"robot", "proxy", "backups"}
     assert all(each.startswith("127.0.0.1:") for each in service.get("ports", []))
     assert all(":" in each for each in service.get("volumes", []))
 

@@ -198,6 +198,7 @@ def _plan(options: argparse.Namespace, systemd: Systemd) -> ServicePlan:
             words += [f"--{name.replace('_', '-')}", str(shown)]
     for robot, folder in settings.index_folders(options.index_folder, {}).items():
         words += ["--index-folder", f"{robot}={folder}"]
+    words += _backups(options)
     words += [f"--{name}" for name in _FLAGS if getattr(options, name)]
     user = _user(options) if options.scope == "system" else ""
     data = _data(options)
@@ -211,8 +212,20 @@ def _plan(options: argparse.Namespace, systemd: Systemd) -> ServicePlan:
         user=user,
         environment=_sourced(os.environ),
         settings=systemd.settings,
-        writes=(*_archive(), *settings.index_folders(options.index_folder).values()),
+        writes=(
+            *_archive(),
+            *settings.index_folders(options.index_folder).values(),
+            *([options.backup_to.absolute()] if options.backup_to is not None else []),
+        ),
     )
+
+
+def _backups(options: argparse.Namespace) -> list[str]:
+    if options.backup_to is None:
+        return []
+    words = ["--backup-to", str(options.backup_to.absolute())]
+    words += ["--backup-every", f"{options.backup_every:g}s", "--backup-keep", options.backup_keep]
+    return [*words, *(["--backup-after", options.backup_after] if options.backup_after else [])]
 
 
 def _data(options: argparse.Namespace) -> Path | None:
