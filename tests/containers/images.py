@@ -30,6 +30,8 @@ STANDS_IN: Final = {
 }
 EDITOR: Final = "temoto-action-assistant/editor:0.1.0"
 RUNNER: Final = "temoto-action-assistant/runner:0.1.0"
+#: From which the images are said to be.
+COMMIT: Final = run("git", "rev-parse", "HEAD").stdout.strip()
 _CERTIFICATES: Final = Path("/etc/ssl/certs/ca-certificates.crt")
 _FOLDER_IN: Final = re.compile(r"(?:file://)?(/[^\s'\"]+)")
 
@@ -103,7 +105,7 @@ def compose_build(*services: str) -> float:
     command = ["podman-compose", "--podman-build-args", " ".join(reach())]
     for profile in ("simulator", "robot"):
         command += ["--profile", profile]
-    run(*command, "build", *services, timeout=3600)
+    run(*command, "build", *services, timeout=3600, more={"SOURCE_COMMIT": COMMIT})
     return time.monotonic() - begun
 
 
