@@ -9,7 +9,7 @@
 ARG ROS_IMAGE=ros:jazzy-ros-core-noble
 ARG ROS_BUILD_IMAGE=ros:jazzy-ros-base-noble
 ARG VERSION=0.1.0
-ARG REVISION=unknown
+ARG SOURCE_COMMIT=
 
 # The page and the wheel are the same for every architecture.
 FROM --platform=$BUILDPLATFORM node:22.16.0-bookworm-slim AS page
@@ -39,7 +39,7 @@ COPY --from=help /out ./build/help
 COPY pyproject.toml README.md LICENSE ./
 COPY migrations ./migrations
 COPY server ./server
-ARG SOURCE_COMMIT=
+ARG SOURCE_COMMIT
 RUN scripts/image wheel /opt/back-end /out
 
 FROM python:3.12.11-slim-bookworm AS editor-dependencies
@@ -64,12 +64,12 @@ HEALTHCHECK --interval=10s --timeout=5s --start-period=30s CMD ["/opt/build/imag
 ENTRYPOINT ["action-assistant"]
 CMD ["editor", "--host", "0.0.0.0"]
 ARG VERSION
-ARG REVISION
+ARG SOURCE_COMMIT
 LABEL org.opencontainers.image.title="TeMoto Action Assistant: editor" \
     org.opencontainers.image.description="Graphs, versions, the page; also everything with the simulator" \
     org.opencontainers.image.licenses="Apache-2.0" \
     org.opencontainers.image.version="$VERSION" \
-    org.opencontainers.image.revision="$REVISION"
+    org.opencontainers.image.revision="$SOURCE_COMMIT"
 
 FROM ${ROS_BUILD_IMAGE} AS messages
 COPY scripts/image /opt/build/
@@ -105,9 +105,9 @@ HEALTHCHECK --interval=10s --timeout=5s --start-period=30s CMD ["/opt/build/imag
 ENTRYPOINT ["action-assistant"]
 CMD ["runner"]
 ARG VERSION
-ARG REVISION
+ARG SOURCE_COMMIT
 LABEL org.opencontainers.image.title="TeMoto Action Assistant: runner" \
     org.opencontainers.image.description="The side of the robots: runs and Stop, over ROS 2" \
     org.opencontainers.image.licenses="Apache-2.0" \
     org.opencontainers.image.version="$VERSION" \
-    org.opencontainers.image.revision="$REVISION"
+    org.opencontainers.image.revision="$SOURCE_COMMIT"

@@ -61,14 +61,14 @@ def defaults() -> dict[str, set[str]]:
 
 def arguments() -> dict[str, str]:
     """Of the Dockerfile, with their defaults."""
-    return dict(re.findall(r"^ARG (\w+)=(\S+)$", (ROOT / "Dockerfile").read_text(), re.MULTILINE))
+    return dict(re.findall(r"^ARG (\w+)=(\S*)$", (ROOT / "Dockerfile").read_text(), re.MULTILINE))
 
 
 def test_every_image_has_a_version() -> None:
     bases = {words[1] for stage in stages().values() for words in stage if words[0] == "FROM"}
     bases |= {each["image"] for each in SERVICES.values()}
     known = arguments() | {name: next(iter(found)) for name, found in defaults().items()}
-    assert set(arguments()) == {"ROS_IMAGE", "ROS_BUILD_IMAGE", "VERSION", "REVISION"}
+    assert set(arguments()) == {"ROS_IMAGE", "ROS_BUILD_IMAGE", "VERSION", "SOURCE_COMMIT"}
     bases = {re.sub(r"\$\{(\w+)(:-.*)?\}", lambda m: known[m[1]], each) for each in bases}
     for base in bases - set(stages()):
         tag = base.rpartition(":")[2]

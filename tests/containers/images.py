@@ -11,6 +11,7 @@ import shutil
 import subprocess
 import sys
 import time
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
@@ -28,8 +29,11 @@ STANDS_IN: Final = {
     "ros-core": "ros:jazzy-ros-core-noble",
     "ros-base": "ros:jazzy-ros-base-noble",
 }
-EDITOR: Final = "temoto-action-assistant/editor:0.1.0"
-RUNNER: Final = "temoto-action-assistant/runner:0.1.0"
+VERSION: Final = str(tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"])
+EDITOR: Final = f"temoto-action-assistant/editor:{VERSION}"
+RUNNER: Final = f"temoto-action-assistant/runner:{VERSION}"
+#: From which the images are said to be.
+COMMIT: Final = run("git", "rev-parse", "HEAD").stdout.strip()
 _CERTIFICATES: Final = Path("/etc/ssl/certs/ca-certificates.crt")
 _FOLDER_IN: Final = re.compile(r"(?:file://)?(/[^\s'\"]+)")
 
@@ -103,7 +107,7 @@ def compose_build(*services: str) -> float:
     command = ["podman-compose", "--podman-build-args", " ".join(reach())]
     for profile in ("simulator", "robot"):
         command += ["--profile", profile]
-    run(*command, "build", *services, timeout=3600)
+    run(*command, "build", *services, timeout=3600, more={"SOURCE_COMMIT": COMMIT})
     return time.monotonic() - begun
 
 

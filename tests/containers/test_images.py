@@ -5,7 +5,7 @@ import time
 import pytest
 
 from containers.engine import ROOT, inspect, podman
-from containers.images import EDITOR, RUNNER, compose_build, say
+from containers.images import COMMIT, EDITOR, RUNNER, VERSION, compose_build, say
 
 #: A module of the program that every image imports at its start.
 _LINE = ROOT / "server" / "action_assistant" / "version.py"
@@ -20,11 +20,13 @@ def inside(image: str, script: str) -> str:
 def test_an_image_says_what_it_is(image: str) -> None:
     found = inspect(image)
     labels = found["Labels"]
-    assert labels["org.opencontainers.image.version"] == "0.1.0"
+    assert labels["org.opencontainers.image.version"] == VERSION
     assert labels["org.opencontainers.image.title"].startswith("TeMoto Action Assistant")
     assert found["User"] == "10001:10001"
     assert found["Healthcheck"]["Test"][1].endswith("/image")
-    assert inside(image, "action-assistant --version") == "action-assistant 0.1.0\n"
+    assert labels["org.opencontainers.image.revision"] == COMMIT
+    said = inside(image, "action-assistant --version")
+    assert said == f"action-assistant {VERSION} (commit {COMMIT[:8]})\n"
 
 
 @pytest.mark.parametrize("image", [EDITOR, RUNNER])

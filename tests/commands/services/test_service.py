@@ -154,7 +154,21 @@ def test_every_option_of_serve_reaches_it_or_has_a_reason_not_to() -> None:
         "backup_keep": "the same",
         "backup_after": "the same",
     }
-    assert known == {*_VALUES, *_FLAGS, *left_out}
+    apart = {"index_folder", "backup_to", "backup_every", "backup_keep", "backup_after"}
+    assert known == {*_VALUES, *_FLAGS, *left_out, *apart}
+
+
+def test_it_makes_the_backups_that_were_asked_for_and_may_write_to_their_folder(
+    service: Service, unit: Path
+) -> None:
+    words = ("--backup-to", "/srv/copies", "--backup-every", "12h", "--backup-keep", "3d")
+    assert service("install", "--as", "robot", *words, "--backup-after", "push there") == 0
+    text = unit.read_text()
+    assert "--backup-to /srv/copies --backup-every 43200s --backup-keep 3d" in text
+    assert "--backup-after" in text
+    assert "ReadWritePaths=/srv/copies" in text
+    assert service("upgrade") == 0
+    assert unit.read_text() == text
 
 
 def test_what_cannot_be_meant_is_refused_before_anything_is_written(
