@@ -47,6 +47,7 @@ LISTED: Final = {
     "pipx": "installs from a registry",
     "uv": "installs from a registry",
     "uvx": "installs from a registry",
+    "action-assistant service": "needs systemd: tests of the command look at what it writes",
     "psql": "needs a Postgres of the reader's",
     "pg_basebackup": "needs a Postgres of the reader's",
     "action-assistant move --to sqlite": "needs graphs in a Postgres: tests/commands has one",
