@@ -55,7 +55,6 @@ LISTED: Final = {
     "action-assistant backup --into /backups --data DIR --every": "needs rclone, and a day",
     "action-assistant serve --index-folder": "needs the folders of two robots",
     "action-assistant serve --data": "needs a data folder that no server has: tests start hundreds",
-    "action-assistant service": "changes the computer: tests/commands/services has an image",
     "action-assistant stop --all --server": "speaks to another computer",
     "action-assistant simulate-robot": "needs rclpy: tests/ros and the browser start it",
     ".venv-ros/bin/action-assistant simulate-robot": "needs rclpy: tests/ros and the browser start it",
