@@ -84,6 +84,7 @@ def build(to: Path) -> int:
         for spare in _SPARE:
             for path in site.rglob(spare):
                 path.unlink()
+        shutil.rmtree(site / "_sources", ignore_errors=True)
         moves.finish(site)
         if to.exists():
             shutil.rmtree(to)

@@ -15,7 +15,10 @@ SECTIONS: Final = (
     ("UMRF", ("umrf", "umrf-and-the-engine")),
     (
         "Administration",
-        ("administration", "installing", "containers", "network", "backups", "monitoring"),
+        (
+            *("administration", "installing", "containers", "network"),
+            *("backups", "monitoring", "doctor"),
+        ),
     ),
     ("For programs", ("api/editor", "api/runner", "contracts", "room-protocol")),
     (
@@ -47,7 +50,8 @@ CARRIED: Final = ("pictures", "proxy")
 #: Where a document wants the list of the other pages of its section.
 LIST: Final = "<!-- the pages of this section -->"
 
-_LINK: Final = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s#]*)(#[^)\s]*)?\)")
+#: A span of code, which stays as it is, or a link.
+_LINK: Final = re.compile(r"`[^`\n]+`|(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s#]*)(#[^)\s]*)?\)")
 _CODE: Final = re.compile(r"(^```[^`]*^```|^(?: {4}[^\n]*\n)+)", re.MULTILINE)
 _TITLE: Final = re.compile(r"^# (.+)$", re.MULTILINE)
 _FIRST: Final = re.compile(r"^# .+\n+([^#\n|!>`].+)$", re.MULTILINE)
@@ -75,7 +79,7 @@ def place_of(path: Path) -> str | None:
 def relinked(text: str, document: Path) -> tuple[str, set[str]]:
     """The text with links that lead where things lie in the help, and which files it needs beside it.
 
-    What the help has no place for stays as words.
+    What the help has no place for stays as words. Fails for what the repository does not have.
     """
     own = place_of(document)
     assert own is not None
@@ -83,12 +87,15 @@ def relinked(text: str, document: Path) -> tuple[str, set[str]]:
 
     def lead(match: re.Match[str]) -> str:
         sign, words, target, anchor = match[1], match[2], match[3], match[4] or ""
-        if "://" in target or target.startswith("mailto:"):
+        if target is None or "://" in target or target.startswith("mailto:"):
             return match[0]
         if not sign:
             words, inside = relinked(words, document)
             needed.update(inside)
-        place = own if not target else place_of((document.parent / target).resolve())
+        there = (document.parent / target).resolve()
+        if target and not there.exists():
+            raise ValueError(f"{document} leads to {target}, which is not there")
+        place = own if not target else place_of(there)
         if place is None:
             return words
         if not place.endswith(".md"):
@@ -99,7 +106,6 @@ def relinked(text: str, document: Path) -> tuple[str, set[str]]:
     def prose(part: str) -> str:
         return _LINK.sub(lead, part)
 
-    # Words of a link may be code, so code within a line is looked at with its prose.
     parts = _CODE.split(text)
     return "".join(part if n % 2 else prose(part) for n, part in enumerate(parts)), needed
 
@@ -124,7 +130,7 @@ def listed(places: list[str], texts: dict[str, str], own: str) -> str:
         found = _FIRST.search(text)
         first = re.split(r"(?<=\.) ", found[1])[0] if found else ""
         # A link in it would lead from another folder.
-        first = _LINK.sub(lambda match: match[2], first)
+        first = _LINK.sub(lambda match: match[2] or match[0], first)
         way = "../" * own.count("/") + place
         lines.append(f"- [{titled(text, place)}]({way}.md){': ' if first else ''}{first}")
     return "\n".join(lines)

@@ -121,8 +121,12 @@ def test_every_route_and_shape_of_both_processes_is_told() -> None:
 
 
 def test_places_that_the_page_leads_to_are_there() -> None:
-    named = re.findall(r'"([\w-]+\.html#[\w-]+)"', (ROOT / "frontend/src/api/help.ts").read_text())
-    assert len(named) >= 4
+    named = [
+        place
+        for path in (ROOT / "frontend/src").rglob("*.tsx")
+        for place in re.findall(r'HelpLink\s+place="([^"]+)"', path.read_text())
+    ]
+    assert len(named) >= 3
     assert [each for each in named if dead(SITE / "index.html", each)] == []
 
 
@@ -183,3 +187,5 @@ def test_a_link_leads_to_where_things_lie_in_the_help(generator: Path) -> None:
     told, needed = site.relinked("[a](../README.md#in-the-lab) [b](proxy/Caddyfile)", network)
     assert told == "[a](overview.md#in-the-lab) [b](proxy/Caddyfile)"
     assert needed == {"proxy/Caddyfile"}
+    with pytest.raises(ValueError, match=r"none\.png"):
+        site.relinked("![a](pictures/none.png)", network)

@@ -2,6 +2,7 @@
 import { Button, Group, Stack, Text, TextInput, useMantineColorScheme } from "@mantine/core";
 import {
   IconDeviceDesktop,
+  IconHelp,
   IconLogout,
   IconMoon,
   IconServerCog,
@@ -12,6 +13,7 @@ import { useState } from "react";
 import { Link } from "wouter";
 import { errorText } from "../api/http";
 import { useLive } from "../api/live/use-live";
+import { helpUrl } from "../api/page-url";
 import { ROLE_WORDS, rememberedName, signOut } from "../api/session";
 import { useMay, usePerson } from "../api/use-person";
 import { Segments } from "../ui/segments";
@@ -121,6 +123,16 @@ export function AccountPanel({ onShare, onClose, onLeave }: Props) {
           </Text>
         )}
         <Appearance />
+        <Button
+          component="a"
+          href={helpUrl("")}
+          target="_blank"
+          rel="noopener"
+          variant="default"
+          leftSection={<IconHelp size={15} aria-hidden />}
+        >
+          Help
+        </Button>
         <Button
           variant="default"
           leftSection={<IconLogout size={15} aria-hidden />}

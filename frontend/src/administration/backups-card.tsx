@@ -1,13 +1,13 @@
 /** Backups: how old the last good one is, and what became of it. */
 import { ago, instant } from "../ui/times";
 import style from "./administration.module.css";
-import { type Fact, Facts } from "./facts";
+import { type StatusFact, Facts } from "./facts";
 import { type Backups, bytes, span } from "./status";
 
-function factsOf(backups: Backups, now: number): Fact[] {
+function factsOf(backups: Backups, now: number): StatusFact[] {
   const { made_at, failed_why, missing, off_site, proven_at, unsound, next_at, keep } = backups;
   const [made, proven, next] = [instant(made_at), instant(proven_at), instant(next_at)];
-  const facts: Fact[] = [
+  const facts: StatusFact[] = [
     { name: "The last one", value: made === null ? "none was made" : ago(made, now), isBad: !made },
   ];
   if (backups.bytes != null && backups.seconds != null) {

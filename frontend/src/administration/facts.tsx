@@ -2,14 +2,14 @@
 import type { ReactNode } from "react";
 import style from "./administration.module.css";
 
-export interface Fact {
+export interface StatusFact {
   readonly name: string;
   readonly value: ReactNode;
   /** Somebody should look at it. */
   readonly isBad?: boolean;
 }
 
-export function Facts({ facts }: { facts: readonly Fact[] }) {
+export function Facts({ facts }: { facts: readonly StatusFact[] }) {
   return (
     <dl className={style.facts}>
       {facts.map(({ name, value, isBad }) => (

@@ -3,7 +3,7 @@ import { Alert } from "@mantine/core";
 import { errorText } from "../api/http";
 import { ago, instant } from "../ui/times";
 import style from "./administration.module.css";
-import { type Fact, Facts } from "./facts";
+import { type StatusFact, Facts } from "./facts";
 import { bytes, type ProcessStatus, span, type useStatus } from "./status";
 
 /** Bytes of the disk below which somebody should make room. */
@@ -18,7 +18,7 @@ const PARTS: Readonly<Record<string, string>> = {
   rclpy: "Way to robots",
 };
 
-function loadFacts({ load, at, began_at }: ProcessStatus): Fact[] {
+function loadFacts({ load, at, began_at }: ProcessStatus): StatusFact[] {
   const files = load.open_files === null ? "not known" : `${load.open_files}`;
   const lag = Math.round(1000 * load.loop_lag_s);
   return [
@@ -30,10 +30,10 @@ function loadFacts({ load, at, began_at }: ProcessStatus): Fact[] {
   ];
 }
 
-function storageFacts({ storage, journal }: ProcessStatus): Fact[] {
+function storageFacts({ storage, journal }: ProcessStatus): StatusFact[] {
   const { failing, waiting, busy_s } = journal;
   const stored = failing ?? (waiting === 0 ? "nothing waits" : `${waiting} wait`);
-  const facts: Fact[] = [
+  const facts: StatusFact[] = [
     { name: "Database", value: <bdi>{journal.database.replace(/^The database /, "")}</bdi> },
     { name: "Journal", value: stored, isBad: failing !== null || busy_s > 2 },
   ];
@@ -48,9 +48,9 @@ function storageFacts({ storage, journal }: ProcessStatus): Fact[] {
   return [...facts, { name: "Disk", value: left, isBad: free < TIGHT }];
 }
 
-function activityFacts({ activity, workers }: ProcessStatus): Fact[] {
+function activityFacts({ activity, workers }: ProcessStatus): StatusFact[] {
   const { sockets, rooms, runs, stops_unconfirmed } = activity;
-  const facts: Fact[] = [{ name: "Open sockets", value: sockets }];
+  const facts: StatusFact[] = [{ name: "Open sockets", value: sockets }];
   if (rooms != null) facts.push({ name: "Open graphs", value: rooms });
   if (runs != null) facts.push({ name: "Open runs", value: runs });
   if (stops_unconfirmed != null) {

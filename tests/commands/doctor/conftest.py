@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from action_assistant import paths
 from support.doctor import served_once
 
 
@@ -13,6 +14,12 @@ from support.doctor import served_once
 def served(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder that was served, and that no test alters."""
     return served_once(tmp_path_factory.mktemp("served"))
+
+
+@pytest.fixture(autouse=True)
+def page_of_these_sources(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever works on the page has sources that are newer than what was built; a test says so itself."""
+    monkeypatch.setattr(paths, "page_sources", lambda: None)
 
 
 @pytest.fixture

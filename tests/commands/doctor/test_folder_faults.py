@@ -127,20 +127,28 @@ def test_settings_that_nobody_reads_or_that_mean_nothing_are_named(
 ) -> None:
     monkeypatch.setenv("ACTION_ASSISTANT_KEEP_RUN", "90")
     monkeypatch.setenv("ACTION_ASSISTANT_KEEP_RAW", "a week")
-    monkeypatch.setenv("ACTION_ASSISTANT_LIMITS", "of")
-    monkeypatch.setenv("ACTION_ASSISTANT_HOSTS", "http://lab/")
-    monkeypatch.setenv("ACTION_ASSISTANT_TOKEN", "guess-me")
-    monkeypatch.setenv("ACTION_ASSISTANT_URL", "lab:8000")
-    monkeypatch.setenv("ACTION_ASSISTANT_PUBLIC_URL", "robots.example.org")
+    wrong = {
+        "LIMITS": "of",
+        "HOSTS": "http://lab/",
+        "TOKEN": "guess-me",
+        "TOKEN_FILE": "/nothing",
+        "URL": "lab:8000",
+        "PUBLIC_URL": "robots.example.org",
+        "PORT": "eight thousand",
+        "LOG_LEVEL": "loud",
+        "METRICS_TOKEN": "short",
+        "INDEX_FOLDERS": "/without/a/robot",
+        "BACKUP_EVERY": "daily",
+        "BACKUP_KEEP": "some",
+    }
+    for name, value in wrong.items():
+        monkeypatch.setenv(f"ACTION_ASSISTANT_{name}", value)
     found = {each.where: each for each in faults(data)}
     assert found.pop("ACTION_ASSISTANT_KEEP_RUN").remedy.startswith(
         "Is ACTION_ASSISTANT_KEEP_RUNS meant?"
     )
     assert {each.code for each in found.values()} == {"setting-wrong"}
-    assert set(found) == {
-        f"ACTION_ASSISTANT_{name}"
-        for name in ("KEEP_RAW", "LIMITS", "HOSTS", "TOKEN", "URL", "PUBLIC_URL")
-    }
+    assert set(found) == {f"ACTION_ASSISTANT_{name}" for name in ("KEEP_RAW", *wrong)}
 
 
 def test_the_command_tells_a_wrong_setting_where_every_other_one_only_refuses(data: Path) -> None:

@@ -148,6 +148,11 @@ def test_every_option_of_serve_reaches_it_or_has_a_reason_not_to() -> None:
         "port": "the usual one is left out",
         "database": "one with a password is refused",
         "switch_database": "it is meant for one start",
+        "index_folder": "there may be several",
+        "backup_to": "backups have a rule of their own",
+        "backup_every": "the same",
+        "backup_keep": "the same",
+        "backup_after": "the same",
     }
     apart = {"index_folder", "backup_to", "backup_every", "backup_keep", "backup_after"}
     assert known == {*_VALUES, *_FLAGS, *left_out, *apart}

@@ -13,6 +13,7 @@ import { type Preflight, type Robot, SIMULATOR } from "../../api/robots";
 import type { Run } from "../../api/runs";
 import { useMay } from "../../api/use-person";
 import { EngineLabel } from "../../status/engine-label";
+import { HelpLink } from "../../status/help-link";
 import { HoldButton } from "../../ui/floating/hold-button";
 import { colorOfName } from "../../ui/name-colors";
 import { useBehaviours } from "./behaviours-choice";
@@ -221,7 +222,7 @@ export function StartDialog(props: Props) {
           aria-busy={look.isFetching}
         >
           <header className={style.lookHead}>
-            <h3>Before the start</h3>
+            <h3>Before the start</h3> <HelpLink place="operators-guide.html#before-a-start" />
             <Button
               size="compact-xs"
               variant="subtle"

@@ -9,7 +9,7 @@ from typing import Final
 import httpx
 import msgspec
 
-_PATIENCE_S: Final = 2.0
+_PATIENCE_S: Final = 3.0
 
 
 class ProcessAnswer(msgspec.Struct, frozen=True, kw_only=True):

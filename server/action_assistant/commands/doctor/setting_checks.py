@@ -1,5 +1,6 @@
 """Settings in the environment: names that nobody reads, values that cannot be meant."""
 
+import argparse
 import difflib
 import os
 import re
@@ -8,9 +9,11 @@ from pathlib import Path
 from typing import Final
 
 from action_assistant import interpreter, settings
+from action_assistant.commands.backups import options
 from action_assistant.commands.doctor.installation import Installation
 from action_assistant.errors import CannotStart
 from action_assistant.journal.databases import database_of
+from action_assistant.logs.setup import log_settings
 from action_assistant.system.diagnostics import Diagnostic, fine, found
 from action_assistant.web.auth.keys import Keys
 
@@ -79,6 +82,26 @@ def _file(name: str) -> Callable[[str], object]:
     return lambda value: settings.take_secrets_from_files({name: value})
 
 
+def _log(name: str) -> Callable[[str], object]:
+    return lambda value: log_settings(environ={name: value})
+
+
+def _metrics(name: str) -> Callable[[str], object]:
+    return lambda value: settings.metrics_token({name: value})
+
+
+def _argument(reads: Callable[[str], object]) -> Callable[[str], object]:
+    """A reader of an option, which raises as argparse wants it."""
+
+    def read(value: str) -> object:
+        try:
+            return reads(value)
+        except argparse.ArgumentTypeError as error:
+            raise CannotStart(f"{error}.") from error
+
+    return read
+
+
 _READERS: Final[Mapping[str, Callable[[str], object]]] = {
     "ACTION_ASSISTANT_PORT": lambda value: settings.port({"ACTION_ASSISTANT_PORT": value}),
     **{name: _file(name) for name in settings.VARIABLES if name.endswith("_FILE")},
@@ -94,4 +117,14 @@ _READERS: Final[Mapping[str, Callable[[str], object]]] = {
     "ACTION_ASSISTANT_KEEP_RUNS": _days("ACTION_ASSISTANT_KEEP_RUNS"),
     "ACTION_ASSISTANT_KEEP_RAW": _days("ACTION_ASSISTANT_KEEP_RAW"),
     "ACTION_ASSISTANT_LIMITS": _limits,
+    **{name: _log(name) for name in ("ACTION_ASSISTANT_LOG_FORMAT", "ACTION_ASSISTANT_LOG_LEVEL")},
+    **{
+        name: _metrics(name)
+        for name in ("ACTION_ASSISTANT_METRICS_TOKEN", "ACTION_ASSISTANT_METRICS_TOKEN_FILE")
+    },
+    settings.INDEX_FOLDERS: lambda value: settings.index_folders(
+        (), {settings.INDEX_FOLDERS: value}
+    ),
+    "ACTION_ASSISTANT_BACKUP_EVERY": _argument(options.span),
+    "ACTION_ASSISTANT_BACKUP_KEEP": _argument(options.rule),
 }

@@ -18,7 +18,6 @@ import msgspec
 from action_assistant.runner.index_folders.scan import shown_path
 from action_assistant.umrf.files.file_names import graph_file_name, unmarked
 
-_FOLDER: Final = os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC
 _NUMBERS: Final = 1_000  # names that are tried
 _KEPT: Final = 120  # bytes of the name of a file that is put aside
 
@@ -91,10 +90,15 @@ def sha(text: bytes) -> str:
     return hashlib.sha256(text).hexdigest()
 
 
+def _as_folder() -> int:
+    """How a folder is opened. Windows, which has no runner, lacks the name."""
+    return os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC
+
+
 @contextmanager
 def _opened(folder: Path) -> Iterator[int]:
     """The folder as the administrator named it, be that a link."""
-    found = os.open(folder, _FOLDER)
+    found = os.open(folder, _as_folder())
     try:
         yield found
     finally:
@@ -109,7 +113,7 @@ def _entered(top: int, path: str) -> Iterator[int]:
         for name in path.split("/")[:-1]:
             if name in {"", ".", ".."}:
                 raise OSError("its path leads out of the folder")
-            below = os.open(name, _FOLDER | os.O_NOFOLLOW, dir_fd=found)
+            below = os.open(name, _as_folder() | os.O_NOFOLLOW, dir_fd=found)
             os.close(found)
             found = below
         yield found
