@@ -24,7 +24,7 @@ WORKDIR /source
 COPY requirements/site.txt ./requirements/
 COPY scripts/image ./scripts/
 RUN scripts/image help-tools /opt/help
-COPY README.md CONTRIBUTING.md CHANGELOG.md ./
+COPY README.md CONTRIBUTING.md CHANGELOG.md LICENSE ./
 COPY frontend/public ./frontend/public
 COPY frontend/src/api/schema ./frontend/src/api/schema
 COPY docs ./docs
