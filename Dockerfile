@@ -23,11 +23,12 @@ FROM --platform=$BUILDPLATFORM python:3.12.11-slim-bookworm AS help
 WORKDIR /source
 COPY requirements/site.txt ./requirements/
 COPY scripts/image ./scripts/
-COPY README.md CONTRIBUTING.md CHANGELOG.md ./
+RUN scripts/image help-tools /opt/help
+COPY README.md CONTRIBUTING.md CHANGELOG.md LICENSE ./
 COPY frontend/public ./frontend/public
 COPY frontend/src/api/schema ./frontend/src/api/schema
 COPY docs ./docs
-RUN scripts/image help /out
+RUN scripts/image help /opt/help /out
 
 FROM --platform=$BUILDPLATFORM python:3.12.11-slim-bookworm AS wheel
 WORKDIR /source

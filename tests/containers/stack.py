@@ -183,5 +183,7 @@ def command(
 
 
 def findings(text: str) -> dict[str, str]:
-    """Of `doctor --json`: what is wrong, by topic."""
-    return {each["topic"]: each["what"] for each in json.loads(text) if each["verdict"] == "wrong"}
+    """Of `doctor --json`: what is wrong, by its code."""
+    return {
+        each["code"]: each["message"] for each in json.loads(text) if each["severity"] == "error"
+    }
