@@ -91,8 +91,9 @@ def holding(piece: Piece) -> Select[Any]:
             fits = func.substr(word.c.text, -len(piece.text)) == piece.text
         case "within":
             fits = func.instr(word.c.text, piece.text) > 0
-    joined = select(run_word.c.number).join_from(word, run_word, run_word.c.word == word.c.id)
-    return joined.where(fits).distinct().limit(MOST + 1)
+    words = select(word.c.id).where(fits)  # not joined: all words of all runs would be read
+    held = select(run_word.c.number).where(run_word.c.word.in_(words))
+    return held.distinct().limit(MOST + 1)
 
 
 def unindexed() -> Select[Any]:
