@@ -31,6 +31,7 @@ from action_assistant.runner.links.port import Reach
 from action_assistant.runner.links.ros2.availability import ros2_reach
 from action_assistant.runner.links.simulated import Simulators
 from action_assistant.runner.review.service import ReviewService
+from action_assistant.runner.review.word_indexer import index_words
 from action_assistant.runner.review.worker_queries import StoragePaths, WorkerQueries
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.robots.registry import Robots
@@ -86,6 +87,7 @@ async def open_services(
             async with anyio.create_task_group() as tasks:
                 tasks.start_soon(services.review_service.run)
                 tasks.start_soon(services.retention.run)
+                tasks.start_soon(index_words, journal)
                 yield services
                 tasks.cancel_scope.cancel()
     finally:

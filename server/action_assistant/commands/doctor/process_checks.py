@@ -50,7 +50,7 @@ def _ours(
             where,
             f"The {name} that runs is version {answer.version}, this program is {VERSION}: they may not "
             "understand each other.",
-            "Start it again, so that editor, runner and commands are of one installation.",
+            "Once no robot moves, start it again, so that editor, runner and commands are of one installation.",
         )
     if answer.clock_s is not None and abs(answer.clock_s) > _CLOCK_S:
         yield clock_differs(name, where, answer.clock_s)
@@ -102,7 +102,8 @@ def _held(place: Installation, name: str, *, runs: bool) -> Iterator[Diagnostic]
             f"{file}.lock",
             f"Process {holder} of this program holds the database, and does not answer at port "
             f"{dict(place.processes)[name]}: it serves at another one, or hangs.",
-            f"Name its port with --port; if it hangs, end it (`kill {holder.pid}`) and start anew.",
+            f"Name its port with --port; if it hangs, see that no robot moves, end it (`kill {holder.pid}`) "
+            "and start anew.",
         )
 
 
