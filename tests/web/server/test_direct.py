@@ -237,6 +237,16 @@ def test_every_byte_by_itself_makes_no_difference() -> None:
     assert asyncio.run(directly([stream[n : n + 1] for n in range(len(stream))])) == whole
 
 
+def test_pieces_beyond_the_limit_are_refused_by_the_head_of_the_last() -> None:
+    mask = os.urandom(4)
+    begun = frame(0x02, b"x" * 175, mask)
+    stream = begun + frame(0x80, b"y" * 126, mask)[: LIMIT - 175]
+    assert len(begun) < len(stream)
+    heard, written, is_gone, is_over = asyncio.run(directly([begun, stream[len(begun) :]]))
+    assert (heard, is_gone, is_over) == ([], True, True)
+    assert written[2:4] == (1009).to_bytes(2, "big")
+
+
 @pytest.mark.parametrize("size", [0, 1, 125, 126, 65_535, 65_536])
 def test_what_is_written_is_one_message(size: int) -> None:
     message = os.urandom(size)

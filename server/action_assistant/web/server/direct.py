@@ -62,7 +62,8 @@ class DirectSocket(WebSocketsSansIOProtocol):
         super().__init__(*args, **more)
         self._taker: Taker | None = None
         self._rest = bytearray()  # of a frame that is not complete, or not to be read yet
-        self._in_pieces = False  # a message of several frames has begun
+        #: Bytes of a message of several frames that has begun; None where none has.
+        self._in_pieces: int | None = None
         self._is_held = False  # its taker wants to hear nothing now
         self._limit: Final = self.config.ws_max_size
 
@@ -123,7 +124,11 @@ class DirectSocket(WebSocketsSansIOProtocol):
         if not self.handshake_initiated:
             super().data_received(data)
             return
-        if not (self._rest or self._in_pieces or self._is_held) and data[0] == _WHOLE_BINARY:
+        if (
+            not (self._rest or self._is_held)
+            and self._in_pieces is None
+            and data[0] == _WHOLE_BINARY
+        ):
             size = len(data) - 6
             if 0 <= size < _SHORT and data[1] == 0x80 | size and self._taker is not None:
                 self._tell(apply_mask(data[6:], data[2:6]))  # nearly always: one short message
@@ -185,17 +190,21 @@ class DirectSocket(WebSocketsSansIOProtocol):
                 return 0, there + 1
             size = int.from_bytes(rest[2 : 2 + width], "big")
             start += width
-        return (start, start + size) if size <= self._limit else (0, there)
+        most = self._limit - (self._in_pieces or 0)
+        return (start, start + size) if size <= most else (0, there)
 
     def _deal_with(self, frame: bytes, start: int) -> None:
         """One frame, whose payload begins there."""
         first = frame[0]
-        if first == _WHOLE_BINARY and start and self._taker is not None and not self._in_pieces:
+        usual = self._taker is None or self._in_pieces is not None
+        if first == _WHOLE_BINARY and start and not usual:
             self._tell(apply_mask(frame[start:], frame[start - 4 : start]))
             return
         kind = first & 0x0F
         if kind <= _BINARY:  # a control frame may come between two pieces
-            self._in_pieces = not first & 0x80 and (kind != _CONTINUED or self._in_pieces)
+            has_begun = kind != _CONTINUED or self._in_pieces is not None
+            so_far = (self._in_pieces or 0) + len(frame) - start
+            self._in_pieces = so_far if has_begun and not first & 0x80 else None
         super().data_received(frame)
         self._drain()
 
