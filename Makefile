@@ -27,6 +27,8 @@ BROWSER = command -v chromium-headless-shell >/dev/null || scripts/need chromium
 NPM := $(NODE) npm --prefix frontend
 LOCK = $(BIN)/uv pip compile --quiet --generate-hashes --universal --python-version 3.11 --no-header \
 	--no-annotate --upgrade
+HELP_SOURCES := README.md CONTRIBUTING.md CHANGELOG.md frontend/public/mark.svg \
+	$(shell find docs frontend/src/api/schema -type f -not -name '*.pyc' 2>/dev/null)
 PAGE_SOURCES := $(shell find frontend/src frontend/public frontend/index.html frontend/vite.config.ts frontend/tsconfig.json -type f 2>/dev/null)
 
 .PHONY: help
@@ -34,7 +36,10 @@ help: ## this list
 	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 .PHONY: setup
-setup: .venv/.done frontend/dist/index.html ## everything that running and testing needs
+setup: .venv/.done frontend/dist/index.html build/help/index.html ## everything that running and testing needs
+
+.PHONY: site
+site: build/help/index.html ## the documentation that is under Help in the page: build/help
 
 .PHONY: ros
 ros: .venv-ros/.done ## what reaching robots over ROS 2 needs, on a machine without ROS: .venv-ros
@@ -127,6 +132,11 @@ soak-ros: ros ## the same over real rclpy: 200 histories, hundreds of stops
 	TEST_ROS_HISTORIES=200 TEST_ROS_AT_ONCE=4 TEST_STOP_CLICKS=50 $(BARE) $(ROS)/python -m pytest -q -s \
 		--timeout=0 tests/ros/test_false_confirmations.py tests/ros/test_stop_latency.py
 
+.PHONY: containers
+containers: setup ## build the images and drive docker-compose.yml with podman, as root on Debian (ARGS="-k proxy")
+	@$(BROWSER)
+	@scripts/containers $(ARGS)
+
 .PHONY: workspace
 workspace: setup ## a sourced ROS 2 as Ubuntu 24.04 lays it out, in a root of its own (PYTHON312=…, FOLDER=…)
 	@scripts/try-workspace "$(or $(PYTHON312),python3.12)" "$(or $(FOLDER),/var/tmp/action-assistant-workspace)"
@@ -134,7 +144,7 @@ workspace: setup ## a sourced ROS 2 as Ubuntu 24.04 lays it out, in a root of it
 .PHONY: pictures
 pictures: setup ## take the pictures of the documentation from the running product
 	@$(BROWSER)
-	@PICTURES=1 $(NPM) run --silent e2e -- e2e/pictures.spec.ts
+	@PICTURES=1 $(NPM) run --silent e2e -- e2e/pictures.spec.ts e2e/tutorial-pictures.spec.ts
 
 .PHONY: screens
 screens: setup ## take every page on every screen, to be looked at: frontend/screens, or TO=DIR
@@ -150,6 +160,12 @@ browsers: setup ## the main job in Firefox and WebKit, by keys and by touch
 newcomer: frontend/node_modules/.done ## count what eight actions cost by mouse: URL=http://127.0.0.1:8000 TOKEN=…
 	@ACTION_ASSISTANT_TOKEN="$(TOKEN)" $(NODE) node bench/newcomer.mjs "$(or $(URL),http://127.0.0.1:8000)"
 
+.PHONY: monitoring
+monitoring: setup ## check alerts, their tests and the metrics of a running product with promtool
+	@scripts/need promtool=prometheus
+	@promtool check rules docs/monitoring/alerts.yml && promtool test rules docs/monitoring/alerts_test.yml
+	@PYTHONPATH=tests $(BIN)/python bench/monitoring.py
+
 .PHONY: bench
 bench: setup ## measure speed; prints tables (ARGS="rooms" for one benchmark)
 	@$(BIN)/python bench/run.py $(ARGS)
@@ -163,7 +179,7 @@ migrate: .venv/.done ## bring the databases to this version (ARGS="--data DIR")
 	@$(BIN)/action-assistant migrate $(ARGS)
 
 .PHONY: build
-build: setup ## the wheel, with migrations and the built page, in dist/
+build: setup ## the wheel, with migrations, the built page and its help, in dist/
 	@echo "» wheel"
 	@$(BIN)/pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .
 	@ls dist/*.whl
@@ -179,6 +195,7 @@ lock: .venv/.done ## renew requirements/*.txt from what pyproject.toml asks for
 	@$(LOCK) --extra ros pyproject.toml requirements/ros.in --output-file requirements/ros.txt
 	@$(LOCK) pyproject.toml requirements/run.in --output-file requirements/run.txt
 	@$(LOCK) requirements/build.in --output-file requirements/build.txt
+	@$(LOCK) requirements/site.in --output-file requirements/site.txt
 
 .venv/.done: requirements/dev.txt pyproject.toml scripts/need
 	@scripts/need $(PYTHON)=python3 || exit 1
@@ -212,4 +229,9 @@ frontend/node_modules/.done: frontend/package-lock.json scripts/with-node
 frontend/dist/index.html: frontend/node_modules/.done $(PAGE_SOURCES)
 	@echo "» building the page"
 	@$(NPM) run --silent build
+	@touch $@
+
+build/help/index.html: .venv/.done $(HELP_SOURCES)
+	@echo "» building the help"
+	@$(BIN)/python -B docs/site/build.py build/help
 	@touch $@

@@ -12,6 +12,7 @@ import random
 import re
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable
 from typing import Any, Final
 
@@ -24,6 +25,7 @@ MARK: Final = re.compile(rb"<(\d{4})(\d{7})(\d{19})>")
 NEVER: Final = b"0" * 19
 ROOT: Final = "positions"  # keys that belong to no action are left alone by every reader
 WARM_S: Final = 1.0
+WARM_ROUNDS: Final = 30
 DRAIN_S: Final = 5.0
 
 
@@ -126,6 +128,41 @@ async def fan_out(clients: Clients) -> dict[str, Any]:
         "delivered_per_s": reached / wall,
         "cpu_us": cost / max(reached, 1) * 1e6,
         "cpu_share": cost / wall,
+        "p50_ms": delays[len(delays) // 2] / 1e6,
+        "p99_ms": delays[int(len(delays) * 0.99)] / 1e6,
+        "missing": expected - clients.delivered,
+        "disconnected": clients.lost,
+        "memory_mb": clients.memory(),
+    }
+
+
+async def lockstep(clients: Clients) -> dict[str, Any]:
+    """Rounds of `burst` edits by some of them; the next one begins a moment after all have arrived. So
+    what is asked of a server does not depend on how busy it is: who is slow cannot merge more."""
+    plan = clients.plan
+    await clients.come(plan.people)
+    chance = random.Random(7)
+    rounds = WARM_ROUNDS + plan.count
+    chosen = [chance.sample(range(plan.people), plan.burst) for _ in range(rounds)]
+    counts = Counter(name for some in chosen for name in some)
+    edits = {name: edits_of(name, count, plan.kind) for name, count in counts.items()}
+    done = [0] * plan.people
+    neighbours = [sum(p.room == other.room for other in clients.people) - 1 for p in clients.people]
+    expected, cost, before = 0, 0.0, 0
+    for nth, some in enumerate(chosen):
+        if nth == WARM_ROUNDS:
+            clients.measuring, cost, before = True, clients.processor(), clients.delivered
+        for name in some:
+            act(clients.people[name], edits[name], done, plan.kind)
+            expected += neighbours[name]
+        async with asyncio.timeout(20):
+            while clients.delivered < expected:  # noqa: ASYNC110 - nobody tells
+                await asyncio.sleep(0.0005)
+        await asyncio.sleep(plan.gap)
+    cost, reached = clients.processor() - cost, clients.delivered - before
+    delays = sorted(clients.delays)
+    return {
+        "cpu_us": cost / reached * 1e6,
         "p50_ms": delays[len(delays) // 2] / 1e6,
         "p99_ms": delays[int(len(delays) * 0.99)] / 1e6,
         "missing": expected - clients.delivered,
@@ -239,6 +276,7 @@ async def one_by_one(clients: Clients) -> dict[str, Any]:
 
 LOADS: Final[dict[str, Callable[[Clients], Any]]] = {
     "fan out": fan_out,
+    "lockstep": lockstep,
     "idle": idle,
     "fill": fill,
     "open": open_,

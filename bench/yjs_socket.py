@@ -19,12 +19,14 @@ class Plan(NamedTuple):
     path: str  # with {room}
     rooms: list[str]
     headers: list[str]
-    operation: Literal["fan out", "idle", "fill", "open", "one by one"]
+    operation: Literal["fan out", "lockstep", "idle", "fill", "open", "one by one"]
     people: int = 1
     rate: float = 10.0  # per second and person
     seconds: float = 5.0
     kind: Literal["add", "drag", "presence"] = "add"
-    count: int = 0
+    count: int = 0  # of edits, or of rounds in lockstep
+    burst: int = 10  # edits of a round
+    gap: float = 0.01  # seconds between rounds
 
 
 class Audience(Protocol):

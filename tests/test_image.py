@@ -1,6 +1,8 @@
-"""What the container files promise, as far as it can be told without a container engine."""
+"""What the container files promise, as far as it can be told without a container engine; `make
+containers` runs them."""
 
 import re
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -8,16 +10,22 @@ import pytest
 import yaml
 
 from action_assistant.cli import parser
+from action_assistant.settings import VARIABLES
 
 ROOT = Path(__file__).parents[1]
-COMPOSE: dict[str, Any] = yaml.safe_load((ROOT / "docker-compose.yml").read_text())
+TEXT = (ROOT / "docker-compose.yml").read_text()
+COMPOSE: dict[str, Any] = yaml.safe_load(TEXT)
 SERVICES: dict[str, dict[str, Any]] = COMPOSE["services"]
-OURS = ("editor", "runner", "simulator")
+OURS = ("editor", "runner", "simulator", "robot")
+EXAMPLE = (ROOT / ".env.example").read_text()
+#: What a container decides itself: where its data are, and which Python it has.
+INSIDE = {"ACTION_ASSISTANT_DATA", "ACTION_ASSISTANT_RUNNER_PYTHON", "ACTION_ASSISTANT_URL"}
 
 
 def stages() -> dict[str, list[list[str]]]:
     """The instructions of each stage of the Dockerfile, split at blanks."""
     text = re.sub(r"\\\n\s*", " ", (ROOT / "Dockerfile").read_text())
+    text = text.replace("--platform=$BUILDPLATFORM ", "")
     found: dict[str, list[list[str]]] = {}
     name = ""
     for line in text.splitlines():
@@ -43,18 +51,39 @@ def texts(value: object) -> list[str]:
             return []
 
 
+def defaults() -> dict[str, set[str]]:
+    """Each variable of compose, with what it is where nobody says."""
+    found: dict[str, set[str]] = {}
+    for name, default in re.findall(r"(?<!\$)\$\{([A-Z_]+):?-?([^}]*)\}", TEXT):
+        found.setdefault(name, set()).add(default)
+    return found
+
+
+def arguments() -> dict[str, str]:
+    """Of the Dockerfile, with their defaults."""
+    return dict(re.findall(r"^ARG (\w+)=(\S*)$", (ROOT / "Dockerfile").read_text(), re.MULTILINE))
+
+
 def test_every_image_has_a_version() -> None:
     bases = {words[1] for stage in stages().values() for words in stage if words[0] == "FROM"}
     bases |= {each["image"] for each in SERVICES.values()}
-    arguments = dict(
-        re.findall(r"^ARG (\w+)=(\S+)$", (ROOT / "Dockerfile").read_text(), re.MULTILINE)
-    )
-    assert set(arguments) == {"ROS_IMAGE", "ROS_BUILD_IMAGE"}
-    bases = {re.sub(r"^\$\{(\w+)(:-.*)?\}$", lambda m: arguments[m[1]], each) for each in bases}
-    for base in bases - {"page", "wheel"}:
+    known = arguments() | {name: next(iter(found)) for name, found in defaults().items()}
+    assert set(arguments()) == {"ROS_IMAGE", "ROS_BUILD_IMAGE", "VERSION", "SOURCE_COMMIT"}
+    bases = {re.sub(r"\$\{(\w+)(:-.*)?\}", lambda m: known[m[1]], each) for each in bases}
+    for base in bases - set(stages()):
         tag = base.rpartition(":")[2]
         assert re.search(r"\d+\.\d+|jazzy-.*-noble", tag), base
         assert "latest" not in base
+
+
+def test_the_version_is_that_of_the_program() -> None:
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+    assert arguments()["VERSION"] == version
+    assert defaults()["IMAGE_VERSION"] == {version}
+    for target in ("editor", "runner"):
+        (label,) = [words for words in stages()[target] if words[0] == "LABEL"]
+        assert 'org.opencontainers.image.version="$VERSION"' in label
+        assert stages()[target][-1] == label, "whatever comes after it is made anew for a version"
 
 
 @pytest.mark.parametrize("target", ["editor", "runner"])
@@ -71,14 +100,31 @@ def test_an_image_runs_as_nobody_special_and_tells_its_health(target: str) -> No
 def test_an_image_holds_nothing_that_only_building_needs(target: str) -> None:
     """What is needed to make an environment stays in the stage that made it."""
     own = [" ".join(words) for words in stages()[target] if words[0] in {"RUN", "COPY"}]
-    copied = [line for line in own if line.startswith("COPY")]
-    assert "COPY scripts/image /opt/build/" in copied
-    made = {f"--from={target}-environment /opt/{each}" for each in ("action-assistant", "temoto")}
-    others = [line for line in copied if line != "COPY scripts/image /opt/build/"]
-    assert {" ".join(line.split()[1:3]) for line in others} <= made
-    assert not re.search(r"python3-venv|colcon|build-essential|image (install|messages)", str(own))
+    copied = [line.split() for line in own if line.startswith("COPY")]
+    assert copied.pop(0) == ["COPY", "scripts/image", "/opt/build/"]
+    made = {
+        ("--from=messages", "/opt/temoto"),
+        (f"--from={target}-dependencies", "/opt/action-assistant"),
+        (f"--from={target}-package", "/opt/package"),
+    }
+    assert {(each[1], each[2]) for each in copied} == made - (
+        {("--from=messages", "/opt/temoto")} if target == "editor" else set()
+    )
+    steps = r"python3-venv|colcon|build-essential|image (dependencies|package|messages)"
+    assert not re.search(steps, str(own))
     (base,) = [words[1] for words in stages()[target] if words[0] == "FROM"]
     assert "BUILD" not in base
+
+
+@pytest.mark.parametrize("target", ["editor", "runner"])
+def test_a_changed_line_of_python_builds_nothing_but_the_package(target: str) -> None:
+    """Nothing of ours is in a layer below it but locks and the steps themselves."""
+    for stage in (f"{target}-dependencies", "messages", "page"):
+        copied = {word for words in stages()[stage] if words[0] == "COPY" for word in words[1:-1]}
+        assert not copied & {"server", "migrations", "pyproject.toml", "--from=wheel"}
+    assert stages()[target][-1][0] == "LABEL"
+    last = [words for words in stages()[target] if words[0] in {"COPY", "RUN"}][-1]
+    assert last[1] == f"--from={target}-package"
 
 
 def test_what_is_copied_exists_and_nothing_else_is_sent() -> None:
@@ -92,49 +138,82 @@ def test_what_is_copied_exists_and_nothing_else_is_sent() -> None:
                     assert f"!{source.split('/')[0]}" in ignored, source
 
 
-@pytest.mark.parametrize("name", [*OURS, "db"])
-def test_a_service_is_not_root_has_a_health_and_is_not_open_to_the_network(name: str) -> None:
+@pytest.mark.parametrize("name", SERVICES)
+def test_a_service_is_bounded_has_no_rights_and_is_not_open_to_the_network(name: str) -> None:
     service = SERVICES[name]
-    assert service["healthcheck"]["test"]
     assert service["cap_drop"] == ["ALL"]
+    assert service.get("cap_add", []) == (["NET_BIND_SERVICE"] if name == "proxy" else [])
     assert service["security_opt"] == ["no-new-privileges:true"]
-    assert name in OURS or service["user"] == "999:999"
+    assert service["read_only"]
+    assert name != "db" or service["user"] == "999:999"
+    assert service["pids_limit"]
+    assert service["logging"]["options"] == {"max-size": "10m", "max-file": "5"}
+    assert "mem_limit" in service or name == "runner", "nothing ends what stops robots"
+    assert service["healthcheck"].get("test") or name in {"robot", "proxy", "backups"}
     assert all(each.startswith("127.0.0.1:") for each in service.get("ports", []))
-    assert all(":" in each for each in service["volumes"])
-    if name in OURS:
-        assert service["read_only"]
+    assert all(":" in each for each in service.get("volumes", []))
 
 
-def test_no_password_stands_anywhere() -> None:
+def test_no_password_stands_anywhere_and_none_is_asked_for() -> None:
     said = " ".join(texts(COMPOSE))
-    assert said.count("${POSTGRES_PASSWORD:?") == 2
-    assert "${POSTGRES_PASSWORD:-" not in said
-    assert not re.search(r"://[^/@ ]*:[^@ ]*@", said)
-    assert re.search(r"^POSTGRES_PASSWORD=$", (ROOT / ".env.example").read_text(), re.MULTILINE)
+    assert not re.search(r"(?<!\$)\$\{[A-Z_]+:\?", said), "what needs it is not all that there is"
+    assert not re.search(r"://[^/@ ]*:[^@ ]*@", said + EXAMPLE)
+    assert SERVICES["db"]["network_mode"] == "none"
+    assert "listen_addresses=" in SERVICES["db"]["command"]
+    assert SERVICES["db"]["environment"]["POSTGRES_PASSWORD_FILE"].startswith("/proc/sys/kernel/")
 
 
-def test_the_example_names_every_variable_and_no_other() -> None:
-    used = set(re.findall(r"\$\{([A-Z_]+)", (ROOT / "docker-compose.yml").read_text()))
-    named = set(re.findall(r"^([A-Z_]+)=", (ROOT / ".env.example").read_text(), re.MULTILINE))
-    assert used == named
+def test_the_example_has_every_setting_and_every_variable_and_no_other() -> None:
+    named = set(re.findall(r"^#?([A-Z_]+)=", EXAMPLE, re.MULTILINE))
+    ros = {"ROS_DOMAIN_ID", "ROS_AUTOMATIC_DISCOVERY_RANGE", "RMW_IMPLEMENTATION", "CYCLONEDDS_URI"}
+    assert named == (set(VARIABLES) - INSIDE) | set(defaults()) | ros
+    assert not re.findall(r"^[A-Z_]+=", EXAMPLE, re.MULTILINE), "a copy of it changes nothing"
 
 
 @pytest.mark.parametrize("name", OURS)
-def test_the_command_line_understands_what_each_service_says(name: str) -> None:
-    options = parser().parse_args(SERVICES[name]["command"])
-    assert str(options.data) == "/data"
+def test_every_setting_reaches_every_container_of_ours(name: str) -> None:
+    """By the file in which people write them; what compose says beside it is what it has to."""
+    service = SERVICES[name]
+    assert service["env_file"] == [{"path": ".env", "required": False}]
+    said = set(service.get("environment", {}))
+    assert said <= set(VARIABLES)
+    alone = {"PORT", "SHARE", "HOSTS", "DATABASE_FILE"} if name == "simulator" else set()
+    kept = {"DATA", "DATABASE"} if name != "robot" else set()
+    assert said == {f"ACTION_ASSISTANT_{each}" for each in kept | alone}
 
 
-def test_the_runner_stands_where_engines_are() -> None:
-    runner = SERVICES["runner"]
-    assert (runner["network_mode"], runner["ipc"]) == ("host", "host")
-    assert {"RMW_IMPLEMENTATION", "ROS_DOMAIN_ID"} <= runner["environment"].keys()
-    assert "depends_on" not in runner, "Stop needs neither the editor nor the database"
+@pytest.mark.parametrize("name", OURS)
+def test_the_command_line_understands_what_each_service_says(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ACTION_ASSISTANT_DATA", "/data")
+    words = [re.sub(r"\$\{\w+:-(\w+)\}", r"\1", each) for each in SERVICES[name]["command"]]
+    options = parser().parse_args(words)
+    assert name == "robot" or str(options.data) == "/data"
 
 
-def test_the_simulator_alone_needs_no_robots_and_no_postgres() -> None:
+@pytest.mark.parametrize("name", ["runner", "robot"])
+def test_what_speaks_to_robots_stands_where_engines_are(name: str) -> None:
+    service = SERVICES[name]
+    assert (service["network_mode"], service["ipc"]) == ("host", "host")
+    assert "depends_on" not in service, "Stop needs neither the editor nor the database"
+
+
+def test_editor_runner_and_proxy_are_on_one_network() -> None:
+    """Else none of them is where its links, proofs and commands say (decision 75)."""
+    for name in ("editor", "runner", "proxy"):
+        assert SERVICES[name]["network_mode"] == "host"
+    assert SERVICES["editor"]["environment"] == SERVICES["runner"]["environment"]
+
+
+def test_the_simulator_alone_needs_no_robots_and_no_postgres_and_keeps_its_data_apart() -> None:
     alone = SERVICES["simulator"]
     assert alone["profiles"] == ["simulator"]
     assert "depends_on" not in alone
-    assert "POSTGRES_PASSWORD" not in " ".join(texts(alone))
+    assert alone["environment"]["ACTION_ASSISTANT_DATABASE"] == ""
     assert alone["build"]["target"] == "editor"
+    others = {each for name, one in SERVICES.items() if name != "simulator" for each in
+              one.get("volumes", [])}  # fmt: skip
+    assert not {each.split(":")[0] for each in alone["volumes"]} & {
+        each.split(":")[0] for each in others
+    }

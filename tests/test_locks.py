@@ -30,14 +30,14 @@ def test_every_package_that_is_asked_for_is_locked(lock: str) -> None:
     assert not missing, f"`make lock` renews requirements/{lock}"
 
 
-@pytest.mark.parametrize("lock", ["ros.txt", "run.txt", "build.txt"])
+@pytest.mark.parametrize("lock", ["ros.txt", "run.txt", "build.txt", "site.txt"])
 def test_every_environment_has_the_versions_that_are_tested(lock: str) -> None:
     tested, other = pinned("dev.txt"), pinned(lock)
     different = {name for name in tested.keys() & other.keys() if tested[name] != other[name]}
     assert not different, "`make lock` renews them all"
 
 
-@pytest.mark.parametrize("lock", ["dev.txt", "ros.txt", "run.txt", "build.txt"])
+@pytest.mark.parametrize("lock", ["dev.txt", "ros.txt", "run.txt", "build.txt", "site.txt"])
 def test_a_lock_names_no_machine_and_hashes_everything(lock: str) -> None:
     text = (ROOT / "requirements" / lock).read_text()
     assert "://" not in text

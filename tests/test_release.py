@@ -10,8 +10,11 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 FILES = (
+    ".env.example",
     "CHANGELOG.md",
+    "Dockerfile",
     "Makefile",
+    "docker-compose.yml",
     "pyproject.toml",
     "ros/temoto_action_assistant/package.xml",
     "scripts/release",
@@ -77,6 +80,9 @@ def test_a_release_is_one_commit_with_changelog_version_and_tag(clone: Path) -> 
     assert git(clone, "cat-file", "-t", "v1.2.3").strip() == "tag"
     assert version_of(clone) == "1.2.3"
     assert version_in_ros(clone) == ["1.2.3"]
+    for name in ("Dockerfile", "docker-compose.yml", ".env.example"):
+        found = re.findall(r"VERSION(?:=|:-)(\d[\d.]*)", (clone / name).read_text())
+        assert set(found) == {"1.2.3"}, name
     now = (clone / "CHANGELOG.md").read_text()
     heading = re.search(
         r"^## Unreleased\n\n(## 1\.2\.3 - \d{4}-\d\d-\d\d)\n\n### ", now, re.MULTILINE

@@ -12,15 +12,18 @@ from pathlib import Path
 import httpx
 import pytest
 
-from support.product import TOKEN, Product
+from support.product import TOKEN, Product, running
 
 ROOT = Path(__file__).parents[1]
 IMAGE = ROOT / "scripts" / "image"
 
 
-def healthy(port: int) -> bool:
-    """What the health check of an image would say."""
-    asked = subprocess.run([IMAGE, "healthy", str(port)], capture_output=True, check=False)
+def healthy(part: str, port: int) -> bool:
+    """What the health check of an image would say of a server on this port and the next."""
+    environment = os.environ | {"ACTION_ASSISTANT_PORT": str(port)}
+    asked = subprocess.run(
+        [IMAGE, "healthy", part], env=environment, capture_output=True, check=False
+    )
     return asked.returncode == 0
 
 
@@ -34,17 +37,21 @@ def tools_in(environment: Path) -> set[str]:
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The wheel of this checkout, with the page that was built last."""
-    if not (ROOT / "frontend" / "dist" / "index.html").is_file():
+    built = [ROOT / each / "index.html" for each in ("frontend/dist", "build/help")]
+    if not all(each.is_file() for each in built):
         pytest.skip("the page is not built; `make setup` builds it")
     folder = tmp_path_factory.mktemp("wheel")
-    subprocess.run([IMAGE, "wheel", folder], cwd=ROOT, check=True)
+    back_end = tmp_path_factory.mktemp("back-end")
+    subprocess.run([IMAGE, "back-end", back_end], cwd=ROOT, check=True)
+    subprocess.run([IMAGE, "wheel", back_end, folder], cwd=ROOT, check=True)
     (found,) = folder.glob("*.whl")
     return found
 
 
-def test_the_wheel_carries_page_and_migrations_and_nothing_foreign(wheel: Path) -> None:
+def test_the_wheel_carries_page_help_and_migrations_and_nothing_foreign(wheel: Path) -> None:
     names = zipfile.ZipFile(wheel).namelist()
     assert "action_assistant/static/index.html" in names
+    assert "action_assistant/help/operators-guide.html" in names
     assert "action_assistant/migrations/env.py" in names
     assert any(name.startswith("action_assistant/examples/") for name in names)
     tops = {name.split("/")[0] for name in names}
@@ -62,7 +69,9 @@ def test_the_wheel_says_which_commit_it_was_built_from(wheel: Path) -> None:
 def test_the_wheel_carries_neither_tests_nor_what_builds(wheel: Path) -> None:
     names = [Path(name) for name in zipfile.ZipFile(wheel).namelist()]
     outside = [
-        each for each in names if "static" not in each.parts and "dist-info" not in str(each)
+        each
+        for each in names
+        if not {"static", "help"} & {*each.parts} and "dist-info" not in str(each)
     ]
     assert {each.suffix for each in outside} == {
         ".py",
@@ -98,12 +107,13 @@ def _bare_environment(folder: Path) -> dict[str, str]:
 @pytest.mark.slow
 @pytest.mark.timeout(300)
 def test_an_installed_wheel_serves_the_page_without_node(wheel: Path, tmp_path: Path) -> None:
-    environment, files = tmp_path / "venv", tmp_path / "files"
-    (files / "wheel").mkdir(parents=True)
-    shutil.copy(wheel, files / "wheel")
-    shutil.copy(ROOT / "requirements" / "run.txt", files)
-    subprocess.run([IMAGE, "install", environment, files], check=True)
+    environment, package = tmp_path / "venv", tmp_path / "package"
+    lock = ROOT / "requirements" / "run.txt"
+    subprocess.run([IMAGE, "dependencies", environment, lock], check=True)
+    subprocess.run([IMAGE, "package", environment, wheel.parent, package], check=True)
+    shutil.copytree(package, environment, dirs_exist_ok=True)  # as COPY in the Dockerfile does
     assert tools_in(environment) == set()
+    assert not [each for each in environment.rglob("tests") if each.is_dir()]
     product = Product(tmp_path / "data")
     clean = _bare_environment(tmp_path)
     assert shutil.which("node", path=clean["PATH"]) is None
@@ -121,11 +131,18 @@ def test_an_installed_wheel_serves_the_page_without_node(wheel: Path, tmp_path: 
                 break
         page = httpx.get(product.url, headers={"accept": "text/html"}, trust_env=False)
         assert '<div id="root">' in page.text
+        told = httpx.get(f"{product.url}/help/", trust_env=False)
+        assert told.status_code == 200
+        assert "Search" in told.text
         with product.editor() as editor:
             assert editor.get("/api/graphs").json()
-        assert healthy(product.port)
-        assert healthy(product.port + 1)
+        assert all(healthy(part, product.port) for part in ("editor", "runner", "serve"))
     finally:
         process.terminate()
         process.communicate(timeout=20)
-    assert not healthy(product.port)
+    assert not any(healthy(part, product.port) for part in ("editor", "runner", "serve"))
+
+
+def test_the_health_check_knows_tls(tmp_path: Path) -> None:
+    with running(tmp_path / "data", "--share", "--tls") as product:
+        assert healthy("serve", product.port)

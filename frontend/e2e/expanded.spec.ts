@@ -104,7 +104,7 @@ test("a card is moved beside what is expanded, and stands there once it is colla
   expect(Math.abs(moved.y - y - 80 * zoom)).toBeLessThan(12);
 });
 
-test("from afar a card is one thing to press, wherever its signs would be", async () => {
+test("from afar a card is one thing to press, beside the one sign that is left", async () => {
   const { page } = ada;
   await page.keyboard.press("{");
   await page.keyboard.press("f");
@@ -113,7 +113,10 @@ test("from afar a card is one thing to press, wherever its signs would be", asyn
   const fetch = outer(page, "Fetch");
   const { x, y, width } = await boxOf(fetch);
   expect(width / 208).toBeLessThan(0.9);
-  for (const right of [8, 20, 32, 44]) {
+  await expect(fetch.getByRole("button", { name: "Expand the graph inside Fetch" })).toBeHidden();
+  const sign = await boxOf(fetch.getByRole("button", { name: "Open the graph inside Fetch" }));
+  expect(Math.min(sign.width, sign.height)).toBeGreaterThan(16);
+  for (const right of [4, 12, 28].map((beside) => x + width - sign.x + beside)) {
     await page.keyboard.press("Escape");
     await expect(fetch).not.toHaveClass(/\bselected\b/);
     await page.mouse.click(x + width - right, y + 12);
@@ -194,7 +197,8 @@ test("what a graph takes and gives elsewhere is set at the graph, with a word be
   const region = page.getByRole("region", { name: "Takes, inside of another graph" });
   await expect(region.getByRole("listitem")).toHaveCount(2);
   await region.getByRole("checkbox", { name: "required" }).last().uncheck();
-  await expect(page.getByRole("alert")).toContainText("This graph runs inside 2 others");
+  const word = page.getByRole("alert").filter({ hasText: "This graph runs inside 2 others" });
+  await expect(word).toBeVisible();
   await saved(page);
   const { actions } = await product.ask<{ actions: { input_parameters: object }[] }>(
     `/api/graphs/${id}/umrf`,

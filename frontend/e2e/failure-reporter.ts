@@ -13,6 +13,7 @@ const ACCEPTED = [
   "takes pictures to be looked at:", // `make screens`
   "measures;", // `make performance`
   "in other browsers than CI has:", // `make browsers`
+  "needs running containers:", // `make containers`
 ];
 
 export default class Failures implements Reporter {

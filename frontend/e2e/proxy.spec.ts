@@ -163,6 +163,21 @@ for (const [kind, path] of CASES) {
       await context.close();
     });
 
+    test("Help is searched there, by whoever comes, and leads back", async ({ browser }) => {
+      const { proxy } = setting;
+      const context = await browser.newContext({ ignoreHTTPSErrors: true });
+      const page = await context.newPage();
+      await page.goto(`${proxy.url}/help`);
+      await expect(page).toHaveURL(`${proxy.url}/help/`);
+      await page.getByRole("textbox", { name: "Search" }).first().fill("unconfirmed");
+      await page.keyboard.press("Enter");
+      await page.getByRole("link", { name: /> STOP UNCONFIRMED$/ }).click();
+      await expect(page.getByText("Take it as if the robot moves.")).toBeVisible();
+      await page.getByRole("link", { name: "Open Action Assistant" }).click();
+      await expect(page).toHaveURL(`${proxy.url}/`);
+      await context.close();
+    });
+
     test("Stop does not pass the editor's process: frozen, with requests that wait, or dead", async ({
       browser,
     }) => {

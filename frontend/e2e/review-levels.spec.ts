@@ -1,7 +1,7 @@
 /** A run of three levels looked back on: opened in place, entered where it failed, compared inside; and files for a robot. */
 
 import { execFileSync } from "node:child_process";
-import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
+import { mkdirSync, mkdtempSync, readdirSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { expect, type Page, test } from "@playwright/test";
@@ -10,8 +10,11 @@ import { DOMAIN, NO_ROS, StandIn } from "./emulated-robot";
 import { type Person, Product } from "./product";
 import { post, violations } from "./valves";
 
+const SLOWLY = { timeout: 30_000 };
 const folder = mkdtempSync(join(tmpdir(), "review-levels-"));
-const product = new Product();
+const packages = join(folder, "packages");
+mkdirSync(packages);
+const product = new Product(["--index-folder", `David=${packages}`]);
 let ada: Person;
 let round: string;
 const runs: string[] = [];
@@ -149,25 +152,36 @@ test("two runs are compared inside, and statistics count by levels; on a phone, 
   await page.setViewportSize({ width: 1280, height: 800 });
 });
 
-test("where a robot lacks a graph inside its files are offered, and one graph without any", async () => {
-  test.skip(NO_ROS !== "", NO_ROS);
-  const { page } = ada;
-  const packages = join(folder, "packages");
-  for (const name of ["Greet", "Drive", "OpenFingers", "CloseFingers"]) {
+/** The packages of a robot that has all actions and no graph. */
+function packagesOf(actions: string[]): string {
+  for (const name of actions) {
     mkdirSync(join(packages, name), { recursive: true });
     const action = { name, type: "sync", instance_id: 0 };
     writeFileSync(join(packages, name, `${name}.umrf.json`), JSON.stringify(action));
   }
-  const david = new StandIn("David", packages);
+  return packages;
+}
+
+const NAME = "Write them where David looks them up";
+
+/** What is looked at before a start on David. */
+async function lookedAtDavid(page: Page) {
+  await page.goto(`${product.url}/graphs/${round}`);
+  await saved(page);
+  await page.getByRole("button", { name: "Choose where to start" }).first().click();
+  await page.getByRole("checkbox", { name: /David/ }).click();
+  return page.getByRole("list", { name: "Looked at on David" });
+}
+
+test("where a robot lacks a graph inside its files are offered, and one graph without any", async () => {
+  test.skip(NO_ROS !== "", NO_ROS);
+  const { page } = ada;
+  const david = new StandIn("David", packagesOf(["Greet", "Drive", "OpenFingers", "CloseFingers"]));
   david.start(folder, { "*": { after_s: 0.2 } });
   try {
     const robot = { name: "David", domain: DOMAIN, get_service: david.path };
     await post(product, "/api/robots", robot, product.runnerUrl);
-    await page.goto(`${product.url}/graphs/${round}`);
-    await saved(page);
-    await page.getByRole("button", { name: "Choose where to start" }).first().click();
-    await page.getByRole("checkbox", { name: /David/ }).click();
-    const looked = page.getByRole("list", { name: "Looked at on David" });
+    const looked = await lookedAtDavid(page);
     await expect(looked).toContainText("David has not indexed Fetch, Grip", { timeout: 30_000 });
     const download = page.waitForEvent("download");
     await looked.getByRole("link", { name: "Files of the graphs inside (ZIP)" }).click();
@@ -180,6 +194,55 @@ test("where a robot lacks a graph inside its files are offered, and one graph wi
     ).toContainText("CloseFingers_0");
     await expect(page.getByRole("dialog", { name: /^Start/ })).toHaveCount(0);
     await expect(page).toHaveURL(`${product.url}/graphs/${round}`);
+  } finally {
+    await david.end();
+  }
+});
+
+test("where the runner has the robot's folder, what it lacks is written there and the start goes", async () => {
+  test.skip(NO_ROS !== "", NO_ROS);
+  const { page } = ada;
+  const other = join(packages, "grip.graph.json");
+  writeFileSync(other, JSON.stringify(line("Grip", "OpenFingers")));
+  const david = new StandIn("David", packages);
+  david.start(folder, { "*": { after_s: 0.2 } });
+  try {
+    await page.setViewportSize({ width: 390, height: 844 });
+    const onPhone = (await lookedAtDavid(page)).getByRole("button", { name: NAME });
+    await onPhone.scrollIntoViewIfNeeded(SLOWLY);
+    await expect(onPhone).toBeInViewport({ ratio: 1 });
+    expect(await violations(page)).toEqual([]);
+    await page.setViewportSize({ width: 1280, height: 800 });
+    const looked = await lookedAtDavid(page);
+    await expect(looked).toContainText(`Fetch, Grip can be written into ${packages}`, SLOWLY);
+    await expect(looked).toContainText(
+      "grip.graph.json, which has another Grip, would be replaced",
+    );
+    expect(await violations(page)).toEqual([]);
+    const write = looked.getByRole("button", { name: NAME });
+    await write.focus();
+    await page.keyboard.press("Enter"); // no hold: it asks
+    await expect(page.getByText("What is there now is kept beside it.")).toBeVisible();
+    await page
+      .getByRole("button", { name: `${NAME}, and replace grip.graph.json` })
+      .last()
+      .press("Enter");
+    await expect(looked.getByRole("status")).toContainText("Waiting until David has indexed it");
+    await expect(looked).toContainText("Written, and David has indexed it.", SLOWLY);
+    await expect(looked).toContainText("David has indexed Fetch, Grip as this version has it.");
+    expect(await violations(page)).toEqual([]);
+    const there = readdirSync(packages).filter((name) => /Fetch|grip/.test(name));
+    expect(there.sort().join(" ")).toMatch(
+      /^Fetch\.umrf\.graph\.json grip\.graph\.json grip\.graph_json\.[0-9a-f]{8}\.replaced$/,
+    );
+    await expect(
+      page.getByRole("dialog").getByRole("button", { name: /^Start .* on David$/ }),
+    ).toBeEnabled(SLOWLY);
+    await page.goto(`${product.url}/robots`);
+    await page.getByRole("tab", { name: "What others told it" }).click();
+    await expect(page.getByText(/Ada wrote Fetch \(Fetch\.umrf\.graph\.json\)/)).toBeVisible(
+      SLOWLY,
+    );
   } finally {
     await david.end();
   }

@@ -73,6 +73,7 @@ const LAYERS: Readonly<Record<string, readonly string[]>> = {
     "library",
   ]),
   account: ["ui", "api"],
+  administration: ["ui", "api"],
   app: ["graph", "ui", "api", "status", "offline", "canvas", "sync", "dry-run", "editor"].concat([
     "runs",
     "review",
@@ -80,6 +81,7 @@ const LAYERS: Readonly<Record<string, readonly string[]>> = {
     "library",
     "actions",
     "account",
+    "administration",
   ]),
 };
 

@@ -11,28 +11,42 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
 from action_assistant.errors import CannotStart
+from action_assistant.logs.setup import say
 from action_assistant.safe_text import make_streams_printable
-from action_assistant.settings import check_environment, hide_password, hide_target_password
+from action_assistant.settings import (
+    check_environment,
+    hide_password,
+    hide_target_password,
+    take_secrets_from_files,
+)
 
 
 class CommandEntry(NamedTuple):
     """One word of the command line. Its `module` names it in COMMANDS, with the function that gives
-    a parser its arguments and its handler. `described`: its own help begins with the same words."""
+    a parser its arguments and its handler. `described`: its own help begins with the same words.
+    `diagnoses`: it looks at settings itself. `posix`: it needs Linux or macOS."""
 
     module: str
     help: str
     described: bool = False
+    diagnoses: bool = False
+    posix: bool = False
 
 
 #: Every command; `--help` lists them in this order. Only the module of the one that is asked for is
 #: imported: all of them together take more than a second.
 COMMANDS: Final[Mapping[str, CommandEntry]] = {
-    "serve": CommandEntry("processes", "start the editor and the runner, and open the page"),
-    "editor": CommandEntry("processes", "the editor alone: graphs, versions, the page"),
-    "runner": CommandEntry("processes", "the runner alone, the side of the robots: runs and Stop"),
+    "serve": CommandEntry(
+        "processes", "start the editor and the runner, and open the page", posix=True
+    ),
+    "editor": CommandEntry("processes", "the editor alone: graphs, versions, the page", posix=True),
+    "runner": CommandEntry(
+        "processes", "the runner alone, the side of the robots: runs and Stop", posix=True
+    ),
     "migrate": CommandEntry(
         "databases.migrate",
         "bring the databases of a data folder to this version, or back to a copy from before",
+        posix=True,
     ),
     "check": CommandEntry("files", "say what is wrong with UMRF files; exit 1 if any has an error"),
     "convert": CommandEntry("files", "print a file of any dialect as canonical UMRF"),
@@ -79,28 +93,46 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
     "watch": CommandEntry(
         "watch.watch", "print each change of a graph as it comes, until Ctrl-C", described=True
     ),
+    "link": CommandEntry(
+        "people", "print the link that signs the owner in, of a server that runs", described=True
+    ),
     "people": CommandEntry("people", "links that let people in: list, invite, revoke"),
     "simulate-robot": CommandEntry(
         "simulate_robot", "a robot that behaves like a real engine, on ROS 2, to practise with"
     ),
-    "verify": CommandEntry("maintenance", "look whether every stored event is what was written"),
+    "service": CommandEntry(
+        "services.service",
+        "serve whenever the computer runs, by systemd: install, uninstall, status, upgrade",
+        diagnoses=True,
+        posix=True,
+    ),
+    "verify": CommandEntry(
+        "maintenance", "look whether every stored event is what was written", posix=True
+    ),
     "rebuild": CommandEntry(
         "maintenance",
         "make the tables of graphs, versions, people, runs and robots again from the events",
+        posix=True,
     ),
     "backup": CommandEntry(
         "backups.backup",
         "write a checked copy of everything into one file, also while it is in use",
+        posix=True,
     ),
     "restore": CommandEntry(
-        "backups.backup", "put a backup in the place of what is there; open pages notice and ask"
+        "backups.backup",
+        "put a backup in the place of what is there; open pages notice and ask",
+        posix=True,
     ),
     "move": CommandEntry(
         "databases.move",
         "take the graphs of a data folder to Postgres, or back; the runs stay where they are",
+        posix=True,
     ),
     "doctor": CommandEntry(
-        "doctor", "look what is wrong: ROS 2, robots, folders, databases, ports, the page"
+        "doctor.doctor",
+        "look what is wrong: ROS 2, robots, folders, databases, ports, the page",
+        diagnoses=True,
     ),
 }
 
@@ -168,18 +200,33 @@ def _with_ids_last(arguments: Sequence[str]) -> list[str]:
     return [*(each for each in arguments if each not in ids), "--", *ids]
 
 
+def _check(entry: CommandEntry, name: str) -> None:
+    """Refuse what cannot be done here before anything of it is. Raises CannotStart."""
+    if entry.posix and sys.platform == "win32":
+        raise CannotStart(
+            f"`{name}` needs Linux or macOS: on Windows use WSL, or a server elsewhere. Files can be "
+            "checked, converted, simulated and packaged here, and commands reach a server "
+            "(docs/installing.md)."
+        )
+    if not entry.diagnoses:
+        check_environment()
+        take_secrets_from_files()
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; the exit code."""
     make_streams_printable()
     if arguments is None:
         hide_password()
         hide_target_password()
-    options = parser().parse_args(_with_ids_last(sys.argv[1:] if arguments is None else arguments))
+    words = _with_ids_last(sys.argv[1:] if arguments is None else arguments)
     try:
-        check_environment()
+        if words and words[0] in COMMANDS:
+            _check(COMMANDS[words[0]], words[0])
+        options = parser().parse_args(words)
         code: int = options.handler(options)
     except CannotStart as error:
-        print(f"action-assistant: {error}", file=sys.stderr)
+        say(str(error), "error")
         return 2
     except KeyboardInterrupt:
         return 130

@@ -15,6 +15,8 @@
     ├── Misrouted                   502  a proxy leads here what is the other process's
     └── Unavailable                 503  something this process needs does not answer
     CannotStart                          the process cannot begin its work; one sentence, exit 2
+    ├── AnothersDatabase                 a database that another program made
+    └── NewerSchema                      one that a newer version of this program made
 
 The class docstring is the title on the wire, the instance's message the detail.
 """
@@ -116,3 +118,11 @@ class Unavailable(Refused):
 
 class CannotStart(Exception):
     """The process cannot begin its work; the message says why in one sentence."""
+
+
+class AnothersDatabase(CannotStart):
+    """Another program has made the database, so it is left as it is."""
+
+
+class NewerSchema(CannotStart):
+    """A newer version of this program has made the tables of the database."""

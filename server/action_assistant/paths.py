@@ -22,9 +22,19 @@ def page() -> Path:
     return _carried("static", _CHECKOUT / "frontend" / "dist")
 
 
+def page_sources() -> Path | None:
+    """What the page is built of, in a checkout; None outside of one."""
+    return _CHECKOUT / "frontend" / "src" if checkout() is not None else None
+
+
 def checkout() -> Path | None:
     """The folder of the sources, when this program runs from them."""
     return _CHECKOUT if (_CHECKOUT / "pyproject.toml").is_file() else None
+
+
+def help_site() -> Path:
+    """The built documentation; the folder is missing when nobody has built it."""
+    return _carried("help", _CHECKOUT / "build" / "help")
 
 
 def wheels() -> Path | None:
@@ -38,6 +48,10 @@ def examples() -> Path:
 
 
 def data() -> Path:
-    """Where journals and the token are kept when nobody says otherwise (XDG base directories)."""
+    """Where journals and the token are kept when no option says otherwise: where the environment does,
+    else among the user's data (XDG base directories)."""
+    named = os.environ.get("ACTION_ASSISTANT_DATA")
+    if named:
+        return Path(named)
     base = os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share"
     return Path(base) / "temoto-action-assistant"

@@ -61,7 +61,10 @@ def prove_writable(data: Path) -> None:
 
 
 def open_to_others(data: Path) -> list[Path]:
-    """What other users of this computer may read or enter: the folder first, then what is ours in it."""
+    """What other users of this computer may read or enter: the folder first, then what is ours in it.
+    Not told on Windows."""
+    if not hasattr(os, "geteuid"):
+        return []  # Windows keeps rights in lists of its own, of which modes tell nothing
     return [path for path in (data, *_ours_in(data)) if _is_open(path)]
 
 
@@ -94,3 +97,16 @@ def _close(path: Path) -> None:
         path.chmod(0o700 if path.is_dir() else 0o600)
     except OSError:  # somebody else's; `doctor` tells
         return
+
+
+def of_others(data: Path) -> list[Path]:
+    """What is ours in it, yet belongs to another user than the folder does."""
+    owner = data.stat().st_uid
+    found: list[Path] = []
+    for path in _ours_in(data):
+        try:
+            if path.lstat().st_uid != owner:
+                found.append(path)
+        except OSError:  # gone meanwhile
+            continue
+    return found

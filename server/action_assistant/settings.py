@@ -2,7 +2,7 @@
 
 import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, MutableMapping, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -14,11 +14,18 @@ from action_assistant.public_url import LOOPBACK_PROXIES, Network, PublicUrl, pr
 
 #: Every variable that this program reads, and what it is for.
 VARIABLES: Final[Mapping[str, str]] = {
+    "ACTION_ASSISTANT_DATA": "the data folder, where --data names none",
+    "ACTION_ASSISTANT_PORT": "the editor's port, where --port names none (8000); the runner has the next",
     "ACTION_ASSISTANT_TOKEN": "the token programs present; instead of the file in the data folder",
+    "ACTION_ASSISTANT_TOKEN_FILE": "a file with that token",
     "ACTION_ASSISTANT_DATABASE": "the editor's database; where --database would show its password to "
     "everybody on this computer",
+    "ACTION_ASSISTANT_DATABASE_FILE": "a file with that URL",
+    "ACTION_ASSISTANT_DATABASE_PASSWORD_FILE": "a file with the password of the database, where its URL "
+    "has none; for Postgres, as PGPASSWORD",
     "ACTION_ASSISTANT_URL": "where the command line finds the editor (http://127.0.0.1:8000)",
     "ACTION_ASSISTANT_HOSTS": "more host names that may stand in the address bar, comma separated",
+    "ACTION_ASSISTANT_SHARE": "`http` as --share, `tls` as --share --tls",
     "ACTION_ASSISTANT_PUBLIC_URL": "where a proxy shows the page to others, as --public-url",
     "ACTION_ASSISTANT_TRUSTED_PROXIES": "addresses and networks of proxies that are believed about who "
     "asks, as --trusted-proxies",
@@ -27,19 +34,37 @@ VARIABLES: Final[Mapping[str, str]] = {
     "ACTION_ASSISTANT_KEEP_RAW": "days after which raw messages of robots go into archives; without "
     "it they are deleted after 7 days or beyond 500 MB",
     "ACTION_ASSISTANT_ARCHIVE": "the folder of archives (`archive` in the data folder)",
+    "ACTION_ASSISTANT_INDEX_FOLDERS": "folders that robots index and the runner may write graphs into, as "
+    f"--index-folder, separated by `{os.pathsep}`",
+    "ACTION_ASSISTANT_LOG_FORMAT": "`json` for programs, `console` for people, as --log-format",
+    "ACTION_ASSISTANT_LOG_LEVEL": "`debug`, `info`, `warning` or `error`, as --log-level",
+    "ACTION_ASSISTANT_METRICS_TOKEN": "a token that opens /metrics and nothing else",
+    "ACTION_ASSISTANT_METRICS_TOKEN_FILE": "a file with that token",
     "ACTION_ASSISTANT_BACKUP_TO": "the folder of regular backups, as --backup-to of serve and --into of "
     "backup",
     "ACTION_ASSISTANT_BACKUP_EVERY": "how often `serve` makes one (24h), as --backup-every",
     "ACTION_ASSISTANT_BACKUP_KEEP": "how many stay (7d,4w,6m), as --backup-keep",
     "ACTION_ASSISTANT_BACKUP_AFTER": "the command that takes a finished one elsewhere, as --backup-after",
     "ACTION_ASSISTANT_LIMITS": "`off` lifts rate and socket limits, for load tests",
+    "ACTION_ASSISTANT_SOCKETS": "`asgi` has the messages of rooms go the long way through ASGI, should the "
+    "direct one fail",
 }
+INDEX_FOLDERS: Final = "ACTION_ASSISTANT_INDEX_FOLDERS"
+#: Where a secret may be that stands in a file, and which variable it is then.
+_FILES: Final[Mapping[str, str]] = {
+    "ACTION_ASSISTANT_TOKEN_FILE": "ACTION_ASSISTANT_TOKEN",
+    "ACTION_ASSISTANT_DATABASE_FILE": "ACTION_ASSISTANT_DATABASE",
+    "ACTION_ASSISTANT_METRICS_TOKEN_FILE": "ACTION_ASSISTANT_METRICS_TOKEN",
+    "ACTION_ASSISTANT_DATABASE_PASSWORD_FILE": "PGPASSWORD",
+}
+_SECRET: Final = 65_536  # characters of such a file
 #: The folder of archives, inside the data folder.
 ARCHIVE: Final = "archive"
 #: Stands in a data folder while `restore` puts things into it.
 RESTORING: Final = "restore.unfinished"
 #: The host that stands for every address of this computer, of both families.
 EVERYWHERE: Final = "*"
+_MIN_TOKEN: Final = 32  # characters, as of the token that programs present
 LOOPBACK: Final = frozenset({"127.0.0.1", "::1", "localhost"})
 
 
@@ -65,6 +90,7 @@ class EditorSettings(msgspec.Struct, frozen=True, kw_only=True):
     tls: bool = False
     switch_database: bool = False
     reached: Reachability = Reachability()
+    metrics_token: str | None = None
 
 
 class Keep(msgspec.Struct, frozen=True, kw_only=True):
@@ -78,7 +104,8 @@ class Keep(msgspec.Struct, frozen=True, kw_only=True):
 
 class RunnerSettings(msgspec.Struct, frozen=True, kw_only=True):
     """How the runner runs. `page_port` is the port of the page that may talk to it, `behaviours` the
-    folder of Python files that simulated actions may be run with."""
+    folder of Python files that simulated actions may be run with, `index_folders` those that robots
+    index, by their names."""
 
     data: Path
     host: str = "127.0.0.1"
@@ -91,6 +118,8 @@ class RunnerSettings(msgspec.Struct, frozen=True, kw_only=True):
     keep: Keep | None = None
     reached: Reachability = Reachability()
     behaviours: Path | None = None
+    index_folders: Mapping[str, Path] = {}
+    metrics_token: str | None = None
 
 
 def check_environment(environ: Mapping[str, str] = os.environ) -> None:
@@ -101,6 +130,45 @@ def check_environment(environ: Mapping[str, str] = os.environ) -> None:
     if unknown:
         known = ", ".join(VARIABLES)
         raise CannotStart(f"Unknown setting {', '.join(unknown)}. Known are: {known}.")
+
+
+def take_secrets_from_files(environ: MutableMapping[str, str] = os.environ) -> None:
+    """Put the secrets of files that the environment names into it, for this process and what it starts.
+    Raises CannotStart: a secret that is named and not there is not done without."""
+    for name, secret in _FILES.items():
+        path = environ.get(name, "")
+        if not path:
+            environ.pop(name, None)
+            continue
+        if environ.get(secret):
+            raise CannotStart(f"{name} and {secret} are both set; keep one of them.")
+        try:
+            with Path(path).open(encoding="utf-8") as file:
+                text = file.read(_SECRET).strip()
+        except (OSError, UnicodeDecodeError) as error:
+            why = error.strerror if isinstance(error, OSError) else "it is no text"
+            raise CannotStart(f"{name} is {path!r}, which cannot be read: {why}.") from error
+        if not text or len(text.splitlines()) > 1:
+            raise CannotStart(f"{name} is {path!r}, which has to hold one line.")
+        environ[secret] = text
+        del environ[name]  # a process that we start would find both
+
+
+def port(environ: Mapping[str, str] = os.environ) -> int:
+    """The editor's, when the command line names none. Raises CannotStart."""
+    text = environ.get("ACTION_ASSISTANT_PORT", "").strip() or "8000"
+    if not text.isdecimal() or not 0 < int(text) < 65535:
+        raise CannotStart(f"ACTION_ASSISTANT_PORT is a port below 65535, not {text!r}.")
+    return int(text)
+
+
+def share(environ: Mapping[str, str] = os.environ) -> str:
+    """How others on the network are let in, when the command line says nothing: "", "http" or "tls".
+    Raises CannotStart."""
+    text = environ.get("ACTION_ASSISTANT_SHARE", "").strip().lower()
+    if text not in {"", "http", "tls"}:
+        raise CannotStart(f"ACTION_ASSISTANT_SHARE is `http` or `tls`, not {text!r}.")
+    return text
 
 
 def database(environ: Mapping[str, str] = os.environ) -> str | None:
@@ -119,6 +187,7 @@ def hide_password() -> None:
         if _is_database(name) and _has_password(url):
             rest = [*sys.orig_argv[1:at], *sys.orig_argv[at + taken :]]
             os.environ["ACTION_ASSISTANT_DATABASE"] = url
+            os.environ.pop("ACTION_ASSISTANT_DATABASE_FILE", None)
             sys.stderr.flush()
             os.execv(sys.executable, [sys.orig_argv[0], *rest])
 
@@ -153,6 +222,17 @@ def _has_password(url: str) -> bool:
     return "@" in url or "password=" in url
 
 
+def metrics_token(environ: Mapping[str, str] = os.environ) -> str | None:
+    """What opens /metrics and nothing else, if there is such a token. Raises CannotStart."""
+    name = "ACTION_ASSISTANT_METRICS_TOKEN"
+    token = environ.get(name, "").strip()
+    if token and len(token) < _MIN_TOKEN:
+        raise CannotStart(
+            f"{name} has {len(token)} characters; a token must have at least {_MIN_TOKEN}."
+        )
+    return token or None
+
+
 def backup_rule(name: str, environ: Mapping[str, str] = os.environ) -> str | None:
     """What the environment says of backups: TO, EVERY, KEEP or AFTER."""
     return environ.get(f"ACTION_ASSISTANT_BACKUP_{name}", "").strip() or None
@@ -161,6 +241,14 @@ def backup_rule(name: str, environ: Mapping[str, str] = os.environ) -> str | Non
 def limits(environ: Mapping[str, str] = os.environ) -> bool:
     """Whether rate and socket limits hold."""
     return environ.get("ACTION_ASSISTANT_LIMITS", "").lower() != "off"
+
+
+def direct_sockets(environ: Mapping[str, str] = os.environ) -> bool:
+    """Whether rooms take their sockets over from the server below. Raises CannotStart."""
+    way = environ.get("ACTION_ASSISTANT_SOCKETS", "").strip().lower()
+    if way not in {"", "direct", "asgi"}:
+        raise CannotStart(f"ACTION_ASSISTANT_SOCKETS is direct or asgi, not {way!r}.")
+    return way != "asgi"
 
 
 def keep(data: Path, environ: Mapping[str, str] = os.environ) -> Keep:
@@ -183,6 +271,28 @@ def _days(name: str, environ: Mapping[str, str]) -> float | None:
     if not 0 <= days < 1e6:
         raise CannotStart(f"{name} is a number of days, not {text!r}.")
     return days
+
+
+def index_folders(
+    given: Sequence[str] = (), environ: Mapping[str, str] = os.environ
+) -> dict[str, Path]:
+    """The folders that robots index, each as ROBOT=DIR: what the command line says, else the
+    environment. Raises CannotStart."""
+    written = given or environ.get(INDEX_FOLDERS, "").split(os.pathsep)
+    found: dict[str, Path] = {}
+    for each in filter(str.strip, written):
+        robot, sign, folder = (part.strip() for part in each.partition("="))
+        if not (robot and sign and folder) or os.pathsep in folder:
+            raise CannotStart(f"A folder that a robot indexes is written ROBOT=DIR, not {each!r}.")
+        if robot in found:
+            raise CannotStart(f"Two folders are named for {robot}: an engine indexes one.")
+        found[robot] = Path(folder).expanduser().absolute()
+    return found
+
+
+def as_index_folders(folders: Mapping[str, Path]) -> str:
+    """The same as the environment has it."""
+    return os.pathsep.join(f"{robot}={folder}" for robot, folder in folders.items())
 
 
 def more_hosts(environ: Mapping[str, str] = os.environ) -> tuple[str, ...]:

@@ -15,8 +15,15 @@ from typing import Final
 import msgspec
 
 from action_assistant.interpreter import Interpreter, for_runner
+from action_assistant.logs.setup import say, writes_json
 from action_assistant.private_files import opener
-from action_assistant.settings import EVERYWHERE, Reachability, more_hosts
+from action_assistant.settings import (
+    EVERYWHERE,
+    INDEX_FOLDERS,
+    Reachability,
+    as_index_folders,
+    more_hosts,
+)
 from action_assistant.share_links import invitations_as_text, is_ours
 from action_assistant.web.auth.keys import Keys
 from action_assistant.web.network.addresses import addresses_of
@@ -52,6 +59,7 @@ class ServePlan(msgspec.Struct, frozen=True, kw_only=True):
     reached: Reachability = Reachability()
     behaviours: Path | None = None
     backups: BackupPlan | None = None
+    index_folders: Mapping[str, Path] = {}
 
 
 class EndSignal:
@@ -130,7 +138,7 @@ class Child:
         self._deaths = 1 if now - self._born > _STEADY else self._deaths + 1
         wait = _BACK_OFF[min(self._deaths, len(_BACK_OFF)) - 1]
         self._again = now + wait
-        _say(f"{self.name} died ({_cause(code)}); starting it again in {wait:g} s")
+        say(f"{self.name} died ({_cause(code)}); starting it again in {wait:g} s")
         return None
 
     def end(self) -> None:
@@ -141,7 +149,7 @@ class Child:
         try:
             self._process.wait(_ENDING)
         except subprocess.TimeoutExpired:
-            _say(f"{self.name} does not end; killing it")
+            say(f"{self.name} does not end; killing it")
             self._process.kill()
             self._process.wait()
         self._process = None
@@ -159,7 +167,7 @@ def serve(plan: ServePlan) -> int:
     reading, _writing = os.pipe()
     children = _children(plan)
     keeper = _keeper(plan)
-    _say("starting …")
+    say("starting …")
     for child in children:
         child.start(reading)
     threading.Thread(
@@ -172,11 +180,11 @@ def serve(plan: ServePlan) -> int:
                 if code is not None:
                     return code
             if keeper is not None and keeper.tend(reading) is not None:
-                _say("no backups are made; the message above says why")
+                say("no backups are made; the message above says why")
                 keeper = None
         return 0
     finally:
-        _say("ending …")
+        say("ending …")
         for child in [*children, *([keeper] if keeper is not None else [])]:
             child.end()
 
@@ -193,7 +201,7 @@ def _children(plan: ServePlan) -> list[Child]:
     this = Interpreter(path=Path(sys.executable), origin="this")
     speaking = for_runner()
     if speaking.remark:
-        _say(speaking.remark)
+        say(speaking.remark)
     return [
         Child(
             "editor",
@@ -207,7 +215,7 @@ def _children(plan: ServePlan) -> list[Child]:
             ["runner", *address, *behaviours, "--port", ports[1], "--page-port", ports[0]],
             plan.port + 1,
             speaking,
-            settings,
+            {**settings, INDEX_FOLDERS: as_index_folders(plan.index_folders)},
         ),
     ]
 
@@ -246,7 +254,7 @@ def _certified(plan: ServePlan) -> ssl.SSLContext | None:
     )
     certificate = Certificate(plan.data)
     certificate.renew(addresses.certified())
-    _say(
+    say(
         "browsers warn until they trust the authority that signs for this computer: import\n"
         f"    {certificate.authority}\n    SHA-256 {certificate.fingerprint()}"
     )
@@ -275,17 +283,17 @@ def _greet(
         with open(redirect, "w", opener=opener) as out:
             out.write(f'<!doctype html><meta http-equiv="refresh" content="0;url={url}">')
     except OSError as error:
-        _say(f"{redirect} cannot be written: {error.strerror}")
+        say(f"{redirect} cannot be written: {error.strerror}")
         opens = False
-    at_terminal = sys.stderr.isatty()  # a log is kept, and read by others
+    at_terminal = sys.stderr.isatty() and not writes_json()  # a log is kept, and read by others
     if at_terminal:
-        _say(f"ready. Open this link (it signs you in, keep it to yourself):\n\n    {shown_at}\n")
+        say(f"ready. Open this link (it signs you in, keep it to yourself):\n\n    {shown_at}\n")
         if shown_at != url:
-            _say(f"or, on this computer and without the proxy:\n\n    {url}\n")
+            say(f"or, on this computer and without the proxy:\n\n    {url}\n")
     else:
-        _say(f"ready at {base}. {redirect} signs you in; the link is shown at a terminal only.")
+        say(f"ready at {base}. {redirect} signs you in; the link is shown at a terminal only.")
     if plan.share:
-        _say(invitations_as_text(base, keys, trust, secret=not at_terminal))
+        say(invitations_as_text(base, keys, trust, secret=not at_terminal))
     if opens:
         webbrowser.open(redirect.as_uri())
 
@@ -304,7 +312,7 @@ def _answer(
             if enough.within(_TICK):
                 return False
             if time.monotonic() > deadline:
-                _say(f"{child.name} does not answer yet; the messages above may say why")
+                say(f"{child.name} does not answer yet; the messages above may say why")
                 deadline = float("inf")
     return True
 
@@ -317,8 +325,3 @@ def _has_screen() -> bool:
 
 def _cause(code: int) -> str:
     return signal.Signals(-code).name if code < 0 else f"exit code {code}"
-
-
-def _say(text: str) -> None:
-    sys.stderr.write(f"action-assistant: {text}\n")
-    sys.stderr.flush()

@@ -73,6 +73,18 @@ def test_a_run_is_waited_for_and_listed(product: Product, files: dict[str, str])
     assert (listed["id"], listed["state"], listed["result"]) == (run, "finished", "on_true")
 
 
+def test_what_is_inside_of_a_graph_runs_with_it(product: Product, files: dict[str, str]) -> None:
+    imported(product, files["graph"])
+    end = {"graph_entry": [{"name": "pair"}], "graph_exit": [{"name": "pair"}]}
+    outer = {"graph_name": "around", **end, "actions": [{"name": "pair", "type": "sync"}]}
+    Path(files["graph"]).write_text(json.dumps(outer))
+    graph = imported(product, files["graph"])
+    answer = product.cli("run", graph, "--script", files["quick"])
+    assert answer.returncode == 0, answer.stderr + answer.stdout
+    told = answer.stdout.splitlines()
+    assert {"around__pair__0/A_0: FINISHED", "around__pair__0/B_0: FINISHED"} <= set(told)
+
+
 def test_expected_courses_are_simulated_again_and_a_changed_graph_is_told(
     product: Product, files: dict[str, str]
 ) -> None:

@@ -10,6 +10,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
+import psutil
+
 NOBODY: Final = 65534
 _SETTINGS: Final = {
     "listen_addresses": "127.0.0.1",
@@ -69,6 +71,12 @@ class Server:
         """Stop; `immediate` is what a crash of the server is."""
         self._ctl("stop", "-m", mode)
 
+    def processes(self) -> list[psutil.Process]:
+        """All of this server, to be frozen or killed."""
+        number = (self._data / "postmaster.pid").read_text().splitlines()[0]
+        first = psutil.Process(int(number))
+        return [first, *first.children(recursive=True)]
+
     def sql(self, text: str, database: str = "postgres") -> None:
         """Run SQL as the owner."""
         self._run("psql", "-q", "-v", "ON_ERROR_STOP=1", "-h", "127.0.0.1", "-p", str(self.port),
@@ -90,6 +98,12 @@ class Server:
         self._run("psql", "-q", "-v", "ON_ERROR_STOP=1", "-h", "127.0.0.1", "-p", str(self.port),
                   "-U", "aa", "-d", url.rpartition("/")[2], "-f", str(dump))  # fmt: skip
         return url
+
+    def demand_password(self, role: str) -> None:
+        """Let a role in by its password only; others need none."""
+        rules = self._data / "pg_hba.conf"
+        rules.write_text(f"host all {role} 127.0.0.1/32 scram-sha-256\n{rules.read_text()}")
+        self._ctl("reload")
 
     def _ctl(self, command: str, *options: str) -> None:
         self._run("pg_ctl", command, "-w", "-s", "-t", "60", "-D", str(self._data), *options)

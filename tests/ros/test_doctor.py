@@ -1,9 +1,6 @@
 """`doctor` on robots and ROS 2 environments that are broken for real."""
 
-import json
-import os
-import subprocess
-import sys
+import sqlite3
 from pathlib import Path
 from typing import Any
 
@@ -14,21 +11,14 @@ pytest.importorskip(
 )
 
 from ros.test_ros2_link import engine
+from support.doctor import asked
 from support.product import running
 
 
 def doctor(data: Path, domain: int, **more: str) -> tuple[int, dict[str, dict[str, Any]]]:
-    """The exit code, and one finding of each topic: what is wrong before anything else."""
-    command = [sys.executable, "-m", "action_assistant", "doctor", "--only", "ros", "--json"]
-    answer = subprocess.run(
-        [*command, "--data", str(data)],
-        env={**os.environ, "ROS_DOMAIN_ID": str(domain), **more},
-        capture_output=True,
-        check=False,
-        timeout=60,
-    )
-    found = sorted(json.loads(answer.stdout), key=lambda each: bool(each["verdict"] == "wrong"))
-    return answer.returncode, {each["topic"]: each for each in found}
+    """The exit code, and what is wrong by its place."""
+    code, found = asked(data, "--only", "ros", ROS_DOMAIN_ID=str(domain), **more)
+    return code, {each["where"]: each for each in found}
 
 
 def registered(folder: Path, robots: list[dict[str, object]]) -> Path:
@@ -62,24 +52,58 @@ def test_what_is_wrong_with_each_robot_is_told_apart(tmp_path: Path, domains: li
         frozen.holding.set()
         code, found = doctor(data, one)
     assert code == 1
-    assert (found["sound"]["verdict"], found["deaf"]["verdict"]) == ("fine", "wrong")
-    assert "Engines answer on /sound/umrf_graph_get, /stranger" in found["elsewhere"]["what"]
-    assert "2 engines answer" in found["twin"]["what"]
-    assert found["deaf"]["what"] == "It answers, but nobody listens to start and stop."
-    assert found["frozen"]["what"] == "It is there, but does not answer."
-    assert "RMW_IMPLEMENTATION" in found["foreign"]["what"]
-    assert "2 engines answer" in found["engines"]["what"]
+    assert "sound" not in found
+    assert "Engines answer on /sound/umrf_graph_get, /stranger" in found["elsewhere"]["message"]
+    assert found["deaf"]["message"] == "It answers, but nobody listens to start and stop."
+    assert found["frozen"]["message"] == "It is there, but does not answer."
+    assert "RMW_IMPLEMENTATION" in found["foreign"]["message"]
+    assert "2 engines answer" in found["twin"]["message"]
+    assert {name: each["code"] for name, each in found.items() if not name.startswith("/")} == {
+        "elsewhere": "robot-silent",
+        "twin": "robot-silent",
+        "deaf": "robot-deaf",
+        "frozen": "robot-silent",
+        "foreign": "robot-middleware",
+    }
+    others = {each["code"] for name, each in found.items() if name.startswith("/")}
+    assert others == {"engine-odd", "engine-unregistered"}
+
+
+def test_an_engine_on_another_domain_than_its_robot_is_registered_on_is_named(
+    tmp_path: Path, domains: list[int]
+) -> None:
+    right, wrong, *_ = domains
+    data = registered(tmp_path, [{"name": "David", "domain": right}])
+    with engine(wrong):
+        code, found = doctor(data, wrong)
+    assert (code, found["David"]["code"]) == (1, "robot-elsewhere")
+    assert f"registered on domain {right}" in found["David"]["message"]
+    assert f"one answers on domain {wrong}" in found["David"]["message"]
+    assert f"ROS_DOMAIN_ID={right}" in found["David"]["remedy"]
+    with engine(right):
+        assert doctor(data, right) == (0, {})
 
 
 @pytest.mark.parametrize(
-    ("setting", "value", "said"),
+    ("setting", "value", "code"),
     [
-        ("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp", "RMW_IMPLEMENTATION is 'rmw_cyclonedds_cpp'"),
-        ("ROS_DOMAIN_ID", "lab", "ROS_DOMAIN_ID is 'lab'"),
+        ("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp", "middleware-broken"),
+        ("ROS_DOMAIN_ID", "lab", "domain-wrong"),
+        ("ROS_DOMAIN_ID", "120", "domain-high"),
+        ("ROS_VERSION", "1", "ros1-sourced"),
     ],
 )
 def test_a_setting_that_cannot_be_is_named(
-    tmp_path: Path, setting: str, value: str, said: str
+    tmp_path: Path, setting: str, value: str, code: str
 ) -> None:
-    _, found = doctor(tmp_path, 1, **{setting: value})
-    assert found["rclpy"]["what"].startswith(said)
+    _, found = asked(tmp_path, "--only", "ros", **{"ROS_DOMAIN_ID": "1", setting: value})
+    assert [(each["code"], each["where"]) for each in found] == [(code, setting)]
+
+
+def test_a_profile_that_cannot_be_is_named(tmp_path: Path, domains: list[int]) -> None:
+    data = registered(tmp_path, [{"name": "Ada", "domain": domains[0]}])
+    with sqlite3.connect(data / "runner.db") as database:
+        database.execute("UPDATE robot SET profile = ?", ('{"nonsense": 5}',))
+    database.close()
+    _, found = doctor(data, domains[0])
+    assert found["Ada"]["code"] == "robot-profile"

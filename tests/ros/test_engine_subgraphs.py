@@ -19,7 +19,8 @@ from support.product import Product, running
 from support.real_engine import answers, browser, needs_engine, real_engine, until
 
 DOMAIN = int(os.environ.get("TEST_SUBGRAPHS_DOMAIN", "150"))
-INDEXED = Path(os.environ.get("ENGINE_LAB", "/nonexistent")) / "actions" / "subgraphs"
+ACTIONS = Path(os.environ.get("ENGINE_LAB", "/nonexistent")) / "actions"
+INDEXED = ACTIONS / "subgraphs"
 INNER = "SubSeq"
 OUTER = {
     "graph_name": "around",
@@ -83,3 +84,38 @@ def test_what_it_has_indexed_is_compared_and_its_code_runs_inside(tmp_path: Path
             assert changed.is_success, changed.text
         other = item_of(ada, order_of(product, graph))
         assert (other["verdict"], other["codes"]) == ("blocked", ["subgraph-differs"])
+
+
+def test_what_it_lacks_is_written_into_its_index_and_its_code_runs_inside(tmp_path: Path) -> None:
+    name = "WrittenByAssistant"
+    inner = json.loads((INDEXED / f"{INNER}.graph.json").read_text()) | {"graph_name": name}
+    outer = json.loads(json.dumps(OUTER).replace(INNER, name).replace("around", "around_written"))
+    written: list[str] = []
+    with (
+        real_engine(tmp_path, DOMAIN) as events,
+        running(tmp_path / "data", "--index-folder", f"David={ACTIONS}") as product,
+        browser(product, "Ada") as ada,
+    ):
+        try:
+            assert ada.post("/api/robots", json={"name": "David", "domain": DOMAIN}).is_success
+            until("David answers", lambda: answers(ada, "David"))
+            with product.editor() as editor:
+                editor.post("/api/graphs", json=inner)
+                graph = editor.post("/api/graphs", json=outer).json()["id"]
+            order = order_of(product, graph)
+            assert item_of(ada, order)["folder"]["writable"] == [{"graph": name, "replaces": ""}]
+            wish = {key: order[key] for key in ("digest", "tree_digest", "subgraphs")}
+            answer = ada.post("/api/robots/David/index", json=wish)
+            assert answer.is_success, answer.text
+            written += [each["path"] for each in answer.json()["written"]]
+            until("David has indexed it", lambda: item_of(ada, order)["verdict"] == "passed")
+
+            run = ada.post("/api/runs", json=order | {"request_id": "written 1"})
+            assert run.status_code == 201, run.text
+            path = f"/api/runs/{run.json()['id']}"
+            until("it has ended", lambda: ada.get(path).json()["state"] == "finished")
+            actions = len(inner["actions"])
+            assert [events().count(each) for each in ("begin", "end")] == [actions, actions]
+        finally:
+            for each in written:
+                (ACTIONS / each).unlink()

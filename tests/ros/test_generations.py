@@ -16,6 +16,7 @@ pytest.importorskip(
 )
 
 from action_assistant.runner.links.port import NotSent
+from ros.test_doctor import doctor, registered
 from ros.test_ros2_link import answering, placed, robot
 
 ROOT = Path(__file__).parents[2]
@@ -92,6 +93,13 @@ async def test_an_engine_of_the_older_generation_gets_no_start_and_the_reason_is
         await anyio.sleep(0.3)
         assert older_engine.stdout is not None
         assert not select.select([older_engine.stdout], [], [], 0)[0]
+
+
+@pytest.mark.usefixtures("older_engine")
+def test_doctor_names_the_generation_of_a_registered_robot(domain: int, tmp_path: Path) -> None:
+    code, found = doctor(registered(tmp_path, [{"name": "David", "domain": domain}]), domain)
+    assert (code, found["David"]["code"]) == (1, "robot-older")
+    assert "March 2025" in found["David"]["remedy"]
 
 
 def test_a_workspace_of_the_older_generation_is_refused_with_a_sentence(

@@ -13,35 +13,20 @@ NGINX = shutil.which("nginx", path="/usr/sbin:/usr/local/sbin:/usr/bin") or ""
 
 
 @contextmanager
-def nginx(folder: Path, *, name: str, port: int, editor: int, without: str = "") -> Iterator[Path]:
-    """It runs inside the block; the file with the certificate that it shows. `without` is taken out
-    of what is documented."""
+def nginx(
+    folder: Path,
+    *,
+    name: str,
+    port: int,
+    editor: int,
+    mistake: tuple[str, str] = ("", ""),
+    identity: tuple[Path, Path] | None = None,
+) -> Iterator[Path]:
+    """It runs inside the block; the file with the certificate that it shows. `mistake`: what is
+    documented, and what stands there instead. `identity`: key and chain, else new ones for the name."""
     folder.mkdir()
-    key, chain = folder / "key.pem", folder / "chain.pem"
-    subject = ("-subj", f"/CN={name}", "-addext", f"subjectAltName=DNS:{name}")
-    command = ("openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-keyout", key)
-    subprocess.run([*command, "-out", chain, *subject], check=True, capture_output=True)
-    text = DOCUMENTED.read_text()
-    assert without in text
-    changes = {
-        "listen 443": f"listen 127.0.0.1:{port}",
-        "robots.example.org;": f"{name};",
-        "/etc/ssl/certs/robots.example.org.pem": str(chain),
-        "/etc/ssl/private/robots.example.org.key": str(key),
-        "127.0.0.1:8000": f"127.0.0.1:{editor}",
-        "127.0.0.1:8001": f"127.0.0.1:{editor + 1}",
-    }
-    text = text.replace(without, "") if without else text
-    for old, new in changes.items():
-        assert old in text
-        text = text.replace(old, new)
-    kinds = ("client_body", "proxy", "fastcgi", "uwsgi", "scgi")
-    temporary = " ".join(f"{kind}_temp_path {folder}/{kind};" for kind in kinds)
-    whole = folder / "nginx.conf"
-    whole.write_text(
-        f"user root; pid {folder}/pid; error_log stderr; events {{}}\n"
-        f"http {{ access_log off; {temporary}\n{text} }}"
-    )
+    key, chain = identity or _identity(folder, name)
+    whole = _configured(folder, (key, chain), (name, port, editor), mistake)
     log = folder / "log"
     with log.open("wb") as out:
         process = subprocess.Popen(
@@ -53,6 +38,46 @@ def nginx(folder: Path, *, name: str, port: int, editor: int, without: str = "")
     finally:
         process.terminate()
         process.wait(10)
+
+
+def _configured(
+    folder: Path, identity: tuple[Path, Path], at: tuple[str, int, int], mistake: tuple[str, str]
+) -> Path:
+    """The documented file for a name, a port and the editor's port, in a configuration of nginx."""
+    key, chain = identity
+    name, port, editor = at
+    text = DOCUMENTED.read_text()
+    documented, instead = mistake
+    assert documented in text
+    changes = {
+        "listen 443": f"listen 127.0.0.1:{port}",
+        "robots.example.org;": f"{name};",
+        "/etc/ssl/certs/robots.example.org.pem": str(chain),
+        "/etc/ssl/private/robots.example.org.key": str(key),
+        "127.0.0.1:8000": f"127.0.0.1:{editor}",
+        "127.0.0.1:8001": f"127.0.0.1:{editor + 1}",
+    }
+    text = text.replace(documented, instead) if documented else text
+    for old, new in changes.items():
+        assert old in text
+        text = text.replace(old, new)
+    kinds = ("client_body", "proxy", "fastcgi", "uwsgi", "scgi")
+    temporary = " ".join(f"{kind}_temp_path {folder}/{kind};" for kind in kinds)
+    whole = folder / "nginx.conf"
+    whole.write_text(
+        f"user root; pid {folder}/pid; error_log stderr; events {{}}\n"
+        f"http {{ access_log off; {temporary}\n{text} }}"
+    )
+    return whole
+
+
+def _identity(folder: Path, name: str) -> tuple[Path, Path]:
+    """A key, and a certificate that signs itself."""
+    key, chain = folder / "key.pem", folder / "chain.pem"
+    subject = ("-subj", f"/CN={name}", "-addext", f"subjectAltName=DNS:{name}")
+    command = ("openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-keyout", key)
+    subprocess.run([*command, "-out", chain, *subject], check=True, capture_output=True)
+    return key, chain
 
 
 def _wait(port: int, process: "subprocess.Popen[bytes]", log: Path) -> None:

@@ -1,11 +1,21 @@
 /** One's own name, light or dark, and the way out. */
 import { Button, Group, Stack, Text, TextInput, useMantineColorScheme } from "@mantine/core";
-import { IconDeviceDesktop, IconLogout, IconMoon, IconShare, IconSun } from "@tabler/icons-react";
+import {
+  IconDeviceDesktop,
+  IconHelp,
+  IconLogout,
+  IconMoon,
+  IconServerCog,
+  IconShare,
+  IconSun,
+} from "@tabler/icons-react";
 import { useState } from "react";
+import { Link } from "wouter";
 import { errorText } from "../api/http";
 import { useLive } from "../api/live/use-live";
+import { helpUrl } from "../api/page-url";
 import { ROLE_WORDS, rememberedName, signOut } from "../api/session";
-import { usePerson } from "../api/use-person";
+import { useMay, usePerson } from "../api/use-person";
 import { Segments } from "../ui/segments";
 
 const schemes = [
@@ -37,6 +47,7 @@ interface Props {
 export function AccountPanel({ onShare, onClose, onLeave }: Props) {
   const { person, rename } = usePerson();
   const { runner } = useLive();
+  const mayLook = useMay("restore");
   const [name, setName] = useState(rememberedName() || person.name);
   const [problem, setProblem] = useState("");
   const save = async () => {
@@ -94,6 +105,17 @@ export function AccountPanel({ onShare, onClose, onLeave }: Props) {
             Share with others …
           </Button>
         )}
+        {mayLook && (
+          <Button
+            component={Link}
+            to="/admin"
+            variant="default"
+            leftSection={<IconServerCog size={15} aria-hidden />}
+            onClick={onClose}
+          >
+            Administration
+          </Button>
+        )}
         {!window.isSecureContext && (
           <Text size="sm" c="dimmed">
             This page came without TLS: reading the clipboard by a button, and opening without a
@@ -101,6 +123,16 @@ export function AccountPanel({ onShare, onClose, onLeave }: Props) {
           </Text>
         )}
         <Appearance />
+        <Button
+          component="a"
+          href={helpUrl("")}
+          target="_blank"
+          rel="noopener"
+          variant="default"
+          leftSection={<IconHelp size={15} aria-hidden />}
+        >
+          Help
+        </Button>
         <Button
           variant="default"
           leftSection={<IconLogout size={15} aria-hidden />}

@@ -18,3 +18,8 @@ export function serverPath(path: string): string {
 export function pageUrl(): string {
   return globalThis.location.origin + basePath;
 }
+
+/** Of a place of the documentation that comes with the server, as "robots.html#registering-one". */
+export function helpUrl(place: string): string {
+  return serverPath(`/help/${place}`);
+}

@@ -22,6 +22,7 @@ import { DropFiles } from "./imports/drop-files";
 import { importReviews } from "./imports/import-review";
 import {
   ActionsScreen,
+  AdministrationScreen,
   CompareScreen,
   GraphScreen,
   HomeScreen,
@@ -93,6 +94,11 @@ function Screens() {
       <Route path="/robots">
         <Screen crumbs={[graphs, { label: "Robots" }]}>
           <RobotsScreen />
+        </Screen>
+      </Route>
+      <Route path="/admin">
+        <Screen crumbs={[graphs, { label: "Administration" }]}>
+          <AdministrationScreen />
         </Screen>
       </Route>
       <Route path="/runs">

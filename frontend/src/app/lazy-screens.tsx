@@ -15,6 +15,9 @@ export const GraphScreen = lazyPart(() =>
 export const RobotsScreen = lazyPart(() =>
   import("./robots-screen").then((part) => part.RobotsScreen),
 );
+export const AdministrationScreen = lazyPart(() =>
+  import("./administration-screen").then((part) => part.AdministrationScreen),
+);
 export const ActionsScreen = lazyPart(() =>
   import("./actions-screen").then((part) => part.ActionsScreen),
 );
@@ -29,6 +32,7 @@ const PLACES: readonly (readonly [start: string, part: Pick<LazyPart<never>, "pr
   ["/runs", RunsScreen],
   ["/robots", RobotsScreen],
   ["/actions", ActionsScreen],
+  ["/admin", AdministrationScreen],
   ["/", HomeScreen],
 ];
 

@@ -50,7 +50,7 @@ export function CardState({ progress }: { progress: Progress }) {
 /** What it is called. */
 function Head({ action, oldName }: { action: Action; oldName: string | null }) {
   return (
-    <div className={style.head}>
+    <div className={style.head} data-head>
       <b className={style.name} title={action.name}>
         {action.missing && <IconGhost2 size={13} aria-hidden />}
         {oldName && <del>{oldName}</del>}

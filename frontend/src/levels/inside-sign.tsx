@@ -31,7 +31,7 @@ function SignButton({ title, label, Sign, onClick }: SignProps) {
 
 export function InsideSign({ of, name }: InsideSignProps) {
   return (
-    <span className={style.signs}>
+    <span className={style.signs} data-signs>
       <SignButton
         title="Expand the graph inside  }"
         label={`Expand the graph inside ${name}`}

@@ -1,7 +1,7 @@
 /** What the service worker does with a request: pure, for the worker and its tests. */
 
 /** Beside the page on its origin: answered by the server or by nobody, and never kept. */
-const NOT_THE_PAGE = ["api/", "runner/", "schema", "healthz", "readyz", "metrics"];
+const NOT_THE_PAGE = ["api/", "runner/", "schema", "help", "healthz", "readyz", "metrics"];
 
 export type Handling =
   /** The browser asks the server, as if there were no worker. */

@@ -28,6 +28,15 @@ const BECAME: Readonly<Record<string, string>> = {
   restarted: "The engine was restarted",
 };
 
+/** Which files somebody wrote for it, and what became of others. */
+function writtenText({ sender, files, why }: RobotLogLine): string {
+  const each = files.map(
+    ({ graph, path, kept }) => `${graph} (${path}${kept ? `; before: ${kept}` : ""})`,
+  );
+  const done = files.length > 0 ? `${sender} wrote ${each.join(", ")}` : `${sender} wrote nothing`;
+  return why === "" ? done : `${done}: ${why}`;
+}
+
 /** A sentence of one line; what it did to a run of ours comes after it. */
 function robotLogText(told: RobotLogLine): string {
   switch (told.kind) {
@@ -41,6 +50,10 @@ function robotLogText(told: RobotLogLine): string {
       return `${told.graph} is proven to have stopped`;
     case "stop_unproven":
       return `Nothing has proven that ${told.graph} stopped: ${told.why}`;
+    case "index_write_asked":
+      return `${told.sender} asked to write ${told.graphs.join(", ")} into its index folder`;
+    case "index_written":
+      return writtenText(told);
   }
 }
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import msgspec
 
-from action_assistant import paths
+from action_assistant import paths, settings
 from action_assistant.errors import CannotStart
 from action_assistant.web.auth.keys import Keys
 from action_assistant.web.network.certificate import Certificate
@@ -46,7 +46,7 @@ def add_server(parser: argparse.ArgumentParser, example: str) -> None:
         "--url",
         "--server",
         metavar="URL",
-        help="of the editor, or the public address of a server (default: port 8000 here)",
+        help="of the editor, or the public address of a server (default: the editor's port here)",
     )
     parser.add_argument(
         "--data", type=Path, default=paths.data(), metavar="DIR", help="that holds the token"
@@ -59,6 +59,11 @@ class Server:
     def __init__(self, editor: "httpx.Client", runner_url: str) -> None:
         self._client = editor
         self._runner_url = runner_url
+
+    @property
+    def url(self) -> str:
+        """Of the editor, as we ask it; without a slash at its end."""
+        return str(self._client.base_url).rstrip("/")
 
     def editor(self, method: str, path: str, **body: Any) -> "httpx.Response":
         """Ask the editor; a refusal becomes one sentence."""
@@ -148,13 +153,14 @@ def reach(options: argparse.Namespace) -> dict[str, Any]:
 
 def _here(trust: ssl.SSLContext) -> str:
     """Where the server of this computer is: it may have been started with --tls or without."""
+    port = settings.port()
     with (
         contextlib.suppress(OSError),
-        socket.create_connection(("127.0.0.1", 8000), 2) as plain,
+        socket.create_connection(("127.0.0.1", port), 2) as plain,
         trust.wrap_socket(plain, server_hostname="127.0.0.1"),
     ):
-        return "https://127.0.0.1:8000"
-    return "http://127.0.0.1:8000"
+        return f"https://127.0.0.1:{port}"
+    return f"http://127.0.0.1:{port}"
 
 
 def print_json(value: object) -> None:

@@ -1,12 +1,21 @@
-"""`people`: who may come in by which link, and the end of a link."""
+"""`people`: who may come in by which link, and the end of a link; `link`: the owner's own."""
 
 import argparse
 from typing import Any, Final
 
-from action_assistant.commands.client import No, Server, command, print_json, refused, running
+from action_assistant.commands.client import (
+    No,
+    Server,
+    add_server,
+    command,
+    print_json,
+    refused,
+    running,
+)
 from action_assistant.errors import CannotStart, Refused
 from action_assistant.private_files import own_folder
 from action_assistant.safe_text import one_line
+from action_assistant.web.auth.keys import Keys
 from action_assistant.web.auth.revocations import Revocations
 
 
@@ -34,7 +43,12 @@ def _add_people(people: argparse.ArgumentParser) -> None:
     revoke.set_defaults(handler=_revoke)
 
 
-COMMANDS: Final = {"people": _add_people}
+def _add_link(link: argparse.ArgumentParser) -> None:
+    add_server(link, "--data ./data")
+    link.set_defaults(handler=_link)
+
+
+COMMANDS: Final = {"people": _add_people, "link": _add_link}
 
 
 def _list(options: argparse.Namespace) -> int:
@@ -104,4 +118,19 @@ def _revoke_at(server: Server, invitation: str) -> int:
     print(f"{gone['id']}  {gone['role']} is revoked; {len(gone['guests'])} came in by it.")
     if gone.get("unrecorded"):
         print("The log could not take that up yet; the server tries again until it can.")
+    return 0
+
+
+def _link(options: argparse.Namespace) -> int:
+    """The likeliest address first. Whoever has the link is the owner, so it leads only to what has
+    proven to know the token: anything else that listens there would be told it."""
+    with running(options) as server:
+        try:
+            sharing = server.editor("GET", "/api/invitations").json()
+        except No as error:
+            return refused(error)
+    public = sharing["origins"][:1] if sharing.get("proxied") else []
+    token = Keys.known(options.data.resolve()).token
+    for address in dict.fromkeys([*public, server.url]):
+        print(f"{address}/#t={token}")
     return 0

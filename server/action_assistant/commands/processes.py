@@ -2,15 +2,13 @@
 
 import argparse
 import gc
-import logging
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from action_assistant import paths, settings
 from action_assistant.commands.backups.options import add_rules, span
 from action_assistant.errors import CannotStart
-from action_assistant.safe_text import PrintableLog
+from action_assistant.logs.setup import FORMS, LEVELS, hand_on, log_settings, set_up
 
 if TYPE_CHECKING:  # slow to load, and most commands do not need it
     from action_assistant.supervisor import BackupPlan
@@ -19,20 +17,28 @@ if TYPE_CHECKING:  # slow to load, and most commands do not need it
 
 def _add_serve(both: argparse.ArgumentParser) -> None:
     both.epilog = "example: action-assistant serve --data ./data --port 8000"
-    _address(both, port=8000)
-    _database(both, switch=True)
-    _sharing(both)
-    _behaviours(both)
-    _backups(both)
+    add_serve_options(both)
     both.add_argument("--no-open", action="store_true", help="do not open a browser")
     both.set_defaults(handler=_serve)
 
 
+def add_serve_options(parser: argparse.ArgumentParser) -> None:
+    """What `serve` takes, also as a service."""
+    _address(parser, port=settings.port())
+    _database(parser, switch=True)
+    _sharing(parser)
+    _behaviours(parser)
+    _backups(parser)
+    _index_folders(parser)
+    _logging(parser)
+
+
 def _add_editor(editor: argparse.ArgumentParser) -> None:
     editor.epilog = "example: action-assistant editor --port 8000 --runner-port 8001"
-    _address(editor, port=8000)
+    _address(editor, port=settings.port())
     _database(editor, switch=True)
     _sharing(editor)
+    _logging(editor)
     editor.add_argument(
         "--runner-port", type=port_number, metavar="N", help="default: the next port"
     )
@@ -41,9 +47,11 @@ def _add_editor(editor: argparse.ArgumentParser) -> None:
 
 def _add_runner(runner: argparse.ArgumentParser) -> None:
     runner.epilog = "example: action-assistant runner --port 8001 --page-port 8000"
-    _address(runner, port=8001)
+    _address(runner, port=settings.port() + 1)
     _sharing(runner)
     _behaviours(runner)
+    _index_folders(runner)
+    _logging(runner)
     runner.add_argument(
         "--page-port", type=port_number, metavar="N", help="default: the port before"
     )
@@ -112,11 +120,18 @@ def _database(parser: argparse.ArgumentParser, *, switch: bool = False) -> None:
 
 
 def _sharing(parser: argparse.ArgumentParser) -> None:
+    shared = settings.share()
     parser.add_argument(
-        "--share", action="store_true", help="let others on the network in, by links with a role"
+        "--share",
+        action="store_true",
+        default=bool(shared),
+        help="let others on the network in, by links with a role",
     )
     parser.add_argument(
-        "--tls", action="store_true", help="encrypt, with a certificate that is made here"
+        "--tls",
+        action="store_true",
+        default=shared == "tls",
+        help="encrypt, with a certificate that is made here",
     )
     parser.add_argument(
         "--public-url",
@@ -142,7 +157,26 @@ def _behaviours(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _reached(options: argparse.Namespace) -> settings.Reachability:
+def _index_folders(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--index-folder",
+        action="append",
+        default=[],
+        metavar="ROBOT=DIR",
+        help="the --actions-path of that robot's engine, where it is on this computer, too: operators may "
+        "have graphs written into it. May be given several times",
+    )
+
+
+def _logging(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--log-format", choices=FORMS, help="how lines of the log look; default: console"
+    )
+    parser.add_argument("--log-level", choices=LEVELS, help="what is not told below; default: info")
+
+
+def reached(options: argparse.Namespace) -> settings.Reachability:
+    """How others come to us. Raises CannotStart."""
     return settings.reached(options.public_url, options.trusted_proxies)
 
 
@@ -151,7 +185,7 @@ def _host(options: argparse.Namespace) -> str:
     host: str = options.host or (settings.EVERYWHERE if options.share else "127.0.0.1")
     if options.share and host in {"0.0.0.0", "::"}:
         host = settings.EVERYWHERE
-    public = _reached(options).public
+    public = reached(options).public
     settings.check_host(host, settings.more_hosts(), share=options.share, public=public)
     return host
 
@@ -172,14 +206,17 @@ def _identity(
     return TlsIdentity(Certificate(chosen.data), addresses.certified)
 
 
-def _log(data: Path) -> None:
+def _log(process: str, options: argparse.Namespace, *secrets: str) -> None:
+    """From here on this process writes its log as it was told to. Raises CannotStart."""
+    chosen = log_settings(options.log_format, options.log_level)
+    hand_on(chosen)
+    set_up(process, chosen, *secrets)
+
+
+def _secrets(data: Path) -> tuple[str, ...]:
     from action_assistant.web.auth.keys import Keys
 
-    handler = logging.StreamHandler(sys.stderr)
-    handler.setFormatter(PrintableLog(Keys.of(data).token))
-    logging.basicConfig(level=logging.INFO, handlers=[handler])
-    logging.getLogger("uvicorn.error").setLevel(logging.WARNING)
-    logging.getLogger("httpx").setLevel(logging.WARNING)
+    return Keys.of(data).token, settings.metrics_token() or ""
 
 
 def _editor_settings(options: argparse.Namespace, data: Path) -> settings.EditorSettings:
@@ -194,7 +231,8 @@ def _editor_settings(options: argparse.Namespace, data: Path) -> settings.Editor
         share=options.share,
         tls=options.tls,
         switch_database=options.switch_database,
-        reached=_reached(options),
+        reached=reached(options),
+        metrics_token=settings.metrics_token(),
     )
 
 
@@ -203,6 +241,8 @@ def _serve(options: argparse.Namespace) -> int:
 
     if options.port == 65535:
         raise CannotStart("The runner needs the port after --port; 65535 has none.")
+    _log("serve", options)
+    settings.metrics_token()
     host = _host(options)
     data = settings.data_folder(options.data.resolve())
     return serve(
@@ -214,8 +254,9 @@ def _serve(options: argparse.Namespace) -> int:
             port=options.port,
             share=options.share,
             tls=options.tls,
-            reached=_reached(options),
+            reached=reached(options),
             behaviours=options.behaviours,
+            index_folders=settings.index_folders(options.index_folder),
             opens=not options.no_open,
             backups=_backup_plan(options),
         )
@@ -241,7 +282,7 @@ def _editor(options: argparse.Namespace) -> int:
     from action_assistant.web.server.listen import serve as listen
 
     data = settings.data_folder(options.data.resolve())
-    _log(data)
+    _log("editor", options, *_secrets(data))
     chosen = _editor_settings(options, data)
     listen(
         lambda: create_app(chosen),
@@ -249,6 +290,7 @@ def _editor(options: argparse.Namespace) -> int:
         port=chosen.port,
         proxies=chosen.reached.proxies,
         identity=_identity(chosen, chosen.port),
+        direct=settings.direct_sockets(),
     )
     return 0
 
@@ -259,7 +301,7 @@ def _runner(options: argparse.Namespace) -> int:
     from action_assistant.web.server.listen import serve as listen
 
     data = settings.data_folder(options.data.resolve())
-    _log(data)
+    _log("runner", options, *_secrets(data))
     chosen = settings.RunnerSettings(
         data=data,
         host=_host(options),
@@ -270,8 +312,10 @@ def _runner(options: argparse.Namespace) -> int:
         share=options.share,
         tls=options.tls,
         keep=settings.keep(data),
-        reached=_reached(options),
+        reached=reached(options),
         behaviours=options.behaviours,
+        index_folders=settings.index_folders(options.index_folder),
+        metrics_token=settings.metrics_token(),
     )
     listen(
         lambda: create_app(chosen),

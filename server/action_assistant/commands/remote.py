@@ -186,6 +186,8 @@ def _run(options: argparse.Namespace) -> int:
                 "request_id": str(uuid.uuid4()),
                 "graph": graph,
             }
+            if version.get("subgraphs"):
+                order |= {name: version[name] for name in ("subgraphs", "tree_digest")}
             if script is not None:
                 order["script"] = script
             run = server.runner("POST", "/api/runs", json=order).json()

@@ -40,13 +40,7 @@ def _add_simulate_robot(robot: argparse.ArgumentParser) -> None:
         metavar="NS",
         help="of its get service; real engines take none: give them domains of their own",
     )
-    robot.add_argument(
-        "--actions",
-        type=Path,
-        metavar="DIR",
-        help="of action packages: *umrf.json and *graph.json, two folders deep; "
-        "without, it has every action",
-    )
+    _add_index(robot)
     robot.add_argument("--script", type=Path, metavar="S.json", help="what the actions do")
     robot.add_argument(
         "--behaviours",
@@ -68,6 +62,23 @@ def _add_simulate_robot(robot: argparse.ArgumentParser) -> None:
     robot.set_defaults(handler=_simulate_robot)
 
 
+def _add_index(robot: argparse.ArgumentParser) -> None:
+    robot.add_argument(
+        "--actions",
+        type=Path,
+        metavar="DIR",
+        help="of action packages: *umrf.json and *graph.json, two folders deep; "
+        "without, it has every action",
+    )
+    robot.add_argument(
+        "--indexing-rate",
+        type=_seconds,
+        default=2.0,
+        metavar="S",
+        help="seconds after which it looks at --actions again; 0: only at its start (default: 2, as engines)",
+    )
+
+
 COMMANDS: Final = {"simulate-robot": _add_simulate_robot}
 
 
@@ -80,6 +91,13 @@ def _known() -> str:
 def _domain(text: str) -> int:
     number = int(text)
     if not 0 <= number <= 232:
+        raise ValueError
+    return number
+
+
+def _seconds(text: str) -> float:
+    number = float(text)
+    if not 0 <= number < 1e6:
         raise ValueError
     return number
 
@@ -101,7 +119,9 @@ def _simulate_robot(options: argparse.Namespace) -> int:
 
     facts = facts_for(options.facts) if options.facts else PINNED
     quirks = msgspec.convert(dict(options.quirk), EngineTraits)
-    script, index = _script(options.script), _index(options.actions)
+    script, folder = _script(options.script), options.actions
+    index = EmulatedIndex() if folder is None else _index(folder)
+    again = options.indexing_rate and folder is not None
     behaviours = BehaviourFolder.opened(options.behaviours) if options.behaviours else None
     extra = tuple(word for word in options.wake_words.split(",") if word)
     domain = int(os.environ.get("ROS_DOMAIN_ID", "0")) if options.domain is None else options.domain
@@ -121,7 +141,12 @@ def _simulate_robot(options: argparse.Namespace) -> int:
 
     try:
         node = EmulatorNode(
-            robot, domain=domain, facts=facts, namespace=options.namespace, told=_tell
+            robot,
+            domain=domain,
+            facts=facts,
+            namespace=options.namespace,
+            told=_tell,
+            indexes=(options.indexing_rate, lambda: _found(folder)) if again else None,
         )
     except RuntimeError as error:
         raise CannotStart(f"Domain {domain} cannot be joined: {error}.") from error
@@ -152,18 +177,25 @@ def _script(path: Path | None) -> Script:
         raise CannotStart(f"{path} is no script: {error}.") from error
 
 
-def _index(folder: Path | None) -> EmulatedIndex:
-    if folder is None:
-        return EmulatedIndex()
+def _index(folder: Path) -> EmulatedIndex:
+    """What an engine finds there. Raises CannotStart where there is no folder."""
     if not folder.is_dir():
         raise CannotStart(f"There is no folder {folder}.")
+    return _found(folder)
+
+
+def _found(folder: Path) -> EmulatedIndex:
+    """Files that cannot be read are skipped."""
     return index_of(_texts(folder, "umrf.json"), _texts(folder, "graph.json"))
 
 
 def _texts(folder: Path, ending: str) -> Iterable[str]:
     for depth in range(_DEEP + 1):
         for path in sorted(folder.glob("*/" * depth + f"*{ending}*")):
-            yield _text(path)
+            try:
+                yield path.read_text()
+            except (OSError, UnicodeDecodeError):
+                continue
 
 
 def _text(path: Path) -> str:

@@ -12,6 +12,7 @@ from litestar.types import ASGIApp, ControllerRouterHandler
 
 from action_assistant import paths
 from action_assistant.editor.api import (
+    doctor,
     drafts,
     drawing,
     editor,
@@ -29,6 +30,7 @@ from action_assistant.editor.catalogue.people import People
 from action_assistant.editor.log import database_location, epochs
 from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.services import EditorServices, EditorState
+from action_assistant.editor.watched import WatchedEditor
 from action_assistant.editor.workers import EditorWorkers
 from action_assistant.errors import BadInput
 from action_assistant.journal.copies import before_upgrade
@@ -36,10 +38,12 @@ from action_assistant.journal.journal import Journal
 from action_assistant.settings import EditorSettings
 from action_assistant.web.auth.keys import Keys
 from action_assistant.web.auth.revocations import Revocations
+from action_assistant.web.auth.scrape_token import ScrapeToken
 from action_assistant.web.auth.session_files import SessionFiles
 from action_assistant.web.auth.sessions import session_routes
+from action_assistant.web.monitoring.monitoring import Monitoring
 from action_assistant.web.network.addresses import Addresses, addresses_of
-from action_assistant.web.server.application import Readiness, application
+from action_assistant.web.server.application import application
 from action_assistant.web.workers.lanes import run_here
 
 log: Final = logging.getLogger(__name__)
@@ -89,15 +93,14 @@ def create_app(settings: EditorSettings) -> ASGIApp:
     browsers = SessionFiles(settings.data, revoked)
     browsers.every()  # forgets those that are over
     addresses = _addresses(settings)
+    monitoring = Monitoring("editor", settings.data)
 
     @asynccontextmanager
     async def lifespan(_: Litestar) -> AsyncIterator[None]:
         async with open_services(settings, revoked) as services:
             app_state.open(services)
-            yield
-
-    async def ready() -> Readiness:
-        return await _readiness(app_state.services)
+            async with monitoring.watching(WatchedEditor(services)):
+                yield
 
     signing_in = session_routes(
         keys,
@@ -109,16 +112,17 @@ def create_app(settings: EditorSettings) -> ASGIApp:
         browsers=browsers,
     )
     return application(
-        [*signing_in, *_routes(app_state, addresses, browsers)],
+        [*signing_in, *_routes(app_state, addresses, browsers), *doctor.routes(settings)],
         title="TeMoto Action Assistant: editor",
         keys=keys,
         revoked=revoked,
         addresses=addresses,
         page_port=settings.port,
         lifespan=[lifespan],
-        ready=ready,
-        measures=lambda: _measures(app_state.services),
+        monitoring=monitoring,
+        scraped=ScrapeToken(settings.metrics_token),
         page=paths.page(),
+        help_site=paths.help_site(),
         runner_port=settings.runner_port,
         mount=settings.reached.public.path if settings.reached.public is not None else "",
         body_limit=SMALL,
@@ -166,17 +170,3 @@ async def _greet(services: EditorServices, folder: Path) -> None:
             )
         except BadInput as error:
             log.error("the example %s cannot be read: %s", path.name, error.detail)
-
-
-async def _readiness(services: EditorServices) -> Readiness:
-    problem = await services.journal.health()
-    return Readiness(problem is None, () if problem is None else (problem,))
-
-
-def _measures(services: EditorServices) -> dict[str, float]:
-    rooms = services.rooms.open_rooms()
-    return {
-        "action_assistant_rooms": len(rooms),
-        "action_assistant_divergences": services.rooms.divergences,
-        "action_assistant_sockets": sum(len(room.members) for room in rooms),
-    }

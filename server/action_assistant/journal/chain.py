@@ -1,6 +1,7 @@
 """The chain through each stream, by which every change of a stored event shows."""
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import lru_cache
 from hashlib import blake2b
 from struct import pack
 from typing import Any, Final
@@ -33,14 +34,17 @@ class Damage(msgspec.Struct, frozen=True):
 
 def link(before: bytes, event: Event) -> bytes:
     """The chain at an event: a digest of everything it holds and of the chain before it."""
-    digest = blake2b(before, digest_size=16)
-    for text in (event.stream, event.kind, event.author):
-        data = text.encode("utf-8", "surrogateescape")  # damaged text has to be told, not to fail
-        digest.update(pack(">I", len(data)))
-        digest.update(data)
-    digest.update(pack(">qqq", event.seq, event.at, event.position))
-    digest.update(event.body)
-    return digest.digest()
+    place = pack(">qqq", event.seq, event.at, event.position)
+    names = _names(event.stream, event.kind, event.author)
+    return blake2b(b"".join((before, names, place, event.body)), digest_size=16).digest()
+
+
+@lru_cache(maxsize=1024)
+def _names(*texts: str) -> bytes:
+    """What is the same in most links of a stream."""
+    # Damaged text has to be told, not to fail.
+    encoded = [text.encode("utf-8", "surrogateescape") for text in texts]
+    return b"".join(pack(">I", len(data)) + data for data in encoded)
 
 
 class Inspector:

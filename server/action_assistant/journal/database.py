@@ -89,6 +89,9 @@ class Database(Protocol):
     def scan(self, connection: Connection, after: int) -> tuple[list[Sequence[Any]], int]:
         """Some stored events with their chain as they stand, and from where to go on."""
 
+    def bytes_in_use(self, connection: Connection) -> dict[str, int]:
+        """Bytes of the database, and of a log beside it, by `database` and `wal`. Raises OSError."""
+
     def complaints(self, connection: Connection) -> list[str]:
         """What the database itself finds wrong with its files."""
 

@@ -2,7 +2,7 @@
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager
 from functools import partial
 from pathlib import Path
@@ -25,6 +25,8 @@ from action_assistant.journal.database import (
 from action_assistant.journal.databases import database_of
 from action_assistant.journal.events import Addition, Draft, Event, Fold
 from action_assistant.journal.follower import Follower
+from action_assistant.journal.health.commits import CommitMetrics
+from action_assistant.journal.health.probe import JournalProbe
 from action_assistant.journal.reader import JournalReader, body_of, following, seal_of
 from action_assistant.journal.removal import STREAM, StreamRemoved, delete_some, taken_out
 from action_assistant.journal.writer import Job, Outcome, Transaction, Writer
@@ -58,6 +60,7 @@ class Journal(JournalReader):
         self._jobs: list[Job[Any]] = []  # of this turn of the loop, for one transaction
         self._followers: set[Follower] = set()
         self._closed = False
+        self._probe = JournalProbe(branch, self.derive, self._ask, lambda: self._writer.is_alive)
 
     @staticmethod
     def prepare(url: str, branch: Branch, *, copies: Path | None = None) -> None:
@@ -199,11 +202,30 @@ class Journal(JournalReader):
             return error.detail
         return None
 
+    async def parts(self) -> Mapping[str, str | None]:
+        """What of it works (None), or why it does not: tried by writing, and said within seconds."""
+        return await self._probe.parts()
+
+    @property
+    def metrics(self) -> CommitMetrics:
+        """What the writer has done."""
+        return self._writer.metrics
+
+    @property
+    def database_name(self) -> str:
+        """What people may read: without a password."""
+        return self._database.name
+
+    async def bytes_in_use(self) -> dict[str, int]:
+        """Bytes of the database and of what waits beside it, by name. Raises Unavailable, OSError."""
+        return await self._ask(self._database.bytes_in_use)
+
     async def close(self) -> None:
         """Finish what was appended, then let go of the file. Followers end."""
         if self._closed:
             return
         self._closed = True
+        self._probe.close()
         self._submit()
         await asyncio.to_thread(self._writer.close)
         await asyncio.sleep(0)  # let the last outcomes arrive

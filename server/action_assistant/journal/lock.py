@@ -1,13 +1,12 @@
 """One process writes a journal: a lock beside its file, which no other user can take or keep from us."""
 
-import fcntl
 import os
-import pwd
 from pathlib import Path
 from typing import Final, NamedTuple
 
 from action_assistant.errors import CannotStart
 from action_assistant.private_files import opener
+from action_assistant.system import file_locks, users
 
 _LOCKS: Final = Path("/proc/locks")
 
@@ -19,11 +18,7 @@ class Holder(NamedTuple):
     uid: int
 
     def __str__(self) -> str:
-        try:
-            name = pwd.getpwuid(self.uid).pw_name
-        except KeyError:
-            name = str(self.uid)
-        return f"{self.pid} of {name}"
+        return f"{self.pid} of {users.name_of(self.uid)}"
 
 
 def own(path: Path) -> int:
@@ -47,13 +42,25 @@ def own(path: Path) -> int:
     return held
 
 
+def holder(path: Path) -> Holder | None:
+    """Who has locked a database, where the system tells: Linux does, of processes that can be seen."""
+    return _holder(path.with_name(f"{path.name}.lock"))
+
+
+def is_program(pid: int) -> bool:
+    """Whether a process is one of this program, as far as its command line says so."""
+    try:
+        words = Path(f"/proc/{pid}/cmdline").read_bytes()
+    except OSError:
+        return False
+    return b"action_assistant" in words or b"action-assistant" in words
+
+
 def _taken(lock: Path) -> int | None:
     """The lock, or None when somebody holds it."""
     while True:
         descriptor = opener(str(lock), os.O_RDWR | os.O_CREAT)
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
+        if not file_locks.take(descriptor):
             os.close(descriptor)
             return None
         try:
@@ -68,7 +75,7 @@ def _taken_from_a_stranger(lock: Path, path: Path) -> int | None:
     """A new lock in the place of theirs, by one process of ours at a time."""
     guard = opener(str(lock.with_name(f"{lock.name}.new")), os.O_RDWR | os.O_CREAT)
     try:
-        fcntl.flock(guard, fcntl.LOCK_EX)
+        file_locks.wait_for(guard)
         if _is_a_strangers(_holder(lock), path):
             lock.unlink()
         return _taken(lock)
@@ -77,9 +84,9 @@ def _taken_from_a_stranger(lock: Path, path: Path) -> int | None:
 
 
 def _is_a_strangers(holder: Holder | None, path: Path) -> bool:
-    if holder is None or holder.uid in {0, os.geteuid()}:
+    if holder is None or holder.uid in {0, users.me()}:
         return False
-    return not path.exists() or path.stat().st_uid == os.geteuid()
+    return not path.exists() or path.stat().st_uid == users.me()
 
 
 def _user_of(pid: int) -> int:

@@ -8,8 +8,9 @@ from typing import Final
 from sqlalchemy import Connection, insert, inspect, select
 
 from action_assistant import paths
-from action_assistant.errors import CannotStart
-from action_assistant.journal.database import Before, Branch, no_copy
+from action_assistant.errors import AnothersDatabase, CannotStart, NewerSchema
+from action_assistant.journal.database import Before, no_copy
+from action_assistant.journal.database import Branch as Branch
 from action_assistant.journal.events import Event
 from action_assistant.journal.program_version import last_writer, sign
 from action_assistant.schema.branches import BRANCHES, VERSIONS
@@ -76,13 +77,13 @@ def recognize(connection: Connection) -> set[str]:
     name = _name_of(connection)
     current = _current(connection)
     if _is_foreign(connection, current):
-        raise CannotStart(
+        raise AnothersDatabase(
             f"The database {name} is another program's: it is left as it is. Choose another one, "
             "or an empty one."
         )
     known = {revision for branch in BRANCHES for revision in revisions_of(branch)}
     if current - known:
-        raise CannotStart(_newer(connection, name, max(current - known)))
+        raise NewerSchema(_newer(connection, name, max(current - known)))
     return current
 
 

@@ -9,7 +9,7 @@ from collections.abc import Awaitable, Callable, Mapping, Sequence
 from typing import Any, Final, TypeVar
 
 import asyncpg  # type: ignore[import-untyped]
-from sqlalchemy import URL, Connection, NullPool, select
+from sqlalchemy import URL, Connection, NullPool, func, select
 from sqlalchemy.exc import DBAPIError, SQLAlchemyError
 from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine, create_async_engine
 from sqlalchemy.util import await_only
@@ -28,6 +28,7 @@ _PAGE: Final = 500
 _CONNECT: Final = 5.0  # seconds for a connection to come up
 _ANSWER: Final = 30.0  # seconds for a statement; after that the connection counts as dead
 _HANDOVER: Final = 3.0  # seconds until a server has ended the connections of a process that died
+_READ_ONLY: Final = "transaction_read_only"
 #: What must hold for an acknowledged commit to survive, and what to say where it does not.
 _SETTINGS: Final = {
     "fsync": ({"on"}, "it does not write commits to the disk"),
@@ -37,7 +38,7 @@ _SETTINGS: Final = {
         "it confirms commits that it may lose",
     ),
     "server_encoding": ({"UTF8"}, "it cannot hold every text"),
-    "transaction_read_only": ({"off"}, "it is a read-only copy"),
+    _READ_ONLY: ({"off"}, "it is a read-only copy"),
 }
 #: One statement: the events, and with them the counter of each stream.
 _STORE: Final = """
@@ -240,6 +241,11 @@ class Postgres:
         rows = [tuple(row) for row in connection.execute(chosen)]
         return list(rows), rows[-1][6] if rows else after
 
+    def bytes_in_use(self, connection: Connection) -> dict[str, int]:
+        """Bytes of the database; its log is that of the whole server."""
+        asked = "SELECT pg_database_size(current_database())"
+        return {"database": int(connection.exec_driver_sql(asked).scalar_one())}
+
     def complaints(self, connection: Connection) -> list[str]:
         """Nothing: the server looks after its own files."""
         del connection
@@ -267,6 +273,18 @@ class Postgres:
     @property
     def _the(self) -> str:
         return self.name[0].lower() + self.name[1:]
+
+
+def weakness(connection: Connection) -> str:
+    """Why nothing may be written to a database, for whoever only looks; empty where nothing is wrong."""
+    for name, (allowed, why) in _SETTINGS.items():
+        if name == _READ_ONLY:  # as whoever only looks has it
+            value = "on" if connection.execute(select(func.pg_is_in_recovery())).scalar() else "off"
+        else:
+            value = str(connection.execute(select(func.current_setting(name))).scalar())
+        if value not in allowed:
+            return f"{why} ({name} is {value})"
+    return ""
 
 
 class Unfit(OSError):

@@ -1,12 +1,12 @@
 """Reading a journal: events by stream or in order, the tables, what was cached."""
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Final, TypeVar
 from urllib.parse import quote
 
-from sqlalchemy import Connection, NullPool, Row, Select, create_engine, func, select
+from sqlalchemy import Connection, CursorResult, NullPool, Row, Select, create_engine, func, select
 from sqlalchemy.exc import DatabaseError
 
 from action_assistant.errors import Unavailable
@@ -56,6 +56,10 @@ class JournalReader:
         """Ask the tables."""
         return await self._ask(lambda connection: list(connection.execute(statement).all()))
 
+    async def plain_rows(self, statement: Select[Any]) -> list[Sequence[Any]]:
+        """Ask for many rows, as the driver gives them out: no value is converted."""
+        return await self._ask(lambda connection: _plain(connection.execute(statement)))
+
     async def snapshot(self, stream: str) -> StreamSnapshot | None:
         """The cached sum of a stream; None when there is none, or when it does not fit the log."""
         chosen = select(_snapshot.seq, _snapshot.proof, _snapshot.state).where(
@@ -102,6 +106,13 @@ class FileJournalReader(JournalReader):
                 return question(connection)
         except DatabaseError as error:
             raise Unavailable(f"The journal cannot be read: {cause_of(error)}.") from error
+
+
+def _plain(result: CursorResult[Any]) -> list[Sequence[Any]]:
+    assert result.cursor is not None
+    rows = list(result.cursor.fetchall())
+    result.close()
+    return rows
 
 
 def following(position: int, limit: int) -> Select[Any]:

@@ -158,7 +158,7 @@ class Sqlite:
                 with engine.connect() as connection:
                     question(connection)
             except CannotStart as error:  # of the file that it is, also where a copy was read
-                raise CannotStart(str(error).replace(str(path), str(self._path))) from error
+                raise type(error)(str(error).replace(str(path), str(self._path))) from error
             except self.faults as error:
                 raise CannotStart(f"Cannot open {self._the}: {cause_of(error)}.") from error
             finally:
@@ -224,6 +224,15 @@ class Sqlite:
         finally:
             raw.text_factory = plain
         return [row[:8] for row in rows], rows[-1][8] if rows else after
+
+    def bytes_in_use(self, connection: Connection) -> dict[str, int]:
+        """Bytes of the file, and of the log beside it."""
+        del connection
+        log = self._path.with_name(f"{self._path.name}-wal")
+        return {
+            "database": self._path.stat().st_size,
+            "wal": log.stat().st_size if log.exists() else 0,
+        }
 
     def complaints(self, connection: Connection) -> list[str]:
         """What SQLite finds wrong with the file."""

@@ -16,6 +16,7 @@ from action_assistant.errors import BadInput, Conflict, Unavailable
 from action_assistant.journal.chain import NOTHING, Head, link
 from action_assistant.journal.database import Database, WriterSession, cause_of
 from action_assistant.journal.events import Addition, Event, Fold
+from action_assistant.journal.health.commits import CommitMetrics
 from action_assistant.schema import editor_tables
 
 log: Final = logging.getLogger(__name__)
@@ -195,6 +196,7 @@ class Writer:
         self._fold = fold
         self._tell = tell
         self._clock = clock
+        self.metrics: Final = CommitMetrics()
         self._transaction: Transaction | None = None
         self._jobs: queue.SimpleQueue[Sequence[Job[Any]] | None] = queue.SimpleQueue()
         self._thread = threading.Thread(
@@ -204,7 +206,13 @@ class Writer:
 
     def submit(self, jobs: Sequence[Job[Any]]) -> None:
         """Queue jobs, for one transaction if it can hold them; returns at once."""
+        self.metrics.submitted(len(jobs))
         self._jobs.put(jobs)
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether the thread goes on."""
+        return self._thread.is_alive()
 
     def close(self) -> None:
         """Finish what was submitted, then end the thread. Blocks."""
@@ -237,6 +245,7 @@ class Writer:
     def _commit(self, jobs: list[Job[Any]]) -> None:
         done: list[Outcome] = []
         transaction: Transaction | None = None
+        self.metrics.begins()
         try:
             session, transaction = self._connected()
             session.run(lambda: self._together(transaction, jobs, done))
@@ -246,6 +255,9 @@ class Writer:
             log.error("%s was not written: %s", self._database.name, cause_of(error), exc_info=ours)
             self._disconnect()
             done = self._settled(transaction, done, len(jobs), error)
+            self.metrics.failed(len(jobs), cause_of(error))
+        else:
+            self.metrics.over(len(jobs), [events for _, failed, events in done if failed is None])
         self._tell(list(zip(jobs, done, strict=True)))
 
     def _together(

@@ -14,7 +14,6 @@ import anyio
 from litestar import Litestar
 from litestar.types import ASGIApp
 
-from action_assistant.errors import Refused
 from action_assistant.journal.copies import before_upgrade
 from action_assistant.journal.journal import Journal
 from action_assistant.public_url import RUNNER
@@ -32,18 +31,23 @@ from action_assistant.runner.links.port import Reach
 from action_assistant.runner.links.ros2.availability import ros2_reach
 from action_assistant.runner.links.simulated import Simulators
 from action_assistant.runner.review.service import ReviewService
+from action_assistant.runner.review.word_indexer import index_words
 from action_assistant.runner.review.worker_queries import StoragePaths, WorkerQueries
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.robots.registry import Robots
+from action_assistant.runner.start.index_writer import IndexWriter, require_folder
 from action_assistant.runner.start.start_checks import StartSources
+from action_assistant.runner.watched import WatchedRunner
 from action_assistant.runner.workers import RunnerWorkers
 from action_assistant.settings import ARCHIVE, Keep, RunnerSettings
 from action_assistant.web.auth.keys import Keys
 from action_assistant.web.auth.revocations import Revocations
+from action_assistant.web.auth.scrape_token import ScrapeToken
 from action_assistant.web.auth.sessions import revocation
+from action_assistant.web.monitoring.monitoring import Monitoring
 from action_assistant.web.network.addresses import addresses_of
 from action_assistant.web.network.connection_limits import ConnectionLimits
-from action_assistant.web.server.application import Readiness, application
+from action_assistant.web.server.application import application
 
 #: For so long (seconds) a thread may keep the interpreter to itself while the loop waits for it.
 _SWITCH_S: Final = 0.0005
@@ -57,13 +61,13 @@ async def open_services(
     services = services or RunnerServices()
     if settings.behaviours is not None:
         services.behaviours = BehaviourFolder.opened(settings.behaviours)
+    services.index_folders = settings.index_folders
     sys.setswitchinterval(_SWITCH_S)
     journal = await Journal.open(_database(settings), branch="runner", fold=projection.fold)
     try:
-        keep = settings.keep or Keep(folder=settings.data / ARCHIVE)
+        keep = _keep(settings)
         on_disk = anyio.to_thread.run_sync  # threads wait for disks; what computes goes to workers
-        folder, prunes = settings.data / "recordings", keep.raw is None
-        recordings = Recordings(folder, on_disk, prunes=prunes)
+        recordings = Recordings(_folders(settings)["recordings"], on_disk, prunes=keep.raw is None)
         archive_store = ArchiveStore(journal, keep.folder, on_disk)
         place = StoragePaths(_file(settings), keep.folder)
         async with _executing(services, archive_store, recordings, place) as control:
@@ -83,6 +87,7 @@ async def open_services(
             async with anyio.create_task_group() as tasks:
                 tasks.start_soon(services.review_service.run)
                 tasks.start_soon(services.retention.run)
+                tasks.start_soon(index_words, journal)
                 yield services
                 tasks.cancel_scope.cancel()
     finally:
@@ -99,6 +104,7 @@ async def _executing(
     """Workers, robots, and what drives runs on them."""
     async with RunnerWorkers.opened() as workers:
         services.run_in_worker = workers.looks
+        services.lanes = (workers.starts, workers.ours, workers.looks)
         asked = WorkerQueries(workers.looks, place, archive_store)
         ours = WorkerQueries(workers.ours, place, archive_store)  # waits behind nobody's questions
         reach = ros2_reach(utc_us)
@@ -113,6 +119,7 @@ async def _executing(
                 sources=StartSources(
                     services.behaviours,
                     lambda *of: asked.value(ReviewService.checked_courses, *of),
+                    services.index_folders,
                 ),
                 # What moves again is read whole.
                 past=lambda run, whole: (ours if whole else asked).past(run, whole),
@@ -121,6 +128,13 @@ async def _executing(
             asked.opened = ours.opened = control.open
             services.asked, services.control = asked, control
             services.hub = Hub(control, utc_us)
+            services.index_writer = IndexWriter(
+                control.robots,
+                services.index_folders,
+                clock_us=utc_us,
+                run_in_worker=workers.starts,
+                on_disk=anyio.to_thread.run_sync,
+            )
             yield control
 
 
@@ -138,6 +152,15 @@ def _file(settings: RunnerSettings) -> Path:
     return settings.data / "runner.db"
 
 
+def _keep(settings: RunnerSettings) -> Keep:
+    return settings.keep or Keep(folder=settings.data / ARCHIVE)
+
+
+def _folders(settings: RunnerSettings) -> dict[str, Path]:
+    """What is kept beside the database."""
+    return {"archive": _keep(settings).folder, "recordings": settings.data / "recordings"}
+
+
 def _database(settings: RunnerSettings) -> str:
     return f"sqlite:///{_file(settings)}"
 
@@ -146,32 +169,21 @@ def create_app(settings: RunnerSettings) -> ASGIApp:
     """The runner as an ASGI application. Raises CannotStart."""
     if settings.behaviours is not None:
         BehaviourFolder.opened(settings.behaviours)
+    for robot, folder in settings.index_folders.items():
+        require_folder(robot, folder)
     Journal.prepare(_database(settings), "runner", copies=settings.data / before_upgrade.FOLDER)
     revoked = Revocations(settings.data)
     services = RunnerServices()
     public = settings.reached.public
+    monitoring = Monitoring("runner", settings.data)
 
     @asynccontextmanager
     async def lifespan(_: Litestar) -> AsyncIterator[None]:
-        async with open_services(settings, services):
+        async with (
+            open_services(settings, services),
+            monitoring.watching(WatchedRunner(services, _folders(settings))),
+        ):
             yield
-
-    async def ready() -> Readiness:
-        problems: list[str] = []
-        try:
-            await services.journal.position()
-        except Refused as refused:
-            problems.append(refused.detail)
-        unrecorded = [each for each in services.control.open.values() if not each.recorder.recorded]
-        if unrecorded:
-            problems.append(f"{len(unrecorded)} runs are not being recorded")
-        return Readiness(ready=not problems, problems=tuple(problems))
-
-    def measures() -> dict[str, float]:
-        return {
-            "action_assistant_runs_open": len(services.control.open),
-            "action_assistant_live_sockets": len(services.hub.boxes),
-        }
 
     return application(
         [*routes(services), *revocation(revoked)],
@@ -188,8 +200,8 @@ def create_app(settings: RunnerSettings) -> ASGIApp:
         ),
         page_port=settings.page_port,
         lifespan=[lifespan],
-        ready=ready,
-        measures=measures,
+        monitoring=monitoring,
+        scraped=ScrapeToken(settings.metrics_token),
         mount=public.path + RUNNER if public is not None else "",
         body_limit=SMALL,
     )

@@ -23,6 +23,7 @@ from action_assistant.runner.runs.events import (
     decode,
 )
 from action_assistant.runner.runs.queries import OPEN
+from action_assistant.runner.runs.word_index import holds
 from action_assistant.schema.runner_tables import review, robot, run
 
 
@@ -46,7 +47,8 @@ def _run_changes(id_: str, event: RunEvent) -> Sequence[Executable]:
     change = update(run).where(run.c.id == id_)
     match event:
         case Requested() as asked:
-            return (_run(asked),)
+            words = holds(asked.run, asked.graph_name, asked.engine, asked.author.name)
+            return (_run(asked), *words)
         case Published() as sent:
             return (change.values(started_at=sent.at),)
         case StopRequested() as stop:

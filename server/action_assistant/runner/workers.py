@@ -2,13 +2,15 @@
 
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
-from multiprocessing.context import ForkServerProcess
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from anyio import CapacityLimiter
 
 from action_assistant.web.workers import lanes as workers
 from action_assistant.web.workers.lanes import Crashed, Lane, kept_warm
+
+if TYPE_CHECKING:  # not on Windows
+    from multiprocessing.context import ForkServerProcess
 
 __all__ = ["Crashed", "Lane", "RunnerWorkers", "child"]
 
@@ -42,7 +44,7 @@ class RunnerWorkers:
             yield lanes
 
 
-def child(work: Callable[..., None], *args: Any, name: str, nice: int) -> ForkServerProcess:
+def child(work: Callable[..., None], *args: Any, name: str, nice: int) -> "ForkServerProcess":
     """A process of low priority that ends with this one, in which `work(*args)` runs. Waits for it
     to exist. Raises OSError, EOFError."""
     return workers.child(work, *args, name=name, nice=nice, preloaded=_PRELOADED)

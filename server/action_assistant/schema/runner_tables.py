@@ -82,6 +82,24 @@ review: Final = Table(
     Column("words", Text, nullable=False),
     Column("summed", Boolean(create_constraint=False), nullable=False),
 )
+#: The words of runs, in small letters, and which runs hold which: `number` is theirs.
+word: Final = Table(
+    "word",
+    RUNNER,
+    Column("id", Integer, primary_key=True),
+    Column("text", Text, nullable=False, unique=True),
+)
+run_word: Final = Table(
+    "run_word",
+    RUNNER,
+    Column("word", Integer, primary_key=True, autoincrement=False),
+    Column("number", Integer, primary_key=True, autoincrement=False),
+    sqlite_with_rowid=False,
+)
+#: Runs whose words are yet to be found.
+unindexed_run: Final = Table(
+    "unindexed_run", RUNNER, Column("number", Integer, primary_key=True, autoincrement=False)
+)
 #: The labels of runs.
 run_label: Final = Table(
     "run_label",

@@ -136,6 +136,10 @@ CODES: Final[dict[str, Code]] = {
         "other", _WARNING, "a sub-graph with the name of several graphs",
         "the oldest of them is taken",
     ),
+    "subgraph-hidden": Code(
+        "other", _WARNING, "an action of the library with the name of a graph",
+        "the action is taken, never the graph",
+    ),
     "actors": Code(
         "hazard", _ERROR, "several actors, and an engine that cannot synchronise",
         "the engine refuses to start the graph",

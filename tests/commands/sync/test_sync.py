@@ -12,8 +12,9 @@ import httpx
 import pytest
 
 from action_assistant.commands.client import Server
-from action_assistant.commands.sync.folder import ENDING, Folder
+from action_assistant.commands.sync.folder import Folder
 from action_assistant.commands.sync.sync import SyncRound
+from action_assistant.umrf.files.file_names import ENDING
 from editor.process import Editor, running
 from support.doses import examples
 

@@ -134,7 +134,7 @@ async def test_drafts_and_actions_of_the_library_are_no_sub_graphs(tmp_path: Pat
         await services.catalogue.recover(inner, "ada")
         assert await codes(services, outer) == ["H8"]
         action, _ = await services.library_edits.create(b'{"name": "Inner"}', "ada")
-        assert await codes(services, outer) == []
+        assert await codes(services, outer) == ["subgraph-hidden"]
         await services.catalogue.delete(action.id, "ada")
         assert await codes(services, outer) == ["H8"]
 
@@ -143,6 +143,8 @@ async def test_an_action_with_the_name_of_its_own_graph_is_an_action(tmp_path: P
     async with editor(tmp_path) as services:
         dock = await made(services, "Dock", "Dock")
         assert (await codes(services, dock), await told(services, dock)) == ([], (0, 0))
+        await services.library_edits.create(b'{"name": "Dock"}', "ada")
+        assert await codes(services, dock) == []
 
 
 async def test_an_edit_costs_what_it_touches(tmp_path: Path) -> None:

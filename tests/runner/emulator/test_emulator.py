@@ -319,3 +319,22 @@ def test_a_pause_that_an_action_does_not_handle_locks_it_for_ever() -> None:
     david.ask(1, 2000)
     assert answers(david.advance(60_000)) == {}
     assert david.moving == ("patrol",)
+
+
+def test_what_it_indexes_later_can_be_inside_of_what_is_started_later() -> None:
+    whole = json.loads(codec.write(sequence("tour", 1)))
+    text = json.dumps(whole).replace("Work", "leg")
+    david = robot(index=index_of([WORK], []))
+    david.hear(start(text), 1)
+    assert "Could not resolve graph" in told(david.advance(100))[-1]
+    david.reindex(index_of([WORK], [codec.write(sequence("leg", 2))]))
+    david.ask(1, 200)
+    (answer,) = [each for each in david.advance(210) if isinstance(each, GetResponse)]
+    assert [json.loads(each)["graph_name"] for each in answer.indexed] == ["leg"]
+    david.hear(start(text), 300)
+    david.ask(2, 10_000)
+    held = answers(david.advance(10_010))[2]
+    assert {name: each["graph_state"] for name, each in held.items()} == {
+        "tour": "FINISHED",
+        "tour__leg__0": "FINISHED",
+    }

@@ -1,6 +1,7 @@
 """Graphs inside graphs, as `check` sees them."""
 
 import json
+import sys
 from itertools import pairwise
 from typing import Any
 
@@ -75,6 +76,32 @@ def test_graphs_that_contain_each_other_are_found() -> None:
     first, second = graph("First", action("Second")), graph("Second", action("First"))
     assert found(first, first, second) == {"recursion": "error"}
     assert found(graph("outer", action("First")), first, second) == {"recursion": "error"}
+
+
+def test_a_graph_that_is_known_by_another_name_than_its_own_may_contain_itself() -> None:
+    inner = graph("Called otherwise", action("First"))
+    assert found_by_name(graph("outer", action("First")), {"First": inner}) == {"recursion"}
+    ring = {"First": graph("x", action("Second")), "Second": graph("x", action("First"))}
+    assert found_by_name(graph("outer", action("First")), ring) == {"recursion"}
+
+
+def test_an_action_called_like_the_graph_that_it_is_in_is_no_way_into_an_older_one() -> None:
+    older = graph("outer", action("A"))
+    assert found_by_name(graph("outer", action("outer")), {"outer": older}) == {"recursion"}
+
+
+def found_by_name(outer: Graph, graphs: dict[str, Graph]) -> set[str]:
+    return {problem.code for problem in check(outer, graphs=graphs)}
+
+
+def test_a_hierarchy_may_be_deeper_than_the_stack_of_the_interpreter() -> None:
+    depth = 2 * sys.getrecursionlimit()
+    chain = {f"L{n}": graph(f"L{n}", action(f"L{n + 1}")) for n in range(depth)}
+    chain[f"L{depth}"] = graph(f"L{depth}", action("A"), exits=False)
+    (problem,) = check(graph("outer", action("L0")), graphs=chain)
+    assert problem.code == "subgraph"
+    assert problem.inside is not None
+    assert (len(problem.inside.levels), problem.inside.graph) == (depth, f"L{depth - 1}")
 
 
 def beside(*names: str) -> Graph:
@@ -153,7 +180,7 @@ def test_sub_graphs_that_double_with_each_level_are_looked_at_for_a_moment_only(
 def test_an_action_comes_before_a_graph_of_its_name_and_a_graph_before_the_unknown() -> None:
     inner = graph("Inner", action("A"), exits=False)
     outer = graph("outer", action("Inner"))
-    assert found(outer, inner, library={"Inner": Signature()}) == {}
+    assert found(outer, inner, library={"Inner": Signature()}) == {"subgraph-hidden": "warning"}
     assert found(outer, library={}) == {"unknown-action": "warning"}
     assert "unknown-action" not in found(outer, inner, library={})
 
@@ -188,6 +215,15 @@ def test_a_name_of_several_graphs_is_told_at_each_action_that_uses_it() -> None:
     (problem,) = check(outer, graphs=graphs, resolution=resolution)
     assert (problem.code, problem.severity) == ("subgraph-ambiguous", "warning")
     assert problem.where.path == "/actions/0/name"
+
+
+def test_an_action_of_the_library_hides_a_graph_of_its_name_and_that_is_told() -> None:
+    outer, inner = graph("outer", action("Inner")), graph("Inner", action("A"), exits=False)
+    told = [("subgraph-hidden", "warning")]
+    hidden = check(outer, resolution=Resolution(hidden=frozenset({"Inner"})))
+    assert [(each.code, each.severity) for each in hidden] == told
+    known = check(outer, {"Inner": Signature()}, graphs={"Inner": inner})
+    assert [(each.code, each.severity) for each in known] == told
 
 
 def test_more_graphs_inside_than_are_looked_at_are_told() -> None:

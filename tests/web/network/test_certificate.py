@@ -121,6 +121,12 @@ def test_both_processes_speak_tls_and_the_command_line_trusts_them(tmp_path: Pat
             assert "secure" in answer.headers["set-cookie"].lower()
             origin = {"origin": product.url.replace("https", "http")}  # a page without TLS
             assert client.get(f"{product.url}/api/graphs", headers=origin).status_code == 403
+            made = client.post(f"{product.url}/api/graphs", json={"name": "task"}).json()["id"]
+        room = f"{product.url.replace('http', 'ws', 1)}/api/graphs/{made}/room"
+        with connect(room, ssl=trust, additional_headers=headers, proxy=None) as socket:
+            socket.send(b"\x00\x00\x01\x00")
+            while not bytes(socket.recv(10)).startswith(b"\x00\x01"):  # until the document comes
+                pass
         live = product.runner_url.replace("http", "ws", 1) + "/api/live"
         with connect(live, ssl=trust, additional_headers=headers, proxy=None) as socket:
             assert '"hello"' in str(socket.recv(10))

@@ -115,31 +115,3 @@ def test_a_large_file_passes_and_one_that_is_too_large_is_refused_by_us(proxied:
     )
     assert answer.status_code < 500
     assert answer.headers["content-type"].endswith("json")
-
-
-@pytest.mark.long
-def test_doctor_says_whether_the_proxy_leads_to_both_and_passes_sockets_on(
-    proxied: Proxied, tmp_path: Path
-) -> None:
-    def doctor(url: str) -> dict[str, str]:
-        words = ("doctor", "--only", "machine", "--json", "--public-url", url)
-        found = json.loads(proxied.cli(*words, "--data", str(proxied.product.data)).stdout)
-        return {each["topic"]: each["verdict"] for each in found if "public" in each["topic"]}
-
-    assert doctor(proxied.url) == {"page in public": "fine", "runner in public": "fine"}
-    assert doctor("https://localhost:1/")["page in public"] == "wrong"
-    assert doctor("robots.example.org") == {"public address": "wrong"}
-
-
-@pytest.mark.long
-def test_doctor_tells_a_proxy_that_passes_no_sockets_on(proxied: Proxied, tmp_path: Path) -> None:
-    port = free_ports()
-    missing = "    proxy_set_header Upgrade $http_upgrade;\n"
-    with nginx(
-        tmp_path / "proxy", name=NAME, port=port, editor=proxied.product.port, without=missing
-    ) as chain:
-        other = Proxied(proxied.product, f"https://{NAME}:{port}/temoto", chain)
-        words = ("doctor", "--only", "machine", "--data", str(tmp_path), "--public-url", other.url)
-        said = other.cli(*words)
-    assert said.returncode == 1
-    assert f"{other.url}/runner passes no WebSockets on" in said.stdout

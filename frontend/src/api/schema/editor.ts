@@ -48,6 +48,17 @@ export interface EditorApi {
         uses: EditorApi["ActionUse"][];
     };
     /**
+     * Activity
+     * @description What goes on in a process: open sockets; rooms of an editor; runs and robots of a runner.
+     */
+    Activity: {
+        sockets: number;
+        rooms: number | null;
+        runs: number | null;
+        stops_unconfirmed: number | null;
+        robots: EditorApi["RobotLink"][];
+    };
+    /**
      * Answering
      * @description Yes or no to a proposal, of somebody who has seen the draft after its change `seq`.
      */
@@ -86,6 +97,25 @@ export interface EditorApi {
         bad?: number | null;
         /** @default null */
         named_at?: number | null;
+    };
+    /**
+     * BackupsShown
+     * @description The last backup that was made, and what it lacks; the last one that came to nothing since; the last
+     *     trial that restored one; and when the next one is due. Null where there was none.
+     */
+    BackupsShown: {
+        made_at: string | null;
+        bytes: number | null;
+        seconds: number | null;
+        missing: string[];
+        off_site: string | null;
+        failed_at: string | null;
+        failed_why: string | null;
+        proven_at: string | null;
+        unsound: string | null;
+        next_at: string | null;
+        keep: string | null;
+        is_late: boolean;
     };
     /**
      * Behaviour
@@ -218,6 +248,19 @@ export interface EditorApi {
         name?: string | null;
         /** @default null */
         description?: string | null;
+    };
+    /**
+     * Diagnostic
+     * @description One thing that was looked at. With `error` something does not work or is not safe; `warning`
+     *     may matter or not; `fine` has neither code nor remedy. `where`: the file, variable, port or robot.
+     */
+    Diagnostic: {
+        code: string;
+        /** @enum {string} */
+        severity: "error" | "fine" | "warning";
+        where: string;
+        message: string;
+        remedy: string;
     };
     /**
      * Difference
@@ -736,6 +779,16 @@ export interface EditorApi {
         label?: string;
     };
     /**
+     * JournalState
+     * @description What the writer of the journal does. `failing`: why the newest transaction was not stored.
+     */
+    JournalState: {
+        database: string;
+        waiting: number;
+        busy_s: number;
+        failing: string | null;
+    };
+    /**
      * KeyChange
      * @description One key of the document. A value that is left out: the key is not there.
      */
@@ -746,6 +799,17 @@ export interface EditorApi {
         before?: unknown;
         /** @description Any JSON value */
         after?: unknown;
+    };
+    /**
+     * LaneState
+     * @description A queue for workers. `deaths` and `given_up` since the process began.
+     */
+    LaneState: {
+        name: string;
+        waiting: number;
+        busy: number;
+        deaths: number;
+        given_up: number;
     };
     /**
      * LastBuild
@@ -798,6 +862,18 @@ export interface EditorApi {
         pvf_type: string | null;
         required: boolean;
         text: string;
+    };
+    /**
+     * Load
+     * @description What a process takes: seconds of a processor, bytes of memory, descriptors; and how late its loop
+     *     was at worst, in the last minute. Null where the system does not say.
+     */
+    Load: {
+        cpu_s: number;
+        memory: number | null;
+        open_files: number | null;
+        most_files: number;
+        loop_lag_s: number;
     };
     /**
      * MadeGraph
@@ -1156,7 +1232,8 @@ export interface EditorApi {
     };
     /**
      * ProblemDetails
-     * @description What a client is told about a refusal. `type` is stable; `detail` is for people.
+     * @description What a client is told about a refusal. `type` is stable; `detail` is for people. By `request_id`
+     *     the lines of the log are found.
      */
     ProblemDetails: {
         type: string;
@@ -1169,6 +1246,7 @@ export interface EditorApi {
             line?: number;
             column?: number;
         };
+        request_id?: string | null;
     };
     /**
      * Problems
@@ -1177,6 +1255,35 @@ export interface EditorApi {
     Problems: {
         seq: number;
         problems: EditorApi["Problem"][];
+    };
+    /**
+     * ProcessStatus
+     * @description One of the two processes, now. `backups` are the editor's to know.
+     */
+    ProcessStatus: {
+        /** @enum {string} */
+        process: "editor" | "runner";
+        /** Format: date-time */
+        at: string;
+        /** Format: date-time */
+        began_at: string;
+        versions: EditorApi["ProcessVersions"];
+        readiness: EditorApi["Readiness"];
+        load: EditorApi["Load"];
+        journal: EditorApi["JournalState"];
+        storage: EditorApi["StorageShown"] | null;
+        workers: EditorApi["LaneState"][];
+        activity: EditorApi["Activity"];
+        backups: EditorApi["BackupsShown"] | null;
+    };
+    /**
+     * ProcessVersions
+     * @description Of the program, of the Python under it, and of the tables in its database.
+     */
+    ProcessVersions: {
+        program: string;
+        python: string;
+        schema: string;
     };
     /**
      * Proposing
@@ -1201,11 +1308,15 @@ export interface EditorApi {
     };
     /**
      * Readiness
-     * @description Whether the process can do its work, and what stands in the way.
+     * @description Whether the process can do its work, and what stands in the way. `parts`: what each lacks, null
+     *     where it works. Without `rclpy` a process is ready.
      */
     Readiness: {
         ready: boolean;
         problems: string[];
+        parts?: {
+            [key: string]: string | null;
+        };
     };
     /**
      * Rehearsal
@@ -1286,6 +1397,16 @@ export interface EditorApi {
         seq: number;
     };
     /**
+     * RobotLink
+     * @description How a robot is, and when it last answered.
+     */
+    RobotLink: {
+        name: string;
+        state: string;
+        why: string;
+        heard_at: string | null;
+    };
+    /**
      * Script
      * @description Behaviours by key: one entry per call, the last repeats.
      */
@@ -1352,6 +1473,21 @@ export interface EditorApi {
         exact: boolean;
         looked: number;
         partings: EditorApi["CourseChange"][];
+    };
+    /**
+     * StorageShown
+     * @description Bytes: what the disk of the data folder has left, and what is in use.
+     */
+    StorageShown: {
+        /** Format: date-time */
+        at: string;
+        free: number;
+        size: number;
+        database: number | null;
+        wal: number | null;
+        folders: {
+            [key: string]: number;
+        };
     };
     /**
      * StoredEvent

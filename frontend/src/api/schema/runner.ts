@@ -63,6 +63,17 @@ export interface RunnerApi {
         spans: RunnerApi["Spans"];
     };
     /**
+     * Activity
+     * @description What goes on in a process: open sockets; rooms of an editor; runs and robots of a runner.
+     */
+    Activity: {
+        sockets: number;
+        rooms: number | null;
+        runs: number | null;
+        stops_unconfirmed: number | null;
+        robots: RunnerApi["RobotLink"][];
+    };
+    /**
      * AlarmShown
      * @description Something that a person must know now.
      */
@@ -159,6 +170,25 @@ export interface RunnerApi {
         by?: "" | "browser" | "program";
         /** @default  */
         address?: string;
+    };
+    /**
+     * BackupsShown
+     * @description The last backup that was made, and what it lacks; the last one that came to nothing since; the last
+     *     trial that restored one; and when the next one is due. Null where there was none.
+     */
+    BackupsShown: {
+        made_at: string | null;
+        bytes: number | null;
+        seconds: number | null;
+        missing: string[];
+        off_site: string | null;
+        failed_at: string | null;
+        failed_why: string | null;
+        proven_at: string | null;
+        unsound: string | null;
+        next_at: string | null;
+        keep: string | null;
+        is_late: boolean;
     };
     /**
      * Beat
@@ -424,6 +454,31 @@ export interface RunnerApi {
         fault?: ("error" | "false" | "hang" | "init_error") | null;
     };
     /**
+     * FolderLook
+     * @description The folder that the robot's engine indexes, as the runner has it. `writable`: what can be written
+     *     there; `waiting`: graphs that are there as they shall be, and that the engine has not indexed;
+     *     `hindered`: why others cannot be written, as sentences by graph.
+     */
+    FolderLook: {
+        path: string;
+        writable: RunnerApi["WritableGraph"][];
+        waiting: string[];
+        hindered: {
+            [key: string]: string;
+        };
+    };
+    /**
+     * GraphFile
+     * @description A file that was written there. `kept`: where the one that it replaced is now.
+     */
+    GraphFile: {
+        graph: string;
+        path: string;
+        digest: string;
+        /** @default  */
+        kept?: string;
+    };
+    /**
      * GroupRequest
      * @description One version for several robots at once. Without version, digest and `request_id` it can only
      *     be looked at.
@@ -509,9 +564,33 @@ export interface RunnerApi {
         body: unknown;
     };
     /**
+     * IndexWriteAnswer
+     * @description What is in the folder now: files that were `written` anew, that `replaced` others, and graphs that
+     *     were `there` as they shall be.
+     */
+    IndexWriteAnswer: {
+        folder: string;
+        written: RunnerApi["WrittenFile"][];
+        replaced: RunnerApi["WrittenFile"][];
+        there: string[];
+    };
+    /**
+     * IndexWriteRequest
+     * @description The graphs inside of a graph, as a start of it has them: `digest` is that graph's, `tree_digest` of
+     *     all together. `replace`: those that may take the place of another file.
+     */
+    IndexWriteRequest: {
+        subgraphs: RunnerApi["SentSubgraph"][];
+        digest: string;
+        /** @default null */
+        tree_digest?: string | null;
+        /** @default [] */
+        replace?: string[];
+    };
+    /**
      * Item
      * @description One thing that was looked at. A person may override a blocked one where `overridable`, with
-     *     the codes in `codes` and a reason.
+     *     the codes in `codes` and a reason. `folder`: where graphs could be written that the robot lacks.
      */
     Item: {
         code: string;
@@ -521,6 +600,17 @@ export interface RunnerApi {
         codes: string[];
         overridable: boolean;
         problems: RunnerApi["Problem"][];
+        folder: RunnerApi["FolderLook"] | null;
+    };
+    /**
+     * JournalState
+     * @description What the writer of the journal does. `failing`: why the newest transaction was not stored.
+     */
+    JournalState: {
+        database: string;
+        waiting: number;
+        busy_s: number;
+        failing: string | null;
     };
     /**
      * KnownAction
@@ -534,6 +624,17 @@ export interface RunnerApi {
         outputs: {
             [key: string]: string;
         };
+    };
+    /**
+     * LaneState
+     * @description A queue for workers. `deaths` and `given_up` since the process began.
+     */
+    LaneState: {
+        name: string;
+        waiting: number;
+        busy: number;
+        deaths: number;
+        given_up: number;
     };
     /**
      * Listed
@@ -575,6 +676,18 @@ export interface RunnerApi {
         note: string;
         labels: string[];
         archived: RunnerApi["ArchivedShown"] | null;
+    };
+    /**
+     * Load
+     * @description What a process takes: seconds of a processor, bytes of memory, descriptors; and how late its loop
+     *     was at worst, in the last minute. Null where the system does not say.
+     */
+    Load: {
+        cpu_s: number;
+        memory: number | null;
+        open_files: number | null;
+        most_files: number;
+        loop_lag_s: number;
     };
     /**
      * MarkShown
@@ -739,7 +852,8 @@ export interface RunnerApi {
     };
     /**
      * ProblemDetails
-     * @description What a client is told about a refusal. `type` is stable; `detail` is for people.
+     * @description What a client is told about a refusal. `type` is stable; `detail` is for people. By `request_id`
+     *     the lines of the log are found.
      */
     ProblemDetails: {
         type: string;
@@ -752,6 +866,36 @@ export interface RunnerApi {
             line?: number;
             column?: number;
         };
+        request_id?: string | null;
+    };
+    /**
+     * ProcessStatus
+     * @description One of the two processes, now. `backups` are the editor's to know.
+     */
+    ProcessStatus: {
+        /** @enum {string} */
+        process: "editor" | "runner";
+        /** Format: date-time */
+        at: string;
+        /** Format: date-time */
+        began_at: string;
+        versions: RunnerApi["ProcessVersions"];
+        readiness: RunnerApi["Readiness"];
+        load: RunnerApi["Load"];
+        journal: RunnerApi["JournalState"];
+        storage: RunnerApi["StorageShown"] | null;
+        workers: RunnerApi["LaneState"][];
+        activity: RunnerApi["Activity"];
+        backups: RunnerApi["BackupsShown"] | null;
+    };
+    /**
+     * ProcessVersions
+     * @description Of the program, of the Python under it, and of the tables in its database.
+     */
+    ProcessVersions: {
+        program: string;
+        python: string;
+        schema: string;
     };
     /**
      * ProposalRequest
@@ -799,11 +943,15 @@ export interface RunnerApi {
     };
     /**
      * Readiness
-     * @description Whether the process can do its work, and what stands in the way.
+     * @description Whether the process can do its work, and what stands in the way. `parts`: what each lacks, null
+     *     where it works. Without `rclpy` a process is ready.
      */
     Readiness: {
         ready: boolean;
         problems: string[];
+        parts?: {
+            [key: string]: string | null;
+        };
     };
     /**
      * Recorded
@@ -970,15 +1118,26 @@ export interface RunnerApi {
         unread: number;
     };
     /**
+     * RobotLink
+     * @description How a robot is, and when it last answered.
+     */
+    RobotLink: {
+        name: string;
+        state: string;
+        why: string;
+        heard_at: string | null;
+    };
+    /**
      * RobotLogLine
-     * @description A line of a robot's flight record. `has_graph`: its graph can be fetched.
+     * @description A line of a robot's flight record. `has_graph`: its graph can be fetched; `graphs`: names of graphs
+     *     for its index; `files`: what was written for it.
      */
     RobotLogLine: {
         seq: number;
         /** Format: date-time */
         at: string;
         /** @enum {string} */
-        kind: "became" | "commanded" | "stop_asked" | "stop_proven" | "stop_unproven";
+        kind: "became" | "commanded" | "index_write_asked" | "index_written" | "stop_asked" | "stop_proven" | "stop_unproven";
         command: string;
         graph: string;
         sender: string;
@@ -987,6 +1146,8 @@ export interface RunnerApi {
         run: string | null;
         number: number | null;
         has_graph: boolean;
+        graphs: string[];
+        files: RunnerApi["GraphFile"][];
     };
     /**
      * RobotStopped
@@ -1331,6 +1492,21 @@ export interface RunnerApi {
         runs: string[];
     };
     /**
+     * StorageShown
+     * @description Bytes: what the disk of the data folder has left, and what is in use.
+     */
+    StorageShown: {
+        /** Format: date-time */
+        at: string;
+        free: number;
+        size: number;
+        database: number | null;
+        wal: number | null;
+        folders: {
+            [key: string]: number;
+        };
+    };
+    /**
      * SubgraphShown
      * @description A graph inside of the one that was started, as it was sent along, by the name of the actions that
      *     stand for it. `graph`: its id; `version`: of it, where there was one.
@@ -1409,5 +1585,24 @@ export interface RunnerApi {
         relation?: string;
         line?: number;
         column?: number;
+    };
+    /**
+     * WritableGraph
+     * @description A graph that can be written. `replaces`: the path of the file that would be put aside, from the
+     *     folder; "" for none.
+     */
+    WritableGraph: {
+        graph: string;
+        replaces: string;
+    };
+    /**
+     * WrittenFile
+     * @description A file that was written, and where the one that it replaced is kept.
+     */
+    WrittenFile: {
+        graph: string;
+        path: string;
+        /** @default  */
+        kept?: string;
     };
 }

@@ -6,6 +6,7 @@ import type { EditActionGroup } from "../../edit-actions/edit-action";
 import { keepOwn, useOwnShortcuts } from "../../edit-actions/keys/own-shortcuts";
 import { ShortcutKeys } from "../../edit-actions/keys/shortcut-keys";
 import { useSingleKeys } from "../../edit-actions/keys/shortcuts";
+import { HelpLink } from "../../status/help-link";
 import { ShortcutRow } from "./shortcut-row";
 import style from "./shortcut-sheet.module.css";
 
@@ -71,6 +72,7 @@ export function ShortcutSheet({ onClose }: { onClose: () => void }) {
             Reset all keys
           </Button>
         )}
+        <HelpLink place="drawing.html#with-keys" words="Help: drawing" />
       </div>
       <div className={style.groups}>
         <FixedShortcuts />

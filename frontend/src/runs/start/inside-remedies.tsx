@@ -11,6 +11,8 @@ export interface MomentLookedAt {
   readonly seq: number;
   /** What leads away from the look closes it. */
   readonly onLeave: () => void;
+  /** Look again, now. */
+  readonly onLookAgain: () => void;
 }
 
 interface Props extends MomentLookedAt {
@@ -18,7 +20,7 @@ interface Props extends MomentLookedAt {
   look: Preflight;
 }
 
-function Files({ graph, seq }: Omit<MomentLookedAt, "onLeave">) {
+function Files({ graph, seq }: Omit<MomentLookedAt, "onLeave" | "onLookAgain">) {
   const path = `/api/graphs/${encodeURIComponent(graph)}/subgraphs.zip?at=${seq}`;
   return (
     <a className={style.remedy} href={serverPath(path)} download="graphs_inside.zip">
@@ -27,7 +29,7 @@ function Files({ graph, seq }: Omit<MomentLookedAt, "onLeave">) {
   );
 }
 
-function OneGraph({ graph, onLeave }: Omit<MomentLookedAt, "seq">) {
+function OneGraph({ graph, onLeave }: Omit<MomentLookedAt, "seq" | "onLookAgain">) {
   return (
     <Link
       className={style.remedy}

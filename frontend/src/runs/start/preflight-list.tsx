@@ -4,6 +4,7 @@ import { IconAlertTriangle, IconCheck, IconX } from "@tabler/icons-react";
 import type { Preflight, PreflightItem } from "../../api/robots";
 import { SIMULATOR } from "../../api/robots";
 import { colorOfName } from "../../ui/name-colors";
+import { IndexWriting } from "./index-writing";
 import { InsideRemedies, type MomentLookedAt } from "./inside-remedies";
 import style from "./preflight-list.module.css";
 
@@ -49,6 +50,9 @@ function Line({ item, look, moment }: PreflightLineProps) {
               ))}
             </ul>
           </details>
+        )}
+        {item.code === "subgraphs" && (
+          <IndexWriting item={item} look={look} robot={look.engine} {...moment} />
         )}
         <InsideRemedies item={item} look={look} {...moment} />
       </span>

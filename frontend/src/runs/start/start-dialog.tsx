@@ -13,6 +13,7 @@ import { type Preflight, type Robot, SIMULATOR } from "../../api/robots";
 import type { Run } from "../../api/runs";
 import { useMay } from "../../api/use-person";
 import { EngineLabel } from "../../status/engine-label";
+import { HelpLink } from "../../status/help-link";
 import { HoldButton } from "../../ui/floating/hold-button";
 import { colorOfName } from "../../ui/name-colors";
 import { useBehaviours } from "./behaviours-choice";
@@ -55,7 +56,8 @@ function useLook(graph: string, seq: number, engines: readonly string[], behavio
     staleTime: 0,
     retry: false,
   });
-  return { look, error: umrf.error ?? look.error };
+  const lookSoon = () => void look.refetch({ cancelRefetch: false });
+  return { look, lookSoon, error: umrf.error ?? look.error };
 }
 
 /** The simulator goes alone; robots go together. */
@@ -176,7 +178,7 @@ export function StartDialog(props: Props) {
   const [reason, setReason] = useState("");
   const { now } = useLive();
   const { behaviours, choice } = useBehaviours(engines.includes(SIMULATOR));
-  const { look, error } = useLook(graph, seq, engines, behaviours);
+  const { look, lookSoon, error } = useLook(graph, seq, engines, behaviours);
   const start = useStart(graph);
   const looks = look.data;
   const codes = [...new Set((looks ?? []).flatMap((each) => each.override))];
@@ -220,7 +222,7 @@ export function StartDialog(props: Props) {
           aria-busy={look.isFetching}
         >
           <header className={style.lookHead}>
-            <h3>Before the start</h3>
+            <h3>Before the start</h3> <HelpLink place="operators-guide.html#before-a-start" />
             <Button
               size="compact-xs"
               variant="subtle"
@@ -241,7 +243,7 @@ export function StartDialog(props: Props) {
               engine={engine}
               alone={engines.length === 1}
               look={looks?.find((each) => each.engine === engine)}
-              moment={{ graph, seq, onLeave: onClose }}
+              moment={{ graph, seq, onLeave: onClose, onLookAgain: lookSoon }}
             />
           ))}
         </section>

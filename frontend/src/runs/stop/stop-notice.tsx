@@ -5,6 +5,7 @@ import { useState } from "react";
 import type { LiveState, StopRequest } from "../../api/live/live-socket";
 import { foreignGraphs, openRuns, useLive } from "../../api/live/use-live";
 import { needsRestConfirmation, type Run } from "../../api/runs";
+import { HelpLink } from "../../status/help-link";
 import { useRootMark } from "../../ui/hooks/use-root-mark";
 import { clock, duration, useNow } from "../../ui/times";
 import { ConfirmRestButton } from "./confirm-rest-button";
@@ -199,6 +200,12 @@ export function StopNotice() {
           <span aria-hidden className={style.since}>
             {` ${notice.since}`}
           </span>
+        )}
+        {notice.tone === "loud" && (
+          <>
+            {" "}
+            <HelpLink place="operators-guide.html#stop-unconfirmed" words="What to do" />
+          </>
         )}
       </span>
       {looked && <ConfirmRestButton run={looked} loud />}

@@ -42,7 +42,9 @@ from action_assistant.web.auth.keys import TOKEN_FILE
 #: What archives are of, in their folder.
 _ARCHIVES: Final = ("runs", "raw")
 #: Of the environment, and never in what a backup says of itself.
-_SECRET: Final = frozenset({"ACTION_ASSISTANT_TOKEN", "ACTION_ASSISTANT_DATABASE"})
+_SECRET: Final = frozenset(
+    {"ACTION_ASSISTANT_TOKEN", "ACTION_ASSISTANT_DATABASE", "ACTION_ASSISTANT_METRICS_TOKEN"}
+)
 _ROOM: Final = 64 << 20  # bytes that have to be left on the disk
 
 

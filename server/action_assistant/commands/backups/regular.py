@@ -2,7 +2,6 @@
 rule, a command takes each finished one elsewhere, and what became of it is written down."""
 
 import contextlib
-import fcntl
 import os
 import select
 import shlex
@@ -25,6 +24,7 @@ from action_assistant.errors import CannotStart
 from action_assistant.journal.copies import backup_state
 from action_assistant.journal.copies.backup_state import BackupSchedule, OffSite
 from action_assistant.private_files import make_folder, opener
+from action_assistant.system import file_locks
 
 _LOCK: Final = ".action-assistant.lock"
 _PATIENCE: Final = 6 * 3600.0  # seconds that a command may take
@@ -112,10 +112,8 @@ def _alone(into: Path) -> Iterator[None]:
     make_folder(into)
     lock = opener(str(into / _LOCK), os.O_RDWR | os.O_CREAT)
     try:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            raise CannotStart(f"Another backup is just being made into {into}.") from error
+        if not file_locks.take(lock):
+            raise CannotStart(f"Another backup is just being made into {into}.")
         for left in into.glob(".backup-*"):
             shutil.rmtree(left, ignore_errors=True)
         yield

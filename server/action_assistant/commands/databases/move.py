@@ -78,7 +78,19 @@ def _move(options: argparse.Namespace) -> int:
             "From one Postgres to another the way leads through the data folder: "
             "`move --to sqlite` first, then `move --to URL`."
         )
-    begun, progress = time.monotonic(), Progress()
+    begun = time.monotonic()
+    events, aside = _moved(data, source, target)
+    _tell(data, source, target, aside)
+    print(
+        f"{events} events, each compared, and all tables alike ({time.monotonic() - begun:.1f} s)"
+    )
+    return 0
+
+
+def _moved(data: Path, source: str, target: str) -> tuple[int, Path | None]:
+    """Take the graphs there while nobody else can write; how many events, and where what was in the
+    folder is now. Raises CannotStart."""
+    progress = Progress()
     database = database_of(source)
     try:
         session = database.open("editor", partial(keep_copy, data / FOLDER))
@@ -98,11 +110,7 @@ def _move(options: argparse.Namespace) -> int:
     finally:
         database.disown()
     progress.end()
-    _tell(data, source, target, aside)
-    print(
-        f"{events} events, each compared, and all tables alike ({time.monotonic() - begun:.1f} s)"
-    )
-    return 0
+    return events, aside
 
 
 def _target(data: Path, to: str) -> str:

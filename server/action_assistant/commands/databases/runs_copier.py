@@ -28,7 +28,6 @@ from sqlalchemy.exc import DBAPIError
 from sqlalchemy.ext.asyncio import AsyncEngine
 
 from action_assistant.commands.backups.progress import Progress
-from action_assistant.commands.databases.runs_copy import SCHEMA
 from action_assistant.errors import CannotStart, Refused, Unavailable
 from action_assistant.journal.database import cause_of
 from action_assistant.journal.events import Event
@@ -43,6 +42,8 @@ _PAGE: Final = 500  # events in a transaction
 _PAUSE: Final = 1.0  # seconds between two looks
 _AWAY: Final = 10.0  # seconds between attempts while the database is away
 _FAULTS: Final = (DBAPIError, asyncpg.PostgresError, asyncpg.InterfaceError, OSError)
+#: Of Postgres, which has the copies.
+SCHEMA: Final = "action_assistant_runs"
 _COPY: Final = MetaData(schema=SCHEMA)
 #: The events, with what they say as bytes; a view beside it has it as JSON.
 _event: Final = Table(

@@ -3,20 +3,18 @@
 import argparse
 import asyncio
 from pathlib import Path
-from typing import Final
 
 from action_assistant import paths, settings
 from action_assistant.commands.backups.progress import Progress
 from action_assistant.errors import CannotStart
-
-SCHEMA: Final = "action_assistant_runs"
 
 
 def add_to(runs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the command to `runs`."""
     copy = runs.add_parser(
         "copy",
-        help=f"copy runs into the schema {SCHEMA} of a Postgres database, for your own queries",
+        help="copy runs into the schema action_assistant_runs of a Postgres database, for your own "
+        "queries",
         epilog="example: action-assistant runs copy --to postgresql://lab@db/lab --follow",
     )
     copy.add_argument("--to", required=True, metavar="URL", help="postgresql://USER@HOST/NAME")

@@ -1,22 +1,15 @@
 """Files below a folder, read and replaced all together; no link is followed."""
 
 import errno
-import os
 import secrets
-import stat
-from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import Final
 
 import msgspec
 
+from action_assistant.commands.packages.directories import Directory, closing, opened
 from action_assistant.errors import CannotStart
-
-_TOP: Final = os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC
-_FOLDER: Final = _TOP | os.O_NOFOLLOW
-_READ: Final = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
-_MAKE: Final = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
 
 
 class FolderContents(msgspec.Struct, frozen=True):
@@ -39,7 +32,7 @@ def contents(root: Path, paths: Iterable[str]) -> FolderContents:
     present: dict[str, bytes] = {}
     barred: dict[str, str] = {}
     try:
-        top = os.open(root, _TOP)
+        top = opened(root)
     except FileNotFoundError:
         return FolderContents()
     except OSError as error:
@@ -53,7 +46,7 @@ def contents(root: Path, paths: Iterable[str]) -> FolderContents:
             except OSError as error:
                 barred[path] = _reason(error)
     finally:
-        os.close(top)
+        top.close()
     return FolderContents(present, barred)
 
 
@@ -66,7 +59,7 @@ def write_all(root: Path, steps: Sequence[FileStep], known: Mapping[str, bytes])
     """
     try:
         root.mkdir(parents=True, exist_ok=True)
-        top = os.open(root, _TOP)
+        top = opened(root)
     except OSError as error:
         raise CannotStart(f"Cannot make {root}: {error.strerror}.") from error
     staged: list[str | None] = []
@@ -93,7 +86,7 @@ def write_all(root: Path, steps: Sequence[FileStep], known: Mapping[str, bytes])
             raise CannotStart(reason) from error
         raise
     finally:
-        os.close(top)
+        top.close()
 
 
 def _reason(error: OSError) -> str:
@@ -107,39 +100,26 @@ def _reason(error: OSError) -> str:
             return error.strerror or str(error)
 
 
-def _inside(top: int, path: str, make: bool = False) -> tuple[int, str]:
+@contextmanager
+def _inside(top: Directory, path: str, make: bool = False) -> Iterator[tuple[Directory, str]]:
     """The folder of a path, opened step by step, and the last name."""
     *folders, name = path.split("/")
     if any(part in {"", ".", ".."} or "\x00" in part for part in (*folders, name)):
         raise OSError(errno.EINVAL, "the path leads out of the folder")
-    at = os.dup(top)
-    for folder in folders:
-        try:
-            if make:
-                with suppress(FileExistsError):
-                    os.mkdir(folder, dir_fd=at)
-            below = os.open(folder, _FOLDER, dir_fd=at)
-        finally:
-            os.close(at)
-        at = below
-    return at, name
+    with ExitStack() as held:
+        at = top
+        for folder in folders:
+            at = held.enter_context(closing(at.below(folder, make=make)))
+        yield at, name
 
 
-def _content(top: int, path: str) -> tuple[bytes, int]:
+def _content(top: Directory, path: str) -> tuple[bytes, int]:
     """What a file holds, and who may do what with it."""
-    at, name = _inside(top, path)
-    try:
-        file = os.open(name, _READ, dir_fd=at)
-    finally:
-        os.close(at)
-    with os.fdopen(file, "rb") as opened:
-        mode = os.fstat(opened.fileno()).st_mode
-        if not stat.S_ISREG(mode):
-            raise OSError(errno.EINVAL, "it is no file")
-        return opened.read(), stat.S_IMODE(mode)
+    with _inside(top, path) as (at, name):
+        return at.read(name)
 
 
-def _prove_unchanged(top: int, path: str, known: bytes | None) -> None:
+def _prove_unchanged(top: Directory, path: str, known: bytes | None) -> None:
     try:
         there = _content(top, path)[0]
     except FileNotFoundError:
@@ -148,24 +128,14 @@ def _prove_unchanged(top: int, path: str, known: bytes | None) -> None:
         raise OSError(errno.EBUSY, "it was changed while this was at work; call again")
 
 
-def _stage(top: int, path: str, content: bytes) -> str:
+def _stage(top: Directory, path: str, content: bytes) -> str:
     """Writes a new file beside the path, as open to others as the one that is there. Returns its name."""
-    at, name = _inside(top, path, make=True)
-    new = f".{name}.{secrets.token_hex(4)}"
-    try:
-        file = os.open(new, _MAKE, 0o666, dir_fd=at)
-        try:
-            with os.fdopen(file, "wb") as opened:
-                with suppress(FileNotFoundError):
-                    os.fchmod(file, _content(top, path)[1])
-                opened.write(content)
-                opened.flush()
-                os.fsync(file)
-        except BaseException:
-            os.unlink(new, dir_fd=at)
-            raise
-    finally:
-        os.close(at)
+    with _inside(top, path, make=True) as (at, name):
+        new = f".{name}.{secrets.token_hex(4)}"
+        mode = None
+        with suppress(FileNotFoundError):
+            mode = at.read(name)[1]
+        at.write_new(new, content, mode)
     return new
 
 
@@ -173,19 +143,15 @@ def _beside(path: str, name: str) -> str:
     return "/".join((*path.split("/")[:-1], name))
 
 
-def _do(top: int, path: str, staged: str | None) -> None:
-    at, name = _inside(top, path)
-    try:
+def _do(top: Directory, path: str, staged: str | None) -> None:
+    with _inside(top, path) as (at, name):
         if staged is None:
-            os.unlink(name, dir_fd=at)
+            at.remove(name)
         else:
-            os.replace(staged, name, src_dir_fd=at, dst_dir_fd=at)
-        os.fsync(at)  # the steps reach the disk in their order, too
-    finally:
-        os.close(at)
+            at.replace(staged, name)
 
 
-def _undo(top: int, done: Sequence[FileStep], known: Mapping[str, bytes]) -> None:
+def _undo(top: Directory, done: Sequence[FileStep], known: Mapping[str, bytes]) -> None:
     """The last first, as far as the disk lets us; what stays is a call that was not finished."""
     for path in reversed(dict.fromkeys(step.path for step in done)):
         with suppress(OSError):
@@ -195,5 +161,5 @@ def _undo(top: int, done: Sequence[FileStep], known: Mapping[str, bytes]) -> Non
                 _remove(top, path)
 
 
-def _remove(top: int, path: str) -> None:
+def _remove(top: Directory, path: str) -> None:
     _do(top, path, None)

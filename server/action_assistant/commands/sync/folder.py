@@ -2,18 +2,16 @@
 
 import hashlib
 import os
-import re
 from pathlib import Path
 from typing import Final
 
 import msgspec
 
 from action_assistant.errors import CannotStart
+from action_assistant.umrf.files.file_names import ENDING, graph_file_name
 
-ENDING: Final = ".umrf.graph.json"
 _STATE: Final = ".action-assistant-sync.json"
 _ASIDE: Final = ".aside"
-_UNFIT: Final = re.compile(r"[^A-Za-z0-9_.-]+")
 
 
 class SyncedFile(msgspec.Struct, frozen=True):
@@ -61,10 +59,9 @@ class Folder:
 
     def free_name(self, graph_name: str) -> str:
         """A name for the file of a graph that has none."""
-        stem = _UNFIT.sub("_", graph_name).strip("._")[:80] or "graph"
         number = 1
         while True:
-            name = f"{stem}{'' if number == 1 else f'-{number}'}{ENDING}"
+            name = graph_file_name(graph_name, number)
             if name not in self.known and not (self._path / name).exists():
                 return name
             number += 1

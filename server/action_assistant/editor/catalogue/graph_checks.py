@@ -69,15 +69,21 @@ class _Member(msgspec.Struct, frozen=True):
 
 class NamedInside(msgspec.Struct, frozen=True):
     """What is inside of a graph, by name: what a result depends on besides the graph itself. `several`:
-    names of more than one graph; `cut`: there are more than these."""
+    names of more than one graph; `cut`: there are more than these; `hidden`: names of graphs that an
+    action of the library has, too."""
 
     members: tuple[_Member, ...] = ()
     several: tuple[str, ...] = ()
     cut: bool = False
+    hidden: tuple[str, ...] = ()
+
+    def __bool__(self) -> bool:
+        """Whether a result depends on any of it."""
+        return bool(self.members or self.hidden)
 
     def key(self) -> bytes:
         """The same for the same graphs at the same moments."""
-        return sha256(msgspec.msgpack.encode(self)).digest() if self.members else b""
+        return sha256(msgspec.msgpack.encode(self)).digest() if self else b""
 
 
 class GraphChecks:
@@ -144,7 +150,7 @@ class GraphChecks:
             about = await self._about(graph, newest)
             named = await self._resolved(about.info.name, about.info.uses)
             counts, told = about.info.problems, about.info.told
-            if named.members:
+            if named:
                 counts, told = await self._counted(graph, about.seq, named)
         except HOPELESS as error:  # others are in the list too
             log.error("%s: nothing can be said of change %d: %s", graph, newest, error.detail)
@@ -214,11 +220,14 @@ class GraphChecks:
         """What is inside, level by level. An action with the name of the graph that it is in is an
         action: no engine runs a graph inside itself."""
         found: dict[str, _Member] = {}
+        hidden: set[str] = set()
         level, actions, cut = [(own, uses)], 0, False
         while level:
             below: list[tuple[str, Iterable[str]]] = []
             for graph, names in level:
                 for name in names:
+                    if name != graph and self.names.is_hidden(name):
+                        hidden.add(name)
                     if name == graph or name in found or not self.names.graph(name):
                         continue
                     about = await self._standing_for(name)
@@ -233,7 +242,7 @@ class GraphChecks:
             level = below
         members = tuple(found[name] for name in sorted(found))
         several = tuple(each.name for each in members if self.names.is_ambiguous(each.name))
-        return NamedInside(members, several, cut)
+        return NamedInside(members, several, cut, tuple(sorted(hidden)))
 
     async def _standing_for(self, name: str) -> tuple[_Member, GraphInfo] | None:
         known = self.names.graph(name)
@@ -249,7 +258,7 @@ class GraphChecks:
 
     async def _seen(self, named: NamedInside) -> Inside:
         graphs = [(each.name, await self._sight(each.graph, each.seq)) for each in named.members]
-        return Inside(tuple(graphs), named.several, named.cut)
+        return Inside(tuple(graphs), named.several, named.cut, named.hidden)
 
     async def _sight(self, graph: str, seq: int) -> GraphAtSeq:
         """A graph at a moment. Raises Unavailable."""

@@ -75,6 +75,10 @@ class GraphNames:
         """Whether several graphs have the name."""
         return len(self._graphs.get(name, ())) > 1
 
+    def is_hidden(self, name: str) -> bool:
+        """Whether a graph has the name, and an action of the library, which comes first."""
+        return bool(self._actions[name]) and name in self._graphs
+
     def is_taken(self, name: str) -> bool:
         """Whether a graph, or an action of the library, has the name."""
         return name in self._graphs or bool(self._actions[name])

@@ -1,13 +1,12 @@
 """Events put together into a document, which travels as the bytes of a snapshot. For workers."""
 
-from collections.abc import Sequence
-
 import msgspec
 
+from action_assistant.editor.crdt.event_columns import EventColumns
 from action_assistant.editor.crdt.messages import Malformed
 from action_assistant.editor.crdt.replica import Panicked, Replica, ReplicaState
+from action_assistant.editor.crdt.sound_updates import Uncertain
 from action_assistant.errors import Unavailable
-from action_assistant.journal.events import Event
 
 
 class StreamDamage(msgspec.Struct, frozen=True):
@@ -25,7 +24,22 @@ class Folded(msgspec.Struct, frozen=True):
     damaged: StreamDamage | None = None
 
 
-def fold(document: bytes, events: Sequence[Event], learn: bool) -> Folded | None:
+def fold_sound(document: bytes, events: EventColumns) -> Folded | None:
+    """As `fold` with learning, of events that are what rooms took: each is read as a whole only where
+    that is needed. Such that no room took may end the process."""
+    replica = ReplicaState.replica(document) if document else Replica()
+    if replica is None:
+        return None
+    try:
+        replica.replay_sound(events)
+        return Folded(ReplicaState.of(replica), events.last)
+    except (Malformed, Panicked, Uncertain):
+        return fold(document, events, learn=True)
+    finally:
+        replica.close()
+
+
+def fold(document: bytes, events: EventColumns, learn: bool) -> Folded | None:
     """A document, as the bytes of a snapshot or nothing, after some events that follow it; None when
     these bytes are no document."""
     replica = ReplicaState.replica(document) if document else Replica()
@@ -33,40 +47,40 @@ def fold(document: bytes, events: Sequence[Event], learn: bool) -> Folded | None
         return None
     try:
         replica.replay(events, learn=learn)
-        return Folded(ReplicaState.of(replica), events[-1].seq)
+        return Folded(ReplicaState.of(replica), events.last)
     except (Malformed, Panicked):
         return _before_the_bad(document, events, learn=learn)
     finally:
         replica.close()
 
 
-def _before_the_bad(document: bytes, events: Sequence[Event], *, learn: bool) -> Folded:
+def _before_the_bad(document: bytes, events: EventColumns, *, learn: bool) -> Folded:
     """As `fold`, up to the first event that cannot be applied. A replica in which something failed
     is not gone on with."""
     bad, why = _first_bad(document, events)
-    good = events[:bad]
-    damaged = StreamDamage(events[bad].seq, why)
-    if not good:
-        return Folded(document, events[bad].seq - 1, damaged)
+    damaged = StreamDamage(events.first + bad, why)
+    if not bad:
+        return Folded(document, events.first - 1, damaged)
+    good = events.part(0, bad)
     replica = ReplicaState.replica(document) if document else Replica()
     assert replica is not None
     try:
         replica.replay(good, learn=learn)
-        return Folded(ReplicaState.of(replica), good[-1].seq, damaged)
+        return Folded(ReplicaState.of(replica), good.last, damaged)
     finally:
         replica.close()
 
 
-def _first_bad(document: bytes, events: Sequence[Event]) -> tuple[int, str]:
-    """Which of these events cannot be applied, and why."""
+def _first_bad(document: bytes, events: EventColumns) -> tuple[int, str]:
+    """The place of the one among these events that cannot be applied, and why."""
     replica = ReplicaState.replica(document) if document else Replica()
     assert replica is not None
     try:
-        for n, event in enumerate(events):
+        for n in range(len(events)):
             try:
-                replica.replay([event])
+                replica.replay(events.part(n, n + 1))
             except (Malformed, Panicked) as error:
                 return n, str(error)
     finally:
         replica.close()
-    raise Unavailable(f"{events[0].stream} reads otherwise each time.")
+    raise Unavailable("A log reads otherwise each time.")

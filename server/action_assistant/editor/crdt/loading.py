@@ -1,17 +1,19 @@
 """Loads documents from the log: snapshot and tail, folded in a worker, piece by piece."""
 
+import asyncio
 import logging
 from typing import Final
 
 import msgspec
 
-from action_assistant.editor.crdt.folding import StreamDamage, fold
+from action_assistant.editor.crdt.event_columns import EventColumns
+from action_assistant.editor.crdt.folding import Folded, StreamDamage, fold, fold_sound
 from action_assistant.editor.crdt.log_tail import LogTail
 from action_assistant.editor.crdt.replica import Replica, ReplicaState
 from action_assistant.errors import Unavailable
 from action_assistant.journal.events import StreamSnapshot
 from action_assistant.journal.journal import Journal
-from action_assistant.web.workers.lanes import RunInWorker, run_here
+from action_assistant.web.workers.lanes import Crashed, OutOfTime, RunInWorker, run_here
 
 log: Final = logging.getLogger(__name__)
 
@@ -99,10 +101,7 @@ async def _followed(
     start, document = (0, b"") if snapshot is None else (snapshot.seq, snapshot.state)
     tail = LogTail(journal, stream, start, upto)
     while events := await tail.next():
-        size = len(document) + sum(len(event.body) for event in events)
-        folded = await (run_here if size <= _SMALL else run_in_worker)(
-            fold, document, events, learn
-        )
+        folded = await _folded(tail, document, events, learn, run_in_worker)
         if folded is None:  # not a snapshot of ours
             return await _followed(
                 journal, stream, None, upto, learn=learn, run_in_worker=run_in_worker
@@ -112,6 +111,50 @@ async def _followed(
             log.error("%s %d cannot be applied: %s", stream, folded.seq + 1, folded.damaged.why)
             return Stored(document, folded.seq, start, folded.damaged)
     return Stored(document, tail.seq, start, tail.damaged)
+
+
+async def _folded(
+    tail: LogTail, document: bytes, events: EventColumns, learn: bool, run_in_worker: RunInWorker
+) -> Folded | None:
+    """As `fold`, of those events that are as they were written. In this process nothing is applied
+    before that is known, and nothing that was not read as a whole."""
+    if run_in_worker is run_here or len(document) + events.size <= _SMALL:
+        return _fold(document, events.part(0, await tail.sound()), learn)
+    folding = asyncio.ensure_future(_folded_aside(document, events, learn, run_in_worker))
+    folding.add_done_callback(_heard)
+    try:
+        good = await tail.sound()  # meanwhile
+        if good == len(events):
+            return await folding
+    finally:
+        folding.cancel()
+    some = events.part(0, good)
+    if not good or len(document) + some.size <= _SMALL:
+        return _fold(document, some, learn)
+    return await _folded_aside(document, some, learn, run_in_worker)
+
+
+def _heard(folding: "asyncio.Future[Folded | None]") -> None:
+    """What became of events that are not what was written is of no interest."""
+    if not folding.cancelled():
+        folding.exception()
+
+
+async def _folded_aside(
+    document: bytes, events: EventColumns, learn: bool, run_in_worker: RunInWorker
+) -> Folded | None:
+    if not learn:
+        return await run_in_worker(fold, document, events, learn)
+    try:
+        return await run_in_worker(fold_sound, document, events)
+    except OutOfTime:
+        raise
+    except Crashed:
+        return await run_in_worker(fold, document, events, learn)
+
+
+def _fold(document: bytes, events: EventColumns, learn: bool) -> Folded | None:
+    return fold(document, events, learn) if len(events) else Folded(document, events.first - 1)
 
 
 async def _snapshot(journal: Journal, stream: str) -> StreamSnapshot | None:

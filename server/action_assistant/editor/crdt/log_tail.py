@@ -1,11 +1,13 @@
 """The events of a stream as they were written, up to the first that is not."""
 
+import asyncio
 import logging
 from collections.abc import Sequence
 from typing import Any, Final
 
 from sqlalchemy import Select, select
 
+from action_assistant.editor.crdt.event_columns import EventColumns
 from action_assistant.editor.crdt.folding import StreamDamage
 from action_assistant.errors import Unavailable
 from action_assistant.journal.chain import START, link
@@ -15,7 +17,9 @@ from action_assistant.schema import editor_tables
 
 log: Final = logging.getLogger(__name__)
 
-SLICE: Final = 500  # events that are read at once
+SLICES: Final = (2_000, 500)  # events read at once; fewer where not all of those can be read
+TOGETHER: Final = 200_000  # events, or
+TOGETHER_BYTES: Final = 16 << 20  # in their bodies, after which those so far are put together
 _COLUMNS: Final = (*Event.__struct_fields__, "chain")
 _TYPES: Final = (str, int, str, str, int, bytes, int, bytes)
 
@@ -30,32 +34,60 @@ class LogTail:
         self._stream = stream
         self._upto = upto
         self._chain = START if after == 0 else None
+        self._unchecked: list[Sequence[Any]] = []
+        self._ended = False
 
-    async def next(self) -> list[Event]:
-        """The next sound events; none when there are no more. Raises Unavailable."""
-        if self.damaged is not None:
-            return []
-        rows = await self._rows()
-        events: list[Event] = []
-        for row in rows:
-            why = self._fault(row)
-            if why is not None:
-                self._stop(why)
-                break
-            self.seq, self._chain = row[1], row[7]
-            events.append(Event(*row[:7]))
-        if not rows and self.damaged is None:
-            await self._check_end()
-        return events
+    async def next(self) -> EventColumns | None:
+        """The next events, as many as one should put together at once; None when there are no more.
+        Which of them are as they were written `sound` says. Raises Unavailable."""
+        rows: list[Sequence[Any]] = []
+        size = 0
+        while not self._ended and len(rows) < TOGETHER and size < TOGETHER_BYTES:
+            more = self._in_place(await self._rows())
+            size += sum(len(row[5]) for row in more)
+            rows += more
+            if not more and self.damaged is None:
+                await self._check_end()
+            if not more or self.damaged is not None:
+                self._ended = True
+        self._unchecked = rows
+        return _columns(rows) if rows else None
+
+    async def sound(self) -> int:
+        """How many of the events that were given out last are as they were written, from the first
+        one on; there are no more where not all are."""
+        rows, self._unchecked = self._unchecked, []
+        good = await asyncio.to_thread(_linked, rows, self._chain or START)
+        if good < len(rows):
+            self._ended = True
+            self.seq = rows[good][1] - 1
+            self._stop("it is not what was written")
+        elif rows:
+            self._chain = rows[-1][7]
+        return good
+
+    def _in_place(self, rows: Sequence[Sequence[Any]]) -> Sequence[Sequence[Any]]:
+        """Those before the first that is no event, or not the next one."""
+        for n, row in enumerate(rows):
+            if tuple(map(type, row)) != _TYPES:
+                self._stop("it holds values of the wrong kind")
+                return rows[:n]
+            if row[1] != self.seq + 1:
+                self._stop(f"{row[1]} stands in its place")
+                return rows[:n]
+            self.seq += 1
+        return rows
 
     async def _rows(self) -> Sequence[Sequence[Any]]:
         if self._chain is None:
             (before,) = await self._ask(self.seq - 1, 1)
             self._chain = before[7] if isinstance(before[7], bytes) else START
-        try:
-            return await self._ask(self.seq, SLICE)
-        except Unavailable:
-            return await self._one_by_one()
+        for limit in SLICES:
+            try:
+                return await self._ask(self.seq, limit)
+            except Unavailable:
+                continue
+        return await self._one_by_one()
 
     async def _one_by_one(self) -> Sequence[Sequence[Any]]:
         """A row that the database cannot even give out: those before it. Raises Unavailable when
@@ -66,7 +98,7 @@ class LogTail:
         try:
             while rows := await self._ask(self.seq + len(found), 1):
                 found += rows
-                if len(found) == SLICE:
+                if len(found) == SLICES[-1]:
                     break
         except Unavailable as error:
             if not found:
@@ -79,16 +111,7 @@ class LogTail:
         chosen = _rows_of(self._stream).where(editor_tables.editor_event.c.seq > after)
         if self._upto is not None:
             chosen = chosen.where(editor_tables.editor_event.c.seq <= self._upto)
-        return await self._journal.query(chosen.limit(limit))
-
-    def _fault(self, row: Sequence[Any]) -> str | None:
-        if tuple(map(type, row)) != _TYPES:
-            return "it holds values of the wrong kind"
-        if row[1] != self.seq + 1:
-            return f"{row[1]} stands in its place"
-        if row[7] != link(self._chain or START, Event(*row[:7])):
-            return "it is not what was written"
-        return None
+        return await self._journal.plain_rows(chosen.limit(limit))
 
     async def _check_end(self) -> None:
         newest = await self._journal.newest(self._stream)
@@ -107,3 +130,18 @@ def _rows_of(stream: str) -> Select[Any]:
     columns = editor_tables.editor_event.c
     chosen = select(*(columns[name] for name in _COLUMNS))
     return chosen.where(columns.stream == stream).order_by(columns.seq)
+
+
+def _columns(rows: Sequence[Sequence[Any]]) -> EventColumns:
+    same: dict[str, str] = {}  # of equal texts one: they travel as such
+    kinds, authors = ([same.setdefault(row[n], row[n]) for row in rows] for n in (2, 3))
+    return EventColumns(rows[0][1], kinds, authors, [row[5] for row in rows])
+
+
+def _linked(rows: Sequence[Sequence[Any]], chain: bytes) -> int:
+    """How many of these rows are in the chain that goes on from here."""
+    for n, row in enumerate(rows):
+        if row[7] != link(chain, Event(*row[:7])):
+            return n
+        chain = row[7]
+    return len(rows)

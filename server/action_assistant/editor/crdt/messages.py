@@ -18,6 +18,7 @@ EPOCH: Final = 103
 STEP_1: Final = 0
 STEP_2: Final = 1
 UPDATE: Final = 2
+_UPDATE: Final = bytes((SYNC, UPDATE))
 
 #: Close codes of accepted sockets, by what they mean.
 UNREADABLE: Final = 1003  # a text frame
@@ -150,6 +151,9 @@ class ByteReader:
 
 def parse(data: bytes) -> Message | None:
     """A message; None for kinds that we do not know. Raises Malformed."""
+    # Most are updates of less than 128 bytes.
+    if data[:2] == _UPDATE and len(data) > 2 and data[2] <= min(0x7F, len(data) - 3):
+        return Edit(data[3 : 3 + data[2]])
     reader = ByteReader(data)
     kind = reader.number()
     if kind == SYNC:
@@ -178,8 +182,13 @@ def _entries(data: bytes) -> Iterable[PresenceEntry]:
         yield PresenceEntry(reader.number(), reader.number(), reader.text())
 
 
+_SMALL: Final = tuple(bytes((value,)) for value in range(128))
+
+
 def number(value: int) -> bytes:
     """A varUint."""
+    if value < 128:
+        return _SMALL[value]
     out = bytearray()
     while value > 0x7F:
         out.append(0x80 | (value & 0x7F))

@@ -35,7 +35,7 @@ class Nesting:
 
         Raises Malformed for what is too deep.
         """
-        if not self.spans and not any(each.inside for each in placed):
+        if not placed or (not self.spans and not any(each.inside for each in placed)):
             return {}
         news = [each for each in placed if each.span[2] > known.get(each.span[0], 0)]
         found = self._resolved(news, known)

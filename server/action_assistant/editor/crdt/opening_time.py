@@ -9,7 +9,7 @@ where so much could have come since the last measurement that it matters, it is 
 from typing import Final
 
 from action_assistant.editor.crdt.document_quota import QuotaExceeded
-from action_assistant.editor.crdt.update_scan import UpdateOutline
+from action_assistant.editor.crdt.update_outline import UpdateOutline
 
 #: Seconds of a processor that opening a document may take, beside what its size needs: an honest
 #: graph takes 0.07 s per MiB.

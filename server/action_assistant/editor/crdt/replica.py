@@ -1,10 +1,9 @@
 """A document in memory that says what each update brought."""
 
-import itertools
 import logging
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, suppress
 from enum import Enum
 from typing import Any, Final, Literal
 
@@ -12,10 +11,13 @@ import msgspec
 from pycrdt import Doc, get_update
 
 from action_assistant.editor.crdt.document_quota import DocumentQuota
+from action_assistant.editor.crdt.event_columns import EventColumns, Told
 from action_assistant.editor.crdt.messages import NOTHING_NEW, ByteReader, Malformed
 from action_assistant.editor.crdt.nesting import Nesting
 from action_assistant.editor.crdt.opening_time import OpeningTime
-from action_assistant.editor.crdt.update_scan import UpdateOutline, outline
+from action_assistant.editor.crdt.sound_updates import Clients, check_nothing_waits, lies_deep
+from action_assistant.editor.crdt.update_outline import UpdateOutline
+from action_assistant.editor.crdt.update_scan import outline
 from action_assistant.editor.log.document_events import DEFERRED, UPDATED
 from action_assistant.journal.events import Event
 
@@ -77,34 +79,70 @@ class Replica:
 
         Raises Malformed, Foreign, Full, TooMuchWaits, Panicked; the document is then as before.
         """
-        if update in self._waiting:
+        if self._waiting and update in self._waiting:
             return UpdateEffect.NOTHING
         read = read or outline(update)
-        new = {client for client, _, end in read.brings if end > self._known.get(client, 0)}
+        known = self._known
+        new = [client for client, _, end in read.brings if end > known.get(client, 0)]
         for client in new:
             if (self.owners.get(client) or holder(client) or author) != author:
                 raise ForeignClient(f"client {client} is not {author}'s")
         if new:  # what is known is echoed by stock clients, and adds nothing
             self._quota.check(update, read)
-        if not read.ready(self._known):
+        if read.ready(known):
+            brought = self._grew(update, read)
+        else:
             self._check_patience(update, author)
-        brought = self._took(update, read, author)
-        self.owners.update(dict.fromkeys(new, author))
+            self._waiting[update] = read, author
+            brought = UpdateEffect.WAITS
+        for client in new:
+            self.owners[client] = author
         return brought
 
-    def replay(self, events: Sequence[Event], *, learn: bool = True) -> None:
+    def replay(self, events: EventColumns, *, learn: bool = True) -> None:
         """Apply events of the log in their order. Raises Malformed, Panicked.
 
         `learn`: also whose each client is and how deep things lie, for a document that goes on.
         """
-        for kind, group in itertools.groupby(events, key=lambda event: event.kind):
+        for group in events.by_kind():
+            kind = group.kinds[0]
             if kind not in {UPDATED, DEFERRED}:
                 continue
             if learn or kind == DEFERRED or self._waiting:
-                self._replay_one_by_one(list(group))
+                self._replay_one_by_one(group)
             else:
-                self._apply(*(event.body for event in group))
+                self._apply(*group.bodies)
                 self._known = clocks(self.doc.get_state())
+
+    def replay_sound(self, events: EventColumns) -> None:
+        """As `replay` with learning, for a document that then travels as a snapshot, of events that
+        are what rooms took. Raises Malformed, Panicked, Uncertain."""
+        for group in events.by_kind():
+            if group.kinds[0] == DEFERRED:
+                self._replay_one_by_one(group)
+            elif group.kinds[0] == UPDATED:
+                at = self._until_nothing_waits(group)
+                self._replay_together(group.part(at, len(group)))
+
+    def _until_nothing_waits(self, events: EventColumns) -> int:
+        """One by one, as long as something waits; how many that were."""
+        done = 0
+        while self._waiting and done < len(events):
+            self._replay_one_by_one(events.part(done, done + 1))
+            done += 1
+        return done
+
+    def _replay_together(self, events: EventColumns) -> None:
+        """Updates that wait for nothing, in a document in which nothing waits."""
+        if self.nesting.spans or lies_deep(events.bodies):
+            self._replay_one_by_one(events)
+            return
+        clients = Clients(events.bodies, events.authors)
+        self.owners = clients.authors | self.owners
+        self._apply(*events.bodies)
+        self._known = clocks(self.doc.get_state())
+        check_nothing_waits(self.doc, self._known, clients.ends)
+        self._quota.took(events.size)
 
     def replay_each(self, events: Sequence[Event]) -> Iterator[Event]:
         """As `replay` without learning, one by one: each event after it was applied, for who watches
@@ -114,7 +152,7 @@ class Replica:
                 self._apply(event.body)
             elif event.kind in {UPDATED, DEFERRED}:
                 self._known = clocks(self.doc.get_state())
-                self._replay_one_by_one([event])
+                self._replay_one_by_one([(event.kind, event.author, event.body)])
             yield event
         self._known = clocks(self.doc.get_state())
 
@@ -128,19 +166,22 @@ class Replica:
         self._known = clocks(self.doc.get_state())
         self._waiting = {update: (outline(update), author) for update, author in kept.waiting}
 
-    def _replay_one_by_one(self, events: list[Event]) -> None:
+    def _replay_one_by_one(self, events: Iterable[Told]) -> None:
         together: list[bytes] = []
-        for event in events:
-            read = outline(event.body)
+        for kind, author, body in events:
+            read = outline(body)
             for client, _, _ in read.brings:
-                self.owners.setdefault(client, event.author)
-            if event.kind == DEFERRED or self._waiting or not read.ready(self._known):
+                self.owners.setdefault(client, author)
+            if kind == DEFERRED or self._waiting or not read.ready(self._known):
                 self._apply(*together)
                 together = []
-                self._took(event.body, read, event.author)
+                if read.ready(self._known):
+                    self._grew(body, read)
+                else:
+                    self._waiting[body] = read, author
             else:
-                self._learn(read, len(event.body))
-                together.append(event.body)
+                self._learn(read, len(body))
+                together.append(body)
         self._apply(*together)
 
     def _learn(self, read: UpdateOutline, size: int) -> None:
@@ -155,10 +196,8 @@ class Replica:
         if len(sizes) >= WAITING_UPDATES or sum(sizes) + len(update) > WAITING_BYTES:
             raise TooMuchWaits
 
-    def _took(self, update: bytes, read: UpdateOutline, author: str) -> UpdateEffect:
-        if not read.ready(self._known):
-            self._waiting[update] = read, author
-            return UpdateEffect.WAITS
+    def _grew(self, update: bytes, read: UpdateOutline) -> UpdateEffect:
+        """Apply what is ready, and what waited for it."""
         if not self._applied(update, read):
             return UpdateEffect.NOTHING
         while self._waiting and self._release():
@@ -231,9 +270,13 @@ class Replica:
     def _apply(self, *updates: bytes) -> None:
         if not updates:
             return
-        with applying(), self.doc.transaction():
-            for update in updates:
-                self.doc.apply_update(update)
+        with applying():
+            if len(updates) == 1:
+                self.doc.apply_update(updates[0])
+                return
+            with self.doc.transaction():
+                for update in updates:
+                    self.doc.apply_update(update)
 
     def adds_nothing(self, update: bytes) -> bool:
         """Whether an update that was not applied would leave the document as it is."""
@@ -260,17 +303,29 @@ class Replica:
             self._fired = True
 
 
-@contextmanager
-def applying() -> Iterator[None]:
-    """Around a call of the CRDT library with foreign bytes, and nothing else."""
-    try:
-        yield
-    except (ValueError, RuntimeError) as error:
-        raise Malformed(f"not a Yjs update: {error}") from error
-    except BaseException as error:
-        if type(error).__name__ != "PanicException":  # pyo3's, derived from BaseException
-            raise
-        raise Panicked(str(error)) from error
+class _Applying:
+    """Tells the failures of the CRDT library from all others. Holds nothing: one serves for all."""
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        match error:
+            case None:
+                return
+            case ValueError() | RuntimeError():
+                raise Malformed(f"not a Yjs update: {error}") from error
+            case _ if type(error).__name__ == "PanicException":  # pyo3's, of BaseException
+                raise Panicked(str(error)) from error
+
+
+_APPLYING: Final = _Applying()
+
+
+def applying() -> AbstractContextManager[None]:
+    """Around a call of the CRDT library with foreign bytes, and nothing else. Raises Malformed,
+    Panicked."""
+    return _APPLYING
 
 
 class ReplicaState(msgspec.Struct, frozen=True, array_like=True):

@@ -15,7 +15,8 @@ from pycrdt import Doc
 
 from action_assistant.editor.crdt.messages import Malformed
 from action_assistant.editor.crdt.replica import applying
-from action_assistant.editor.crdt.update_scan import UpdateOutline, outline
+from action_assistant.editor.crdt.update_outline import UpdateOutline
+from action_assistant.editor.crdt.update_scan import outline
 
 SECONDS: Final = 0.25  # of a processor that one update may take
 _ENDS: Final = 8 * SECONDS  # of a processor, after which the process that tries it ends

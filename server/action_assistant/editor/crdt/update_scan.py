@@ -7,15 +7,17 @@ Yjs update format, version 1.
 
 from typing import Final, Literal, TypeAlias
 
-import msgspec
-
 from action_assistant.editor.crdt.messages import ByteReader, Malformed
 from action_assistant.editor.crdt.nesting import Placed
+from action_assistant.editor.crdt.small_update import small_outline
+from action_assistant.editor.crdt.update_outline import (
+    MOST_CLIENT,
+    MOST_CLIENTS,
+    MOST_CLOCK,
+    MOST_STRUCTS,
+    UpdateOutline,
+)
 
-MOST_STRUCTS: Final = 200_000
-MOST_CLIENTS: Final = 20_000
-MOST_CLIENT: Final = 2**53 - 1  # beyond that a page cannot read the number, and fails
-MOST_CLOCK: Final = 2**31 - 1
 DEEPEST: Final = 64  # of arrays and objects in one value
 
 _GC, _DELETED, _JSON, _BINARY, _STRING, _EMBED, _FORMAT, _TYPE, _ANY, _DOC, _SKIP = range(11)
@@ -23,34 +25,13 @@ _FIXED: Final = {127: 0, 126: 0, 124: 4, 123: 8, 122: 8, 121: 0, 120: 0}  # byte
 _NAMED_TYPES: Final = frozenset({3, 5})
 
 
-class UpdateOutline(msgspec.Struct, frozen=True):
-    """What an update brings, `(client, from clock, to clock)`, and what must be there before it:
-    of each client so many clocks. `placed`: what need not lie in a root. `fields`: how many keys that
-    may be new are among it, `actions`: how many of them are new actions; `structs`: how many there are
-    in all."""
-
-    brings: tuple[tuple[int, int, int], ...]
-    needs: dict[int, int]
-    placed: tuple[Placed, ...] = ()
-    actions: int = 0
-    fields: int = 0
-    structs: int = 0
-
-    def ready(self, known: dict[int, int]) -> bool:
-        """Whether everything that it builds on is known, or comes with it."""
-        ends: dict[int, int] = {}
-        for client, start, end in self.brings:
-            if start > max(known.get(client, 0), ends.get(client, 0)):
-                return False
-            ends[client] = max(end, ends.get(client, 0))
-        return all(
-            clock <= max(known.get(client, 0), ends.get(client, 0))
-            for client, clock in self.needs.items()
-        )
-
-
 def outline(update: bytes) -> UpdateOutline:
     """Read an update. Raises Malformed for what is none, or beyond the bounds."""
+    return small_outline(update) or scanned(update)
+
+
+def scanned(update: bytes) -> UpdateOutline:
+    """Read an update of any kind: `outline` without its short cut. Raises Malformed."""
     reader = ByteReader(update)
     brings: list[tuple[int, int, int]] = []
     needs: dict[int, int] = {}

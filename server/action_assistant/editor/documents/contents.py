@@ -38,22 +38,23 @@ class GraphAtSeq(msgspec.Struct, frozen=True):
 class Inside(msgspec.Struct, frozen=True):
     """The graphs that are inside of one, by the names of the actions that stand for them, at one seq each
     (docs/decisions/070-one-truth-for-sub-graphs.md). `several`: names of more than one graph; `cut`: there
-    are more than these."""
+    are more than these; `hidden`: names of graphs that an action of the library has, too."""
 
     graphs: tuple[tuple[str, GraphAtSeq], ...] = ()
     several: tuple[str, ...] = ()
     cut: bool = False
+    hidden: tuple[str, ...] = ()
 
     @property
     def key(self) -> tuple[object, ...]:
         """The same for the same graphs at the same moments."""
         moments = tuple((name, each.graph, each.seq) for name, each in self.graphs)
-        return moments, self.several, self.cut
+        return moments, self.several, self.cut, self.hidden
 
     @property
     def resolution(self) -> Resolution:
         """How names were resolved."""
-        return Resolution(frozenset(self.several), self.cut)
+        return Resolution(frozenset(self.several), self.cut, frozenset(self.hidden))
 
 
 NOTHING_INSIDE: Final = Inside()

@@ -1,13 +1,12 @@
 """The graphs inside of a graph as files, named so that an engine indexes them: `*graph.json`. Pure."""
 
 import io
-import re
 import zipfile
 from collections.abc import Iterable
 from typing import Final
 
-_ENDING: Final = ".umrf.graph.json"
-_UNFIT: Final = re.compile(r"[^A-Za-z0-9_.-]+")
+from action_assistant.umrf.files.file_names import graph_file_name
+
 _LONG_AGO: Final = (1980, 1, 1, 0, 0, 0)  # the same files are the same bytes
 _MODE: Final = 0o644 << 16
 
@@ -26,11 +25,9 @@ def packed(graphs: Iterable[tuple[str, bytes]]) -> bytes:
 
 
 def _free_name(graph: str, taken: set[str]) -> str:
-    """A name that every file system takes, also one that makes no difference of case."""
-    stem = _UNFIT.sub("_", graph).strip("._")[:80] or "graph"
-    number, name = 1, stem
-    while name.lower() in taken:
+    """One of its own, also where a file system makes no difference of case."""
+    number = 1
+    while (name := graph_file_name(graph, number)).lower() in taken:
         number += 1
-        name = f"{stem}-{number}"
     taken.add(name.lower())
-    return f"{name}{_ENDING}"
+    return name

@@ -79,7 +79,7 @@ async def _epoch(journal: Journal, mark: Path) -> str:
         return await begin(journal, "the first")
     (event,) = await journal.read(_STREAM, after=newest - 1)
     epoch = msgspec.json.decode(event.body, type=EpochBegun).id
-    if await _follows(journal, _marked(mark)):
+    if await _follows(journal, marked(mark)):
         return epoch
     log.warning("the log lacks what was in it before: open pages are told, and begin anew")
     return await begin(journal, "the log had gone back")
@@ -95,7 +95,8 @@ async def _chain(journal: Journal, position: int) -> str:
     return "".join(bytes(row.chain).hex() for row in rows)
 
 
-def _marked(mark: Path) -> EpochMark | None:
+def marked(mark: Path) -> EpochMark | None:
+    """What a folder has seen last; None where it has seen nothing, or does not know."""
     try:
         return msgspec.json.decode(mark.read_bytes(), type=EpochMark)
     except (OSError, msgspec.DecodeError):  # a new folder, or one of an older version

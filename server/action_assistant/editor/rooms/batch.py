@@ -1,6 +1,7 @@
 """What enters a room, and the outcome of a batch of it."""
 
 import asyncio
+import time
 from collections.abc import Callable, Sequence
 from typing import Any, Final, TypeAlias
 
@@ -12,7 +13,8 @@ from action_assistant.editor.crdt.document_quota import QuotaExceeded
 from action_assistant.editor.crdt.messages import Malformed
 from action_assistant.editor.crdt.replica import ForeignClient, Panicked, Replica, TooMuchWaits
 from action_assistant.editor.crdt.trial import OVERLONG, TooSlow, TriedOutline, tried
-from action_assistant.editor.crdt.update_scan import UpdateOutline, outline
+from action_assistant.editor.crdt.update_outline import UpdateOutline
+from action_assistant.editor.crdt.update_scan import outline
 from action_assistant.editor.rooms.member import Member
 from action_assistant.errors import BadInput, Refused, TooLarge
 from action_assistant.web.auth.caller import acting_for
@@ -27,12 +29,14 @@ _MERGED_BYTES: Final = 128 * 1024
 
 
 class Offer(msgspec.Struct, frozen=True):
-    """An edit on its way in: from a socket, or from the server itself (`done` is told)."""
+    """An edit on its way in: from a socket, or from the server itself (`done` is told). `at`: when it
+    came, by the clock of performance counters."""
 
     update: bytes
     author: str
     member: Member | None = None
     done: "asyncio.Future[int] | None" = None
+    at: float = msgspec.field(default_factory=time.perf_counter)
 
 
 class Ask(msgspec.Struct, frozen=True):
@@ -95,6 +99,18 @@ Objection: TypeAlias = (
     | NotAllowed
     | TooSlow
     | NotNow
+)
+
+#: All of them, to be caught.
+OBJECTIONS: Final = (
+    Malformed,
+    ForeignClient,
+    QuotaExceeded,
+    TooMuchWaits,
+    Panicked,
+    NotAllowed,
+    TooSlow,
+    NotNow,
 )
 
 

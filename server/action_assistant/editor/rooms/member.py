@@ -1,6 +1,7 @@
 """One socket in a room: what waits to be sent to it, and when it is too slow (rule R5)."""
 
 import asyncio
+from collections.abc import Callable
 from enum import Enum
 from typing import Final
 
@@ -53,6 +54,8 @@ class Member:
         self._ack: bytes | None = None
         self._said = -1, -1  # with the last acknowledgement
         self._news = asyncio.Event()
+        #: Called when there is something to be sent, or the end has come.
+        self.on_news: Callable[[], None] = self._news.set
         self._room_again: asyncio.Event | None = None  # few sockets are ever far ahead
         self._loop = asyncio.get_running_loop()
         self._taken_at = self._loop.time()
@@ -67,7 +70,7 @@ class Member:
             return
         self._frames.append(frame)
         self._bytes += len(frame)
-        self._news.set()
+        self.on_news()
 
     def asks(self) -> bool:
         """The socket wants the document; False when it is still on its way for an earlier wish.
@@ -83,7 +86,7 @@ class Member:
         """Send the document, however large: it was asked for."""
         self._answer = _Answer.WAITS
         self._frames.append(frame)
-        self._news.set()
+        self.on_news()
 
     def post_epoch(self, epoch: str) -> None:
         """Say which history this is, to those who know our own messages."""
@@ -100,20 +103,29 @@ class Member:
         if news.entries:
             waiting = self._presence
             self._presence = news if waiting is None else waiting.followed_by(news)
-            self._news.set()
+            self.on_news()
 
     def post_ack(self, seq: int) -> None:
         """Say what is durable, and that everything up to `seq` was sent; the last word counts."""
         if self.acks and self.synced and (self.handled, seq) != self._said:
             self._said = self.handled, seq
             self._ack = messages.acks(self.handled, seq)
-            self._news.set()
+            self.on_news()
 
     async def take(self) -> list[bytes]:
-        """What is to be sent next, in order; waits until there is something."""
-        if self._answer is _Answer.LEFT:  # whoever takes again has sent what was taken before
-            self._answer = _Answer.NONE
+        """What is to be sent next, in order; waits until there is something. Whoever takes again has
+        sent what was taken before."""
+        self.all_sent()
         await self._news.wait()
+        return self.gather()
+
+    def all_sent(self) -> None:
+        """What was gathered has gone out."""
+        if self._answer is _Answer.LEFT:
+            self._answer = _Answer.NONE
+
+    def gather(self) -> list[bytes]:
+        """What is to be sent next, in order."""
         self._news.clear()
         self._taken_at = self._loop.time()
         frames, self._frames = self._frames, []
@@ -148,6 +160,11 @@ class Member:
         wait, self._spent = _SHARE * self._spent, 0.0
         return wait
 
+    @property
+    def owes(self) -> bool:
+        """Whether there is a toll."""
+        return self._spent >= _FREE
+
     def edit_handled(self) -> None:
         """The room has dealt with the next edit of this socket, for good."""
         self.handled += 1
@@ -173,7 +190,7 @@ class Member:
         if not self._closed.done():
             self._closed.set_result(code)
             self._let_on()
-            self._news.set()
+            self.on_news()
 
     def refuse(self, code: int, said: str | None = None) -> None:
         """End this socket for what it did; what it sent after that is not looked at."""

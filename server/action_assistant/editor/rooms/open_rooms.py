@@ -9,6 +9,7 @@ from action_assistant.editor.crdt import messages
 from action_assistant.editor.crdt.loading import load
 from action_assistant.editor.rooms.batch_window import LENGTH, BatchWindow
 from action_assistant.editor.rooms.room import Room
+from action_assistant.editor.rooms.room_metrics import RoomMetrics
 from action_assistant.errors import Unavailable
 from action_assistant.journal.journal import Journal
 from action_assistant.web.auth.caller import done_for_person
@@ -46,6 +47,7 @@ class Rooms:
         self._timers: dict[str, asyncio.TimerHandle] = {}
         self._closed = False
         self._divergences = 0
+        self.metrics: Final = RoomMetrics()
         self._heart = asyncio.create_task(self._beat(), name="heart")
 
     @asynccontextmanager
@@ -126,7 +128,9 @@ class Rooms:
                 self._moments,
                 self._run_in_worker,
                 self._tried,
+                self.metrics,
             )
+            self.metrics.opened += 1
             return room
         finally:
             del self._loading[stream]
@@ -134,6 +138,7 @@ class Rooms:
     def _forget(self, room: Room) -> None:
         if self._rooms.get(room.stream) is room:
             del self._rooms[room.stream]
+            self.metrics.unloaded += 1
             self._divergences += room.comparisons.divergences
 
     def _unload(self, stream: str) -> None:

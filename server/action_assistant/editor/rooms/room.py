@@ -11,27 +11,19 @@ from collections.abc import Callable, Sequence
 from typing import Final, TypeVar
 
 from action_assistant.editor.crdt import messages
-from action_assistant.editor.crdt.document_quota import QuotaExceeded
 from action_assistant.editor.crdt.loading import Loaded, load
 from action_assistant.editor.crdt.messages import Malformed
-from action_assistant.editor.crdt.replica import (
-    ForeignClient,
-    Panicked,
-    Replica,
-    ReplicaState,
-    TooMuchWaits,
-    UpdateEffect,
-)
-from action_assistant.editor.crdt.trial import TooSlow
-from action_assistant.editor.crdt.update_scan import UpdateOutline
+from action_assistant.editor.crdt.replica import Panicked, Replica, ReplicaState, UpdateEffect
+from action_assistant.editor.crdt.update_outline import UpdateOutline
 from action_assistant.editor.log.graph_events import DEFERRED, UPDATED
 from action_assistant.editor.rooms.batch import (
+    OBJECTIONS,
     Ask,
     Compare,
     Item,
     Look,
     NotAllowed,
-    NotNow,
+    Objection,
     Offer,
     Taken,
     fail,
@@ -45,9 +37,11 @@ from action_assistant.editor.rooms.comparisons import Comparisons
 from action_assistant.editor.rooms.member import Member
 from action_assistant.editor.rooms.presence import PresenceNews, RoomPresence
 from action_assistant.editor.rooms.presence_spread import PresenceSpread
+from action_assistant.editor.rooms.room_metrics import RoomMetrics
 from action_assistant.errors import Conflict, Refused, Unavailable
 from action_assistant.journal.events import Draft
 from action_assistant.journal.journal import Journal
+from action_assistant.logs.context import begin
 from action_assistant.web.auth.caller import done_for_nobody
 from action_assistant.web.workers.lanes import RunInWorker, run_here
 
@@ -74,8 +68,10 @@ class Room:
         moments: BatchWindow,
         run_in_worker: RunInWorker = run_here,
         tried: RunInWorker = run_here,
+        metrics: RoomMetrics | None = None,
     ) -> None:
         self.stream: Final = stream
+        self._metrics = metrics or RoomMetrics()
         self.seq = loaded.seq
         self.members: set[Member] = set()
         self.attendance: Final = RoomPresence()
@@ -124,6 +120,7 @@ class Room:
             case messages.Edit(update):
                 member.heard_edit()
                 if len(update) > messages.UPDATE_LIMIT:
+                    self._metrics.refused["too_big"] += 1
                     member.refuse(messages.TOO_BIG)
                     return
                 self._enter(Offer(update, member.person.id, member))
@@ -197,6 +194,7 @@ class Room:
         """Batch after batch. Whatever goes wrong closes the room; its log opens the next one."""
         reason: Refused = Unavailable(_CLOSING)
         done_for_nobody()  # whoever came first may leave
+        begin({"graph": self.stream.rpartition("/")[2]})
         try:
             while True:
                 await self._news.wait()
@@ -267,9 +265,8 @@ class Room:
             read = None
             if member is None or (member.edits and not member.refused):
                 read = await tried_first(offer, self._replica, self._tried)
-        except (Malformed, TooSlow, Panicked, NotNow, QuotaExceeded) as error:
-            log.warning("%s: refused an edit of %s: %s", self.stream, offer.author, error)
-            refuse(offer, error)
+        except OBJECTIONS as error:
+            self._refuse(offer, error)
             return taken
         self._take_in(offer, taken, read)
         return taken
@@ -279,17 +276,9 @@ class Room:
         begun = time.perf_counter()
         try:
             brought = self._brought(offer, read)
-        except (
-            Malformed,
-            ForeignClient,
-            QuotaExceeded,
-            TooMuchWaits,
-            Panicked,
-            NotAllowed,
-        ) as error:
-            log.warning("%s: refused an edit of %s: %s", self.stream, offer.author, error)
+        except OBJECTIONS as error:
             taken.panicked = isinstance(error, Panicked)
-            refuse(offer, error)
+            self._refuse(offer, error)
             return
         finally:
             if offer.member is not None:
@@ -304,6 +293,11 @@ class Room:
             released = self._replica.released()
             taken.shown += [offer.update, *released]
             taken.for_all = taken.for_all or bool(released)
+
+    def _refuse(self, offer: Offer, error: Objection) -> None:
+        log.warning("%s: refused an edit of %s: %s", self.stream, offer.author, error)
+        self._metrics.objected(error)
+        refuse(offer, error)
 
     def _brought(self, offer: Offer, read: UpdateOutline | None) -> UpdateEffect | None:
         """Apply one edit; None when it was refused, or comes from a socket that was."""
@@ -334,6 +328,7 @@ class Room:
         for author in {offer.member for offer in taken.handled}:
             if author is not None:
                 author.post_ack(self.seq)
+        self._metrics.acknowledged(taken.handled)
         if taken.news and not self._naming:
             self._naming = True
             self._moments.when_open(self._name_moment)

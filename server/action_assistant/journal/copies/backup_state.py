@@ -4,7 +4,6 @@ Whoever makes or rehearses a backup writes it down; doctor, metrics and pages re
 fails a backup: what cannot be written down is logged.
 """
 
-import fcntl
 import logging
 import os
 import time
@@ -15,6 +14,7 @@ from typing import Final
 import msgspec
 
 from action_assistant.private_files import opener
+from action_assistant.system import file_locks
 
 log: Final = logging.getLogger(__name__)
 
@@ -108,7 +108,7 @@ def note(data: Path, change: Callable[[BackupState], BackupState]) -> None:
     try:
         guard = opener(str(path.with_name(f"{FILE}.lock")), os.O_RDWR | os.O_CREAT)
         try:
-            fcntl.flock(guard, fcntl.LOCK_EX)
+            file_locks.wait_for(guard)
             state = change(backup_state(data) or BackupState())
             part = path.with_name(f".{FILE}.part")
             with open(part, "wb", opener=opener) as out:

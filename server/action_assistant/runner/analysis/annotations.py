@@ -19,6 +19,7 @@ from action_assistant.runner.runs.durations import Took, of_run, of_visit, took_
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.visits import ActionRun
+from action_assistant.runner.runs.word_index import holds, will_be_indexed
 from action_assistant.schema.runner_tables import action_sum, review, run_label
 from action_assistant.schema.runner_tables import run as runs
 from action_assistant.umrf.model import Graph
@@ -144,7 +145,7 @@ def fold(event: Event) -> Sequence[Executable]:
         case SummedUp.kind:
             return _put_sum(run, msgspec.json.decode(event.body, type=SummedUp))
         case Put.kind:
-            return (_put_away(run, msgspec.json.decode(event.body, type=Put)),)
+            return _put_away(run, msgspec.json.decode(event.body, type=Put))
         case _:
             return ()
 
@@ -154,7 +155,7 @@ def _mark(run: str, marks: Marks) -> Sequence[Executable]:
     fields = {name: value for name, value in given.items() if value is not None}
     statements: list[Executable] = []
     if fields:
-        statements.append(_review(run, fields))
+        statements += [_review(run, fields), *holds(run, marks.note or "")]
     if marks.labels is not None:
         statements.append(delete(run_label).where(run_label.c.run == run))
         rows = [{"run": run, "label": label} for label in dict.fromkeys(marks.labels)]
@@ -178,17 +179,21 @@ def _put_sum(run: str, summed: SummedUp) -> Sequence[Executable]:
     ]
     return [
         _review(run, {"words": summed.words, "summed": True}),
+        *holds(run, summed.words),
         *_told(run, summed),
         delete(action_sum).where(action_sum.c.run == run),
         *(insert(action_sum).values(rows[i : i + 100]) for i in range(0, len(rows), 100)),
     ]
 
 
-def _put_away(run_id: str, put: Put) -> Executable:
+def _put_away(run_id: str, put: Put) -> Sequence[Executable]:
     """The row stays, also when it is made again without the events."""
     row: Mapping[str, Any] = {**put.row, "archived_at": put.at, "archived_as": put.file}
     statement = upsert(runs).values(id=run_id, **row)
-    return statement.on_conflict_do_update(index_elements=["id"], set_=dict(row))
+    return (
+        will_be_indexed(run_id, row["number"]),
+        statement.on_conflict_do_update(index_elements=["id"], set_=dict(row)),
+    )
 
 
 def _review(run: str, fields: Mapping[str, object]) -> Executable:

@@ -17,12 +17,21 @@ from action_assistant.runner.robots.registration import Robot
 from action_assistant.runner.robots.robot_events import (
     Commanded,
     EngineBecame,
+    GraphFile,
+    IndexWriteAsked,
+    IndexWritten,
     RobotEvent,
     StopAsked,
     StopUnproven,
     StopWasProven,
 )
 from action_assistant.runner.runs import views
+from action_assistant.runner.start.index_writer import (
+    IndexWriteAnswer,
+    IndexWriter,
+    IndexWriteRequest,
+    read_index_write,
+)
 from action_assistant.runner.start.preflight import Preflight
 from action_assistant.runner.start.start_checks import GroupRequest, read_group
 from action_assistant.umrf.files import codec
@@ -45,6 +54,7 @@ class RobotServices(Protocol):
     body_limit: ConcurrencyLimit
     run_in_worker: RunInWorker
     behaviours: BehaviourFolder | None
+    index_writer: IndexWriter
 
 
 class ReachStatus(msgspec.Struct, frozen=True):
@@ -82,11 +92,20 @@ class RobotKnowledge(msgspec.Struct, frozen=True):
 
 
 class RobotLogLine(msgspec.Struct, frozen=True, kw_only=True):
-    """A line of a robot's flight record. `has_graph`: its graph can be fetched."""
+    """A line of a robot's flight record. `has_graph`: its graph can be fetched; `graphs`: names of graphs
+    for its index; `files`: what was written for it."""
 
     seq: int
     at: datetime
-    kind: Literal["commanded", "became", "stop_asked", "stop_proven", "stop_unproven"]
+    kind: Literal[
+        "commanded",
+        "became",
+        "stop_asked",
+        "stop_proven",
+        "stop_unproven",
+        "index_write_asked",
+        "index_written",
+    ]
     command: str = ""
     graph: str = ""
     sender: str = ""
@@ -95,6 +114,8 @@ class RobotLogLine(msgspec.Struct, frozen=True, kw_only=True):
     run: str | None = None
     number: int | None = None
     has_graph: bool = False
+    graphs: tuple[str, ...] = ()
+    files: tuple[GraphFile, ...] = ()
 
 
 class RobotStopped(msgspec.Struct, frozen=True):
@@ -114,7 +135,12 @@ class GroupShown(msgspec.Struct, frozen=True, kw_only=True):
 
 def routes(services: RobotServices) -> list[ControllerRouterHandler]:
     """All of them."""
-    return [*_registry(services), *_one_robot(services), *_starts(services)]
+    return [
+        *_registry(services),
+        *_one_robot(services),
+        *_starts(services),
+        _index(services),
+    ]
 
 
 def _registry(services: RobotServices) -> list[ControllerRouterHandler]:
@@ -265,6 +291,23 @@ def _starts(services: RobotServices) -> list[ControllerRouterHandler]:
     return [look, start]
 
 
+def _index(services: RobotServices) -> ControllerRouterHandler:
+    @post(
+        "/api/robots/{name:str}/index",
+        status_code=200,
+        summary="Write graphs inside of a task into the folder that a robot indexes",
+        opt=reads(IndexWriteRequest) | COUNTED,
+        guards=[Needs("operate")],
+        request_max_body_size=GRAPH_BODY,
+    )
+    async def write_into_index(name: str, request: _Asking) -> IndexWriteAnswer:
+        async with body_of(request, services.body_limit) as body:
+            asked = read_index_write(body)
+            return await services.index_writer.write(name, asked, author_of(request))
+
+    return write_into_index
+
+
 def _action(name: str, signature: Signature) -> KnownAction:
     return KnownAction(name, signature.inputs, signature.outputs)
 
@@ -294,6 +337,18 @@ def _told(seq: int, event: RobotEvent) -> RobotLogLine:
         case StopUnproven():
             return RobotLogLine(
                 seq=seq, at=at, kind="stop_unproven", graph=event.graph, why=event.why
+            )
+        case IndexWriteAsked():
+            by, names = event.author.name, tuple(each.name for each in event.graphs)
+            return RobotLogLine(seq=seq, at=at, kind="index_write_asked", sender=by, graphs=names)
+        case IndexWritten():
+            return RobotLogLine(
+                seq=seq,
+                at=at,
+                kind="index_written",
+                sender=event.author.name,
+                files=event.files,
+                why=event.why,
             )
         case _:
             assert_never(event)

@@ -1,5 +1,7 @@
 """What the routes of the runner work on."""
 
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Final
 from weakref import WeakKeyDictionary
 
@@ -12,8 +14,9 @@ from action_assistant.runner.links.behaviours.folder import BehaviourFolder
 from action_assistant.runner.review.service import ReviewService
 from action_assistant.runner.review.worker_queries import WorkerQueries
 from action_assistant.runner.runs.sent_views import Sent
+from action_assistant.runner.start.index_writer import IndexWriter
 from action_assistant.web.network.connection_limits import ConcurrencyLimit, ConnectionLimits
-from action_assistant.web.workers.lanes import RunInWorker
+from action_assistant.web.workers.lanes import Lane, RunInWorker
 
 _BODIES: Final = 4  # large ones of a person at a time
 
@@ -30,10 +33,14 @@ class RunnerServices:
     retention: Retention
     body_limit: ConcurrencyLimit
     run_in_worker: RunInWorker
+    lanes: Sequence[Lane]
     behaviours: BehaviourFolder | None
+    index_folders: Mapping[str, Path]
+    index_writer: IndexWriter
     sent: WeakKeyDictionary[OpenRun, Sent]
 
     def __init__(self) -> None:
         self.behaviours = None
+        self.index_folders = {}
         self.sent = WeakKeyDictionary()
         self.body_limit = ConcurrencyLimit(_BODIES)

@@ -78,7 +78,6 @@ class EmulatedEngine:
         self.quirks = quirks
         self.gone = ""  # why its process has ended
         self._facts = facts
-        self._index = index
         self._engine = engine_inside(index, quirks, facts, script, first, performer)
         self._now = self._tick = born_ms
         self._out: list[Said] = []
@@ -90,8 +89,7 @@ class EmulatedEngine:
         self._works = False  # a turn of its thread is planned
         self._under_way: list[Callable[[], None]] = []
         self._lingers = 0
-        self._frozen = False
-        self._frozen_ms = born_ms
+        self._frozen, self._frozen_ms = False, born_ms
         self._deaf = False
         self._log("The Action Engine is initialized.")
 
@@ -144,6 +142,10 @@ class EmulatedEngine:
         self._pass(to_ms)
         said, self._out = self._out, []
         return said
+
+    def reindex(self, index: EmulatedIndex) -> None:
+        """It has looked at its folder again. What runs already stays as it was looked up."""
+        self._view.reindex(index)
 
     def freeze(self, at_ms: float) -> None:
         """Its process is stopped (SIGSTOP): it does nothing, and messages wait."""
@@ -276,7 +278,7 @@ class EmulatedEngine:
     def _start(self, message: Start) -> None:
         name = message.graph_name
         try:
-            plan = asked_for(message, self._index, self._engine.graphs)
+            plan = asked_for(message, self._view.index, self._engine.graphs)
         except Refusal as refused:
             self._log(str(refused))
             return
@@ -346,7 +348,9 @@ class EmulatedEngine:
     def _answer(self, ticket: int) -> None:
         view = self._view
         self._take(self._engine.asked())
-        self._say(GetResponse(self._now, ticket, self._index.texts, view.indexed, view.running()))
+        self._say(
+            GetResponse(self._now, ticket, self._view.index.texts, view.indexed, view.running())
+        )
 
     # --- what its graphs do -------------------------------------------------------------------
 

@@ -226,6 +226,16 @@ def index_of(actions: Iterable[str], graphs: Iterable[str]) -> EmulatedIndex:
     return EmulatedIndex(tuple(texts), found, plans)
 
 
+def library_of(index: EmulatedIndex) -> dict[str, Graph]:
+    """The graphs that can be sub-graphs, by name."""
+    return {name: plan.graph for name, plan in index.graphs.items()}
+
+
+def signatures_of(index: EmulatedIndex, quirks: EngineTraits) -> dict[str, Signature] | None:
+    """The actions that it has; None where it has every action."""
+    return index.actions if index.actions and quirks.checks_actions else None
+
+
 def engine_inside(
     index: EmulatedIndex,
     quirks: EngineTraits,
@@ -238,9 +248,9 @@ def engine_inside(
     return Engine(
         facts=facts,
         script=script,
-        library={name: plan.graph for name, plan in index.graphs.items()},
+        library=library_of(index),
         actor=actor,
-        signatures=index.actions if index.actions and quirks.checks_actions else None,
+        signatures=signatures_of(index, quirks),
         loading_ms=quirks.loading_ms,
         performer=performer,
     )

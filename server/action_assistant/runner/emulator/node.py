@@ -28,6 +28,7 @@ from temoto_msgs.srv import UmrfGraphGet
 from action_assistant.runner.emulator.engine import EmulatedEngine
 from action_assistant.runner.emulator.messages import (
     NODE,
+    EmulatedIndex,
     FeedbackMessage,
     GetResponse,
     Gone,
@@ -52,7 +53,8 @@ _WAITING: Final = 100  # commands that wait on the wire when the quirk of one is
 class EmulatorNode:
     """A node for one life of a stand-in. `make(epoch_ms)` gives it, at 0 ms of the node's own clock.
 
-    `told` hears of everything that it says. Raises RuntimeError when the domain cannot be joined.
+    `told` hears of everything that it says; `indexes` is asked every so many seconds what its folder has.
+    Raises RuntimeError when the domain cannot be joined.
     """
 
     def __init__(
@@ -63,8 +65,10 @@ class EmulatorNode:
         facts: EngineFacts,
         namespace: str = "",
         told: Callable[[Said], None] = lambda _: None,
+        indexes: tuple[float, Callable[[], EmulatedIndex]] | None = None,
     ) -> None:
-        self._began = time.monotonic()
+        self._began = self._indexed = time.monotonic()
+        self._indexes = indexes
         self._told = told
         self._tickets: dict[int, Future] = {}
         self._asked = 0
@@ -131,6 +135,7 @@ class EmulatorNode:
                 now = self._now()
                 wait = _LONGEST_S if due is None else min(_LONGEST_S, max(0.0, due - now) / 1000)
                 self._turn(wait)
+                self._index_again()
                 for said in self.robot.advance(self._now()):
                     self._say(said)
         finally:
@@ -149,6 +154,14 @@ class EmulatorNode:
             if not self._context.ok():
                 raise
             log.warning("an answer could not be sent: %s", error.__cause__ or error)
+
+    def _index_again(self) -> None:
+        if self._indexes is None:
+            return
+        every_s, index = self._indexes
+        if time.monotonic() - self._indexed >= every_s:
+            self.robot.reindex(index())
+            self._indexed = time.monotonic()
 
     def end(self) -> None:
         """Leave; may be called on any thread."""

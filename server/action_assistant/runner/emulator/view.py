@@ -5,7 +5,13 @@ from collections import deque
 from collections.abc import Sequence
 from typing import Final
 
-from action_assistant.runner.emulator.messages import EmulatedIndex, EngineTraits, GraphPlan
+from action_assistant.runner.emulator.messages import (
+    EmulatedIndex,
+    EngineTraits,
+    GraphPlan,
+    library_of,
+    signatures_of,
+)
 from action_assistant.umrf.semantics import (
     Engine,
     GraphStateEvent,
@@ -55,12 +61,20 @@ class PublishedGraphs:
         self.plans: dict[str, GraphPlan] = dict(index.graphs)
         self.indexed = tuple(map(_printed, index.graphs.values()))
         self._engine = engine
-        self._index = index
+        self.index = index
         self._quirks = quirks
         self._chance = chance
         self._epoch_ms = epoch_ms
         self._held: dict[str, _Held] = {}
         self._ring: deque[str] = deque(maxlen=quirks.ring)
+
+    def reindex(self, index: EmulatedIndex) -> None:
+        """Other actions and graphs are indexed now."""
+        self.index = index
+        self._engine.library = library_of(index)
+        self._engine.signatures = signatures_of(index, self._quirks)
+        self.indexed = tuple(map(_printed, index.graphs.values()))
+        self.plans |= index.graphs
 
     def take(self, traces: Sequence[Trace], now_ms: float) -> list[str]:
         """What happened in the engine; the graphs that have ended by it, but no sub-graphs."""
@@ -129,7 +143,7 @@ class PublishedGraphs:
         running = self._engine.graphs.get(name)
         held = self._held.get(name)
         if running is not None and (held is None or held.running is not running):
-            again = held is not None and running.home is None and name not in self._index.graphs
+            again = held is not None and running.home is None and name not in self.index.graphs
             held = self._held[name] = _Held(running, self._sheet(running, again=again))
         return held
 

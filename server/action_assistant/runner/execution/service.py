@@ -13,6 +13,7 @@ from anyio.abc import TaskGroup
 from sqlalchemy import Row
 
 from action_assistant.errors import BadInput, Conflict, NotFound, Refused
+from action_assistant.logs.context import begin
 from action_assistant.random_ids import random_id
 from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.execution import interventions
@@ -271,6 +272,7 @@ class ExecutionService:
 
     async def _drive(self, opened: OpenRun, order: Order | None, incarnation: str = "") -> None:
         done_for_nobody()  # a run goes on without whoever started it
+        begin({"run": opened.run.id})
         await opened.drive(order, incarnation)
         self.open.pop(opened.run.id, None)
         self._late_activity.ended(opened.run, opened.recorder.seq)

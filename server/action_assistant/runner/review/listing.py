@@ -1,15 +1,15 @@
 """The list of runs and the events of one, page by page. For workers."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from datetime import datetime
 from typing import Any, Final
 
 import msgspec
-from sqlalchemy import Row
+from sqlalchemy import Row, Select
 
 from action_assistant.journal.events import Event
 from action_assistant.runner.review.service import ReviewService
-from action_assistant.runner.runs import queries, views
+from action_assistant.runner.runs import queries, views, word_index
 
 _PAGE: Final = 500  # events read at once
 
@@ -31,13 +31,29 @@ async def listed(
     going: Mapping[str, views.RunSummary],
 ) -> list[views.Listed]:
     """Runs, newest first; those that are `going` are as they are there."""
-    rows = await review_service.rows(queries.listed(wanted, limit))
+    among = None if wanted.text is None else await numbers_with(wanted.text, review_service.rows)
+    rows = await review_service.rows(queries.listed(wanted, limit, among))
     labels = await _labels(review_service, rows)
     shown = (
         views.listed(going.get(row.id) or views.summary_of_row(row), row, labels.get(row.id, []))
         for row in rows
     )
     return [each for each in shown if not wanted.states or each.state in wanted.states]
+
+
+async def numbers_with(
+    text: str, rows: Callable[[Select[Any]], Awaitable[Sequence[Row[Any]]]]
+) -> set[int] | None:
+    """The numbers of all runs in which a text may be found; None where that may be very many."""
+    pieces = word_index.pieces(text)
+    late = await rows(word_index.unindexed()) if pieces else []
+    for piece in pieces if len(late) <= word_index.MOST else []:
+        found = await rows(word_index.holding(piece))
+        if len(found) <= word_index.MOST:
+            # a number is found, too, as a whole
+            own = {int(text)} if text.isascii() and text.isdecimal() and len(text) < 19 else set()
+            return {row.number for row in (*found, *late)} | own
+    return None
 
 
 async def _labels(review_service: ReviewService, rows: Sequence[Row[Any]]) -> dict[str, list[str]]:

@@ -10,6 +10,7 @@ from anyio.abc import TaskGroup
 
 from action_assistant.errors import BadInput, Conflict, NotFound
 from action_assistant.journal.events import Draft
+from action_assistant.logs.context import begin
 from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import (
@@ -56,6 +57,10 @@ class ForeignStops(Protocol):
 
     def going(self, robot: str) -> bool:
         """Whether something is being stopped there."""
+        ...
+
+    def all_going(self) -> Iterator[tuple[str, str]]:
+        """The robot of each graph that is being stopped, and why that is not proven yet."""
         ...
 
     def stop(self, engine: KnownEngine, graph: str, author: Author) -> None:
@@ -186,6 +191,7 @@ class Robots:
             scope.cancel()
 
     async def _watch(self, engine: KnownEngine, scope: anyio.CancelScope) -> None:
+        begin({"robot": engine.registration.name})
         with scope:
             await engine.watch()
 
@@ -244,6 +250,11 @@ class Robots:
         if engine is None:
             return plain
         return seen(plain, engine, self.foreign_stops.trouble)
+
+    @property
+    def names(self) -> list[str]:
+        """Of all that are registered."""
+        return sorted(self._registered)
 
     def heard(self) -> dict[str, int]:
         """When each robot last answered, microseconds UTC; those that never did are left out."""

@@ -1,4 +1,4 @@
-"""The log of a robot: commands of others, and changes of its engine's state.
+"""The log of a robot: commands of others, changes of its engine's state, files written for it.
 
 One stream per robot, `robot/NAME`. Bodies are msgspec JSON; fields are only ever added, with a
 default. What our own runs sent stands in their streams.
@@ -7,15 +7,18 @@ default. What our own runs sent stands in their streams.
 from collections.abc import Mapping
 from typing import ClassVar, Final, TypeAlias
 
+import anyio
 import msgspec
 from anyio.abc import TaskGroup
 
-from action_assistant.errors import NotFound
+from action_assistant.errors import NotFound, Unavailable
 from action_assistant.journal.events import Draft, Event
 from action_assistant.runner.links.port import Command, EngineState, ForeignCommand
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.history import Ledger
 from action_assistant.runner.runs.recorder import StreamAppender
+
+_PATIENCE_S: Final = 5.0  # until something that has to be stored is given up
 
 
 def stream_of_robot(name: str) -> str:
@@ -82,10 +85,67 @@ class StopUnproven(msgspec.Struct, frozen=True, kw_only=True):
     why: str
 
 
-RobotEvent: TypeAlias = Commanded | EngineBecame | StopAsked | StopWasProven | StopUnproven
+class AskedGraph(msgspec.Struct, frozen=True, omit_defaults=True):
+    """A graph that shall be in a robot's index. `replaces`: the path of the file that was to go aside."""
+
+    name: str
+    digest: str
+    replaces: str = ""
+
+
+class IndexWriteAsked(msgspec.Struct, frozen=True, kw_only=True):
+    """Somebody wants graphs written into the folder that the robot's engine indexes. Stored before
+    anything is written."""
+
+    kind: ClassVar[str] = "robot.index_write_asked.v1"
+
+    at: int
+    author: Author
+    folder: str
+    graphs: tuple[AskedGraph, ...]
+
+
+class GraphFile(msgspec.Struct, frozen=True, omit_defaults=True):
+    """A file that was written there. `kept`: where the one that it replaced is now."""
+
+    graph: str
+    path: str
+    digest: str
+    kept: str = ""
+
+
+class IndexWritten(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """These files were written; `why` not all, "" if all were."""
+
+    kind: ClassVar[str] = "robot.index_written.v1"
+
+    at: int
+    author: Author
+    files: tuple[GraphFile, ...]
+    why: str = ""
+
+
+RobotEvent: TypeAlias = (
+    Commanded
+    | EngineBecame
+    | StopAsked
+    | StopWasProven
+    | StopUnproven
+    | IndexWriteAsked
+    | IndexWritten
+)
 
 _KINDS: Final[Mapping[str, type[RobotEvent]]] = {
-    each.kind: each for each in (Commanded, EngineBecame, StopAsked, StopWasProven, StopUnproven)
+    each.kind: each
+    for each in (
+        Commanded,
+        EngineBecame,
+        StopAsked,
+        StopWasProven,
+        StopUnproven,
+        IndexWriteAsked,
+        IndexWritten,
+    )
 }
 
 
@@ -133,15 +193,32 @@ class RobotLog:
 
     def note(self, robot: str, event: RobotEvent, author: str) -> None:
         """Record soon. Never waits."""
+        self._appender(robot).add(draft_of(event, author))
+
+    async def record(self, robot: str, event: RobotEvent, author: str) -> None:
+        """Record, and wait until it is stored. Raises Unavailable; then it may be stored later."""
+        self.note(robot, event, author)
+        try:
+            with anyio.fail_after(_PATIENCE_S):
+                await self._appender(robot).flushed()
+        except TimeoutError as late:
+            raise Unavailable("The runner's journal does not take anything in now.") from late
+
+    def _appender(self, robot: str) -> StreamAppender:
         appender = self._pens.get(robot)
         if appender is None:
             appender = self._pens[robot] = StreamAppender(self._ledger, stream_of_robot(robot), -1)
             self._tasks.start_soon(self._write, appender)
-        appender.add(draft_of(event, author))
+        return appender
 
     async def _write(self, appender: StreamAppender) -> None:
         await appender.find_end()
         await appender.run()
+
+    @property
+    def waiting(self) -> int:
+        """How much is not stored."""
+        return sum(each.waiting for each in self._pens.values())
 
     async def newest(self, robot: str, most: int) -> list[tuple[int, RobotEvent]]:
         """The newest events of a robot, oldest first, with their seqs. Raises Unavailable."""

@@ -4,7 +4,7 @@ Open runs live in memory; the table answers for those that are over, and says wh
 the process ended.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, Final
 
 import msgspec
@@ -73,11 +73,16 @@ class Filter(msgspec.Struct, frozen=True, kw_only=True):
     before: str | None = None
 
 
-def listed(wanted: Filter, limit: int) -> Select[Any]:
-    """Runs and what was noted about them, newest first. Which of its states an open run is in the
-    table does not know: with `states` all open ones are there, too."""
+def listed(wanted: Filter, limit: int, among: Iterable[int] | None = None) -> Select[Any]:
+    """Runs and what was noted about them, newest first; `among`: numbers of the only ones that may be
+    wanted. Which of its states an open run is in the table does not know: with `states` all open ones
+    are there, too."""
     query = select(run, review.c.pinned, review.c.note)
     query = query.outerjoin(review, review.c.run == run.c.id)
+    if among is not None:
+        numbers = func.json_each(msgspec.json.encode(sorted(among)).decode()).table_valued("value")
+        query = query.where(run.c.number.in_(select(numbers.c.value)))
+        return _newest(_of_graph(query, wanted.graph), wanted, limit)
     if wanted.graph is None:
         return _newest(query, wanted, limit)
     ids = select(run.c.id).outerjoin(review, review.c.run == run.c.id)
@@ -89,6 +94,14 @@ def listed(wanted: Filter, limit: int) -> Select[Any]:
         )
     )
     return query.where(run.c.id.in_(named)).order_by(run.c.number.desc()).limit(limit)
+
+
+def _of_graph(query: Select[Any], graph: str | None) -> Select[Any]:
+    return (
+        query
+        if graph is None
+        else query.where(or_(run.c.graph == graph, run.c.graph_name == graph))
+    )
 
 
 def _newest(query: Select[Any], wanted: Filter, limit: int) -> Select[Any]:

@@ -72,6 +72,11 @@ class StreamAppender:
         """Whether everything is stored."""
         return not self._waiting
 
+    @property
+    def waiting(self) -> int:
+        """How much is not stored."""
+        return len(self._waiting)
+
     async def flushed(self) -> None:
         """Wait until everything that was put so far is stored."""
         while self._waiting:

@@ -115,7 +115,7 @@ def admit(asked: StartRequest, facts: EngineFacts, *, approved: bool = True) -> 
         )
     subgraphs, inside = read_inside(asked.subgraphs, found, asked.tree_digest, approved=approved)
     for graph in (reading.graph, *inside.values()):
-        _check_names(graph, simulated=asked.engine == SIMULATOR)
+        check_names(graph, simulated=asked.engine == SIMULATOR)
     found_in_it = check(reading.graph, None, facts, inside)
     problems = [*reading.problems, *reading.placed(found_in_it)]
     _check_problems(problems, asked.override)
@@ -159,7 +159,9 @@ def prepared(
     )
 
 
-def _check_names(graph: Graph, *, simulated: bool) -> None:
+def check_names(graph: Graph, *, simulated: bool) -> None:
+    """Refuse names of the graph and its actions that no engine, or not even the simulator, may read.
+    Raises Conflict."""
     allowed = _PLAIN_NAME if simulated else _WIRE_NAME
     names = [("graph", graph.name)]
     names += [("action", action.name) for action in graph.actions if not action.missing]

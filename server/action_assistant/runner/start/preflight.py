@@ -11,13 +11,13 @@ from typing import Final, Literal, TypeAlias
 import msgspec
 
 from action_assistant.errors import Conflict, Refused
+from action_assistant.runner.index_folders.comparison import FolderLook
 from action_assistant.runner.links.observations import Snapshot, failed_in
 from action_assistant.runner.links.port import Answer, Standing
 from action_assistant.runner.robots.engine import EngineIndex
 from action_assistant.runner.robots.foreign_graphs import foreign_graphs
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start.admission import Admitted, Prepared
-from action_assistant.runner.start.built_libraries import older_libraries
 from action_assistant.umrf.check import STRUCTURAL, check
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.files import codec
@@ -36,7 +36,7 @@ _SHOWN: Final = 20
 
 class Item(msgspec.Struct, frozen=True, kw_only=True):
     """One thing that was looked at. A person may override a blocked one where `overridable`, with
-    the codes in `codes` and a reason."""
+    the codes in `codes` and a reason. `folder`: where graphs could be written that the robot lacks."""
 
     code: str
     verdict: Verdict
@@ -44,6 +44,7 @@ class Item(msgspec.Struct, frozen=True, kw_only=True):
     codes: tuple[str, ...] = ()
     overridable: bool = False
     problems: tuple[Problem, ...] = ()
+    folder: FolderLook | None = None
 
 
 class Preflight(msgspec.Struct, frozen=True):
@@ -71,7 +72,8 @@ class Settled(msgspec.Struct, frozen=True):
 
 class EngineView(msgspec.Struct, frozen=True, kw_only=True):
     """An engine at the moment of a pre-flight. `took_ms`: until it answered a get sent for it;
-    `open_runs`: runs of ours that go on there; `settled`: those that somebody has seen at rest."""
+    `open_runs`: runs of ours that go on there; `settled`: those that somebody has seen at rest;
+    `index_folder`: what it indexes, where the runner may write there."""
 
     name: str
     facts: EngineFacts
@@ -81,6 +83,7 @@ class EngineView(msgspec.Struct, frozen=True, kw_only=True):
     took_ms: float
     open_runs: Collection[str] = ()
     settled: tuple[Settled, ...] = ()
+    index_folder: Path | None = None
 
 
 def summed(engine: str, items: Sequence[Item], digest: str = "", tree: str = "") -> Preflight:
@@ -167,13 +170,6 @@ def of_robot(view: EngineView, graph: Graph) -> tuple[Item, ...]:
     )
 
 
-def of_text(view: EngineView, umrf: str, prefixes: Sequence[Path] = ()) -> tuple[Item, ...]:
-    """As `of_robot`, of a graph as it will be sent, and of the workspace that is sourced here. For
-    workers."""
-    graph = codec.read(umrf).graph
-    return (*of_robot(view, graph), *_built(view, graph, prefixes))
-
-
 def check_items(items: Sequence[Item], overridden: Collection[str]) -> None:
     """Refuse a start that an item stands in the way of. Raises Conflict."""
     for item in items:
@@ -248,22 +244,6 @@ def _actions(view: EngineView, graph: Graph) -> Item:
         overridable=not codes & _REFUSED,
         problems=problems[:_SHOWN],
     )
-
-
-def _built(view: EngineView, graph: Graph, prefixes: Sequence[Path]) -> tuple[Item, ...]:
-    """No library of its actions is older than its source, as far as this computer has the workspace."""
-    older = older_libraries(graph, prefixes)
-    if not older:
-        return ()
-    first = older[0]
-    more = f" (and {len(older) - 1} more)" if len(older) > 1 else ""
-    text = (
-        f"{first.library.name} in the workspace that is sourced here is older than "
-        f"{first.source.name}{more}: {view.name} would run {first.action} as it was before. Call "
-        "`colcon build` and restart its engine."
-    )
-    codes = ("older-library",)
-    return (Item(code="built", verdict="blocked", text=text, codes=codes, overridable=True),)
 
 
 def _again(view: EngineView, graph: Graph) -> Item:

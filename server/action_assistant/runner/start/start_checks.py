@@ -1,8 +1,9 @@
 """The checks before a start is stored and sent, for each engine that it shall go to."""
 
 import os
-from collections.abc import Awaitable, Callable, Collection, Sequence
+from collections.abc import Awaitable, Callable, Collection, Mapping, Sequence
 from functools import partial
+from pathlib import Path
 from typing import Annotated, Final, TypeAlias
 
 import anyio
@@ -26,8 +27,8 @@ from action_assistant.runner.start import preflight
 from action_assistant.runner.start.admission import Prepared, StartRequest, decoded, prepared
 from action_assistant.runner.start.approvals import Approvals
 from action_assistant.runner.start.course_items import of_courses, of_unknown_courses
+from action_assistant.runner.start.disk_items import looked_at
 from action_assistant.runner.start.preflight import EngineView, Item, Preflight, Settled
-from action_assistant.runner.start.subgraph_items import looked_at
 from action_assistant.umrf.facts import SIMULATED, EngineFacts, facts_of
 from action_assistant.web.workers.lanes import RunInWorker
 
@@ -113,11 +114,12 @@ class Grouped(msgspec.Struct, frozen=True):
 
 
 class StartSources(msgspec.Struct, frozen=True):
-    """What starts have besides robots: the folder of `behaviours`, and `courses(graph, umrf)`, which
-    holds what is expected of a graph against it."""
+    """What starts have besides robots: the folder of `behaviours`, `courses(graph, umrf)`, which holds
+    what is expected of a graph against it, and the folders that robots index, by their names."""
 
     behaviours: BehaviourFolder | None = None
     courses: CoursesOf | None = None
+    index_folders: Mapping[str, Path] = {}
 
 
 NO_SOURCES: Final = StartSources()
@@ -151,6 +153,7 @@ class StartChecks:
         self._settled = settled
         self._simulator = simulator
         self._behaviours = sources.behaviours
+        self._index_folders = sources.index_folders
         self._prefixes = Workspace.of(os.environ).prefixes
 
     async def cleared(self, asked: StartRequest, starter: str) -> Cleared:
@@ -320,6 +323,7 @@ class StartChecks:
             took_ms=took,
             open_runs=going,
             settled=tuple(self._settled(name)),
+            index_folder=self._index_folders.get(name),
         )
 
     async def _folder(self, ready: Prepared) -> BehaviourFolder:

@@ -4,28 +4,19 @@ An engine runs what it has indexed under a name, whatever was sent (docs/umrf-an
 """
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
+from action_assistant.runner.index_folders.comparison import FileState, held_against, same_to_engine
+from action_assistant.runner.index_folders.scan import IndexedFiles
 from action_assistant.runner.robots.engine import EngineIndex
-from action_assistant.runner.sent_subgraphs import graphs_in
-from action_assistant.runner.start.admission import Prepared
-from action_assistant.runner.start.preflight import EngineView, Item, of_text
-from action_assistant.umrf.digest import digest
-from action_assistant.umrf.echo import echo
+from action_assistant.runner.start.preflight import EngineView, Item
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.model import Graph
 
 _TOLD = 3  # names in a sentence
 
 
-def looked_at(view: EngineView, ready: Prepared, prefixes: Sequence[Path]) -> tuple[Item, ...]:
-    """All that an answering robot is looked at for before this start. For workers."""
-    items = of_text(view, ready.umrf, prefixes)
-    return (*items, *of_inside(view, graphs_in(ready.subgraphs)))
-
-
 def of_inside(view: EngineView, pinned: Mapping[str, Graph]) -> tuple[Item, ...]:
-    """Whether it has indexed the graphs that were sent along; nothing where there are none."""
+    """Whether it has indexed the graphs that were sent along; nothing where there are none. Pure."""
     if not pinned:
         return ()
     index = view.index
@@ -35,12 +26,7 @@ def of_inside(view: EngineView, pinned: Mapping[str, Graph]) -> tuple[Item, ...]
             "has it cannot be said."
         )
         return (Item(code="subgraphs", verdict="warned", text=text),)
-    lacking = [each for each in sorted(pinned) if not _is_known(each, index)]
-    other = [
-        name
-        for name, graph in sorted(pinned.items())
-        if _is_known(name, index) and not _is_same(name, graph, index, view.facts)
-    ]
+    lacking, other = unlike(view, pinned)
     if not lacking and not other:
         text = f"{view.name} has indexed {_listed(sorted(pinned))} as this version has it."
         return (Item(code="subgraphs", verdict="passed", text=text),)
@@ -59,6 +45,25 @@ def of_inside(view: EngineView, pinned: Mapping[str, Graph]) -> tuple[Item, ...]
     return (item,)
 
 
+def unlike(view: EngineView, pinned: Mapping[str, Graph]) -> tuple[list[str], list[str]]:
+    """The names of graphs that the engine has not indexed, and of those that it has otherwise."""
+    index = view.index
+    lacking = [each for each in sorted(pinned) if not _is_known(each, index)]
+    other = [
+        name
+        for name, graph in sorted(pinned.items())
+        if _is_known(name, index) and not _is_same(name, graph, index, view.facts)
+    ]
+    return lacking, other
+
+
+def of_index(
+    graph: Graph, files: IndexedFiles, index: EngineIndex, facts: EngineFacts
+) -> FileState:
+    """How a graph is in the folder of an engine that has named this index."""
+    return held_against(graph, files, facts, actions=index.actions, graphs=index.graphs)
+
+
 def _is_known(name: str, index: EngineIndex) -> bool:
     return name in index.graphs or name in index.actions
 
@@ -67,8 +72,7 @@ def _is_same(name: str, graph: Graph, index: EngineIndex, facts: EngineFacts) ->
     """Whether the engine would run just this; an action of that name comes before a graph."""
     if name in index.actions:
         return False
-    ours, theirs = echo(graph, facts), echo(index.graphs[name], facts)
-    return digest(ours) == digest(theirs)
+    return same_to_engine(graph, index.graphs[name], facts)
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -5,7 +5,7 @@ brought no proof; no start from here leaves before: a late stop would hit a run 
 name.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Final
 
 import anyio
@@ -57,6 +57,10 @@ class ForeignStopLoop:
     def going(self, robot: str) -> bool:
         """Whether something is being stopped there."""
         return any(name == robot for name, _ in self._going)
+
+    def all_going(self) -> Iterator[tuple[str, str]]:
+        """The robot of each graph that is being stopped, and why that is not proven yet."""
+        return ((robot, why) for (robot, _), why in self._going.items())
 
     def stop(self, engine: KnownEngine, graph: str, author: Author) -> None:
         """Want a graph stopped. Never waits."""

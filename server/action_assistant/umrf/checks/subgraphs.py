@@ -4,7 +4,7 @@ See docs/umrf-and-the-engine.md 2.6.
 """
 
 from collections import Counter
-from collections.abc import Container, Mapping
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -16,6 +16,7 @@ from action_assistant.umrf.checks.scenarios import check_scenarios, halted
 from action_assistant.umrf.checks.structure import check_structure
 from action_assistant.umrf.checks.values import check_signature, check_values
 from action_assistant.umrf.codes import rank
+from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.model import (
     EXIT,
     PRECONDITIONS,
@@ -59,10 +60,12 @@ class _Inner:
 @dataclass(frozen=True)
 class Resolution:
     """How names were resolved to graphs. `several`: names of more than one graph, of which the oldest
-    was taken; `cut`: there are more graphs inside than were looked at."""
+    was taken; `cut`: there are more graphs inside than were looked at; `hidden`: names of a graph that an
+    action of the library has, too."""
 
     several: Container[str] = frozenset()
     cut: bool = False
+    hidden: Container[str] = frozenset()
 
 
 #: Each name is that of one graph, and all were looked at.
@@ -77,9 +80,53 @@ class _Graphs:
     known: Container[str]
     resolution: Resolution
     found: dict[str, _Inner] = field(default_factory=dict)
+    _recurring: dict[tuple[str, str], bool] = field(default_factory=dict)
 
     def of(self, name: str) -> Graph | None:
         return None if name in self.known else self.by_name.get(name)
+
+    def is_hidden(self, name: str) -> bool:
+        """Whether an action comes before a graph of that name."""
+        return name in self.resolution.hidden or (name in self.known and name in self.by_name)
+
+    def recurs(self, name: str, within: str) -> bool:
+        """Whether the graph of an action of that name contains itself, or the graph that it is in.
+        Told by the names that actions use: the name in a graph's own text decides nothing."""
+        if (name, within) not in self._recurring:
+            self._recurring[name, within] = name == within or self._reaches(name, {name, within})
+        return self._recurring[name, within]
+
+    def _reaches(self, name: str, goals: set[str]) -> bool:
+        seen = {name}
+        stack = [name]
+        while stack:
+            for inner in self._inside(self.by_name[stack.pop()]):
+                if inner in goals:
+                    return True
+                if inner not in seen:
+                    seen.add(inner)
+                    stack.append(inner)
+        return False
+
+    def _inside(self, graph: Graph) -> Iterator[str]:
+        real = (action.name for action in graph.actions if not action.missing)
+        return (name for name in real if self.of(name) is not None)
+
+    def inmost_first(self, top: Graph) -> Iterator[str]:
+        """Every graph inside that does not recur, after all that is inside of it. No call of itself: a
+        hierarchy may be deeper than Python's stack."""
+        seen: set[str] = set()
+        levels = [(top.name, self._inside(top))]
+        while levels:
+            within, left = levels[-1]
+            name = next(left, None)
+            if name is None:
+                levels.pop()
+                if levels:
+                    yield within
+            elif name not in seen and not self.recurs(name, within):
+                seen.add(name)
+                levels.append((name, self._inside(self.by_name[name])))
 
 
 def check_subgraphs(
@@ -95,15 +142,24 @@ def check_subgraphs(
             "and a dry-run plays it as one action."
         )
         subject.report("not-tried", "warning", message)
-    _check_each(subject, _Graphs(graphs, known, resolution))
+    inside = _Graphs(graphs, known, resolution)
+    for name in inside.inmost_first(subject.graph):
+        inside.found[name] = _inner(name, subject.facts, inside)
+    _check_each(subject, subject.graph.name, inside)
     _check_again(subject, graphs, known)
 
 
-def _check_each(subject: Subject, graphs: _Graphs) -> None:
-    contains: dict[str, bool] = {}
+def _check_each(subject: Subject, within: str, graphs: _Graphs) -> None:
+    """Reports what the sub-graphs of one graph do to it. `within`: the name by which it is called."""
     for action in subject.real:
         graph = graphs.of(action.name)
         if graph is None:
+            if action.name != within and graphs.is_hidden(action.name):
+                message = (
+                    f"“{action.name}” is an action of the library and a graph, too: the action is taken, "
+                    "never the graph. Rename one of them where the graph is meant."
+                )
+                subject.report("subgraph-hidden", "warning", message, action=action, member="/name")
             continue
         if action.name in graphs.resolution.several:
             message = (
@@ -111,17 +167,13 @@ def _check_each(subject: Subject, graphs: _Graphs) -> None:
                 "others, so that nobody is mistaken."
             )
             subject.report("subgraph-ambiguous", "warning", message, action=action, member="/name")
-        if action.name not in contains:
-            contains[action.name] = _contains(graph, {subject.graph.name, graph.name}, graphs)
-        if contains[action.name]:
+        if graphs.recurs(action.name, within):
             message = (
                 f"The sub-graph “{graph.name}” contains itself or the graph that it is in; the "
                 "engine cannot resolve the graph."
             )
             subject.report("recursion", "error", message, action=action, member="/name")
             continue
-        if action.name not in graphs.found:
-            graphs.found[action.name] = _inner(subject, graph, graphs)
         _report(subject, action, graph, graphs.found[action.name])
         _check_pauses(subject, action)
 
@@ -179,30 +231,14 @@ def _check_again(subject: Subject, graphs: Mapping[str, Graph], known: Container
             subject.report("subgraph-twice", "error", message, action=found.action, member="/name")
 
 
-def _contains(graph: Graph, above: set[str], graphs: _Graphs) -> bool:
-    """Whether one of the graphs in which it is comes again inside."""
-    seen: set[str] = set()
-    stack = [graph]
-    while stack:
-        for action in stack.pop().actions:
-            inner = graphs.of(action.name)
-            if inner is None:
-                continue
-            if action.name in above:
-                return True
-            if action.name not in seen:
-                seen.add(action.name)
-                stack.append(inner)
-    return False
-
-
-def _inner(subject: Subject, graph: Graph, graphs: _Graphs) -> _Inner:
-    """What a sub-graph does wrong, with all that is inside of it: no graph is there that contains it."""
-    inside = Subject(with_inputs(graph), subject.facts)
+def _inner(name: str, facts: EngineFacts, graphs: _Graphs) -> _Inner:
+    """What a sub-graph does wrong, with all that is inside of it, which was looked at before."""
+    graph = graphs.by_name[name]
+    inside = Subject(with_inputs(graph), facts)
     check_structure(inside)
     check_flow(inside)
     check_values(inside, None)
-    _check_each(inside, graphs)
+    _check_each(inside, name, graphs)
     check_scenarios(inside)
     findings = _findings(inside)
     when = None if any(_stays(each) for each in findings) else halted(inside)

@@ -23,10 +23,12 @@ from action_assistant.errors import (
     WrongHost,
     WrongOrigin,
 )
+from action_assistant.logs.context import request_id
 from action_assistant.web.auth.caller import Caller, asked_by
 from action_assistant.web.auth.keys import Keys, Person, Session
 from action_assistant.web.auth.revocations import SESSION_ENDED, Revocations, SessionGuards
 from action_assistant.web.auth.roles import OWNER, Permission, allowed, may
+from action_assistant.web.auth.scrape_token import ScrapeToken
 from action_assistant.web.http import cookies
 from action_assistant.web.http.problems import problem_of
 from action_assistant.web.network.addresses import Addresses
@@ -40,6 +42,7 @@ _SAFE: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 _STOPS: Final = re.compile(r"/api/stop|/api/(runs|robots)/[^/]+/stop")
 _LIVE: Final = "/api/live"
 _GOODBYE: Final = 1.0  # seconds that a close frame gets
+_POLICY: Final = b"content-security-policy"
 _HEADERS: Final = (
     (b"x-content-type-options", b"nosniff"),
     (b"referrer-policy", b"no-referrer"),
@@ -134,8 +137,10 @@ class Access:
         is_open: Callable[[str, bool], bool],
         policy: Callable[[str], str],
         revoked: Revocations,
+        scraped: ScrapeToken | None = None,
     ) -> None:
         self._app = app
+        self._scraped = scraped or ScrapeToken()
         self._keys = keys
         self._addresses = addresses
         self._cookie = cookie_name(page_port)
@@ -239,6 +244,8 @@ class Access:
         if scheme.lower() == "bearer" and self._keys.opens(token.strip()):
             state["person"] = self._local
             return
+        if scheme.lower() == "bearer" and self._scraped.opens(method, path, token.strip()):
+            return  # as nobody: there is nothing else to be found out
         genuine = self._sessions(headers)
         state["sessions"] = genuine
         session = self._lasting(genuine)
@@ -278,16 +285,22 @@ class Access:
                 (b"access-control-allow-credentials", b"true"),
                 (b"access-control-allow-methods", b"GET, POST, PATCH, PUT, DELETE"),
                 (b"access-control-allow-headers", b"content-type, last-event-id"),
-                (b"access-control-expose-headers", b"location"),
+                (b"access-control-expose-headers", b"location, x-request-id"),
                 (b"access-control-max-age", b"600"),
                 (b"vary", b"origin"),
             ]
+        name = request_id()
+        if name is not None:
+            extra.append((b"x-request-id", name.encode()))
         policy = self._policy(headers.get("host", "")).encode("latin-1", "replace")
-        extra.append((b"content-security-policy", policy))
 
         async def dressed(message: Message) -> None:
             if message["type"] in {"http.response.start", "websocket.http.response.start"}:
-                message["headers"] = [*message.get("headers", []), *extra]
+                own = list(message.get("headers", []))
+                # The documentation has a stricter one.
+                if all(name != _POLICY for name, _ in own):
+                    own.append((_POLICY, policy))
+                message["headers"] = [*own, *extra]
             await send(message)
 
         return dressed

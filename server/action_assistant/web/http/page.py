@@ -1,32 +1,18 @@
 """The built page, served from memory: a few megabytes, read again when somebody builds it anew."""
 
-import gzip
-import hashlib
-import mimetypes
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
-import msgspec
 from litestar.enums import ScopeType
 from litestar.types import ASGIApp, HTTPScope, Receive, Scope, Send
 
+from action_assistant.web.http.static_files import File, file_of, send_file
+
 _NOT_PAGES: Final = ("/api/", "/runner/", "/schema", "/healthz", "/readyz", "/metrics")
-_COMPRESSED: Final = frozenset({".html", ".js", ".css", ".svg", ".json", ".webmanifest"})
-_MEDIA: Final = {**mimetypes.types_map, ".webmanifest": "application/manifest+json"}
 _UNBUILT: Final = b"""<!doctype html><meta charset="utf-8"><title>Page not built</title>
 <p>The page has not been built. Run <code>make setup</code> in the folder of the source code.</p>
 """
-
-
-class File(msgspec.Struct, frozen=True):
-    """One file as it is sent. `zipped` is empty where compression does not pay."""
-
-    body: bytes
-    zipped: bytes
-    media: str
-    etag: str
-    lasting: bool
 
 
 class Page:
@@ -43,7 +29,7 @@ class Page:
         self._root_of = root_of
         self._built: float | None = None
         self._files: dict[str, File] = {}
-        self._index = _file(_UNBUILT, ".html", lasting=False)
+        self._index = file_of(_UNBUILT, ".html", lasting=False)
         self._rooted: dict[str, File] = {}
         self._renew()
 
@@ -62,7 +48,7 @@ class Page:
         """The page itself. What it names beside it is at its root, whichever address it is opened by."""
         if root not in self._rooted:
             body = self._index.body.replace(b'="./', f'="{root}/'.encode())
-            self._rooted[root] = _file(body, ".html", lasting=False)
+            self._rooted[root] = file_of(body, ".html", lasting=False)
         return self._rooted[root]
 
     def knows(self, path: str, accepts_html: bool) -> bool:
@@ -84,46 +70,14 @@ class Page:
         if found is None or found is self._index:
             self._renew()
             found = self._index_at(self._root_of(scope))
-        await _send_file(scope, send, found)
+        await send_file(scope, send, found)
 
 
 def _load(folder: Path) -> dict[str, File]:
     return {
-        f"/{path.relative_to(folder).as_posix()}": _file(
+        f"/{path.relative_to(folder).as_posix()}": file_of(
             path.read_bytes(), path.suffix, lasting="assets" in path.parts
         )
         for path in folder.rglob("*")
         if path.is_file() and not path.relative_to(folder).parts[0].startswith(".")
     }
-
-
-def _file(body: bytes, suffix: str, *, lasting: bool) -> File:
-    media = _MEDIA.get(suffix, "application/octet-stream")
-    if suffix in {".html", ".js", ".css"}:
-        media += "; charset=utf-8"
-    zipped = gzip.compress(body, mtime=0) if suffix in _COMPRESSED and len(body) > 1000 else b""
-    etag = f'"{hashlib.sha256(body).hexdigest()[:20]}"'
-    return File(body, zipped, media, etag, lasting)
-
-
-async def _send_file(scope: HTTPScope, send: Send, file: File) -> None:
-    asked = dict(scope["headers"])
-    fields = [
-        (b"etag", file.etag.encode()),
-        (b"cache-control", b"max-age=31536000, immutable" if file.lasting else b"no-cache"),
-        (b"vary", b"accept-encoding"),
-    ]
-    body, status = file.body, 200
-    if asked.get(b"if-none-match") == file.etag.encode():
-        body, status = b"", 304
-    else:
-        fields.append((b"content-type", file.media.encode()))
-        if file.zipped and b"gzip" in asked.get(b"accept-encoding", b""):
-            body = file.zipped
-            fields.append((b"content-encoding", b"gzip"))
-        fields.append((b"content-length", str(len(body)).encode()))
-    start: Any = {"type": "http.response.start", "status": status, "headers": fields}
-    sent = b"" if scope["method"] == "HEAD" else body
-    end: Any = {"type": "http.response.body", "body": sent, "more_body": False}
-    await send(start)
-    await send(end)

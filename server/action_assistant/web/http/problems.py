@@ -11,6 +11,7 @@ from litestar.handlers import HTTPRouteHandler
 from litestar.types import ExceptionHandlersMap
 
 from action_assistant.errors import Refused
+from action_assistant.logs.context import request_id
 
 log: Final = logging.getLogger(__name__)
 
@@ -30,13 +31,15 @@ _PLACE: Final = msgspec.Meta(
 
 
 class ProblemDetails(msgspec.Struct, frozen=True, omit_defaults=True):
-    """What a client is told about a refusal. `type` is stable; `detail` is for people."""
+    """What a client is told about a refusal. `type` is stable; `detail` is for people. By `request_id`
+    the lines of the log are found."""
 
     type: str
     title: str
     status: int
     detail: str
     where: Annotated[dict[str, Any], _PLACE] | None = None
+    request_id: str | None = msgspec.field(default_factory=request_id)
 
 
 def problem_of(refused: Refused) -> bytes:

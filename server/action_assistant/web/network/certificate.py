@@ -6,9 +6,9 @@ private networks alone, so that whoever steals its key cannot stand in for the r
 """
 
 import contextlib
-import fcntl
 import ipaddress
 import os
+import platform
 import ssl
 from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime, timedelta
@@ -22,6 +22,7 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from action_assistant.errors import CannotStart
 from action_assistant.private_files import opener
+from action_assistant.system import file_locks
 
 FOLDER: Final = "tls"
 _AUTHORITY_DAYS: Final = 3650
@@ -83,7 +84,7 @@ class Certificate:
     def _alone(self) -> Iterator[None]:
         self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         with open(self._folder / "lock", "w", opener=opener) as lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)
+            file_locks.wait_for(lock.fileno())
             yield
 
     def _serves(self, names: Sequence[str], now: datetime) -> bool:
@@ -138,7 +139,7 @@ class Certificate:
 
     def _new_authority(self, names: Sequence[str], now: datetime) -> Signer:
         key = ec.generate_private_key(ec.SECP256R1())
-        name = _called(f"Action Assistant on {os.uname().nodename} ({now:%Y-%m-%d %H:%M:%S})")
+        name = _called(f"Action Assistant on {platform.node()} ({now:%Y-%m-%d %H:%M:%S})")
         certificate = (
             _begun(name, now, _AUTHORITY_DAYS)
             .subject_name(name)

@@ -9,7 +9,6 @@ import asyncio
 import contextlib
 import logging
 import os
-import resource
 import socket
 import ssl
 import time
@@ -30,17 +29,6 @@ _PAUSE_S: Final = 0.05  # when the system has no descriptor left
 
 Peer = tuple[str, int]
 Factory = Callable[[], asyncio.Protocol]
-
-
-def raise_limit() -> int:
-    """Have as many descriptors as the system allows; how many that is."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    most = 1 << 16 if hard == resource.RLIM_INFINITY else hard
-    if soft != resource.RLIM_INFINITY and soft < most:
-        with contextlib.suppress(OSError, ValueError):
-            resource.setrlimit(resource.RLIMIT_NOFILE, (most, hard))
-            soft = most
-    return most if soft == resource.RLIM_INFINITY else soft
 
 
 class Connection:

@@ -1,7 +1,7 @@
 """The ASGI application of either process: Litestar inside, access control around it."""
 
 import logging
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractAsyncContextManager
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -14,13 +14,20 @@ from litestar.params import Parameter
 from litestar.routes import HTTPRoute
 from litestar.types import ASGIApp, ControllerRouterHandler, HTTPScope, Receive, Scope, Send
 
+from action_assistant.errors import NotFound
 from action_assistant.version import VERSION, commit
 from action_assistant.web.auth.access import Access, Needs, require
 from action_assistant.web.auth.keys import Keys, ServerProof
 from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.auth.roles import Permission
+from action_assistant.web.auth.scrape_token import METRICS, ScrapeToken
+from action_assistant.web.http.help_site import HelpSite
 from action_assistant.web.http.page import Page
 from action_assistant.web.http.problems import problem_handlers
+from action_assistant.web.http.requests import RequestCounts, Requests
+from action_assistant.web.monitoring.monitoring import Monitoring
+from action_assistant.web.monitoring.readiness import Readiness
+from action_assistant.web.monitoring.status import ProcessStatus
 from action_assistant.web.network.addresses import Addresses, host_name
 from action_assistant.web.server.openapi import OpenApiText, document, openapi_config
 from action_assistant.web.server.proxy import MOUNT, Mounted, misrouted
@@ -42,15 +49,6 @@ class Health(msgspec.Struct, frozen=True):
     commit: str | None
 
 
-class Readiness(msgspec.Struct, frozen=True):
-    """Whether the process can do its work, and what stands in the way."""
-
-    ready: bool
-    problems: tuple[str, ...] = ()
-
-
-Check = Callable[[], Awaitable[Readiness]]
-Measures = Callable[[], dict[str, float]]
 Lifespan = Callable[[Litestar], AbstractAsyncContextManager[None]]
 
 
@@ -63,19 +61,21 @@ def application(
     addresses: Addresses,
     page_port: int,
     lifespan: Sequence[Lifespan] = (),
-    ready: Check | None = None,
-    measures: Measures | None = None,
+    monitoring: Monitoring | None = None,
+    scraped: ScrapeToken | None = None,
     page: Path | None = None,
+    help_site: Path | None = None,
     runner_port: int | None = None,
     mount: str = "",
     body_limit: int = BODY_LIMIT,
 ) -> ASGIApp:
-    """The whole application. Routes may read less or more than `body_limit` bytes. `page` and
-    `runner_port` are the editor's: it serves the page, whose Content-Security-Policy names the
-    runner. `mount` is the path at which a proxy shows this process."""
+    """The whole application. Routes may read less or more than `body_limit` bytes. `page`, `help_site`
+    and `runner_port` are the editor's: it serves the built page, whose Content-Security-Policy names
+    the runner, and the documentation. `mount` is the path at which a proxy shows this process;
+    `scraped` the token that opens /metrics alone."""
     handlers = [
         *route_handlers,
-        *_health(ready, measures),
+        *_health(monitoring),
         _proving(keys),
         *([misrouted(runner_port)] if runner_port is not None else []),
     ]
@@ -87,19 +87,40 @@ def application(
         public = addresses.public_at(_host(scope))
         return str(state.get(MOUNT) or (public.path if public is not None else ""))
 
-    shown = Page(inner, page, root_of) if page is not None else None
+    built, is_public = _with_built(inner, page, help_site, root_of)
     outer: ASGIApp = Access(
-        shown or inner,
+        built,
         keys=keys,
         addresses=addresses,
         page_port=page_port,
-        is_open=lambda path, html: (
-            _answers_strangers(path) or (shown is not None and shown.knows(path, html))
-        ),
+        is_open=lambda path, html: _answers_strangers(path) or is_public(path, html),
         policy=lambda host: _policy(addresses, host, page_port, runner_port),
         revoked=revoked,
+        scraped=scraped,
     )
-    return _Described(Mounted(outer, mount), openapi)
+    return _Described(Mounted(Requests(outer, _counts(monitoring)), mount), openapi)
+
+
+def _counts(monitoring: Monitoring | None) -> RequestCounts:
+    return RequestCounts() if monitoring is None else monitoring.requests
+
+
+def _with_built(
+    inner: ASGIApp,
+    page: Path | None,
+    help_site: Path | None,
+    root_of: Callable[[HTTPScope], str],
+) -> tuple[ASGIApp, Callable[[str, bool], bool]]:
+    """The routes with the built page and documentation before them, and which paths are those'."""
+    shown = Page(inner, page, root_of) if page is not None else None
+    helped = HelpSite(shown or inner, help_site) if help_site is not None else None
+
+    def is_public(path: str, accepts_html: bool) -> bool:
+        if helped is not None and helped.knows(path):
+            return True
+        return shown is not None and shown.knows(path, accepts_html)
+
+    return helped or shown or inner, is_public
 
 
 def _routed(
@@ -223,21 +244,31 @@ def _proving(keys: Keys) -> ControllerRouterHandler:
     return prove
 
 
-def _health(ready: Check | None, measures: Measures | None) -> list[ControllerRouterHandler]:
+def _health(monitoring: Monitoring | None) -> list[ControllerRouterHandler]:
     health = Health("ok", VERSION, commit())
 
     @get("/healthz", summary="Whether the process answers")
     async def healthz() -> Health:
         return health
 
-    @get("/readyz", summary="Whether the process can do its work")
+    @get("/readyz", summary="Whether the process can do its work, and which part of it cannot")
     async def readyz() -> Response[Readiness]:
-        found = await ready() if ready is not None else Readiness(ready=True)
+        found = await monitoring.readiness() if monitoring is not None else Readiness(ready=True)
         return Response(found, status_code=200 if found.ready else 503)
 
-    @get("/metrics", media_type=MediaType.TEXT, summary="Measures, as Prometheus reads them")
-    async def metrics() -> str:
-        values = measures() if measures is not None else {}
-        return "".join(f"{name} {value:g}\n" for name, value in sorted(values.items()))
+    @get(METRICS, media_type=MediaType.TEXT, summary="Measures, as Prometheus reads them")
+    async def metrics() -> Response[str]:
+        text = await monitoring.exposition() if monitoring is not None else ""
+        return Response(text, media_type="text/plain; version=0.0.4")
 
-    return [healthz, readyz, metrics]
+    @get(
+        "/api/status",
+        guards=[Needs("restore")],
+        summary="How the process is: versions, room, queues, what goes on",
+    )
+    async def status() -> ProcessStatus:
+        if monitoring is None:
+            raise NotFound("Nobody looks at this process.")
+        return await monitoring.status()
+
+    return [healthz, readyz, metrics, status]

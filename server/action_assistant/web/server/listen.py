@@ -20,8 +20,10 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from action_assistant.errors import BadInput, CannotStart
 from action_assistant.public_url import Network
+from action_assistant.system import limits
 from action_assistant.web.auth.access import KNOWN
-from action_assistant.web.network.connections import Connections, raise_limit
+from action_assistant.web.network.connections import Connections
+from action_assistant.web.server.direct import DirectSocket
 from action_assistant.web.server.proxy import ASKED, Forwarded
 from action_assistant.web.server.sockets import bound
 
@@ -55,9 +57,11 @@ def serve(
     port: int,
     identity: "TlsIdentity | None" = None,
     proxies: tuple[Network, ...] = (),
+    direct: bool = False,
 ) -> None:
     """Serve what `make` makes until told to end; nothing is touched before the address is ours.
-    With an `identity` over TLS. `proxies` are believed about who asks.
+    With an `identity` over TLS. `proxies` are believed about who asks. `direct`: applications may take
+    their sockets over.
 
     Raises CannotStart when the address is taken or unknown.
     """
@@ -71,9 +75,9 @@ def serve(
             listener.close()
         raise
     forwarded = Forwarded(endings, proxies)
-    connections = Connections(raise_limit(), forwarded.is_proxy)
+    connections = Connections(limits.raise_descriptors(), forwarded.is_proxy)
     app = ActivityTracker(forwarded, connections)
-    config = _configured(app, identity)
+    config = _configured(app, identity, direct=direct)
     logging.getLogger("uvicorn.error").addFilter(_in_one_line)
     server = _Server(config, endings, connections)
     _end_with_parent(server)
@@ -82,7 +86,7 @@ def serve(
         raise CannotStart("The process could not be set up; the log above says why.")
 
 
-def _configured(app: ASGIApp, identity: "TlsIdentity | None") -> uvicorn.Config:
+def _configured(app: ASGIApp, identity: "TlsIdentity | None", *, direct: bool) -> uvicorn.Config:
     config = uvicorn.Config(
         app,
         http=_Http,
@@ -92,7 +96,7 @@ def _configured(app: ASGIApp, identity: "TlsIdentity | None") -> uvicorn.Config:
         access_log=False,
         proxy_headers=False,
         server_header=False,
-        ws="websockets-sansio",
+        ws=DirectSocket if direct else "websockets-sansio",
         ws_max_size=WEBSOCKET_LIMIT,
         ws_per_message_deflate=False,
         ws_ping_interval=10,

@@ -20,6 +20,7 @@ from litestar.types import (
 from action_assistant.errors import Misrouted
 from action_assistant.public_url import RUNNER, Network
 from action_assistant.web.auth.access import Needs
+from action_assistant.web.http.requests import PROXIED
 
 #: Under this name the state of a request has the path at which the page lies for whoever asks.
 MOUNT: Final = "mount"
@@ -45,6 +46,8 @@ class Forwarded:
         """Pass on."""
         if scope["type"] in _CALLS and self._proxies:
             peer: Any = scope.get("client")
+            if peer and self.is_proxy(peer[0]):
+                scope.setdefault("state", {})[PROXIED] = True
             found = self._asker(peer[0], _forwarded(scope)) if peer else None
             if found is not None:
                 scope.get("state", {}).get(ASKED, _nobody)(found)

@@ -9,45 +9,55 @@ import logging
 import multiprocessing
 import os
 import pickle
-import resource
 import signal
 import threading
 from collections.abc import Callable, Sequence
+from functools import cache
 from multiprocessing.connection import Connection
-from multiprocessing.context import ForkServerProcess
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from action_assistant.errors import TooLarge
+from action_assistant.logs.setup import set_up_worker
 from action_assistant.safe_text import make_streams_printable
+from action_assistant.system import limits
+
+if TYPE_CHECKING:  # not on Windows
+    from multiprocessing.context import ForkServerContext, ForkServerProcess
 
 _MEMORY: Final = 768 << 20  # bytes that a worker may take beyond what it begins with
 _TIRED: Final = 256 << 20  # bytes in use after which a worker makes room for a fresh one
 
-_context: Final = multiprocessing.get_context("forkserver")
+
+@cache
+def _context() -> "ForkServerContext":
+    """Where processes are forked from one that has nothing but what they need. Not on Windows."""
+    return multiprocessing.get_context("forkserver")
 
 
 def wire() -> tuple[Connection, Connection]:
     """Two ends, ours and that of a worker."""
-    ours, theirs = _context.Pipe()
+    ours, theirs = _context().Pipe()
     return ours, theirs
 
 
 def child(
     work: Callable[..., None], *args: Any, name: str, nice: int, preloaded: Sequence[str]
-) -> ForkServerProcess:
+) -> "ForkServerProcess":
     """A process of low priority that ends with this one, in which `work(*args)` runs. Waits for it
     to exist. `preloaded`: the modules that the server process imports before it forks the first one.
     Raises OSError, EOFError."""
-    _context.set_forkserver_preload(list(preloaded))
-    process = _context.Process(target=_humbly, args=(work, args, nice), name=name, daemon=True)
+    _context().set_forkserver_preload(list(preloaded))
+    told = (name, work, args, nice)
+    process = _context().Process(target=_humbly, args=told, name=name, daemon=True)
     process.start()
     return process
 
 
-def _humbly(work: Callable[..., None], args: tuple[Any, ...], nice: int) -> None:
+def _humbly(name: str, work: Callable[..., None], args: tuple[Any, ...], nice: int) -> None:
     """In the process: others first, when time or memory runs short."""
     make_streams_printable()
+    set_up_worker(name)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # meant for our parent, which ends us
     threading.Thread(target=_end_with_parent, daemon=True).start()
     with contextlib.suppress(OSError):
@@ -55,8 +65,7 @@ def _humbly(work: Callable[..., None], args: tuple[Any, ...], nice: int) -> None
     with contextlib.suppress(OSError):
         Path("/proc/self/oom_score_adj").write_text("1000")
     with contextlib.suppress(OSError, ValueError):
-        limit = _mapped() + _MEMORY
-        resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+        limits.bound_memory(_MEMORY)
     gc.freeze()
     work(*args)
 
@@ -66,19 +75,6 @@ def _end_with_parent() -> None:
     if parent is not None:
         parent.join()
         os._exit(0)
-
-
-def _mapped() -> int:
-    """Bytes of address space in use."""
-    return int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-
-
-def _in_use() -> int:
-    """Bytes of memory in use; 0 where nobody says."""
-    try:
-        return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
-    except OSError:
-        return 0
 
 
 _MORE: Final = b"+"
@@ -101,7 +97,7 @@ def _reply(request: bytes) -> bytes:
         return LAST + pickle.dumps(("raised", large))
     except Exception as error:  # noqa: BLE001 - it is raised where it was asked for
         reply = _raised(error)
-    return (LAST if _in_use() > _TIRED else _MORE) + reply
+    return (LAST if limits.memory_in_use() > _TIRED else _MORE) + reply
 
 
 def _raised(error: Exception) -> bytes:

@@ -13,8 +13,7 @@ import signal
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Sequence
 from contextlib import asynccontextmanager, contextmanager
 from multiprocessing.connection import Connection
-from multiprocessing.context import ForkServerProcess
-from typing import Any, Final, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Final, Protocol, TypeVar
 
 import anyio
 from anyio import CapacityLimiter, to_thread
@@ -22,6 +21,9 @@ from anyio import CapacityLimiter, to_thread
 from action_assistant.errors import TooLarge, TooMany, Unavailable
 from action_assistant.web.auth.caller import Caller, caller
 from action_assistant.web.workers.child_process import LAST, child, serve, wire
+
+if TYPE_CHECKING:  # not on Windows
+    from multiprocessing.context import ForkServerProcess
 
 __all__ = [
     "HOPELESS",
@@ -104,6 +106,8 @@ class Lane:
         self._idle: list[_Worker] = []
         self._busy: set[_Worker] = set()
         self._free = anyio.Semaphore(processes)
+        self.deaths = 0  # of workers, while they worked on something
+        self.given_up = 0  # what took longer than `patience`
         self._turns: dict[str, anyio.Lock] = {}
         self._waiting: dict[str, int] = {}
 
@@ -167,10 +171,12 @@ class Lane:
                 )
             finished = reply[:1] != LAST
         except TimeoutError as late:
+            self.given_up += 1
             raise GaveUp(
                 f"This took longer than {self._patience:.0f} s and was given up."
             ) from late
         except (OSError, EOFError) as error:
+            self.deaths += 1
             log.error("%s: a worker has died (%r)", self._name, error)
             if await to_thread.run_sync(worker.ran_out, limiter=self._threads):
                 raise OutOfTime("The process that worked on this took too long.") from error
@@ -184,6 +190,21 @@ class Lane:
             else:
                 worker.kill()
         return reply
+
+    @property
+    def name(self) -> str:
+        """What it is called."""
+        return self._name
+
+    @property
+    def busy(self) -> int:
+        """Workers that work on something."""
+        return len(self._busy)
+
+    @property
+    def waiting(self) -> int:
+        """Requests without an answer, those that are worked on among them."""
+        return sum(self._waiting.values())
 
     async def warm(self) -> None:
         """Have a worker ready."""
@@ -238,7 +259,7 @@ async def _keep_warm(lane: Lane) -> None:
 class _Worker:
     """A process, as whoever asks it sees it."""
 
-    def __init__(self, process: ForkServerProcess, wire: Connection) -> None:
+    def __init__(self, process: "ForkServerProcess", wire: Connection) -> None:
         self._process = process
         self._wire = wire
 

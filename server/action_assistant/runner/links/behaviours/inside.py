@@ -9,7 +9,6 @@ import ctypes
 import json
 import linecache
 import os
-import resource
 import select
 import signal
 import sys
@@ -199,6 +198,8 @@ def _wired() -> tuple[TextIO, _Saying]:
 
 def _bounded() -> None:
     """What it may take. Others go first when processor or memory run short."""
+    import resource  # of POSIX alone, as all of this is
+
     os.nice(_NICE)
     with contextlib.suppress(OSError):  # some containers have none: the kernel chooses by size then
         score = os.open("/proc/self/oom_score_adj", os.O_WRONLY)

@@ -3,7 +3,8 @@ its domains, and whether each registered robot answers."""
 
 import importlib
 import os
-import pwd
+import re
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -12,7 +13,6 @@ from typing import Final
 import anyio
 
 from action_assistant import ros_workspace
-from action_assistant.runner.links.diagnostics import Diagnostic, Verdict
 from action_assistant.runner.links.port import (
     Candidate,
     EngineChanged,
@@ -23,12 +23,16 @@ from action_assistant.runner.links.port import (
     Standing,
 )
 from action_assistant.runner.links.ros2.availability import ros2_reach
+from action_assistant.system import users
+from action_assistant.system.diagnostics import Diagnostic, fine, found
 from action_assistant.umrf.facts import BadProfile, facts_of
 
 _PATIENCE_S: Final = 6.0
 _SAFE_DOMAIN: Final = 101
+_LAST_DOMAIN: Final = 232
 _SHM: Final = Path("/dev/shm")
-_CONTAINER: Final = (Path("/.dockerenv"), Path("/run/.containerenv"))
+_MOUNTS: Final = Path("/proc/self/mountinfo")
+_OWN_SHM: Final = re.compile(r"^(?:\S+ ){4}/dev/shm .* - tmpfs shm ", re.MULTILINE)
 _SAYS_FASTRTPS: Final = "FASTDDS_BUILTIN_TRANSPORTS"
 
 
@@ -38,120 +42,129 @@ async def look(
     environ: Mapping[str, str] = os.environ,
 ) -> list[Diagnostic]:
     """Everything there is to say, the ground first. Takes some seconds; never raises for trouble."""
-    found = environment(environ)
+    seen = [*_sourced(environ), *_domain(environ)]
     reach = ros2_reach(clock_us, environ)
     if isinstance(reach, str):
-        verdict: Verdict = "wrong" if robots else "note"  # a computer without robots needs none
-        return [*found, Diagnostic(topic="rclpy", verdict=verdict, what=reach)]
-    found.append(
-        Diagnostic(
-            topic="rclpy",
-            verdict="fine",
-            what=f"rclpy of {_origin('rclpy')} speaks {reach.rmw}, with the temoto_msgs of "
+        return [*seen, _no_reach(reach, robots)]
+    seen += shared_memory(environ)
+    seen.append(
+        fine(
+            "rclpy",
+            f"rclpy of {_origin('rclpy')} speaks {reach.rmw}, with the temoto_msgs of "
             f"{_origin('temoto_msgs')}.",
         )
     )
     try:
-        found += await _robots(reach, robots)
-        found += _seen(await reach.candidates(), robots)
+        standings = await _standings(reach, robots, seen)
+        candidates = await reach.candidates()
     except RuntimeError as error:
-        found.append(
-            Diagnostic(
-                topic="domain",
-                verdict="wrong",
-                what=f"The middleware cannot be started: {error}.",
-                advice="Its own messages above may say why.",
+        seen.append(
+            found(
+                "middleware-broken",
+                environ.get("RMW_IMPLEMENTATION", "the default middleware"),
+                f"The middleware cannot be started: {error}.",
+                "Its own messages above may say why; unset what configures it, or reinstall it.",
             )
         )
+    else:
+        known = {(each.domain, f"/{each.get_service.lstrip('/')}") for each in robots}
+        strangers = [each for each in candidates if (each.domain, each.get_service) not in known]
+        seen += [_robot(each, standing, strangers) for each, standing in standings]
+        seen += _engines(candidates, strangers)
     finally:
         await reach.aclose()
-    return found
+    return seen
 
 
-def environment(environ: Mapping[str, str]) -> list[Diagnostic]:
-    """What the environment sets, and what follows."""
-    return [*_sourced(environ), *_domain(environ), *_shared_memory(environ)]
+def _no_reach(why: str, robots: Sequence[Registration]) -> Diagnostic:
+    """A computer without robots needs no ROS 2."""
+    if "ROS_DOMAIN_ID" in why:
+        return found(
+            "domain-wrong", "ROS_DOMAIN_ID", why, "Set it to the robot's domain, or unset it."
+        )
+    if why.startswith("RMW_IMPLEMENTATION"):
+        return found("middleware-broken", "RMW_IMPLEMENTATION", why, "Do either, and start anew.")
+    if not robots:
+        return fine("rclpy", f"No robot is registered, and none could be reached: {why}")
+    names = ", ".join(each.name for each in robots)
+    return found("rclpy-missing", "rclpy", f"{names} cannot be reached: {why}", "Do as it says.")
 
 
 def _sourced(environ: Mapping[str, str]) -> list[Diagnostic]:
     if environ.get("ROS_VERSION") == "1":
         return [
-            Diagnostic(
-                topic="environment",
-                verdict="wrong",
-                what="ROS 1 is sourced in this shell.",
-                advice="Open a fresh shell, and source ROS 2 only.",
+            found(
+                "ros1-sourced",
+                "ROS_VERSION",
+                "ROS 1 is sourced in this shell.",
+                "Open a fresh shell, and source ROS 2 only.",
             )
         ]
     distro = environ.get("ROS_DISTRO")
-    what = f"ROS 2 {distro} is sourced." if distro else "No ROS 2 is sourced."
-    return [Diagnostic(topic="environment", verdict="fine", what=what)]
+    return [
+        fine("environment", f"ROS 2 {distro} is sourced." if distro else "No ROS 2 is sourced.")
+    ]
 
 
 def _domain(environ: Mapping[str, str]) -> list[Diagnostic]:
     number = environ.get("ROS_DOMAIN_ID", "0")
-    found = [
-        Diagnostic(topic="domain", verdict="fine", what=f"The domain of this shell is {number}.")
-    ]
-    if number.isdigit() and int(number) > _SAFE_DOMAIN:
-        found.append(
-            Diagnostic(
-                topic="domain",
-                verdict="note",
-                what=f"Domain {number} uses ports that Linux also hands out to other programs.",
-                advice=f"Domains up to {_SAFE_DOMAIN} are safe.",
-            )
-        )
     scope = environ.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").upper()
-    local = scope == "LOCALHOST" or environ.get("ROS_LOCALHOST_ONLY") == "1"
-    if local or scope == "OFF":
-        sees = "only engines on this computer" if local else "no engine by itself"
-        found.append(
-            Diagnostic(
-                topic="domain",
-                verdict="note",
-                what=f"Discovery is restricted, so this process sees {sees}.",
-                advice="For robots elsewhere: unset ROS_AUTOMATIC_DISCOVERY_RANGE and "
-                "ROS_LOCALHOST_ONLY, here and there.",
+    reaches = "Engines on the network are seen."
+    if scope == "LOCALHOST" or environ.get("ROS_LOCALHOST_ONLY") == "1":
+        reaches = "Discovery is restricted, so only engines on this computer are seen."
+    elif scope == "OFF":
+        reaches = "Discovery is restricted, so no engine is seen by itself."
+    seen = [fine("ROS_DOMAIN_ID", f"The domain of this shell is {number}. {reaches}")]
+    if number.isdigit() and _SAFE_DOMAIN < int(number) <= _LAST_DOMAIN:
+        seen.append(
+            found(
+                "domain-high",
+                "ROS_DOMAIN_ID",
+                f"Domain {number} uses ports that Linux also hands out to other programs.",
+                f"Take one up to {_SAFE_DOMAIN}, here and on the robot.",
             )
         )
-    return found
+    return seen
 
 
-def _shared_memory(environ: Mapping[str, str]) -> list[Diagnostic]:
-    found: list[Diagnostic] = []
-    if not os.access(_SHM, os.W_OK):
-        found.append(
-            Diagnostic(
-                topic="shared memory",
-                verdict="note",
-                what=f"{_SHM} cannot be written, so messages go over the network stack.",
+def shared_memory(environ: Mapping[str, str]) -> list[Diagnostic]:
+    """Whether nodes of this computer can share memory with ours; that there is any is looked at
+    elsewhere."""
+    if not sys.platform.startswith("linux") or _SAYS_FASTRTPS in environ:
+        return []
+    seen: list[Diagnostic] = []
+    if _is_private():
+        seen.append(
+            found(
+                "shared-memory-apart",
+                _SHM,
+                "This container has shared memory of its own: engines outside are seen, yet nothing of "
+                "them arrives.",
+                f"Share memory and user with them (`ipc: host`), or set {_SAYS_FASTRTPS}=UDPv4 on both "
+                "sides.",
             )
         )
-    if any(each.exists() for each in _CONTAINER) and _SAYS_FASTRTPS not in environ:
-        found.append(
-            Diagnostic(
-                topic="shared memory",
-                verdict="note",
-                what="This is a container. Where it shares the host's network but not its memory, "
-                "engines outside are listed, yet nothing arrives.",
-                advice=f"Share memory and user with them (ipc: host), or set {_SAYS_FASTRTPS}=UDPv4 "
-                "on both sides.",
-            )
-        )
-    strangers = sorted(_name(uid) for uid in _owners() - {os.getuid()})
+    strangers = sorted(users.name_of(uid) for uid in _owners() - {users.me()})
     if strangers:
         runs = "runs" if len(strangers) == 1 else "run"
-        found.append(
-            Diagnostic(
-                topic="shared memory",
-                verdict="note",
-                what=f"{' and '.join(strangers)} {runs} nodes of Fast DDS too. Nodes of different "
-                "users see each other, but may not read each other's memory.",
-                advice=f"Run them as one user, or set {_SAYS_FASTRTPS}=UDPv4 for all of them.",
+        seen.append(
+            found(
+                "shared-memory-users",
+                _SHM,
+                f"{' and '.join(strangers)} {runs} nodes of Fast DDS too. Nodes of different users see "
+                "each other, but may not read each other's memory.",
+                f"Run them as one user, or set {_SAYS_FASTRTPS}=UDPv4 for all of them.",
             )
         )
-    return found
+    return seen
+
+
+def _is_private() -> bool:
+    """Whether the memory is a container's own: engines of containers call what they mount `shm`."""
+    try:
+        return _OWN_SHM.search(_MOUNTS.read_text()) is not None
+    except OSError:
+        return False
 
 
 def _owners() -> set[int]:
@@ -163,38 +176,32 @@ def _owners() -> set[int]:
     return found
 
 
-def _name(uid: int) -> str:
-    """A user for people. Those of containers mostly have no name outside."""
-    try:
-        return pwd.getpwuid(uid).pw_name
-    except KeyError:
-        return f"User {uid}"
-
-
 def _origin(module: str) -> str:
     """Where a package of ROS 2 comes from, for people."""
     place = getattr(importlib.import_module(module), "__file__", None)
     return ros_workspace.prefix_of(place) if place else "an unknown place"
 
 
-async def _robots(reach: Reach, robots: Sequence[Registration]) -> list[Diagnostic]:
-    """Whether each registered robot answers, all at once."""
+async def _standings(
+    reach: Reach, robots: Sequence[Registration], seen: list[Diagnostic]
+) -> list[tuple[Registration, Standing]]:
+    """How each registered robot stands, all asked at once. Raises RuntimeError."""
     links: list[tuple[Registration, Link]] = []
-    found: list[Diagnostic] = []
     for each in robots:
         try:
             links.append((each, reach.link(each, facts_of(each.profile))))
         except BadProfile as bad:
-            found.append(Diagnostic(topic=each.name, verdict="wrong", what=f"Its profile: {bad}"))
+            remedy = "Correct it on the Robots page."
+            seen.append(found("robot-profile", each.name, f"Its profile cannot be: {bad}", remedy))
     async with anyio.create_task_group() as tasks:
         for _, link in links:
             tasks.start_soon(link.run)
         with anyio.move_on_after(_PATIENCE_S):
             for _, link in links:
                 await _answering(link)
-        found += [_robot(registration, link.standing) for registration, link in links]
+        standings = [(registration, link.standing) for registration, link in links]
         tasks.cancel_scope.cancel()
-    return found
+    return standings
 
 
 async def _answering(link: Link) -> None:
@@ -210,72 +217,79 @@ async def _answering(link: Link) -> None:
             await answers.wait()
 
 
-def _robot(robot: Registration, standing: Standing) -> Diagnostic:
+def _robot(robot: Registration, standing: Standing, strangers: Sequence[Candidate]) -> Diagnostic:
     """What one robot's standing means."""
     if standing.generation == "older":
-        return Diagnostic(
-            topic=robot.name,
-            verdict="wrong",
-            what="Its temoto_msgs are another generation than the ones here; starts are refused.",
-            advice="Build its engine with temoto_msgs of March 2025 or later.",
+        return found(
+            "robot-older",
+            robot.name,
+            "Its temoto_msgs are another generation than the ones here; starts are refused.",
+            "Build its engine with temoto_msgs of March 2025 or later.",
         )
     if standing.state != "answering":
-        return Diagnostic(
-            topic=robot.name, verdict="wrong", what=standing.why, advice=_advice(standing)
-        )
+        return _silent(robot, standing, strangers)
     deaf = [name for name in ("start", "stop") if not standing.listeners.get(name)]
     if deaf:
-        return Diagnostic(
-            topic=robot.name,
-            verdict="wrong",
-            what=f"It answers, but nobody listens to {' and '.join(deaf)}.",
-            advice="Compare the topics in its profile with `ros2 topic list`.",
+        return found(
+            "robot-deaf",
+            robot.name,
+            f"It answers, but nobody listens to {' and '.join(deaf)}.",
+            "Compare the topics in its profile with `ros2 topic list`.",
         )
-    return Diagnostic(
-        topic=robot.name,
-        verdict="fine",
-        what=f"It answers on {robot.get_service}, domain {robot.domain}, and listens.",
+    return fine(
+        robot.name, f"It answers on {robot.get_service}, domain {robot.domain}, and listens."
     )
 
 
-def _advice(standing: Standing) -> str:
-    if standing.servers == 1:
-        return (
-            "It may be busy with a long stop, hang, speak another middleware (RMW_IMPLEMENTATION "
-            "must be the same on both sides), or be cut off from shared memory."
+def _silent(robot: Registration, standing: Standing, strangers: Sequence[Candidate]) -> Diagnostic:
+    """Why a robot does not answer, as far as can be seen from here."""
+    if "RMW_IMPLEMENTATION" in standing.why:
+        return found(
+            "robot-middleware",
+            robot.name,
+            f"{standing.why}.",
+            "Start runner and engine with the same RMW_IMPLEMENTATION, and register the robot with it.",
         )
-    if standing.servers > 1:
-        return ""
-    return (
-        "Is the engine running, on this domain, within ROS_AUTOMATIC_DISCOVERY_RANGE, and on the "
-        "path that is registered?"
-    )
-
-
-def _seen(candidates: Sequence[Candidate], robots: Sequence[Registration]) -> list[Diagnostic]:
-    """Engines that nobody registered, and what is odd about any."""
-    known = {(each.domain, f"/{each.get_service.lstrip('/')}") for each in robots}
-    found: list[Diagnostic] = []
-    for each in candidates:
-        if each.problem:
-            found.append(_odd(each))
-        elif (each.domain, each.get_service) not in known:
-            name = f" of {each.actor}" if each.actor else ""
-            found.append(
-                Diagnostic(
-                    topic="engines",
-                    verdict="note",
-                    what=f"An engine{name} on {each.get_service}, domain {each.domain}, is not "
-                    "registered.",
-                )
-            )
-    return found or [
-        Diagnostic(
-            topic="engines", verdict="fine", what="No engine that is not registered is in sight."
-        )
+    if standing.servers:
+        return found("robot-silent", robot.name, standing.why, _SILENT[standing.servers > 1])
+    elsewhere = [
+        each for each in strangers if each.domain != robot.domain and each.actor in {"", robot.name}
     ]
+    if elsewhere:
+        where = " and ".join(f"{each.domain} ({each.get_service})" for each in elsewhere)
+        return found(
+            "robot-elsewhere",
+            robot.name,
+            f"It is registered on domain {robot.domain}, where no engine is; one answers on domain "
+            f"{where}.",
+            "If that is it, register it with that domain, or start its engine with ROS_DOMAIN_ID="
+            f"{robot.domain}.",
+        )
+    return found("robot-silent", robot.name, standing.why, _NOBODY)
 
 
-def _odd(candidate: Candidate) -> Diagnostic:
-    place = f"{candidate.get_service}, domain {candidate.domain}"
-    return Diagnostic(topic="engines", verdict="wrong", what=f"On {place}: {candidate.problem}")
+_SILENT: Final = {
+    False: "It may be busy with a long stop, hang, speak another middleware (RMW_IMPLEMENTATION must be "
+    "the same on both sides), or be cut off from shared memory: look at it, and start its engine anew.",
+    True: "End all of these engines but one, or give each a domain of its own (ROS_DOMAIN_ID).",
+}
+_NOBODY: Final = (
+    "Start its engine with the registered domain (ROS_DOMAIN_ID) and path, within reach of "
+    "ROS_AUTOMATIC_DISCOVERY_RANGE here and there."
+)
+
+
+def _engines(candidates: Sequence[Candidate], strangers: Sequence[Candidate]) -> list[Diagnostic]:
+    """Engines that nobody registered, and what is odd about any."""
+    seen: list[Diagnostic] = []
+    for each in candidates:
+        place = f"{each.get_service}, domain {each.domain}"
+        if each.problem:
+            remedy = "Leave one engine on each path, of the generation of these messages."
+            seen.append(found("engine-odd", place, each.problem, remedy))
+        elif each in strangers:
+            name = f" of {each.actor}" if each.actor else ""
+            what = f"An engine{name} that nobody registered answers."
+            remedy = "Register it on the Robots page, or leave it alone."
+            seen.append(found("engine-unregistered", place, what, remedy))
+    return seen or [fine("engines", "No engine that is not registered is in sight.")]

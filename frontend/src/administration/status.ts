@@ -1,0 +1,58 @@
+/** How both processes are, and what `doctor` finds: for owners. */
+import { useQuery } from "@tanstack/react-query";
+import { fetchJson } from "../api/http";
+import type { EditorApi } from "../api/schema/editor";
+
+export type ProcessStatus = EditorApi["ProcessStatus"];
+export type Backups = EditorApi["BackupsShown"];
+/** One thing that was looked at; `remedy` says what mends it. */
+export type Finding = EditorApi["Diagnostic"];
+
+const EACH_MS = 5_000;
+
+/** A process, looked at again and again. `at` is where it answers, "" for the editor. */
+export function useStatus(name: string, at: string | undefined) {
+  return useQuery({
+    queryKey: ["status", name, at],
+    queryFn: ({ signal }) =>
+      fetchJson<ProcessStatus>(`${at}/api/status`, { signal, timeoutMs: 6_000 }),
+    enabled: at !== undefined,
+    refetchInterval: EACH_MS,
+    retry: false,
+  });
+}
+
+/** Not before somebody asks: it takes seconds, and starts programs. */
+export function useFindings() {
+  return useQuery({
+    queryKey: ["doctor"],
+    queryFn: ({ signal }) => fetchJson<Finding[]>("/api/doctor", { signal, timeoutMs: 120_000 }),
+    enabled: false,
+    retry: false,
+  });
+}
+
+const UNITS = ["bytes", "kB", "MB", "GB", "TB"] as const;
+
+/** `714 kB`, `1.4 GB`: of 1000 each, as disks are sold. */
+export function bytes(count: number): string {
+  let value = count;
+  let unit = 0;
+  while (value >= 999.5 && unit < UNITS.length - 1) {
+    value /= 1000;
+    unit += 1;
+  }
+  const digits = unit > 0 && value < 9.95 ? 1 : 0;
+  return `${value.toFixed(digits)} ${UNITS[unit]}`;
+}
+
+/** `3 days 4 h`, `2 h 5 min`, `40 s`: the two largest parts. */
+export function span(ms: number): string {
+  const s = Math.max(0, Math.floor(ms / 1000));
+  const days = Math.floor(s / 86_400);
+  const hours = Math.floor(s / 3600) % 24;
+  const minutes = Math.floor(s / 60) % 60;
+  if (days > 0) return `${days} ${days === 1 ? "day" : "days"} ${hours} h`;
+  if (hours > 0) return `${hours} h ${minutes} min`;
+  return minutes > 0 ? `${minutes} min ${s % 60} s` : `${s} s`;
+}

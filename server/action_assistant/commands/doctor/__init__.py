@@ -1,0 +1,1 @@
+"""`doctor`: what is wrong with an installation, with the place, the reason and the remedy."""

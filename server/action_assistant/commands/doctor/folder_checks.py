@@ -1,0 +1,205 @@
+"""The data folder: whose it is, who can read it, how full its disk is; the archive; the token."""
+
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Final
+
+from action_assistant import settings
+from action_assistant.commands.doctor.installation import Installation
+from action_assistant.editor.log.database_location import FILE, JOURNAL
+from action_assistant.errors import CannotStart
+from action_assistant.private_files import holds_nothing_else, of_others, open_to_others
+from action_assistant.system import users
+from action_assistant.system.diagnostics import Diagnostic, fine, found
+from action_assistant.web.auth.keys import TOKEN_FILE, Keys
+
+_LEAST_MIB: Final = 100
+_SHOWN: Final = 5
+
+
+def folder_is_ours(place: Installation) -> Iterator[Diagnostic]:
+    """Whether it can be used by whoever looks, and by nobody else."""
+    data = place.data
+    if not data.exists():
+        if blocked := _blocked(data):
+            yield _unusable(data, blocked)
+        else:
+            yield fine(data, "The data folder is not there yet; serve makes it.")
+        return
+    if not data.is_dir() or not os.access(data, os.R_OK | os.W_OK | os.X_OK):
+        yield _unusable(data, data)
+        return
+    strangers = of_others(data)
+    if strangers:
+        whose = users.name_of(strangers[0].lstat().st_uid)
+        owner = users.name_of(data.stat().st_uid)
+        yield found(
+            "folder-of-others",
+            data,
+            f"{_listed(data, strangers)} {'is' if len(strangers) == 1 else 'are'} {whose}'s, the "
+            f"folder is {owner}'s: this program was once started as another user.",
+            f"Start it as {owner} only, and give the files back: sudo chown -R {owner} {data}",
+        )
+    yield from _readable(data)
+    if not strangers:
+        yield fine(data, "The data folder can be read and written.")
+
+
+def _unusable(data: Path, why: Path) -> Diagnostic:
+    if why.exists() and not why.is_dir():
+        return found(
+            "folder-unusable",
+            data,
+            f"{why} is no folder.",
+            "Choose another data folder with --data, or move that file away.",
+        )
+    owner = users.name_of(why.stat().st_uid) if why.exists() else "nobody"
+    return found(
+        "folder-unusable",
+        data,
+        f"{users.mine()} cannot read and write in {why}, which is {owner}'s.",
+        f"Run this program as {owner}, mend the rights of the folder, or choose another with --data.",
+    )
+
+
+def _blocked(folder: Path) -> Path | None:
+    """What keeps us from making a folder that is not there."""
+    above = next(each for each in folder.absolute().parents if each.exists())
+    return None if above.is_dir() and os.access(above, os.W_OK | os.X_OK) else above
+
+
+def _readable(data: Path) -> Iterator[Diagnostic]:
+    exposed = open_to_others(data)
+    token = data / TOKEN_FILE
+    if token in exposed:
+        yield found(
+            "token-readable",
+            token,
+            "Other users of this computer may read the token, and sign in as the owner with it.",
+            f"Run `chmod 600 {token}`; if others may have read it, delete it instead: the next start "
+            "makes another, and links and sessions of the old one end.",
+        )
+    rest = [each for each in exposed if each != token]
+    if not rest:
+        return
+    remedy = "The next start of this program closes them."
+    if data in rest and not holds_nothing_else(data):
+        remedy = (
+            f"Run `chmod 700 {data}`, or move what else is in it; the start closes only our files."
+        )
+    yield found(
+        "folder-readable",
+        data,
+        f"Other users of this computer can read {_listed(data, rest)}.",
+        remedy,
+    )
+
+
+def _listed(data: Path, paths: list[Path]) -> str:
+    """Some of them, by their names in the folder."""
+    names = [str(path.relative_to(data)) if path != data else str(data) for path in paths]
+    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+    return ", ".join(names[:_SHOWN]) + more
+
+
+def token_is_there(place: Installation) -> Iterator[Diagnostic]:
+    """The token of a folder that was served; the environment's counts before it."""
+    data, token = place.data, place.data / TOKEN_FILE
+    served = any((data / name).exists() for name in (JOURNAL, FILE, "runner.db"))
+    if os.environ.get("ACTION_ASSISTANT_TOKEN"):
+        yield fine("ACTION_ASSISTANT_TOKEN", "The token is the environment's.")
+    elif not served and not token.exists():
+        yield fine(token, "There is no token yet; serve makes it.")
+    elif served and not token.exists():
+        yield found(
+            "token-missing",
+            token,
+            "The token is gone, though this folder was served: the next start makes another, with "
+            "which no link and no session of before opens.",
+            "Restore the file from a backup; or set ACTION_ASSISTANT_TOKEN here, if the server has "
+            "its token from there; or start anew and send new links.",
+        )
+    else:
+        try:
+            Keys.known(data)
+        except CannotStart as error:
+            yield found(
+                "token-unusable",
+                token,
+                str(error),
+                "Restore the file from a backup, or delete it: the next start makes another, and links "
+                "and sessions of the old one end.",
+            )
+        else:
+            yield fine(token, "The token can be read.")
+
+
+def nothing_was_interrupted(place: Installation) -> Iterator[Diagnostic]:
+    """A restore that was killed left a mark, with which nothing starts."""
+    mark = place.data / settings.RESTORING
+    if mark.exists():
+        yield found(
+            "restore-unfinished",
+            mark,
+            "A restore was interrupted, so the folder holds parts of a backup and nothing starts.",
+            f"Run the same `action-assistant restore FILE --data {place.data}` again.",
+        )
+
+
+def archive_is_usable(place: Installation) -> Iterator[Diagnostic]:
+    """The folder into which older runs go."""
+    try:
+        folder = settings.keep(place.data).folder
+    except CannotStart:  # told with the settings
+        return
+    problem = ""
+    if folder.exists():
+        if not folder.is_dir():
+            problem = f"{folder} is no folder"
+        elif not os.access(folder, os.R_OK | os.W_OK | os.X_OK):
+            problem = f"{users.mine()} cannot read and write in it"
+    elif blocked := _blocked(folder):
+        problem = f"it is not there, and cannot be made in {blocked}"
+    if problem and folder != place.data / settings.ARCHIVE:
+        yield found(
+            "archive-unusable",
+            folder,
+            f"Runs cannot go into the archive: {problem}; archived runs do not open.",
+            "Mount its disk or mend its rights, or name another folder in ACTION_ASSISTANT_ARCHIVE.",
+        )
+    elif problem and place.data.is_dir():
+        yield found(
+            "archive-unusable",
+            folder,
+            f"Runs cannot go into the archive: {problem}; archived runs do not open.",
+            "Mend its rights, or move what stands in its place away.",
+        )
+    else:
+        yield fine(folder, "The archive of runs can be used.")
+
+
+def disk_has_room(place: Installation) -> Iterator[Diagnostic]:
+    """The disks of the data folder and of the archive."""
+    folders = [place.data]
+    with suppress(CannotStart):  # told with the settings
+        folders.append(settings.keep(place.data).folder)
+    seen: set[int] = set()
+    for folder in folders:
+        above = next(each for each in (folder, *folder.absolute().parents) if each.exists())
+        if above.stat().st_dev in seen:
+            continue
+        seen.add(above.stat().st_dev)
+        free = shutil.disk_usage(above).free // 2**20
+        if free < _LEAST_MIB:
+            yield found(
+                "disk-full",
+                folder,
+                f"Its disk has {free} MiB left: soon no edit can be saved and no run recorded.",
+                "Make room there, move the data folder, or let older runs go into archives elsewhere "
+                "(`action-assistant runs archive`, ACTION_ASSISTANT_ARCHIVE).",
+            )
+        else:
+            yield fine(folder, f"Its disk has {free} MiB left.")

@@ -1,0 +1,106 @@
+"""The side of the robots, looked at by the Python that the runner would have."""
+
+import os
+import sqlite3
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+import anyio
+import msgspec
+from sqlalchemy import create_engine
+from sqlalchemy.exc import DBAPIError
+
+from action_assistant.commands.doctor.installation import Installation
+from action_assistant.errors import CannotStart
+from action_assistant.interpreter import Interpreter, for_runner
+from action_assistant.journal.sqlite import unchanged
+from action_assistant.runner.links.port import Registration
+from action_assistant.runner.links.ros2.checkup import look
+from action_assistant.runner.runs import queries
+from action_assistant.system.diagnostics import Diagnostic, found
+
+_PATIENCE_S: Final = 45.0
+#: Seconds that it takes at most.
+ROBOTS_S: Final = _PATIENCE_S + 5
+
+
+def robots_answer(place: Installation) -> Iterator[Diagnostic]:
+    """ROS 2 and each registered robot. Takes some seconds where there are any."""
+    try:
+        interpreter = for_runner()
+    except CannotStart:  # told with the settings
+        return
+    if interpreter.remark:
+        yield found(
+            "python-unusable",
+            interpreter.path,
+            interpreter.remark,
+            "Do as the sentence says; until then robots are reached as far as it says.",
+        )
+    yield from _asked(interpreter, place)
+
+
+def look_here(place: Installation) -> list[Diagnostic]:
+    """The same by this very Python."""
+    return anyio.run(look, _registered(place.data), lambda: time.time_ns() // 1000)
+
+
+def _asked(interpreter: Interpreter, place: Installation) -> list[Diagnostic]:
+    command = [
+        str(interpreter.path),
+        *("-m", "action_assistant", "doctor", "--only", "ros", "--here", "--json"),
+        *("--data", str(place.data)),
+    ]
+
+    try:
+        answer = subprocess.run(
+            command,
+            env=interpreter.environment(os.environ),
+            capture_output=True,
+            timeout=_PATIENCE_S,
+            check=False,
+        )
+        return msgspec.json.decode(answer.stdout, type=list[Diagnostic])
+    except subprocess.TimeoutExpired:
+        why = f"did not answer in {_PATIENCE_S:g} s"
+    except OSError as error:
+        why = f"cannot be started: {error.strerror}"
+    except msgspec.DecodeError:
+        said = answer.stderr.decode(errors="replace").strip().splitlines()
+        why = f"cannot run this program: {said[-1] if said else f'exit code {answer.returncode}'}"
+    return [
+        found(
+            "python-unusable",
+            interpreter.path,
+            f"The Python of the runner {why}.",
+            "Name another one in ACTION_ASSISTANT_RUNNER_PYTHON, or renew it (`make ros`).",
+        )
+    ]
+
+
+def _registered(data: Path) -> list[Registration]:
+    """Robots in the registry, read without waiting for the runner; none when there is none yet."""
+    path = data / "runner.db"
+    if not path.exists():
+        return []
+    engine = create_engine(unchanged(path))
+    try:
+        with engine.connect() as connection:
+            rows = connection.execute(queries.all_robots()).all()
+    except (sqlite3.Error, DBAPIError):
+        return []  # what is wrong with the file is said elsewhere
+    finally:
+        engine.dispose()
+    return [
+        Registration(
+            name=row.name,
+            domain=row.domain,
+            rmw=row.rmw,
+            get_service=row.get_service,
+            profile=row.profile,
+        )
+        for row in rows
+    ]

@@ -1,0 +1,60 @@
+"""What `action-assistant doctor` finds, for the page of whoever looks after the installation."""
+
+import os
+import subprocess
+import sys
+from typing import Final
+
+import anyio
+import msgspec
+from litestar import get
+from litestar.types import ControllerRouterHandler
+
+from action_assistant.errors import Unavailable
+from action_assistant.journal.health.shared_check import SharedCheck
+from action_assistant.settings import EditorSettings
+from action_assistant.system.diagnostics import Diagnostic
+from action_assistant.web.auth.access import Needs
+
+_PATIENCE_S: Final = 90.0  # it looks for robots, too
+_FRESH_S: Final = 5.0
+_NICE: Final = 10
+
+
+def routes(settings: EditorSettings) -> list[ControllerRouterHandler]:
+    """The route. However many ask, it is looked once at a time."""
+
+    async def look() -> list[Diagnostic]:
+        return await _examined(settings)
+
+    examination = SharedCheck(look, patience=_PATIENCE_S, fresh=_FRESH_S)
+
+    @get(
+        "/api/doctor",
+        guards=[Needs("restore")],
+        summary="What `doctor` finds wrong with this installation; takes some seconds",
+    )
+    async def doctor() -> list[Diagnostic]:
+        found = await examination.answer()
+        if found is None:
+            raise Unavailable(f"It has not looked at everything within {_PATIENCE_S:g} s.")
+        return found
+
+    return [doctor]
+
+
+async def _examined(settings: EditorSettings) -> list[Diagnostic]:
+    """The command itself, in a process that gives way: it loads much, and may hang on what is wrong."""
+    command = [sys.executable, "-m", "action_assistant", "doctor", "--json"]
+    command += ["--data", str(settings.data), "--port", str(settings.port)]
+    async with await anyio.open_process(
+        command, stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    ) as process:
+        os.setpriority(os.PRIO_PROCESS, process.pid, _NICE)
+        assert process.stdout is not None
+        said = b"".join([piece async for piece in process.stdout])
+        code = await process.wait()
+    try:
+        return msgspec.json.decode(said, type=list[Diagnostic])
+    except msgspec.DecodeError as error:
+        raise Unavailable(f"`action-assistant doctor` ended with exit code {code}.") from error

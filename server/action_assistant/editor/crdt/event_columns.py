@@ -1,0 +1,60 @@
+"""Events of one stream that follow one another, column by column: as values one by one they take more time
+on their way to a worker than being put together."""
+
+import itertools
+from collections.abc import Iterable, Iterator
+from typing import TypeAlias
+
+import msgspec
+
+from action_assistant.journal.events import Event
+
+#: Kind, author and body of an event.
+Told: TypeAlias = tuple[str, str, bytes]
+
+
+class EventColumns(msgspec.Struct, frozen=True):
+    """`first` is the seq of the first one; the columns are equally long."""
+
+    first: int
+    kinds: list[str]
+    authors: list[str]
+    bodies: list[bytes]
+
+    @classmethod
+    def of(cls, events: Iterable[Event]) -> "EventColumns":
+        """Of at least one event."""
+        rows = [(each.seq, each.kind, each.author, each.body) for each in events]
+        seqs, kinds, authors, bodies = (list(column) for column in zip(*rows, strict=True))
+        return cls(seqs[0], kinds, authors, bodies)
+
+    def __len__(self) -> int:
+        return len(self.kinds)
+
+    def __iter__(self) -> Iterator[Told]:
+        return zip(self.kinds, self.authors, self.bodies, strict=True)
+
+    @property
+    def last(self) -> int:
+        """The seq of the last one."""
+        return self.first + len(self) - 1
+
+    @property
+    def size(self) -> int:
+        """Bytes of all bodies."""
+        return sum(map(len, self.bodies))
+
+    def part(self, start: int, end: int) -> "EventColumns":
+        """Those from place `start` to place `end`, without that one."""
+        some = slice(start, end)
+        return EventColumns(
+            self.first + start, self.kinds[some], self.authors[some], self.bodies[some]
+        )
+
+    def by_kind(self) -> Iterator["EventColumns"]:
+        """Parts of one kind each, in order."""
+        start = 0
+        for _, same in itertools.groupby(self.kinds):
+            end = start + sum(1 for _ in same)
+            yield self.part(start, end)
+            start = end

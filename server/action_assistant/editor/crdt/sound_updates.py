@@ -1,0 +1,80 @@
+"""Reads of updates that are what a room took only what a document has to know of them besides.
+
+A room reads every update as a whole before it is stored, and the chain proves that it is still the same.
+Opening a graph need not do that again: it asks whose the clients are, whether anything may lie deeper
+than in a root, and afterwards whether anything waits. For workers: what a room never took may end them.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+from pycrdt import Doc, get_update
+
+from action_assistant.editor.crdt.messages import ByteReader
+from action_assistant.editor.crdt.update_scan import outline
+
+#: The beginning of an update with structs of one client: how many, whose.
+_ONE_CLIENT: Final = re.compile(rb"\x01[\x01-\x7f]([\x80-\xff]*[\x00-\x7f])")
+#: Whatever a struct that lies in another one looks like: its kind, neighbours not told, then a 0.
+_MAY_LIE_INSIDE: Final = re.compile(rb"[\x01-\x09\x21-\x29]\x80*\x00")
+_APART: Final = b"\xff"  # ends nothing that looks so
+
+
+class Uncertain(Exception):
+    """Only reading these updates as a whole tells what they did."""
+
+
+class Clients:
+    """The clients of some updates: `authors`, who used each first; `ends`, how many clocks each has
+    after them."""
+
+    def __init__(self, bodies: Sequence[bytes], authors: Sequence[str]) -> None:
+        """Raises Malformed."""
+        self.authors: Final[dict[int, str]] = {}
+        self.ends: Final[dict[int, int]] = {}
+        last: dict[bytes, bytes] = {}  # of each client that is alone in an update
+        for body, author in zip(bodies, authors, strict=True):
+            begins = _ONE_CLIENT.match(body)
+            if begins is None:
+                if body[:1] != b"\x00":  # it has more than deletions
+                    self._add(body, author)
+                continue
+            client_bytes = begins[1]
+            if client_bytes not in last:
+                self.authors.setdefault(ByteReader(client_bytes).number(), author)
+            last[client_bytes] = body
+        for body in last.values():
+            self._add(body, "")
+
+    def _add(self, body: bytes, author: str) -> None:
+        for client, _, end in outline(body).brings:
+            self.authors.setdefault(client, author)
+            self.ends[client] = max(end, self.ends.get(client, 0))
+
+
+def lies_deep(bodies: Sequence[bytes]) -> bool:
+    """Whether anything in these updates does not lie in a root. Raises Malformed."""
+    if _MAY_LIE_INSIDE.search(_APART.join(body[:-1] for body in bodies)) is None:
+        return False
+    return any(
+        any(each.inside for each in outline(body).placed)
+        for body in bodies
+        if _MAY_LIE_INSIDE.search(body, 0, len(body) - 1)  # the last 0 says: nothing was deleted
+    )
+
+
+def check_nothing_waits(doc: "Doc[Any]", known: Mapping[int, int], ends: Mapping[int, int]) -> None:
+    """Raise Uncertain where a document lacks something that updates built on, or lost some. `known`:
+    how many clocks it has of each client, `ends`: how many it should have."""
+    if any(known.get(client, 0) < end for client, end in ends.items()):
+        raise Uncertain
+    # All deletions, and of structs only those with others missing before them.
+    rest = ByteReader(get_update(doc.get_update(), doc.get_state()))
+    if rest.number():
+        raise Uncertain
+    for _ in range(rest.number()):
+        clocks = known.get(rest.number(), 0)
+        for _ in range(rest.number()):
+            if rest.number() + rest.number() > clocks:
+                raise Uncertain

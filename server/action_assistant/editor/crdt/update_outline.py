@@ -1,0 +1,44 @@
+"""What an update consists of, as it was read (rule R4)."""
+
+from typing import Final
+
+import msgspec
+
+from action_assistant.editor.crdt.nesting import Placed
+
+MOST_STRUCTS: Final = 200_000
+MOST_CLIENTS: Final = 20_000
+MOST_CLIENT: Final = 2**53 - 1  # beyond that a page cannot read the number, and fails
+MOST_CLOCK: Final = 2**31 - 1
+
+
+class UpdateOutline(msgspec.Struct, frozen=True):
+    """What an update brings, `(client, from clock, to clock)`, and what must be there before it:
+    of each client so many clocks. `placed`: what need not lie in a root. `fields`: how many keys that
+    may be new are among it, `actions`: how many of them are new actions; `structs`: how many there are
+    in all."""
+
+    brings: tuple[tuple[int, int, int], ...]
+    needs: dict[int, int]
+    placed: tuple[Placed, ...] = ()
+    actions: int = 0
+    fields: int = 0
+    structs: int = 0
+
+    def ready(self, known: dict[int, int]) -> bool:
+        """Whether everything that it builds on is known, or comes with it."""
+        ends: dict[int, int] = {}
+        if len(self.brings) == 1:  # nearly always
+            client, start, end = self.brings[0]
+            if start > known.get(client, 0):
+                return False
+            ends[client] = end
+        else:
+            for client, start, end in self.brings:
+                if start > max(known.get(client, 0), ends.get(client, 0)):
+                    return False
+                ends[client] = max(end, ends.get(client, 0))
+        for client, clock in self.needs.items():
+            if clock > known.get(client, 0) and clock > ends.get(client, 0):
+                return False
+        return True

@@ -1,0 +1,120 @@
+"""What the writer of a journal has done, as numbers. Written by its thread, read by whoever asks."""
+
+import time
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+from prometheus_client import Counter, Gauge, Histogram, Metric
+from prometheus_client.registry import Collector
+
+from action_assistant.journal.events import Event
+
+_BUCKETS: Final = (
+    0.0005,
+    0.001,
+    0.0025,
+    0.005,
+    0.01,
+    0.025,
+    0.05,
+    0.1,
+    0.25,
+    0.5,
+    1,
+    2.5,
+    5,
+    10,
+    30,
+)
+
+
+class CommitMetrics(Collector):
+    """A collector for a registry of Prometheus. `failing`: why the newest transaction was not stored;
+    None once one was."""
+
+    def __init__(self) -> None:
+        self.failing: str | None = None
+        self._submitted = self._done = 0  # jobs; each is counted by one thread
+        self._busy_since: float | None = None
+        self._seconds = Histogram(
+            "action_assistant_commit_seconds",
+            "Time that a transaction took, from its first statement to the end of its commit.",
+            registry=None,
+            buckets=_BUCKETS,
+        )
+        self._failures = Counter(
+            "action_assistant_commit_failures",
+            "Transactions that were not stored, or of which that is not known.",
+            registry=None,
+        )
+        self._events = Counter(
+            "action_assistant_events_stored", "Events that were stored.", registry=None
+        )
+        self._last = Gauge(
+            "action_assistant_last_commit_timestamp_seconds",
+            "When something was stored last; 0 if nothing was since this process began.",
+            registry=None,
+        )
+
+    def submitted(self, jobs: int) -> None:
+        """Jobs wait for the writer."""
+        self._submitted += jobs
+
+    def begins(self) -> None:
+        """The writer begins a transaction."""
+        self._busy_since = time.monotonic()
+
+    def over(self, jobs: int, stored: Sequence[Sequence[Event]]) -> None:
+        """A transaction of so many jobs is over. `stored`: the events of each that was not refused; where
+        all were, nothing was written, and nothing is known of the disk."""
+        if stored and self._busy_since is not None:
+            self._seconds.observe(time.monotonic() - self._busy_since)
+            self.failing = None
+            self._last.set_to_current_time()
+            self._events.inc(sum(map(len, stored)))
+        self._ended(jobs)
+
+    def failed(self, jobs: int, why: str) -> None:
+        """The transaction failed."""
+        self.failing = why
+        self._failures.inc()
+        self._ended(jobs)
+
+    def _ended(self, jobs: int) -> None:
+        self._busy_since = None
+        self._done += jobs
+
+    @property
+    def waiting(self) -> int:
+        """Jobs that were submitted and have no outcome yet."""
+        return self._submitted - self._done
+
+    @property
+    def busy_s(self) -> float:
+        """Seconds for which the transaction has lasted that is under way; 0 without one."""
+        since = self._busy_since
+        return 0.0 if since is None else time.monotonic() - since
+
+    def collect(self) -> Iterator[Metric]:
+        """As a registry asks."""
+        for each in (self._seconds, self._failures, self._events, self._last):
+            yield from each.collect()
+        yield _gauge(
+            "writer_waiting", "Jobs that wait for the writer of the journal.", self.waiting
+        )
+        yield _gauge(
+            "writer_busy_seconds",
+            "For how long the transaction lasts that is under way; 0 without one.",
+            self.busy_s,
+        )
+        yield _gauge(
+            "writer_failing",
+            "1 while the newest transaction is one that was not stored.",
+            self.failing is not None,
+        )
+
+
+def _gauge(name: str, documentation: str, value: float) -> Metric:
+    metric = Metric(f"action_assistant_{name}", documentation, "gauge")
+    metric.add_sample(metric.name, {}, float(value))
+    return metric

@@ -1,0 +1,81 @@
+"""Whether a journal can be written and read now: tried, in a bounded time."""
+
+from collections.abc import Awaitable, Callable
+from typing import Any, Final, TypeAlias
+
+from sqlalchemy import Connection, delete, insert, select
+
+from action_assistant.errors import Unavailable
+from action_assistant.journal.database import Branch
+from action_assistant.journal.health.shared_check import SharedCheck
+from action_assistant.journal.migrate import revisions_of
+from action_assistant.schema.branches import VERSIONS
+from action_assistant.schema.editor_tables import editor_snapshot
+
+Asked: TypeAlias = Callable[[Callable[[Connection], Any]], Awaitable[Any]]
+
+_PATIENCE_S: Final = 2.0
+_FINE: Final = ""
+#: A stream that nothing is ever stored in.
+_NOTHING: Final = {"stream": "health", "seq": 0, "proof": b"", "state": b""}
+
+
+class JournalProbe:
+    """Tries a journal when somebody wants to know, once a second at most. `write` does something on the
+    writer's thread and commits it, `read` asks beside it; `is_alive` says whether the thread is."""
+
+    def __init__(
+        self, branch: Branch, write: Asked, read: Asked, is_alive: Callable[[], bool]
+    ) -> None:
+        self._expected = revisions_of(branch)[-1]
+        self._is_alive = is_alive
+        self._writing = SharedCheck(lambda: _tried(write, _leave_no_trace), patience=_PATIENCE_S)
+        self._reading = SharedCheck(lambda: _tried(read, self._misfit), patience=_PATIENCE_S)
+
+    async def parts(self) -> dict[str, str | None]:
+        """What of the journal works (None), or why it does not."""
+        parts: dict[str, str | None] = {"database": None, "writer": None, "schema": None}
+        if not self._is_alive():
+            parts["writer"] = (
+                "The thread that writes the journal has ended: start this process anew."
+            )
+            return parts
+        wrote = await self._writing.answer()
+        read = await self._reading.answer()
+        if wrote:
+            parts["database"] = wrote
+        elif read is None:
+            parts["database"] = f"The database does not answer within {_PATIENCE_S:g} s."
+        elif wrote is None:
+            parts["writer"] = f"Nothing was stored within {_PATIENCE_S:g} s, though it can be read."
+        elif read:
+            parts["schema"] = read
+        return parts
+
+    def close(self) -> None:
+        """Nobody will ask any more."""
+        self._writing.cancel()
+        self._reading.cancel()
+
+    def _misfit(self, connection: Connection) -> str:
+        found = set(connection.scalars(select(VERSIONS.c.version_num)))
+        if self._expected in found:
+            return _FINE
+        other = ", ".join(sorted(found)) or "none"
+        return f"The tables are of another version ({other}, not {self._expected})."
+
+
+async def _tried(way: Asked, question: Callable[[Connection], Any]) -> str:
+    """Why it failed."""
+    try:
+        said: str | None = await way(question)
+    except Unavailable as error:
+        return error.detail
+    return said or _FINE
+
+
+def _leave_no_trace(connection: Connection) -> None:
+    """A commit that has to reach the disk, as that of an edit."""
+    table = editor_snapshot
+    connection.execute(insert(table).values(_NOTHING))
+    connection.execute(delete(table).where(table.c.stream == _NOTHING["stream"]))

@@ -1,0 +1,45 @@
+"""What a line of a log is about: the request, run, graph or robot that a task works on.
+
+Whoever begins a task says so once; every line that it writes then carries these ids.
+"""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from types import MappingProxyType
+from typing import Final, Literal, TypeAlias
+
+Subject: TypeAlias = Literal["request", "run", "graph", "robot"]
+
+_NOTHING: Final[Mapping[str, str]] = MappingProxyType({})
+_SUBJECTS: Final[ContextVar[Mapping[str, str]]] = ContextVar("subjects", default=_NOTHING)
+
+
+def subjects() -> Mapping[str, str]:
+    """Ids by what they are of; none where nobody has said."""
+    return _SUBJECTS.get()
+
+
+def request_id() -> str | None:
+    """The id of the request that is answered."""
+    return _SUBJECTS.get().get("request")
+
+
+def begin(ids: Mapping[str, str]) -> None:
+    """This task, and those that it begins, are about these and nothing else."""
+    _SUBJECTS.set(ids)
+
+
+def is_about(subject: Subject, id_of_it: str) -> None:
+    """From here on this task, and those that it begins, are about this, too."""
+    _SUBJECTS.set({**_SUBJECTS.get(), subject: id_of_it})
+
+
+@contextmanager
+def about(subject: Subject, id_of_it: str) -> Iterator[None]:
+    """What is written inside is about this, too."""
+    token = _SUBJECTS.set({**_SUBJECTS.get(), subject: id_of_it})
+    try:
+        yield
+    finally:
+        _SUBJECTS.reset(token)

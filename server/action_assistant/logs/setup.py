@@ -1,0 +1,103 @@
+"""Where the lines of a process go, in which form, and how much of them.
+
+What the command line says is put into the environment, where workers and children find it.
+"""
+
+import logging
+import os
+import sys
+import threading
+from collections.abc import Mapping
+from types import TracebackType
+from typing import Final, Literal, TypeAlias, get_args
+
+import msgspec
+
+from action_assistant.errors import CannotStart
+from action_assistant.logs.formats import ConsoleLog, JsonLog
+
+Form: TypeAlias = Literal["console", "json"]
+Level: TypeAlias = Literal["debug", "info", "warning", "error"]
+FORMS: Final[tuple[Form, ...]] = get_args(Form)
+LEVELS: Final[tuple[Level, ...]] = get_args(Level)
+
+_FORM: Final = "ACTION_ASSISTANT_LOG_FORMAT"
+_LEVEL: Final = "ACTION_ASSISTANT_LOG_LEVEL"
+#: They tell much, of no use to whoever runs this; some of it, such as header fields, is secret.
+_QUIET: Final = ("uvicorn.error", "httpx", "httpcore", "websockets", "asyncio")
+
+log: Final = logging.getLogger("action_assistant")
+
+
+class LogSettings(msgspec.Struct, frozen=True):
+    """In which form a process writes, and from which level on."""
+
+    form: Form = "console"
+    level: Level = "info"
+
+
+def log_settings(
+    form: str | None = None, level: str | None = None, environ: Mapping[str, str] = os.environ
+) -> LogSettings:
+    """What the command line says, else the environment. Raises CannotStart."""
+    given = {
+        "form": (form or environ.get(_FORM, "")).strip().lower() or "console",
+        "level": (level or environ.get(_LEVEL, "")).strip().lower() or "info",
+    }
+    try:
+        return msgspec.convert(given, LogSettings)
+    except msgspec.ValidationError:
+        name, known = (_FORM, FORMS) if given["form"] not in FORMS else (_LEVEL, LEVELS)
+        wrong = given["form"] if name == _FORM else given["level"]
+        raise CannotStart(f"{name} is one of {', '.join(known)}, not {wrong!r}.") from None
+
+
+def hand_on(chosen: LogSettings) -> None:
+    """Have whatever this process starts write in the same way."""
+    os.environ[_FORM], os.environ[_LEVEL] = chosen.form, chosen.level
+
+
+def set_up(process: str, chosen: LogSettings, *secrets: str) -> None:
+    """Write lines to the standard error from here on; `secrets` are never among them."""
+    handler = logging.StreamHandler(sys.stderr)
+    known = tuple(each for each in secrets if each)
+    is_json = chosen.form == "json"
+    handler.setFormatter(JsonLog(process, *known) if is_json else ConsoleLog(*known))
+    logging.basicConfig(level=logging.INFO, handlers=[handler], force=True)
+    log.setLevel(chosen.level.upper())
+    for name in _QUIET:
+        logging.getLogger(name).setLevel(logging.WARNING)
+    if is_json:
+        logging.captureWarnings(True)
+        sys.excepthook = _failed
+        threading.excepthook = lambda args: _failed(
+            args.exc_type, args.exc_value or args.exc_type(), args.exc_traceback
+        )
+
+
+def set_up_worker(name: str) -> None:
+    """The same in a process that was forked to work for this one."""
+    try:
+        chosen = log_settings()
+    except CannotStart:  # then its parent did not start either
+        chosen = LogSettings()
+    set_up(f"worker {name}", chosen)
+
+
+def writes_json() -> bool:
+    """Whether whatever is said is read by programs."""
+    return any(isinstance(each.formatter, JsonLog) for each in logging.getLogger().handlers)
+
+
+def say(text: str, level: Level = "info") -> None:
+    """Tell whoever started a command how it goes: in plain words, unless programs read them."""
+    if writes_json():
+        log.log(logging.getLevelName(level.upper()), "%s", text)
+        return
+    sys.stderr.write(f"action-assistant: {text}\n")
+    sys.stderr.flush()
+
+
+def _failed(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+    """What nobody caught."""
+    log.critical("failed", exc_info=(kind, error, trace))

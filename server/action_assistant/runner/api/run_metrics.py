@@ -1,0 +1,163 @@
+"""What runs, stops and robots look like from outside, for everybody who watches the runner.
+
+Follows what is shown of runs, as pages do: nothing on the way of a Stop waits for it or counts.
+"""
+
+import logging
+import time
+from collections import Counter
+from collections.abc import Iterator
+from typing import Final
+from weakref import WeakKeyDictionary
+
+from prometheus_client import Histogram, Metric
+from prometheus_client.registry import Collector
+
+from action_assistant.runner.execution.run_loop import OpenRun
+from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.links.port import SIMULATOR
+from action_assistant.web.monitoring.gauges import Family
+
+log: Final = logging.getLogger(__name__)
+
+_SENT: Final = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5)
+_PROVEN: Final = (0.05, 0.1, 0.25, 0.5, 1, 2, 5, 10, 30, 60, 300)
+_UNCONFIRMED: Final = "stop_unconfirmed"
+
+
+class StopTimes:
+    """What is known of the Stop of one open run: when it was asked for, and what was noted of it."""
+
+    def __init__(self) -> None:
+        self.asked_at = time.monotonic()
+        self.is_sent = self.is_proven = False
+
+
+class RunMetrics(Collector):
+    """Of all runs of a process, and of its robots."""
+
+    def __init__(self, control: ExecutionService) -> None:
+        self._control = control
+        self._stops: WeakKeyDictionary[OpenRun, StopTimes] = WeakKeyDictionary()
+        self._over: WeakKeyDictionary[OpenRun, str] = WeakKeyDictionary()
+        self._ended: Counter[tuple[str, str]] = Counter()
+        self._sent = _histogram("send", "until the first message that stops it had left", _SENT)
+        self._proven = _histogram("proof", "until it was proven that nothing moves", _PROVEN)
+        control.watch(self._changed)
+
+    def _changed(self, opened: OpenRun) -> None:
+        try:
+            self._note(opened)
+        except Exception:  # a count is never worth a run
+            log.exception("run %s was not counted", opened.run.id)
+
+    def _note(self, opened: OpenRun) -> None:
+        run = opened.run
+        if run.end is not None and self._over.get(opened) != run.end:
+            self._over[opened] = run.end
+            self._ended[run.engine, run.end] += 1
+        if run.end is None:
+            self._over.pop(opened, None)  # it moves again, and will end once more
+        if run.desired != "stopped":
+            return
+        stop = self._stops.get(opened)
+        if stop is None:
+            stop = self._stops[opened] = StopTimes()
+        if not stop.is_sent and run.stops_sent:
+            stop.is_sent = True
+            self._sent.observe(time.monotonic() - stop.asked_at)
+        if not stop.is_proven and run.proof_at is not None:
+            stop.is_proven = True
+            self._proven.observe(time.monotonic() - stop.asked_at)
+
+    def collect(self) -> Iterator[Metric]:
+        """As a registry asks."""
+        yield from self._sent.collect()
+        yield from self._proven.collect()
+
+    def families(self) -> Iterator[Family]:
+        """What is so now."""
+        yield from self._of_runs()
+        yield from self._of_stops()
+        yield from self._of_robots()
+
+    def _of_runs(self) -> Iterator[Family]:
+        opened = tuple(self._control.open.values())
+        going = [each.run for each in opened if each.run.end is None]
+        yield Family("runs_open", "Runs that are not over, or not stored yet.", len(opened))
+        yield Family(
+            "runs",
+            "Runs that are not over, by engine and state.",
+            Counter((run.engine, run.state) for run in going),
+            ("engine", "state"),
+        )
+        yield Family(
+            "runs_ended",
+            "Runs that have ended since this process began, by engine and how.",
+            self._ended,
+            ("engine", "end"),
+            "counter",
+        )
+        unrecorded = sum(not each.recorder.recorded for each in opened)
+        yield Family(
+            "runs_unrecorded", "Open runs of which the newest facts are not stored.", unrecorded
+        )
+        waiting = sum(each.recorder.waiting for each in opened)
+        waiting += self._control.robots.robot_log.waiting
+        yield Family("facts_waiting", "Facts that were shown and are not stored yet.", waiting)
+
+    @property
+    def unconfirmed(self) -> Counter[str]:
+        """What the page calls STOP UNCONFIRMED, by engine."""
+        going = (each.run for each in self._control.open.values() if each.run.end is None)
+        found = Counter(
+            run.engine
+            for run in going
+            if run.lost or any(alarm.code == _UNCONFIRMED for alarm in run.alarms)
+        )
+        for robot, why in self._control.robots.foreign_stops.all_going():
+            found[robot] += bool(why)
+        return found
+
+    def _of_stops(self) -> Iterator[Family]:
+        going = (each.run for each in self._control.open.values() if each.run.end is None)
+        engines = [SIMULATOR, *self._control.robots.names]
+        stopping = Counter(run.engine for run in going if run.desired == "stopped")
+        stopping.update(robot for robot, _ in self._control.robots.foreign_stops.all_going())
+        unconfirmed = self.unconfirmed
+        yield Family(
+            "stops_pending",
+            "Stops that are wanted and not proven yet, of runs and of graphs of others.",
+            {(name,): stopping[name] for name in engines},
+            ("engine",),
+        )
+        yield Family(
+            "stops_unconfirmed",
+            "Those of them that the page calls STOP UNCONFIRMED: look at the robot.",
+            {(name,): unconfirmed[name] for name in engines},
+            ("engine",),
+        )
+
+    def _of_robots(self) -> Iterator[Family]:
+        robots = self._control.robots
+        yield Family(
+            "engine_state",
+            "1 for the state that an engine is in.",
+            {(each.name, each.state): 1 for each in robots.all()},
+            ("engine", "state"),
+        )
+        yield Family(
+            "engine_last_answer_timestamp_seconds",
+            "When an engine answered last; missing where it never did.",
+            {(name,): at / 1e6 for name, at in robots.heard().items()},
+            ("engine",),
+        )
+
+
+def _histogram(name: str, until: str, buckets: tuple[float, ...]) -> Histogram:
+    return Histogram(
+        f"action_assistant_stop_{name}_seconds",
+        f"Time from the first Stop of a run {until}.",
+        registry=None,
+        buckets=buckets,
+    )

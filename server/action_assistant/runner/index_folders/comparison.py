@@ -1,0 +1,130 @@
+"""The graphs inside of a task held against the files that an engine indexes. Pure.
+
+A graph is there, lacks, is another one there, or is kept from being written. An engine takes the first
+file of a name that it finds, in no order, and an action before a graph; so what would leave two is refused.
+"""
+
+from collections.abc import Collection, Mapping
+from typing import TypeAlias
+
+import msgspec
+
+from action_assistant.runner.index_folders.scan import DefiningFile, IndexedFiles
+from action_assistant.umrf.check import refused_by_parser
+from action_assistant.umrf.digest import digest
+from action_assistant.umrf.echo import echo
+from action_assistant.umrf.facts import EngineFacts
+from action_assistant.umrf.files import codec
+from action_assistant.umrf.model import Graph
+
+_TOLD = 5  # paths in a sentence
+
+
+class There(msgspec.Struct, frozen=True):
+    """An engine that indexes the folder has just this graph."""
+
+
+class Lacking(msgspec.Struct, frozen=True):
+    """No file defines the graph."""
+
+
+class Differing(msgspec.Struct, frozen=True):
+    """This one file defines another graph of that name, or one that no engine reads."""
+
+    file: DefiningFile
+
+
+class Hindered(msgspec.Struct, frozen=True):
+    """The graph cannot be written; `why` is a sentence."""
+
+    why: str
+
+
+FileState: TypeAlias = There | Lacking | Differing | Hindered
+
+
+class WritableGraph(msgspec.Struct, frozen=True):
+    """A graph that can be written. `replaces`: the path of the file that would be put aside, from the
+    folder; "" for none."""
+
+    graph: str
+    replaces: str = ""
+
+
+class FolderLook(msgspec.Struct, frozen=True, kw_only=True):
+    """The folder that the robot's engine indexes, as the runner has it. `writable`: what can be written
+    there; `waiting`: graphs that are there as they shall be, and that the engine has not indexed;
+    `hindered`: why others cannot be written, as sentences by graph."""
+
+    path: str
+    writable: tuple[WritableGraph, ...] = ()
+    waiting: tuple[str, ...] = ()
+    hindered: dict[str, str] = {}
+
+
+def same_to_engine(ours: Graph, theirs: Graph, facts: EngineFacts) -> bool:
+    """Whether an engine makes no difference between two graphs."""
+    return digest(echo(ours, facts)) == digest(echo(theirs, facts))
+
+
+def held_against(
+    graph: Graph,
+    files: IndexedFiles,
+    facts: EngineFacts,
+    *,
+    actions: Collection[str],
+    graphs: Mapping[str, Graph],
+) -> FileState:
+    """How it is with one graph. `actions`, `graphs`: what the engine itself has named."""
+    name = graph.name
+    if defining := files.actions.get(name, ()):
+        return Hindered(
+            f"{_listed(defining)} defines an action {name}, which comes before a graph."
+        )
+    if name in actions:
+        return Hindered(f"It has an action {name}, which comes before a graph.")
+    if files.unread:
+        unread = "; ".join(files.unread[:_TOLD])
+        return Hindered(f"Whether another file defines {name} is not known: {unread}.")
+    found = files.graphs.get(name, ())
+    if found and all(_is_same(graph, each, facts) for each in found):
+        return There()
+    if len(found) > 1:
+        return Hindered(
+            f"{len(found)} files define {name}, and nobody knows which of them is taken: "
+            f"{_listed(found)}. Leave one of them."
+        )
+    if found:
+        return _of_another(name, found[0])
+    known = graphs.get(name)
+    if known is None:
+        return Lacking()
+    if same_to_engine(graph, known, facts):
+        return There()
+    return Hindered(
+        f"It has another {name}, of which no file is here: it looks elsewhere, or has not looked since."
+    )
+
+
+def _is_same(graph: Graph, file: DefiningFile, facts: EngineFacts) -> bool:
+    """Whether an engine reads just this graph from the file."""
+    try:
+        reading = codec.read(file.text)
+    except codec.Unreadable:
+        return False
+    is_read = reading.dialect == "D3" and not refused_by_parser(reading)
+    return is_read and same_to_engine(graph, reading.graph, facts)
+
+
+def _of_another(name: str, file: DefiningFile) -> FileState:
+    if file.linked:
+        return Hindered(
+            f"{file.shown} defines another {name} and is a link, or behind one: what it leads to is not "
+            "touched."
+        )
+    return Differing(file)
+
+
+def _listed(files: tuple[DefiningFile, ...]) -> str:
+    more = f" and {len(files) - _TOLD} more" if len(files) > _TOLD else ""
+    return f"{', '.join(each.shown for each in files[:_TOLD])}{more}"

@@ -1,0 +1,139 @@
+"""What of a folder an engine indexes: the files that define given names. Reads only; for workers.
+
+As an engine looks: each file with `graph.json` or `umrf.json` in its name, links followed, down to two
+folders below the first (docs/umrf-and-the-engine.md 1.5, 4).
+"""
+
+import os
+import stat
+from collections.abc import Collection, Iterator
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+from action_assistant.safe_text import one_line
+from action_assistant.umrf.files.file_names import ACTION_MARK, GRAPH_MARK
+
+DEEP: Final = 2  # folders below the first one
+_LARGEST: Final = 8 << 20  # bytes of a file
+_MOST: Final = 50_000  # files and folders
+_BOM: Final = b"\xef\xbb\xbf"
+
+
+class DefiningFile(msgspec.Struct, frozen=True):
+    """A file that defines a name. `path` leads there from the folder; `linked`: by way of a link."""
+
+    path: str
+    linked: bool
+    text: bytes
+
+    @property
+    def shown(self) -> str:
+        """The path, as people read it."""
+        return shown_path(self.path)
+
+
+class IndexedFiles(msgspec.Struct, frozen=True):
+    """The files that define names, by these. `unread`: what cannot be read, and why, so that what it
+    defines is not known."""
+
+    graphs: dict[str, tuple[DefiningFile, ...]] = {}
+    actions: dict[str, tuple[DefiningFile, ...]] = {}
+    unread: tuple[str, ...] = ()
+
+
+class _NamedText(msgspec.Struct):
+    graph_name: object = None
+    name: object = None
+
+
+def shown_path(path: str) -> str:
+    """A path of a file system, which is bytes, as text of one line."""
+    return one_line(os.fsencode(path).decode(errors="replace"))
+
+
+def scanned(folder: Path, names: Collection[str]) -> IndexedFiles:
+    """The files below that define one of these names. Never raises."""
+    graphs: dict[str, tuple[DefiningFile, ...]] = {}
+    actions: dict[str, tuple[DefiningFile, ...]] = {}
+    unread: list[str] = []
+    for path, linked in _marked(folder, unread):
+        try:
+            text = _text(folder / path)
+        except OSError as error:
+            unread.append(f"{shown_path(path)} ({error.strerror or error})")
+            continue
+        found = _names(text)
+        file = DefiningFile(path, linked, text)
+        base = path.rpartition("/")[2]
+        for mark, name, files in (
+            (GRAPH_MARK, found.graph_name, graphs),
+            (ACTION_MARK, found.name, actions),
+        ):
+            if mark in base and isinstance(name, str) and name in names:
+                files[name] = (*files.get(name, ()), file)
+    return IndexedFiles(graphs, actions, tuple(unread))
+
+
+def _marked(folder: Path, unread: list[str]) -> Iterator[tuple[str, bool]]:
+    """The paths of files that an engine would read, and whether a link leads there."""
+    left, seen = [("", False, 0)], 0
+    while left:
+        below, linked, depth = left.pop()
+        try:
+            entries = sorted(os.scandir(folder / below), key=lambda each: each.name)
+        except OSError as error:
+            unread.append(f"{shown_path(below) or 'the folder'} ({error.strerror or error})")
+            continue
+        for entry in entries:
+            seen += 1
+            if seen > _MOST:
+                unread.append(f"what comes after {_MOST:,} files and folders")
+                return
+            path = f"{below}{entry.name}"
+            by_link = linked or entry.is_symlink()
+            if _is_folder(entry):
+                if depth < DEEP:
+                    left.append((f"{path}/", by_link, depth + 1))
+            elif _is_marked(entry.name) and not _is_dangling(entry):
+                yield path, by_link
+
+
+def _is_marked(name: str) -> bool:
+    return GRAPH_MARK in name or ACTION_MARK in name
+
+
+def _is_folder(entry: "os.DirEntry[str]") -> bool:
+    try:
+        return entry.is_dir()
+    except OSError:  # a circle of links
+        return False
+
+
+def _is_dangling(entry: "os.DirEntry[str]") -> bool:
+    """A link to nothing, which defines nothing."""
+    try:
+        entry.stat()
+    except OSError:
+        return entry.is_symlink()
+    return False
+
+
+def _text(path: Path) -> bytes:
+    """What is in a regular file. Raises OSError."""
+    with os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as opened:
+        if not stat.S_ISREG(os.fstat(opened.fileno()).st_mode):
+            return b""  # an engine cannot read it either
+        text = opened.read(_LARGEST + 1)
+    if len(text) > _LARGEST:
+        raise OSError(f"larger than {_LARGEST >> 20} MB")
+    return text
+
+
+def _names(text: bytes) -> _NamedText:
+    """What a text names; nothing where it is no JSON object, which engines skip, too."""
+    try:
+        return msgspec.json.decode(text.removeprefix(_BOM), type=_NamedText)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
+        return _NamedText()

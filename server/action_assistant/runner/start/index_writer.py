@@ -1,0 +1,248 @@
+"""Graphs inside of a task, written where a robot's engine looks them up (docs/decisions/085-written-into-the-index.md)."""
+
+import os
+from collections import defaultdict
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import anyio
+import msgspec
+
+from action_assistant.errors import BadInput, CannotStart, Conflict, Unavailable
+from action_assistant.runner.clock import ClockUs
+from action_assistant.runner.index_folders.comparison import (
+    Differing,
+    FileState,
+    Hindered,
+    Lacking,
+    There,
+)
+from action_assistant.runner.index_folders.scan import scanned, shown_path
+from action_assistant.runner.index_folders.writing import (
+    NewFile,
+    WritingOutcome,
+    WrittenFile,
+    sha,
+    write,
+)
+from action_assistant.runner.robots.engine import EngineIndex
+from action_assistant.runner.robots.registry import Robots
+from action_assistant.runner.robots.robot_events import (
+    AskedGraph,
+    GraphFile,
+    IndexWriteAsked,
+    IndexWritten,
+)
+from action_assistant.runner.runs.events import Author
+from action_assistant.runner.sent_subgraphs import MOST_INSIDE, SentSubgraph, read_inside
+from action_assistant.runner.start.admission import check_names, decoded
+from action_assistant.runner.start.subgraph_items import of_index
+from action_assistant.umrf.check import STRUCTURAL, blocking, check
+from action_assistant.umrf.facts import EngineFacts, facts_of
+from action_assistant.umrf.files import codec
+from action_assistant.umrf.model import Graph
+from action_assistant.web.workers.lanes import RunInWorker
+
+#: Something that waits for a disk, done apart from the loop.
+OnDisk = Callable[..., Awaitable[Any]]
+
+
+class IndexWriteRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The graphs inside of a graph, as a start of it has them: `digest` is that graph's, `tree_digest` of
+    all together. `replace`: those that may take the place of another file."""
+
+    subgraphs: Annotated[tuple[SentSubgraph, ...], msgspec.Meta(min_length=1)]
+    digest: str
+    tree_digest: str | None = None
+    replace: Annotated[tuple[str, ...], msgspec.Meta(max_length=MOST_INSIDE)] = ()
+
+
+class IndexWriteAnswer(msgspec.Struct, frozen=True, kw_only=True):
+    """What is in the folder now: files that were `written` anew, that `replaced` others, and graphs that
+    were `there` as they shall be."""
+
+    folder: str
+    written: tuple[WrittenFile, ...]
+    replaced: tuple[WrittenFile, ...]
+    there: tuple[str, ...]
+
+
+class WritePlan(msgspec.Struct, frozen=True):
+    """What has to be written, and what has not."""
+
+    files: tuple[NewFile, ...]
+    graphs: tuple[AskedGraph, ...]
+    there: tuple[str, ...]
+
+
+def require_folder(robot: str, folder: Path) -> None:
+    """Raises CannotStart where there is no such folder."""
+    try:
+        with os.scandir(folder):
+            pass
+    except OSError as error:
+        why = error.strerror or str(error)
+        raise CannotStart(
+            f"There is no folder {folder} that {robot} could index: {why}."
+        ) from error
+
+
+def read_index_write(body: bytes) -> IndexWriteRequest:
+    """The body of a wish. Raises BadInput with the place."""
+    asked = decoded(body, IndexWriteRequest)
+    sent = {each.name for each in asked.subgraphs}
+    if unknown := [name for name in asked.replace if name not in sent]:
+        raise BadInput(
+            f"{unknown[0][:80]!r} is not among the graphs that were sent.",
+            where={"path": f"/replace/{asked.replace.index(unknown[0])}"},
+        )
+    return asked
+
+
+def planned(
+    asked: IndexWriteRequest, folder: Path, index: EngineIndex, facts: EngineFacts
+) -> WritePlan:
+    """What a wish comes to, all of it or nothing. For workers. Raises BadInput, NotUmrf, TooLarge, Conflict
+    with the place, Unavailable."""
+    told, graphs = read_inside(asked.subgraphs, asked.digest, asked.tree_digest)
+    for place, graph in enumerate(graphs.values()):
+        _require_sound(place, graph, graphs, facts)
+    digests = {each.name: each.digest for each in told}
+    files = scanned(folder, graphs.keys())
+    states = {name: of_index(each, files, index, facts) for name, each in graphs.items()}
+    _require_free(states, asked.replace, folder)
+    new: list[NewFile] = []
+    asked_for: list[AskedGraph] = []
+    for name, state in states.items():
+        text = codec.write(graphs[name]).encode()
+        match state:
+            case Lacking():
+                new.append(NewFile(name, text))
+                asked_for.append(AskedGraph(name, digests[name]))
+            case Differing(file):
+                new.append(NewFile(name, text, file.path, sha(file.text)))
+                asked_for.append(AskedGraph(name, digests[name], file.shown))
+            case There() | Hindered():
+                continue
+    there = tuple(name for name, state in states.items() if isinstance(state, There))
+    return WritePlan(tuple(new), tuple(asked_for), there)
+
+
+def _require_sound(
+    place: int, graph: Graph, inside: Mapping[str, Graph], facts: EngineFacts
+) -> None:
+    """Nothing gets into an index that an engine must not read. Raises Conflict."""
+    check_names(graph, simulated=False)
+    wrong = blocking(check(graph, None, facts, inside))
+    never = [each for each in wrong if each.code in STRUCTURAL]
+    if never:
+        raise Conflict(
+            f"{graph.name} cannot be written: {never[0].message}",
+            where={"path": f"/subgraphs/{place}/umrf{never[0].where.path}"},
+        )
+
+
+def _require_free(states: Mapping[str, FileState], replace: Sequence[str], folder: Path) -> None:
+    """Raises Conflict with all that stands in the way; then nothing is written."""
+    hindered = {name: each.why for name, each in states.items() if isinstance(each, Hindered)}
+    others = {
+        name: each.file.shown
+        for name, each in states.items()
+        if isinstance(each, Differing) and name not in replace
+    }
+    where: dict[str, object] = {"folder": shown_path(str(folder))}
+    if hindered:
+        told = " ".join(f"{name} cannot be written. {why}" for name, why in hindered.items())
+        where |= {"path": "/subgraphs", "hindered": hindered}
+        raise Conflict(f"{told} Nothing was written.", where=where)
+    if others:
+        told = ", ".join(f"{path} ({name})" for name, path in others.items())
+        where |= {"path": "/replace", "files": others}
+        raise Conflict(
+            f"Other files would be replaced: {told}. Name their graphs in `replace` to do that. "
+            "Nothing was written.",
+            where=where,
+        )
+
+
+class IndexWriter:
+    """Writes into the `folders` of robots that whoever started the runner has named; into one of them one
+    wish at a time."""
+
+    def __init__(
+        self,
+        robots: Robots,
+        folders: Mapping[str, Path],
+        *,
+        clock_us: ClockUs,
+        run_in_worker: RunInWorker,
+        on_disk: OnDisk,
+    ) -> None:
+        self._robots: Final = robots
+        self._folders: Final = folders
+        self._clock_us = clock_us
+        self._run_in_worker = run_in_worker
+        self._on_disk = on_disk
+        self._locks: Final = defaultdict[str, anyio.Lock](anyio.Lock)
+
+    async def write(self, robot: str, asked: IndexWriteRequest, author: Author) -> IndexWriteAnswer:
+        """Write what is lacking. Raises NotFound, Conflict, Unavailable and what reading raises."""
+        known = self._robots.registration(robot)
+        folder = self._folders.get(robot)
+        if folder is None:
+            raise Conflict(
+                f"The runner has no folder into which it could write for {robot}: whoever starts it names "
+                "one with --index-folder.",
+                where={"path": "/robot"},
+            )
+        async with self._locks[str(folder)]:
+            index = await self._robots.index(robot)
+            plan: WritePlan = await self._run_in_worker(
+                planned, asked, folder, index, facts_of(known.profile)
+            )
+            outcome = WritingOutcome(())
+            if plan.files:
+                with anyio.CancelScope(shield=True):  # what was begun is told whoever has gone
+                    outcome = await self._written(robot, folder, plan, author)
+        if outcome.failed:
+            done = ", ".join(each.path for each in outcome.written)
+            rest = f"Written before that: {done}." if done else "Nothing was written."
+            raise Unavailable(f"{outcome.failed} {rest}", where={"folder": shown_path(str(folder))})
+        if (engine := self._robots.link(robot)) is not None:
+            engine.look_closely()
+        return IndexWriteAnswer(
+            folder=shown_path(str(folder)),
+            written=tuple(each for each in outcome.written if not each.kept),
+            replaced=tuple(each for each in outcome.written if each.kept),
+            there=plan.there,
+        )
+
+    async def _written(
+        self, robot: str, folder: Path, plan: WritePlan, author: Author
+    ) -> WritingOutcome:
+        """What cannot be recorded is not written. Raises Unavailable."""
+        wish = IndexWriteAsked(
+            at=self._clock_us(), author=author, folder=shown_path(str(folder)), graphs=plan.graphs
+        )
+        try:
+            await self._robots.robot_log.record(robot, wish, author.id)
+        except Unavailable as refused:
+            raise Unavailable(f"{refused.detail} Nothing was written.") from refused
+        outcome: WritingOutcome = await self._on_disk(write, folder, plan.files)
+        digests = {each.name: each.digest for each in plan.graphs}
+        done = IndexWritten(
+            at=self._clock_us(),
+            author=author,
+            files=tuple(
+                GraphFile(each.graph, each.path, digests[each.graph], each.kept)
+                for each in outcome.written
+            ),
+            why=outcome.failed,
+        )
+        with suppress(
+            Unavailable
+        ):  # it is done; the log says that it is not being recorded, and goes on
+            await self._robots.robot_log.record(robot, done, author.id)
+        return outcome

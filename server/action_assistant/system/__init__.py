@@ -1,0 +1,1 @@
+"""What this program asks of the computer that it runs on, and what may be wrong with that."""

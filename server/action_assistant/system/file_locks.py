@@ -1,0 +1,29 @@
+"""Locks on files, by which processes of this program keep out of each other's way. Of Linux and macOS:
+elsewhere nothing that needs one starts."""
+
+from action_assistant.errors import CannotStart
+from action_assistant.system.posix import fcntl
+
+
+def take(descriptor: int) -> bool:
+    """Lock a file that is open, until it is closed or its process ends; False when somebody else has
+    locked it. Raises CannotStart where there are no such locks."""
+    try:
+        _locking(descriptor, wait=False)
+    except OSError:
+        return False
+    return True
+
+
+def wait_for(descriptor: int) -> None:
+    """The same, as soon as nobody else has locked it. Raises OSError, CannotStart."""
+    _locking(descriptor, wait=True)
+
+
+def _locking(descriptor: int, *, wait: bool) -> None:
+    if fcntl is None:
+        raise CannotStart(
+            "This system has no file locks that this program knows, so it cannot keep a journal here: "
+            "docs/installing.md says what works on Windows."
+        )
+    fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))

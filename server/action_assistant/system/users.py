@@ -1,0 +1,37 @@
+"""Users of this computer, as far as the system has such: POSIX does, Windows in another way."""
+
+import os
+
+from action_assistant.system.posix import pwd
+
+
+def me() -> int | None:
+    """The number of the user whose rights this process has; None where users have none."""
+    return os.geteuid() if hasattr(os, "geteuid") else None
+
+
+def name_of(uid: int) -> str:
+    """A user for people. Those of containers mostly have no name outside."""
+    if pwd is not None:
+        try:
+            return str(pwd.getpwuid(uid).pw_name)
+        except KeyError:
+            pass
+    return f"user {uid}"
+
+
+def mine() -> str:
+    """The user of this process, for people."""
+    uid = me()
+    return name_of(uid) if uid is not None else os.environ.get("USERNAME", "this user")
+
+
+def exists(name: str) -> bool:
+    """Whether this computer has a user of this name."""
+    if pwd is None:
+        return False
+    try:
+        pwd.getpwnam(name)
+    except KeyError:
+        return False
+    return True

@@ -1,0 +1,84 @@
+"""Each request gets an id, by which its answer, a problem and the lines of the log belong together."""
+
+import logging
+import re
+import secrets
+import time
+from collections import Counter
+from typing import Any, Final
+
+from litestar.enums import ScopeType
+from litestar.types import ASGIApp, Message, Receive, Scope, Send
+
+from action_assistant.logs.context import begin
+
+log: Final = logging.getLogger(__name__)
+
+#: Under this name the state of a request says whether a proxy that is believed has sent it.
+PROXIED: Final = "proxied"
+HEADER: Final = b"x-request-id"
+
+_CALLS: Final = frozenset({"http", "websocket"})
+_ID: Final = re.compile(rb"[\w.:/+=-]{1,64}", re.ASCII)
+#: What a path is about.
+_SUBJECT: Final = re.compile(r"/api/(run|graph)s/([^/]{1,64})(?=/|$)")
+
+
+class RequestCounts:
+    """What was answered, and what is open. Only the loop counts."""
+
+    def __init__(self) -> None:
+        self.answered: Final[Counter[int]] = Counter()  # requests, by status
+        self.open: Final[Counter[str]] = Counter()  # connections that are busy, by kind
+
+
+class Requests:
+    """An ASGI middleware that names and counts requests."""
+
+    def __init__(self, app: ASGIApp, counts: RequestCounts) -> None:
+        self._app = app
+        self._counts = counts
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Pass on."""
+        if scope["type"] not in _CALLS:  # lifespan
+            await self._app(scope, receive, send)
+            return
+        kind = str(scope["type"])
+        ids = {"request": _id_of(scope)}
+        about = _SUBJECT.match(scope["path"])
+        if about is not None:
+            ids[about[1]] = about[2]
+        begin(ids)
+        self._counts.open[kind] += 1
+        try:
+            if kind == ScopeType.HTTP:
+                await self._answer(scope, receive, send)
+            else:
+                await self._app(scope, receive, send)
+        finally:
+            self._counts.open[kind] -= 1
+
+    async def _answer(self, scope: Any, receive: Receive, send: Send) -> None:
+        begun, status = time.perf_counter(), 0
+
+        async def sent(message: Message) -> None:
+            nonlocal status
+            if message["type"] == "http.response.start":
+                status = message["status"]
+                self._counts.answered[status] += 1
+            await send(message)
+
+        await self._app(scope, receive, sent)
+        if log.isEnabledFor(logging.DEBUG):
+            took = 1e3 * (time.perf_counter() - begun)
+            log.debug("%s %s: %d in %.1f ms", scope["method"], scope["path"], status, took)
+
+
+def _id_of(scope: Any) -> str:
+    """What a proxy that is believed calls it; else a name of our own."""
+    if scope.get("state", {}).get(PROXIED):
+        for name, value in scope["headers"]:
+            if name.lower() == HEADER and _ID.fullmatch(value):
+                return str(value.decode())
+    return secrets.token_hex(8)

@@ -1,0 +1,1 @@
+"""How a process tells others how it is: metrics, readiness, status."""

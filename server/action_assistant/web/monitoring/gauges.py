@@ -1,0 +1,44 @@
+"""Numbers that are looked up when somebody asks for them: nothing is counted meanwhile."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any, Final, NamedTuple, TypeAlias
+
+from prometheus_client import Metric
+from prometheus_client.registry import Collector
+
+PREFIX: Final = "action_assistant_"
+#: A value for each tuple of labels.
+Labelled: TypeAlias = Mapping[Any, float]
+
+
+class Family(NamedTuple):
+    """One metric, with a value for each set of labels; without labels the value alone."""
+
+    name: str
+    documentation: str
+    values: Labelled | float
+    labels: tuple[str, ...] = ()
+    kind: str = "gauge"
+
+    def metric(self) -> Metric:
+        """As a registry of Prometheus wants it."""
+        metric = Metric(PREFIX + self.name, self.documentation, self.kind)
+        suffix = "_total" if self.kind == "counter" else ""
+        values = self.values if isinstance(self.values, Mapping) else {(): self.values}
+        for of, value in values.items():
+            metric.add_sample(
+                metric.name + suffix, dict(zip(self.labels, of, strict=True)), float(value)
+            )
+        return metric
+
+
+class Looked(Collector):
+    """A collector whose numbers `look` finds."""
+
+    def __init__(self, look: Callable[[], Iterable[Family]]) -> None:
+        self._look = look
+
+    def collect(self) -> Iterator[Metric]:
+        """As a registry asks."""
+        for family in self._look():
+            yield family.metric()

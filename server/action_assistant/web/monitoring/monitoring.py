@@ -1,0 +1,158 @@
+"""What a process tells of itself, put together: once its services are open, until it ends."""
+
+from collections.abc import AsyncIterator, Callable, Iterator, Sequence
+from contextlib import asynccontextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Final
+
+import anyio
+from prometheus_client import CollectorRegistry, ProcessCollector, disable_created_metrics
+from prometheus_client.exposition import generate_latest
+
+from action_assistant.journal.migrate import revisions_of
+from action_assistant.version import VERSION
+from action_assistant.web.http.requests import RequestCounts
+from action_assistant.web.monitoring.backups import backups_shown
+from action_assistant.web.monitoring.gauges import Family, Looked
+from action_assistant.web.monitoring.loop_lag import LoopLag
+from action_assistant.web.monitoring.readiness import Check, DiskCheck, Parts, Readiness
+from action_assistant.web.monitoring.status import (
+    ProcessName,
+    ProcessStatus,
+    began_at,
+    journal_state,
+    lane_states,
+    load_now,
+    storage_shown,
+    versions,
+)
+from action_assistant.web.monitoring.storage import StorageWatch
+from action_assistant.web.monitoring.watched import Watched
+from action_assistant.web.workers.lanes import Lane
+
+disable_created_metrics()  # type: ignore[no-untyped-call]  # each counter and histogram would be told twice
+
+
+class Monitoring:
+    """Of one process."""
+
+    def __init__(self, process: ProcessName, data: Path) -> None:
+        self.requests: Final = RequestCounts()
+        self._process = process
+        self._data = data
+        self._schema = revisions_of(process)[-1]
+        self._disk = DiskCheck(data)
+        self._lag = LoopLag()
+        self._parts: Parts = {}
+        self._watched: Watched | None = None
+        self._storage: StorageWatch | None = None
+        self._registry = CollectorRegistry()
+        ProcessCollector(registry=self._registry)
+        self._registry.register(self._lag)
+        self._registry.register(Looked(self._families))
+
+    @asynccontextmanager
+    async def watching(self, watched: Watched) -> AsyncIterator[None]:
+        """Look at these services, as long as you are inside."""
+        self._watched = watched
+        storage = self._storage = StorageWatch(
+            self._data,
+            watched.journal.bytes_in_use,
+            watched.folders,
+            watched.lanes[-1],
+            backups=self._process == "editor",
+        )
+        for each in (watched.journal.metrics, *watched.collectors):
+            self._registry.register(each)
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(self._lag.run)
+            tasks.start_soon(storage.run)
+            yield
+            tasks.cancel_scope.cancel()
+
+    # --- what is told -------------------------------------------------------------------------
+
+    async def readiness(self) -> Readiness:
+        """Whether the process can do its work; known within seconds, whatever hangs."""
+        if self._watched is None:
+            return Readiness(ready=True)
+        found: dict[str, str | None] = {}
+
+        async def ask(check: Check) -> None:
+            found.update(await check())
+
+        async def disk() -> Parts:
+            return {"disk": await self._disk.problem()}
+
+        checks: tuple[Check, ...] = (self._watched.journal.parts, disk, self._watched.parts)
+        async with anyio.create_task_group() as tasks:
+            for check in checks:
+                tasks.start_soon(ask, check)
+        self._parts = dict(sorted(found.items()))
+        return Readiness.of(self._parts)
+
+    async def exposition(self) -> str:
+        """All metrics, in the text format of Prometheus."""
+        await self.readiness()
+        return generate_latest(self._registry).decode()
+
+    async def status(self) -> ProcessStatus:
+        """How the process is, for whoever looks after it."""
+        watched, storage = self._watched, self._storage
+        if watched is None or storage is None:
+            raise RuntimeError("the process is not open yet")
+        return ProcessStatus(
+            process=self._process,
+            at=datetime.now(UTC),
+            began_at=began_at(),
+            versions=versions(self._schema),
+            readiness=await self.readiness(),
+            load=load_now(self._lag.worst_s),
+            journal=journal_state(watched.journal),
+            storage=storage_shown(storage.found),
+            workers=lane_states(watched.lanes),
+            activity=watched.activity(),
+            backups=backups_shown(storage.backups),
+        )
+
+    def _families(self) -> Iterator[Family]:
+        labels = {(self._process, VERSION, self._schema): 1}
+        yield Family("info", "What runs here.", labels, ("process", "version", "schema"))
+        yield Family(
+            "part_ready",
+            "1 for each part that works, 0 for one that keeps the process from its work.",
+            {(part,): why is None for part, why in self._parts.items()},
+            ("part",),
+        )
+        yield Family(
+            "responses",
+            "Requests that were answered, by status.",
+            {(str(status),): count for status, count in self.requests.answered.items()},
+            ("status",),
+            "counter",
+        )
+        yield Family(
+            "requests_open",
+            "Requests and WebSockets that are open.",
+            {(kind,): self.requests.open[kind] for kind in ("http", "websocket")},
+            ("kind",),
+        )
+        if self._watched is not None:
+            yield from _of_lanes(self._watched.lanes)
+            yield from self._watched.families()
+        if self._storage is not None:
+            yield from self._storage.families()
+
+
+def _of_lanes(lanes: Sequence[Lane]) -> Iterator[Family]:
+    def of(value: Callable[[Lane], int]) -> dict[tuple[str, ...], float]:
+        return {(lane.name,): value(lane) for lane in lanes}
+
+    label = ("lane",)
+    waiting, busy = of(lambda lane: lane.waiting), of(lambda lane: lane.busy)
+    deaths, given_up = of(lambda lane: lane.deaths), of(lambda lane: lane.given_up)
+    yield Family("lane_waiting", "Requests to workers without an answer yet.", waiting, label)
+    yield Family("lane_busy", "Workers that work on one.", busy, label)
+    yield Family("worker_deaths", "Workers that died of their work.", deaths, label, "counter")
+    yield Family("lane_given_up", "Requests that took too long.", given_up, label, "counter")

@@ -1,0 +1,62 @@
+"""Whether a process can do its work, part by part. Alive is another question: it answers at all."""
+
+import shutil
+from collections.abc import Awaitable, Callable, Mapping
+from pathlib import Path
+from typing import Final, TypeAlias
+
+import msgspec
+from anyio import to_thread
+
+from action_assistant.journal.health.shared_check import SharedCheck
+
+#: What each part of a process lacks; None where it works.
+Parts: TypeAlias = Mapping[str, str | None]
+Check: TypeAlias = Callable[[], Awaitable[Parts]]
+
+_ROOM: Final = 4 << 20  # bytes: what a log beside a database grows by, as a rule
+_PATIENCE_S: Final = 1.0
+
+
+#: Robots cannot be reached without it, but a Stop, a simulation and all that is stored can.
+_OPTIONAL: Final = frozenset({"rclpy"})
+
+
+class Readiness(msgspec.Struct, frozen=True):
+    """Whether the process can do its work, and what stands in the way. `parts`: what each lacks, null
+    where it works. Without `rclpy` a process is ready."""
+
+    ready: bool
+    problems: tuple[str, ...] = ()
+    parts: Parts | msgspec.UnsetType = msgspec.UNSET
+
+    @classmethod
+    def of(cls, parts: Parts) -> "Readiness":
+        """All parts have to work that are not optional."""
+        lacking = {name: why for name, why in parts.items() if name not in _OPTIONAL}
+        problems = tuple(why for why in lacking.values() if why is not None)
+        return cls(not problems, problems, parts)
+
+
+class DiskCheck:
+    """Whether there is room on the disk of a folder."""
+
+    def __init__(self, folder: Path) -> None:
+        async def free() -> int | str:
+            try:
+                return (await to_thread.run_sync(shutil.disk_usage, folder)).free
+            except OSError as error:
+                return f"The disk of the data folder cannot be looked at: {error.strerror}."
+
+        self._free: SharedCheck[int | str] = SharedCheck(free, patience=_PATIENCE_S)
+
+    async def problem(self) -> str | None:
+        """What is wrong with it."""
+        free = await self._free.answer()
+        if free is None:
+            return f"The disk of the data folder does not answer within {_PATIENCE_S:g} s."
+        if isinstance(free, str):
+            return free
+        if free < _ROOM:
+            return f"The disk of the data folder is full: {free >> 20} MiB are left."
+        return None

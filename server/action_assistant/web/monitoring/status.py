@@ -1,0 +1,158 @@
+"""How a process is, for whoever looks after it: what `GET /api/status` answers, and its page shows."""
+
+import os
+import platform
+import time
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from typing import Final, Literal, TypeAlias
+
+import msgspec
+
+from action_assistant.journal.journal import Journal
+from action_assistant.system import limits
+from action_assistant.system.posix import resource
+from action_assistant.version import VERSION
+from action_assistant.web.monitoring.backups import BackupsShown
+from action_assistant.web.monitoring.readiness import Readiness
+from action_assistant.web.monitoring.storage import Storage
+from action_assistant.web.workers.lanes import Lane
+
+ProcessName: TypeAlias = Literal["editor", "runner"]
+
+_BEGAN: Final = time.time()
+
+
+class ProcessVersions(msgspec.Struct, frozen=True):
+    """Of the program, of the Python under it, and of the tables in its database."""
+
+    program: str
+    python: str
+    schema: str
+
+
+class Load(msgspec.Struct, frozen=True):
+    """What a process takes: seconds of a processor, bytes of memory, descriptors; and how late its loop
+    was at worst, in the last minute. Null where the system does not say."""
+
+    cpu_s: float
+    memory: int | None
+    open_files: int | None
+    most_files: int
+    loop_lag_s: float
+
+
+class JournalState(msgspec.Struct, frozen=True):
+    """What the writer of the journal does. `failing`: why the newest transaction was not stored."""
+
+    database: str
+    waiting: int
+    busy_s: float
+    failing: str | None
+
+
+class StorageShown(msgspec.Struct, frozen=True):
+    """Bytes: what the disk of the data folder has left, and what is in use."""
+
+    at: datetime
+    free: int
+    size: int
+    database: int | None
+    wal: int | None
+    folders: Mapping[str, int]
+
+
+class LaneState(msgspec.Struct, frozen=True):
+    """A queue for workers. `deaths` and `given_up` since the process began."""
+
+    name: str
+    waiting: int
+    busy: int
+    deaths: int
+    given_up: int
+
+
+class RobotLink(msgspec.Struct, frozen=True):
+    """How a robot is, and when it last answered."""
+
+    name: str
+    state: str
+    why: str = ""
+    heard_at: datetime | None = None
+
+
+class Activity(msgspec.Struct, frozen=True, kw_only=True):
+    """What goes on in a process: open sockets; rooms of an editor; runs and robots of a runner."""
+
+    sockets: int
+    rooms: int | None = None
+    runs: int | None = None
+    stops_unconfirmed: int | None = None
+    robots: Sequence[RobotLink] = ()
+
+
+class ProcessStatus(msgspec.Struct, frozen=True, kw_only=True):
+    """One of the two processes, now. `backups` are the editor's to know."""
+
+    process: ProcessName
+    at: datetime
+    began_at: datetime
+    versions: ProcessVersions
+    readiness: Readiness
+    load: Load
+    journal: JournalState
+    storage: StorageShown | None
+    workers: Sequence[LaneState]
+    activity: Activity
+    backups: BackupsShown | None = None
+
+
+def began_at() -> datetime:
+    """When this process began."""
+    return datetime.fromtimestamp(_BEGAN, UTC)
+
+
+def load_now(loop_lag_s: float) -> Load:
+    """What this process takes."""
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    soft, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    return Load(
+        cpu_s=used.ru_utime + used.ru_stime,
+        memory=limits.memory_in_use() or None,
+        open_files=_open_files(),
+        most_files=soft,
+        loop_lag_s=loop_lag_s,
+    )
+
+
+def versions(schema: str) -> ProcessVersions:
+    """Of this process."""
+    return ProcessVersions(VERSION, platform.python_version(), schema)
+
+
+def journal_state(journal: Journal) -> JournalState:
+    """What its writer does."""
+    metrics = journal.metrics
+    return JournalState(journal.database_name, metrics.waiting, metrics.busy_s, metrics.failing)
+
+
+def storage_shown(found: Storage | None) -> StorageShown | None:
+    """What was found when it was looked last."""
+    if found is None:
+        return None
+    at = datetime.fromtimestamp(found.at, UTC)
+    return StorageShown(at, found.free, found.size, found.database, found.wal, found.folders)
+
+
+def lane_states(lanes: Sequence[Lane]) -> list[LaneState]:
+    """Each of them."""
+    return [
+        LaneState(each.name, each.waiting, each.busy, each.deaths, each.given_up) for each in lanes
+    ]
+
+
+def _open_files() -> int | None:
+    try:
+        return len(os.listdir("/proc/self/fd"))  # noqa: PTH208 - counted, not visited
+    except OSError:
+        return None

@@ -1,0 +1,238 @@
+"""WebSockets whose messages go straight to whoever takes them: no queue, no task, no event for each.
+
+A protocol for uvicorn (its setting `ws`), which stays the one that speaks: handshake, pings, closing and
+everything that is wrong or rare are its own, and that of `websockets` below it. Here the bytes are only
+cut into frames. A whole binary message is unmasked and handed over; every other frame goes the usual
+way, whole, so that the usual parser always stands at the beginning of one. An application that takes
+nothing over sees no difference.
+"""
+
+from collections.abc import Mapping, MutableMapping
+from typing import Any, Final, Protocol
+
+from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+
+try:
+    from websockets.speedups import apply_mask
+except ImportError:  # where it was not compiled
+    from websockets.utils import apply_mask
+
+#: In the extensions of a scope: here is a socket that can be taken over, as `socket`.
+_EXTENSION: Final = "action_assistant.direct"
+_WHOLE_BINARY: Final = 0x82  # the first byte of a message in one frame
+_SHORT: Final = 126
+_CONTINUED, _BINARY = (
+    0,
+    2,
+)  # kinds of frames: a second one of a message and those after it, a first one
+_KINDS: Final = frozenset({_CONTINUED, 1, _BINARY, 8, 9, 10})
+_WRITTEN_AT_ONCE: Final = 1 << 16  # bytes; more is written message by message
+
+
+class Taker(Protocol):
+    """Who takes a socket over. Called on the event loop; must not raise."""
+
+    def heard(self, message: bytes | None) -> None:
+        """A message has come; None for text."""
+
+    def may_write(self) -> None:
+        """What was written has gone out far enough."""
+
+    def gone(self) -> None:
+        """Nothing will come any more."""
+
+
+class Nobody:
+    """Takes what comes after somebody has let go."""
+
+    def heard(self, message: bytes | None) -> None:
+        """Nothing."""
+
+    def may_write(self) -> None:
+        """Nothing."""
+
+    def gone(self) -> None:
+        """Nothing."""
+
+
+class DirectSocket(WebSocketsSansIOProtocol):
+    """One socket. `taker` hears its messages, once there is one."""
+
+    def __init__(self, *args: Any, **more: Any) -> None:
+        super().__init__(*args, **more)
+        self._taker: Taker | None = None
+        self._rest = bytearray()  # of a frame that is not complete, or not to be read yet
+        self._in_pieces = False  # a message of several frames has begun
+        self._is_held = False  # its taker wants to hear nothing now
+        self._limit: Final = self.config.ws_max_size
+
+    async def run_asgi(self) -> None:
+        """Called once, for the application."""
+        extensions: MutableMapping[str, dict[object, object]] = self.scope["extensions"]
+        extensions[_EXTENSION] = {"socket": self}
+        await super().run_asgi()
+
+    # --- for whoever takes it over ------------------------------------------------------------
+
+    def take_over(self, taker: Taker) -> None:
+        """From now on, once the handshake is over, `taker` hears what comes, and nobody else."""
+        self._taker = taker
+        self._go_on()
+
+    def let_go(self) -> None:
+        """Nobody hears anything any more. The application may still close the socket."""
+        self._taker = Nobody()
+        self.resume_hearing()
+
+    def pause_hearing(self) -> None:
+        """Read nothing more, so that whoever sends has to wait."""
+        self._is_held = True
+        if not self.read_paused and not self.transport.is_closing():
+            self.read_paused = True
+            self.transport.pause_reading()
+
+    def resume_hearing(self) -> None:
+        """Go on, beginning with what has come already."""
+        self._is_held = False
+        self._read_on()
+        self._go_on()
+
+    @property
+    def is_writable(self) -> bool:
+        """Whether little enough waits to be sent."""
+        return self.writable.is_set()
+
+    def write(self, messages: list[bytes]) -> int:
+        """Send messages, as many as may wait; how many that are. Those after that are for
+        `may_write`. Where nobody hears them any more, all are."""
+        if self.close_sent or self.disconnected or self.transport.is_closing():
+            return len(messages)
+        if sum(map(len, messages)) <= _WRITTEN_AT_ONCE:
+            self.transport.write(b"".join(map(framed, messages)))
+            return len(messages)
+        for n, message in enumerate(messages):
+            if not self.writable.is_set():
+                return n
+            self.transport.write(framed(message))
+        return len(messages)
+
+    # --- for the transport --------------------------------------------------------------------
+
+    def data_received(self, data: bytes) -> None:
+        """Something has come."""
+        if not self.handshake_initiated:
+            super().data_received(data)
+            return
+        if not (self._rest or self._in_pieces or self._is_held) and data[0] == _WHOLE_BINARY:
+            size = len(data) - 6
+            if 0 <= size < _SHORT and data[1] == 0x80 | size and self._taker is not None:
+                self._tell(apply_mask(data[6:], data[2:6]))  # nearly always: one short message
+                return
+        self._rest += data
+        self._cut()
+
+    def resume_writing(self) -> None:
+        """There is room again."""
+        super().resume_writing()
+        if self._taker is not None:
+            self._taker.may_write()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """It is over."""
+        super().connection_lost(exc)
+        self._rest.clear()
+        if self._taker is not None:
+            self._taker.gone()
+
+    def shutdown(self) -> None:
+        """The process ends."""
+        super().shutdown()
+        if self._taker is not None:
+            self._taker.gone()
+
+    # --- frames -------------------------------------------------------------------------------
+
+    def _go_on(self) -> None:
+        self._drain()
+        self._cut()
+
+    def _cut(self) -> None:
+        """Deal with every frame that is complete, unless nobody wants to hear."""
+        while not self._is_held and not self.transport.is_closing():
+            start, end = self._frame()
+            if end > len(self._rest):
+                return
+            frame = bytes(self._rest[:end])
+            del self._rest[:end]  # whoever hears it may have us go on
+            self._deal_with(frame, start)
+        if self.transport.is_closing():
+            self._rest.clear()
+
+    def _frame(self) -> tuple[int, int]:
+        """Where the payload of the next frame begins, and where it ends: beyond what has come, where
+        that is not known yet. One that nobody may send has no payload and ends where the bytes do:
+        the usual parser refuses it by its head."""
+        rest, there = self._rest, len(self._rest)
+        start = 6
+        if there < 2:
+            return 0, there + 1
+        if not rest[1] & 0x80 or rest[0] & 0x0F not in _KINDS:
+            return 0, there
+        size = rest[1] & 0x7F
+        if size >= _SHORT:
+            width = 2 if size == _SHORT else 8
+            if there < 2 + width:
+                return 0, there + 1
+            size = int.from_bytes(rest[2 : 2 + width], "big")
+            start += width
+        return (start, start + size) if size <= self._limit else (0, there)
+
+    def _deal_with(self, frame: bytes, start: int) -> None:
+        """One frame, whose payload begins there."""
+        first = frame[0]
+        if first == _WHOLE_BINARY and start and self._taker is not None and not self._in_pieces:
+            self._tell(apply_mask(frame[start:], frame[start - 4 : start]))
+            return
+        kind = first & 0x0F
+        if kind <= _BINARY:  # a control frame may come between two pieces
+            self._in_pieces = not first & 0x80 and (kind != _CONTINUED or self._in_pieces)
+        super().data_received(frame)
+        self._drain()
+
+    def _drain(self) -> None:
+        """Hand over what went the usual way."""
+        while self._taker is not None and not self._is_held and not self.queue.empty():
+            event = self.queue.get_nowait()
+            if event["type"] == "websocket.receive":
+                self._read_on()  # the usual way has nobody read until this one is fetched
+                self._taker.heard(event.get("bytes"))
+            elif event["type"] == "websocket.disconnect":
+                self._taker.gone()
+
+    def _read_on(self) -> None:
+        if self.read_paused:
+            self.read_paused = False
+            if not self.transport.is_closing():
+                self.transport.resume_reading()
+
+    def _tell(self, message: bytes) -> None:
+        if self._taker is not None and not self.close_sent:
+            self._taker.heard(message)
+
+
+def direct_socket(
+    extensions: Mapping[str, Mapping[object, object]] | None,
+) -> DirectSocket | None:
+    """The socket of a scope with these extensions, where it can be taken over."""
+    found = (extensions or {}).get(_EXTENSION, {}).get("socket")
+    return found if isinstance(found, DirectSocket) else None
+
+
+def framed(message: bytes) -> bytes:
+    """A binary message as a server sends it."""
+    size = len(message)
+    if size < _SHORT:
+        return bytes((_WHOLE_BINARY, size)) + message
+    if size < 1 << 16:
+        return b"\x82\x7e" + size.to_bytes(2, "big") + message
+    return b"\x82\x7f" + size.to_bytes(8, "big") + message

@@ -1,0 +1,132 @@
+"""Makes the images: bases out of Debian's packages, then those of our own Dockerfile, by compose.
+
+    python -m containers.images [--bases-only]
+
+Told are how long each took and how large it is, beside its base.
+"""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import time
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+from containers.engine import FOLDER, ROOT, inspect, podman, run
+
+BASES: Final = Path(__file__).parent / "bases"
+SUITES: Final = ("bookworm", "trixie")
+#: A stage of bases/Dockerfile for each image that is named as a base.
+STANDS_IN: Final = {
+    "python": "python:3.12.11-slim-bookworm",
+    "node": "node:22.16.0-bookworm-slim",
+    "caddy": "caddy:2.10.0",
+    "postgres": "postgres:17.5-bookworm",
+    "ros-core": "ros:jazzy-ros-core-noble",
+    "ros-base": "ros:jazzy-ros-base-noble",
+}
+VERSION: Final = str(tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"])
+EDITOR: Final = f"temoto-action-assistant/editor:{VERSION}"
+RUNNER: Final = f"temoto-action-assistant/runner:{VERSION}"
+#: From which the images are said to be.
+COMMIT: Final = run("git", "rev-parse", "HEAD").stdout.strip()
+_CERTIFICATES: Final = Path("/etc/ssl/certs/ca-certificates.crt")
+_FOLDER_IN: Final = re.compile(r"(?:file://)?(/[^\s'\"]+)")
+
+
+def say(text: str) -> None:
+    """A line for whoever waits."""
+    sys.stdout.write(f"» {text}\n")
+    sys.stdout.flush()
+
+
+def pip_settings() -> dict[str, str]:
+    """How this machine reaches PyPI. What the environment says wins, as it does for pip."""
+    said = subprocess.run(
+        [sys.executable, "-m", "pip", "config", "list"], capture_output=True, text=True, check=True
+    )
+    found = {}
+    for scope in ("global", ":env:"):
+        for name, value in re.findall(rf"^{scope}\.([\w-]+)='(.*)'$", said.stdout, re.MULTILINE):
+            found[name] = value
+    found.pop("constraint", None)
+    return found
+
+
+def folders() -> Iterator[Path]:
+    """On this machine's disk, with wheels. An index (…/simple) leads to files beside it."""
+    for name in ("find-links", "extra-index-url", "index-url"):
+        for text in _FOLDER_IN.findall(pip_settings().get(name, "")):
+            folder = Path(text.removesuffix("/").removesuffix("/simple"))
+            if folder.is_dir():
+                yield folder
+
+
+def reach() -> list[str]:
+    """Options of a build: the network of this machine, its wheels, and no registry."""
+    wheels = (f"--volume={folder}:{folder}:ro" for folder in folders())
+    return ["--network=host", "--format=docker", "--layers", "--pull=never", *wheels]
+
+
+def make_bases() -> None:
+    """One image for each name, and how long it took."""
+    for suite in SUITES:
+        root = FOLDER / f"{suite}.tar"
+        if not root.exists():
+            part = root.with_suffix(".part")
+            run("mmdebstrap", "--quiet", "--variant=apt", "--format=tar",
+                "--include=ca-certificates", suite, part)  # fmt: skip
+            part.rename(root)
+        if run("podman", "image", "exists", f"debian-{suite}", check=False).returncode:
+            podman("import", root, f"debian-{suite}")
+    context = FOLDER / "bases"
+    shutil.rmtree(context, ignore_errors=True)
+    machine = context / "machine"
+    (machine / "etc/ssl/certs").mkdir(parents=True)
+    shutil.copy(_CERTIFICATES, machine / "etc/ssl/certs")
+    lines = [f"{name} = {value}" for name, value in pip_settings().items()]
+    (machine / "etc/pip.conf").write_text("\n".join(["[global]", *lines, ""]))
+    shutil.copytree(BASES, context / "bases")
+    for name in ("requirements/ros.txt", "scripts/build-messages"):
+        (context / name).parent.mkdir(exist_ok=True)
+        shutil.copy(ROOT / name, context / name)
+    for stage, name in STANDS_IN.items():
+        begun = time.monotonic()
+        podman("build", *reach(), "--target", stage, "--tag", name,
+               "--file", BASES / "Dockerfile", context, timeout=3600)  # fmt: skip
+        say(f"{name} stood in for: {time.monotonic() - begun:.0f} s, {size(name)} MB")
+
+
+def compose_build(*services: str) -> float:
+    """The images that compose names; how many seconds it took."""
+    begun = time.monotonic()
+    command = ["podman-compose", "--podman-build-args", " ".join(reach())]
+    for profile in ("simulator", "robot"):
+        command += ["--profile", profile]
+    run(*command, "build", *services, timeout=3600, more={"SOURCE_COMMIT": COMMIT})
+    return time.monotonic() - begun
+
+
+def size(name: str) -> int:
+    """Of an image, in MB."""
+    return round(int(inspect(name)["Size"]) / 1e6)
+
+
+def make() -> None:
+    """Everything."""
+    make_bases()
+    if "--bases-only" in sys.argv:
+        return
+    for service, base in (("editor", STANDS_IN["python"]), ("runner", STANDS_IN["ros-core"])):
+        seconds = compose_build(service)
+        name = {"editor": EDITOR, "runner": RUNNER}[service]
+        say(f"{name}: {seconds:.0f} s, {size(name)} MB, {size(name) - size(base)} over its base")
+
+
+if __name__ == "__main__":
+    os.nice(5)
+    make()

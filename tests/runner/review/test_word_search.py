@@ -1,0 +1,161 @@
+"""A search by the index of words finds what reading through all runs would."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import anyio
+import pytest
+from alembic import command
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from sqlalchemy import Connection, Row, Select, create_engine, insert, select, text
+
+from action_assistant.journal.alembic_scripts import config_for
+from action_assistant.journal.databases import database_of
+from action_assistant.journal.journal import Journal
+from action_assistant.runner.analysis import annotations
+from action_assistant.runner.review.listing import numbers_with
+from action_assistant.runner.review.word_indexer import index_words
+from action_assistant.runner.runs import queries, word_index
+from action_assistant.runner.runs.events import Author
+from action_assistant.schema.runner_tables import RUNNER, review, run, unindexed_run
+from runner.review.old_runs import DAY_US, LENGTHS, add_run, opened, retention
+from support.doses import examples
+
+ANN = Author("ann", "Ann")
+texts = st.text(st.sampled_from("aBcÄé1_ -/%.\0\n\U0010ffff"), max_size=12)
+
+
+def added(
+    connection: Connection, number: int, told: Sequence[str], *, indexed: bool = True
+) -> None:
+    """A run that holds these texts: of graph, robot and person, what was said, a note."""
+    name, engine, author, words, note = told
+    row = {column.name: 0 for column in run.columns if not column.nullable}
+    fields = {"id": f"r{number}", "number": number, "request_id": f"q{number}", "summary": {}}
+    names = {"graph_name": name, "engine": engine, "author_name": author}
+    connection.execute(insert(run).values({**row, "state": "finished", **fields, **names}))
+    noted = {"run": f"r{number}", "pinned": False, "summed": True, "words": words, "note": note}
+    connection.execute(insert(review).values(noted))
+    if indexed:
+        for each in ((name, engine, author), (words,), (note,)):
+            for statement in word_index.holds(f"r{number}", *each):
+                connection.execute(statement)
+    else:
+        connection.execute(insert(unindexed_run).values(number=number))
+
+
+def asked(connection: Connection, wanted: str) -> tuple[list[Any], list[Any], bool]:
+    """What a search finds by the index and by reading all runs; whether the index was of use."""
+
+    async def rows(statement: Select[Any]) -> list[Row[Any]]:
+        return list(connection.execute(statement).all())
+
+    among = anyio.run(numbers_with, wanted, rows)
+    every = queries.Filter(text=wanted)
+    by_index, by_reading = (
+        [row.number for row in connection.execute(queries.listed(every, 99, each))]
+        for each in (among, None)
+    )
+    return by_index, by_reading, among is not None
+
+
+@settings(max_examples=examples(200), deadline=None)
+@given(st.lists(st.tuples(texts, texts, texts, texts, texts), max_size=5), texts, st.integers(0, 3))
+def test_every_text_is_found_where_it_is(
+    told: list[tuple[str, ...]], wanted: str, late: int
+) -> None:
+    engine = create_engine("sqlite://")
+    with engine.begin() as connection:
+        RUNNER.create_all(connection)
+        for number, each in enumerate(told, 1):
+            added(connection, number, each, indexed=number > late)
+        parts = [each[n][i : i + 3] for each in told for n in range(5) for i in range(len(each[n]))]
+        for one in {wanted, *parts[:20]} - {""}:
+            by_index, by_reading, _ = asked(connection, one)
+            assert by_index == by_reading, repr(one)
+        while word_index.index_some(connection, 2):
+            pass
+        for one in {wanted, *parts[:20]} - {""}:
+            by_index, by_reading, _ = asked(connection, one)
+            assert by_index == by_reading, repr(one)
+    engine.dispose()
+
+
+def test_the_index_is_of_use_but_for_what_very_many_hold(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(word_index, "MOST", 5)
+    engine = create_engine("sqlite://")
+    with engine.begin() as connection:
+        RUNNER.create_all(connection)
+        for number in range(1, 21):
+            told = (f"Graph_{number % 4}", "David", "Ann", f"Needle {number} of many", "")
+            added(connection, number, told)
+        assert asked(connection, "nowhere") == ([], [], True)
+        assert asked(connection, "eedle 7") == ([7], [7], True)
+        assert asked(connection, "NEEDLE 7 o") == ([7], [7], True)
+        assert asked(connection, "raph_3") == ([19, 15, 11, 7, 3],) * 2 + (True,)
+        assert asked(connection, "dle 2") == ([20, 2], [20, 2], False)
+        assert asked(connection, "needle")[2] is False
+        assert asked(connection, "--")[2] is False
+        added(connection, 21, ("", "", "", "needle", ""), indexed=False)
+        assert asked(connection, "nowhere") == ([], [], True)
+    engine.dispose()
+
+
+async def found(journal: Journal, wanted: str) -> list[str]:
+    among = await numbers_with(wanted, journal.query)
+    assert among is not None
+    rows = await journal.query(queries.listed(queries.Filter(text=wanted), 99, among))
+    return [row.id for row in rows]
+
+
+async def words_of(journal: Journal) -> set[tuple[str, int]]:
+    held = text("SELECT word.text, number FROM run_word JOIN word ON word.id = run_word.word")
+    return {(row[0], row[1]) for row in await journal.query(held)}  # type: ignore[arg-type]
+
+
+async def test_words_follow_from_the_events_and_are_found_again(tmp_path: Path) -> None:
+    journal = await opened(tmp_path)
+    for number, name in enumerate(LENGTHS, 1):
+        await add_run(journal, name, number, 12, ended_at=3 * DAY_US)
+    marked = annotations.Marked(1, ANN, annotations.Marks(note="Bumped a chair"))
+    await journal.append(annotations.stream_about("r2"), [annotations.draft(marked)])
+    assert await found(journal, "a CHAIR") == ["r2"]
+    assert await found(journal, "David") == ["r3", "r2", "r1"]
+    before = await words_of(journal)
+    await journal.rebuild()
+    assert await words_of(journal) == before
+    assert (await retention(journal, tmp_path).sweep(30, None)).runs == 3
+    assert await found(journal, "chair") == ["r2"]
+    assert not await journal.query(select(unindexed_run))
+    await journal.rebuild()  # without the events of the runs themselves
+    assert await found(journal, "chair") == ["r2"]
+    await index_words(journal)
+    assert await words_of(journal) == before
+    assert await found(journal, "chair") == ["r2"]
+    await journal.close()
+
+
+async def test_runs_of_earlier_versions_are_found_before_and_after_their_words_are(
+    tmp_path: Path,
+) -> None:
+    journal = await opened(tmp_path)
+    for number in range(1, 25):
+        await add_run(journal, f"r{number}", number, 12, ended_at=3 * DAY_US)
+    marked = annotations.Marked(1, ANN, annotations.Marks(note="Bumped a chair"))
+    await journal.append(annotations.stream_about("r2"), [annotations.draft(marked)])
+    before = await words_of(journal)
+    await journal.close()
+    database_of(f"sqlite:///{tmp_path / 'runner.db'}").migrate(
+        lambda connection: command.downgrade(config_for(connection, "runner"), "runner_0005")
+    )
+    journal = await opened(tmp_path)
+    assert await words_of(journal) == set()
+    assert len(await journal.query(select(unindexed_run))) == 24
+    assert await found(journal, "chair") == ["r2"]
+    await index_words(journal)
+    assert not await journal.query(select(unindexed_run))
+    assert await words_of(journal) == before
+    assert await found(journal, "chair") == ["r2"]
+    await journal.close()

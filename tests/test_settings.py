@@ -1,0 +1,87 @@
+"""What the environment says, where the command line does not."""
+
+from pathlib import Path
+
+import pytest
+
+from action_assistant import paths, settings
+from action_assistant.cli import main, parser
+from action_assistant.commands.client import reach
+from action_assistant.errors import CannotStart
+
+
+def test_the_data_folder_is_where_the_environment_says(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ACTION_ASSISTANT_DATA", "/somewhere")
+    assert paths.data() == Path("/somewhere")
+    for command in ("serve", "runner", "verify", "link", "doctor"):
+        assert parser().parse_args([command]).data == Path("/somewhere")
+    assert parser().parse_args(["verify", "--data", "/else"]).data == Path("/else")
+
+
+def test_the_ports_are_those_that_the_environment_says(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("ACTION_ASSISTANT_PORT", "9000")
+    (tmp_path / "token").write_text("t" * 43)
+    assert [parser().parse_args([each]).port for each in ("serve", "editor", "runner")] == [
+        9000,
+        9000,
+        9001,
+    ]
+    found = reach(parser().parse_args(["graphs", "--data", str(tmp_path)]))
+    assert found["base_url"] == "http://127.0.0.1:9000"
+
+
+@pytest.mark.parametrize(
+    ("said", "share", "tls"), [("", False, False), ("http", True, False), ("TLS", True, True)]
+)
+def test_who_is_let_in_is_what_the_environment_says(
+    said: str, share: bool, tls: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ACTION_ASSISTANT_SHARE", said)
+    for command in ("serve", "editor", "runner"):
+        options = parser().parse_args([command])
+        assert (options.share, options.tls) == (share, tls)
+    monkeypatch.setenv("ACTION_ASSISTANT_SHARE", "yes")
+    assert main(["serve"]) == 2
+
+
+@pytest.mark.parametrize("text", ["x", "0", "65535", "-1"])
+def test_a_port_that_is_none_is_refused(
+    text: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("ACTION_ASSISTANT_PORT", text)
+    assert main(["serve"]) == 2
+    assert "ACTION_ASSISTANT_PORT is a port below 65535" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("name", "secret"),
+    [
+        ("ACTION_ASSISTANT_TOKEN_FILE", "ACTION_ASSISTANT_TOKEN"),
+        ("ACTION_ASSISTANT_DATABASE_FILE", "ACTION_ASSISTANT_DATABASE"),
+        ("ACTION_ASSISTANT_DATABASE_PASSWORD_FILE", "PGPASSWORD"),
+    ],
+)
+def test_a_secret_may_stand_in_a_file(name: str, secret: str, tmp_path: Path) -> None:
+    file = tmp_path / "secret"
+    file.write_text("s" * 43 + "\n")
+    found = {name: str(file), "OTHER": "1"}
+    settings.take_secrets_from_files(found)
+    assert found == {secret: "s" * 43, "OTHER": "1"}
+    unset = {name: ""}
+    settings.take_secrets_from_files(unset)
+    assert unset == {}
+    with pytest.raises(CannotStart, match=f"{name} and {secret} are both set"):
+        settings.take_secrets_from_files({name: str(file), secret: "another"})
+
+
+@pytest.mark.parametrize("content", [b"", b" \n", b"two\nlines", b"\xff\xfe", None])
+def test_a_secret_that_is_named_and_not_there_is_not_done_without(
+    content: bytes | None, tmp_path: Path
+) -> None:
+    file = tmp_path / "secret"
+    if content is not None:
+        file.write_bytes(content)
+    with pytest.raises(CannotStart, match="ACTION_ASSISTANT_TOKEN_FILE is "):
+        settings.take_secrets_from_files({"ACTION_ASSISTANT_TOKEN_FILE": str(file)})

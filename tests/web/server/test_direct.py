@@ -1,0 +1,243 @@
+"""A socket that is taken over, against the way that it would go otherwise: the same messages, the same
+bytes, the same end, whatever a client sends and however it arrives."""
+
+import asyncio
+import itertools
+import logging
+import os
+from typing import Any, Final
+
+import pytest
+import uvicorn
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from uvicorn.server import ServerState
+
+from action_assistant.web.server.direct import DirectSocket, direct_socket, framed
+from support.doses import examples
+
+LIMIT: Final = 300  # bytes of a message
+REQUEST: Final = (
+    b"GET / HTTP/1.1\r\nHost: here\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+    b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\nSec-WebSocket-Version: 13\r\n\r\n"
+)
+
+
+class Wire(asyncio.Transport):
+    """A connection whose other side only looks at what was written."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.written = b""
+        self.is_read = True
+        self._is_closing = False
+
+    def write(self, data: Any) -> None:
+        assert not self._is_closing or not data
+        self.written += data
+
+    def close(self) -> None:
+        self._is_closing = True
+
+    def is_closing(self) -> bool:
+        return self._is_closing
+
+    def pause_reading(self) -> None:
+        assert self.is_read
+        self.is_read = False
+
+    def resume_reading(self) -> None:
+        assert not self.is_read
+        self.is_read = True
+
+
+class Ears:
+    """Keeps what it hears; after each message in `stops` it wants a pause."""
+
+    def __init__(self, socket: DirectSocket, stops: frozenset[int] = frozenset()) -> None:
+        self.heard_so_far: list[bytes | None] = []
+        self.is_gone = self.wants_a_pause = False
+        self._socket = socket
+        self._stops = stops
+
+    def heard(self, message: bytes | None) -> None:
+        self.heard_so_far.append(message)
+        if len(self.heard_so_far) in self._stops:
+            self.wants_a_pause = True
+            self._socket.pause_hearing()
+
+    def go_on(self) -> None:
+        """The pause is over, and each that it leads to."""
+        while self.wants_a_pause:
+            self.wants_a_pause = False
+            self._socket.resume_hearing()
+
+    def may_write(self) -> None:
+        """Nothing waits."""
+
+    def gone(self) -> None:
+        self.is_gone = True
+
+
+async def opened(kind: type[Any], app: Any) -> tuple[Any, Wire]:
+    """A socket of a server that has accepted it."""
+    config = uvicorn.Config(app, ws_max_size=LIMIT, ws_per_message_deflate=False, log_config=None)
+    config.load()
+    protocol, wire = kind(config, ServerState(), {}), Wire()
+    protocol.connection_made(wire)
+    protocol.data_received(REQUEST)
+    for _ in range(3):
+        await asyncio.sleep(0)
+    assert wire.written.startswith(b"HTTP/1.1 101")
+    wire.written = b""
+    return protocol, wire
+
+
+def said(message: Any) -> bytes | None:
+    """What an event of ASGI brings."""
+    found: bytes | None = message.get("bytes")
+    return found
+
+
+async def usually(stream: bytes) -> tuple[list[bytes | None], bytes, bool, bool]:
+    """What is heard by ASGI, what is answered, whether the client is gone, and the connection over.
+    Byte by byte: what is wrong costs all that came in one piece with it."""
+    heard: list[bytes | None] = []
+    gone: list[bool] = []
+
+    async def app(_: Any, receive: Any, send: Any) -> None:
+        await receive()
+        await send({"type": "websocket.accept"})
+        while (event := await receive())["type"] == "websocket.receive":
+            heard.append(said(event))
+        gone.append(True)
+        await asyncio.Event().wait()
+
+    protocol, wire = await opened(WebSocketsSansIOProtocol, app)
+    for n in range(len(stream)):
+        if not wire.is_closing():
+            protocol.data_received(stream[n : n + 1])
+    for _ in range(30):
+        await asyncio.sleep(0)
+    end(protocol)
+    return heard, wire.written, bool(gone), wire.is_closing()
+
+
+async def directly(
+    pieces: list[bytes], *, before: int = 0, stops: frozenset[int] = frozenset()
+) -> tuple[list[bytes | None], bytes, bool, bool]:
+    """As `usually`, by a socket that is taken over after `before` pieces have come."""
+    taken: list[Ears] = []
+    go = asyncio.Event()
+
+    async def app(scope: Any, receive: Any, send: Any) -> None:
+        await receive()
+        await send({"type": "websocket.accept"})
+        await go.wait()
+        socket = direct_socket(scope["extensions"])
+        assert socket is not None
+        ears = Ears(socket, stops)
+        taken.append(ears)
+        socket.take_over(ears)
+        await asyncio.Event().wait()
+
+    protocol, wire = await opened(DirectSocket, app)
+    for n, piece in enumerate([*pieces, b""]):
+        if n == before:
+            go.set()
+            for _ in range(3):
+                await asyncio.sleep(0)
+        if piece and not wire.is_closing():
+            protocol.data_received(piece)
+        for ears in taken:
+            ears.go_on()
+    (ears,) = taken
+    end(protocol)
+    return ears.heard_so_far, wire.written, ears.is_gone, wire.is_closing()
+
+
+def end(protocol: Any) -> None:
+    """Leave nothing behind."""
+    protocol.stop_keepalive()
+    protocol.logger = logging.getLogger("nobody reads it")
+    protocol.logger.disabled = True
+    for task in protocol.tasks:
+        task.cancel()
+
+
+def frame(first: int, payload: bytes, mask: bytes, *, masked: bool = True, size: int = -1) -> bytes:
+    """A frame of a client; `size` is what it says of its length, if it lies."""
+    length = len(payload) if size < 0 else size
+    bit = 0x80 if masked else 0
+    if length < 126:
+        head = bytes((first, bit | length))
+    elif length < 1 << 16:
+        head = bytes((first, bit | 126)) + length.to_bytes(2, "big")
+    else:
+        head = bytes((first, bit | 127)) + length.to_bytes(8, "big")
+    if not masked:
+        return head + payload
+    return head + mask + bytes(byte ^ mask[n % 4] for n, byte in enumerate(payload))
+
+
+payloads = st.binary(max_size=20) | st.integers(100, LIMIT + 20).map(
+    lambda n: bytes(range(256))[:1] * n
+)
+masks = st.binary(min_size=4, max_size=4)
+honest = st.builds(frame, st.just(0x82), payloads, masks)
+rare = st.builds(
+    frame,
+    st.sampled_from([0x82, 0x02, 0x00, 0x80, 0x01, 0x81, 0x88, 0x89, 0x8A, 0x09, 0xC2, 0x83, 0x8B]),
+    payloads
+    | st.sampled_from([b"\x03\xe8", b"\x03\xe8bye", b"\x03\xe8\xff", b"\x00", b"caf\xc3\xa9"]),
+    masks,
+    masked=st.sampled_from([True] * 9 + [False]),
+    size=st.sampled_from([-1] * 20 + [3, 126, 1 << 17, 1 << 63]),
+)
+streams = st.lists(honest | honest | rare, min_size=1, max_size=8).map(b"".join)
+
+
+def pieces_of(stream: bytes, cuts: list[int]) -> list[bytes]:
+    """The stream as it arrives."""
+    places = sorted({0, len(stream), *(cut % (len(stream) + 1) for cut in cuts)})
+    return [stream[a:b] for a, b in itertools.pairwise(places)]
+
+
+@settings(max_examples=examples(400), deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(
+    streams,
+    st.lists(st.integers(0, 4000), max_size=6),
+    st.integers(0, 3),
+    st.frozensets(st.integers(1, 6), max_size=3),
+)
+def test_it_hears_says_and_ends_as_the_usual_way_does(
+    stream: bytes, cuts: list[int], before: int, stops: frozenset[int]
+) -> None:
+    pieces = pieces_of(stream, cuts)
+    usual = asyncio.run(usually(stream))
+    before = min(before, len(pieces))
+    assert asyncio.run(directly(pieces, before=before, stops=stops)) == usual
+
+
+def test_every_byte_by_itself_makes_no_difference() -> None:
+    mask = os.urandom(4)
+    stream = b"".join(
+        [
+            frame(0x82, b"x" * 200, mask),
+            frame(0x02, b"in ", mask),
+            frame(0x89, b"there?", mask),
+            frame(0x80, b"pieces", mask),
+            frame(0x82, b"", mask),
+            frame(0x88, b"\x03\xe8bye", mask),
+        ]
+    )
+    whole = asyncio.run(directly([stream]))
+    assert whole[0] == [b"x" * 200, b"in pieces", b""]
+    assert asyncio.run(directly([stream[n : n + 1] for n in range(len(stream))])) == whole
+
+
+@pytest.mark.parametrize("size", [0, 1, 125, 126, 65_535, 65_536])
+def test_what_is_written_is_one_message(size: int) -> None:
+    message = os.urandom(size)
+    assert framed(message) == frame(0x82, message, b"", masked=False)
