@@ -65,7 +65,7 @@ def _rows(folder: Path, data: Path, postgres: Any) -> Iterator[list[str]]:
     yield ["backup with Postgres", _took("backup", file, "--data", data), _mib(file.stat().st_size)]
     yield ["move back, compared", _took("move", "--to", "sqlite", "--data", data), ""]
     yield ["runs copy, from nothing", _took("runs", "copy", "--to", url, "--data", data), ""]
-    for branch, before in (("editor", "editor_0007"), ("runner", "runner_0006")):
+    for branch, before in (("editor", "editor_0007"), ("runner", "runner_0005")):
         _downgraded(f"sqlite:///{data / f'{branch}.db'}", branch, before)
     yield ["upgrade of both, with copies", _took("migrate", "--data", data), ""]
 
