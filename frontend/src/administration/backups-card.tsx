@@ -1,7 +1,7 @@
 /** Backups: how old the last good one is, and what became of it. */
 import { ago, instant } from "../ui/times";
 import style from "./administration.module.css";
-import { type StatusFact, Facts } from "./facts";
+import { Facts, type StatusFact } from "./facts";
 import { type Backups, bytes, span } from "./status";
 
 function factsOf(backups: Backups, now: number): StatusFact[] {

@@ -3,7 +3,7 @@ import { Alert } from "@mantine/core";
 import { errorText } from "../api/http";
 import { ago, instant } from "../ui/times";
 import style from "./administration.module.css";
-import { type StatusFact, Facts } from "./facts";
+import { Facts, type StatusFact } from "./facts";
 import { bytes, type ProcessStatus, span, type useStatus } from "./status";
 
 /** Bytes of the disk below which somebody should make room. */
