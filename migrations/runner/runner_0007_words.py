@@ -6,8 +6,8 @@ from collections.abc import Sequence
 import sqlalchemy as sa
 from alembic import op
 
-revision: str = "runner_0006"
-down_revision: str | None = "runner_0005"
+revision: str = "runner_0007"
+down_revision: str | None = "runner_0006"
 branch_labels: Sequence[str] | None = None
 depends_on: Sequence[str] | None = None
 
