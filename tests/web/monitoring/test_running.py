@@ -240,7 +240,7 @@ def test_a_frozen_database_is_no_ready_one_and_a_live_process_all_the_same(
             assert frozen["database"]
             assert httpx.get(f"{editor.url}/healthz", trust_env=False).status_code == 200
             metrics = get(f"{editor.url}/metrics", **OWNER).text
-            assert 'action_assistant_part_ready{part="database"} 0.0' in metrics
+            assert 'action_assistant_part_ready{part="database"} 0\n' in metrics
         finally:
             for process in mortal.processes():
                 process.send_signal(signal.SIGCONT)

@@ -95,7 +95,8 @@ class Monitoring:
     async def exposition(self) -> str:
         """All metrics, in the text format of Prometheus."""
         await self.readiness()
-        return generate_latest(self._registry).decode()
+        # Whole numbers are written as such, as they were before: programs may read them so.
+        return generate_latest(self._registry).decode().replace(".0\n", "\n")
 
     async def status(self) -> ProcessStatus:
         """How the process is, for whoever looks after it."""
