@@ -1,5 +1,5 @@
 /** The installation, for whoever looks after it: both processes, what they take, what is wrong. */
-import { IconLock } from "@tabler/icons-react";
+import { IconServerCog } from "@tabler/icons-react";
 import { useLive } from "../api/live/use-live";
 import { useMay } from "../api/use-person";
 import { Empty } from "../ui/empty";
@@ -38,7 +38,7 @@ export function AdministrationPage() {
         {may ? (
           <Inside />
         ) : (
-          <Empty icon={<IconLock size={22} />} title="For owners only">
+          <Empty icon={<IconServerCog size={22} />} title="For owners only">
             Who has the token of this server sees here how its processes are.
           </Empty>
         )}

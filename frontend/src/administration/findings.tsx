@@ -1,6 +1,6 @@
 /** What `action-assistant doctor` finds here, when somebody asks for it. */
-import { Alert, Button, Loader } from "@mantine/core";
-import { IconAlertTriangle, IconCheck, IconInfoCircle, IconStethoscope } from "@tabler/icons-react";
+import { Button, Loader } from "@mantine/core";
+import { IconStethoscope } from "@tabler/icons-react";
 import { useState } from "react";
 import { errorText } from "../api/http";
 import { useNow } from "../ui/times";
@@ -8,18 +8,20 @@ import style from "./administration.module.css";
 import { type Finding, useFindings } from "./status";
 
 const SIGNS = {
-  error: { icon: IconAlertTriangle, word: "Wrong" },
-  warning: { icon: IconInfoCircle, word: "May matter" },
-  fine: { icon: IconCheck, word: "Fine" },
+  error: { sign: "✗", word: "Wrong" },
+  warning: { sign: "·", word: "May matter" },
+  fine: { sign: "✓", word: "Fine" },
 } as const;
 
 const ORDER = ["error", "warning", "fine"] as const;
 
 function Found({ code, severity, where, message, remedy }: Finding) {
-  const { icon: Icon, word } = SIGNS[severity];
+  const { sign, word } = SIGNS[severity];
   return (
     <li data-severity={severity}>
-      <Icon size={16} aria-hidden />
+      <b className={style.sign} aria-hidden>
+        {sign}
+      </b>
       <div>
         <span className="visually-hidden">{word}: </span>
         <b>
@@ -76,7 +78,11 @@ export function Findings() {
         </Button>
       </div>
       {isFetching && <Looking />}
-      {error && !isFetching && <Alert color="red">{errorText(error)}</Alert>}
+      {error && !isFetching && (
+        <p className={style.refused} role="alert">
+          {errorText(error)}
+        </p>
+      )}
       {data === undefined && !isFetching && !error && (
         <p className={style.version}>
           The same as <code>action-assistant doctor</code> on the computer of the editor.

@@ -1,5 +1,4 @@
 /** One of the two processes: whether it can do its work, and what it takes. */
-import { Alert } from "@mantine/core";
 import { errorText } from "../api/http";
 import { ago, instant } from "../ui/times";
 import style from "./administration.module.css";
@@ -113,10 +112,10 @@ export function ProcessCard({ title, asked: { data, error } }: Props) {
         )}
       </div>
       {error && (
-        <Alert color="red" title="It does not answer" mb="sm">
+        <p className={style.refused} role="alert">
           {errorText(error)}
           {data && ` What stands below was so ${ago(instant(data.at) ?? 0, Date.now())}.`}
-        </Alert>
+        </p>
       )}
       {data && <Lacking status={data} />}
       {data && (
