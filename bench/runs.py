@@ -23,6 +23,7 @@ from action_assistant.runner.analysis.keyframes import APART, KeyframeStore
 from action_assistant.runner.analysis.replay import run_replay
 from action_assistant.runner.archives import archive_file
 from action_assistant.runner.links.observations import NodeResult, NodeState
+from action_assistant.runner.review.listing import numbers_with
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.runs import queries, views
 from action_assistant.runner.runs.events import (
@@ -35,7 +36,8 @@ from action_assistant.runner.runs.events import (
 )
 from action_assistant.runner.runs.fold import replay
 from action_assistant.runner.runs.recorder import stream_of
-from action_assistant.schema.runner_tables import action_sum, review, run_label
+from action_assistant.runner.runs.word_index import index_some
+from action_assistant.schema.runner_tables import action_sum, review, run_label, unindexed_run
 from action_assistant.schema.runner_tables import run as runs
 from action_assistant.web.workers.lanes import RunInWorker
 
@@ -75,14 +77,17 @@ async def _lists(folder: Path) -> Table:
         (middle,) = await journal.query(select(runs.c.id).where(runs.c.number == size // 2))
         rows.append([f"{size:,}", *[await _took(ask) for ask in _questions(journal, middle.id)]])
     await journal.close()
-    head = ("newest 200", "200 from the middle", "of one graph", "failed", "label", "rare word")
-    return Table(["runs", *head, "statistics of a graph"], rows)
+    head = ("newest 200", "200 from the middle", "of one graph", "failed", "label")
+    words = ("a word that is nowhere", "rare words", "a word of all")
+    return Table(["runs", *head, *words, "statistics of a graph"], rows)
 
 
 def _questions(journal: Journal, middle: str) -> list[Callable[[], Awaitable[Any]]]:
     def page(**wanted: Any) -> Callable[[], Awaitable[Any]]:
         async def ask() -> None:
-            rows = await journal.query(queries.listed(queries.Filter(**wanted), 200))
+            text = wanted.get("text")
+            among = None if text is None else await numbers_with(text, journal.query)
+            rows = await journal.query(queries.listed(queries.Filter(**wanted), 200, among))
             await journal.query(queries.labels_of([row.id for row in rows]))
             msgspec.json.encode([views.listed(views.summary_of_row(r), r, []) for r in rows])
 
@@ -93,7 +98,8 @@ def _questions(journal: Journal, middle: str) -> list[Callable[[], Awaitable[Any
         sums.statistics(rows, await journal.query(sums.sums_of([row.id for row in rows])), None)
 
     pages = ({}, {"before": middle}, {"graph": "g7"}, {"failed": True}, {"label": "demo"})
-    return [*(page(**wanted) for wanted in pages), page(text="needle 7 "), summed]
+    words = [page(text=text) for text in ("nowhere", "needle 7 ", "needle")]
+    return [*(page(**wanted) for wanted in pages), *words, summed]
 
 
 def _add_runs(path: Path, after: int, upto: int) -> None:
@@ -107,6 +113,9 @@ def _add_runs(path: Path, after: int, upto: int) -> None:
             connection.execute(insert(action_sum), [each for n in numbers for each in _sums(n)])
             labels = [{"run": f"run-{n}", "label": "demo"} for n in numbers if n % 50 == 0]
             connection.execute(insert(run_label), labels)
+            connection.execute(insert(unindexed_run), [{"number": number} for number in numbers])
+            while index_some(connection, 1_000):
+                pass
     engine.dispose()
 
 

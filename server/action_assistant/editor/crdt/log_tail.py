@@ -80,8 +80,8 @@ class LogTail:
 
     async def _rows(self) -> Sequence[Sequence[Any]]:
         if self._chain is None:
-            (before,) = await self._ask(self.seq - 1, 1)
-            self._chain = before[7] if isinstance(before[7], bytes) else START
+            before = await self._ask(self.seq - 1, 1)
+            self._chain = before[0][7] if before and isinstance(before[0][7], bytes) else START
         for limit in SLICES:
             try:
                 return await self._ask(self.seq, limit)
@@ -108,10 +108,12 @@ class LogTail:
         return found
 
     async def _ask(self, after: int, limit: int) -> Sequence[Sequence[Any]]:
-        chosen = _rows_of(self._stream).where(editor_tables.editor_event.c.seq > after)
+        last = after + limit  # without it Postgres may sort all that follows, for each slice anew
         if self._upto is not None:
-            chosen = chosen.where(editor_tables.editor_event.c.seq <= self._upto)
-        return await self._journal.plain_rows(chosen.limit(limit))
+            last = min(last, self._upto)
+        seq = editor_tables.editor_event.c.seq
+        chosen = _rows_of(self._stream).where(seq > after, seq <= last)
+        return await self._journal.plain_rows(chosen)
 
     async def _check_end(self) -> None:
         newest = await self._journal.newest(self._stream)
