@@ -36,6 +36,7 @@ from action_assistant.runner.runs.events import (
 )
 from action_assistant.runner.runs.fold import replay
 from action_assistant.runner.runs.recorder import stream_of
+from action_assistant.runner.runs.sent_views import Sent
 from action_assistant.runner.runs.word_index import index_some
 from action_assistant.schema.runner_tables import action_sum, review, run_label, unindexed_run
 from action_assistant.schema.runner_tables import run as runs
@@ -206,7 +207,7 @@ async def _opening(journal: Journal, run: str, size: int) -> list[str]:
 
     async def opened(keyframe_store: KeyframeStore) -> None:
         key = (await keyframe_store.keyframes(run)).keys[-1]
-        msgspec.json.encode(views.whole(key.run, "{}"))
+        msgspec.json.encode(views.whole(key.run, Sent("{}", {})))
 
     started = time.perf_counter()
     await opened(KeyframeStore(journal, _ASIDE))

@@ -1,6 +1,7 @@
 """A search by the index of words finds what reading through all runs would."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,18 @@ from support.doses import examples
 
 ANN = Author("ann", "Ann")
 texts = st.text(st.sampled_from("aBcÄé1_ -/%.\0\n\U0010ffff"), max_size=12)
+
+
+@contextmanager
+def empty() -> Iterator[Connection]:
+    """The tables of a runner, in memory, without runs."""
+    engine = create_engine("sqlite://")
+    try:
+        with engine.begin() as connection:
+            RUNNER.create_all(connection)
+            yield connection
+    finally:
+        engine.dispose()
 
 
 def added(
@@ -66,9 +79,7 @@ def asked(connection: Connection, wanted: str) -> tuple[list[Any], list[Any], bo
 def test_every_text_is_found_where_it_is(
     told: list[tuple[str, ...]], wanted: str, late: int
 ) -> None:
-    engine = create_engine("sqlite://")
-    with engine.begin() as connection:
-        RUNNER.create_all(connection)
+    with empty() as connection:
         for number, each in enumerate(told, 1):
             added(connection, number, each, indexed=number > late)
         parts = [each[n][i : i + 3] for each in told for n in range(5) for i in range(len(each[n]))]
@@ -80,14 +91,11 @@ def test_every_text_is_found_where_it_is(
         for one in {wanted, *parts[:20]} - {""}:
             by_index, by_reading, _ = asked(connection, one)
             assert by_index == by_reading, repr(one)
-    engine.dispose()
 
 
 def test_the_index_is_of_use_but_for_what_very_many_hold(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(word_index, "MOST", 5)
-    engine = create_engine("sqlite://")
-    with engine.begin() as connection:
-        RUNNER.create_all(connection)
+    with empty() as connection:
         for number in range(1, 21):
             told = (f"Graph_{number % 4}", "David", "Ann", f"Needle {number} of many", "")
             added(connection, number, told)
@@ -100,7 +108,6 @@ def test_the_index_is_of_use_but_for_what_very_many_hold(monkeypatch: pytest.Mon
         assert asked(connection, "--")[2] is False
         added(connection, 21, ("", "", "", "needle", ""), indexed=False)
         assert asked(connection, "nowhere") == ([], [], True)
-    engine.dispose()
 
 
 async def found(journal: Journal, wanted: str) -> list[str]:
