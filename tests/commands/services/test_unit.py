@@ -6,6 +6,7 @@ import shlex
 import shutil
 import subprocess
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import httpx
 import pytest
@@ -38,15 +39,16 @@ def plan(scope: Scope = "system", **more: object) -> ServicePlan:
 def read_by_systemd(text: str, scope: Scope, folder: Path, *words: str) -> str:
     """What systemd complains about, or says."""
     (folder / NAME).write_text(text)
-    (folder / "run").mkdir(exist_ok=True)
     manager = ["--user"] if scope == "user" else []
-    answer = subprocess.run(
-        ["systemd-analyze", *manager, *words, str(folder / NAME)],
-        env={**os.environ, "XDG_RUNTIME_DIR": str(folder / "run")},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    # Units of others have sockets there, whose paths must be short.
+    with TemporaryDirectory(dir="/tmp") as run:
+        answer = subprocess.run(
+            ["systemd-analyze", *manager, *words, str(folder / NAME)],
+            env={**os.environ, "XDG_RUNTIME_DIR": run},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
     assert answer.returncode == 0, answer.stderr
     return answer.stderr if words == ("verify",) else answer.stdout
 

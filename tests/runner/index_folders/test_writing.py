@@ -1,12 +1,13 @@
 """Graphs are written into an index whole, beside what others have there, and nowhere else."""
 
 import json
-import multiprocessing
 import os
 import resource
 import shutil
 import tempfile
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import msgspec
@@ -182,9 +183,15 @@ def test_what_somebody_writes_at_the_same_time_is_never_lost(tmp_path: Path) -> 
     assert not any(each.name.endswith(".new") for each in tmp_path.iterdir())
 
 
-def _write_with_little_space(folder: Path, files: tuple[NewFile, ...]) -> WritingOutcome:
-    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))
-    return write(folder, files)
+@contextmanager
+def little_space() -> Iterator[None]:
+    """No file of this process may grow beyond 1,000 bytes: as on a full disk, nothing more is taken."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 def test_where_there_is_no_space_nothing_is_written_and_the_place_is_told(tmp_path: Path) -> None:
@@ -194,8 +201,8 @@ def test_where_there_is_no_space_nothing_is_written_and_the_place_is_told(tmp_pa
         NewFile("small", b"{}"),
         NewFile("leg", b" " * 2000, "leg.graph.json", sha(before["leg.graph.json"])),  # type: ignore[arg-type]
     )
-    with multiprocessing.get_context("spawn").Pool(1) as apart:
-        outcome = apart.apply(_write_with_little_space, (tmp_path, files))
+    with little_space():
+        outcome = write(tmp_path, files)
     assert outcome.written == ()
     assert outcome.failed == f"{tmp_path}/leg.graph.json cannot be written: File too large."
     assert held(tmp_path) == before
