@@ -1,7 +1,6 @@
 /** Robots as the runner tells them, and what it looks at before a start. */
 import { useQueries, useQuery } from "@tanstack/react-query";
 import { fetchJson, fetchText } from "./http";
-import type { Inside } from "./runs";
 import type { RunnerApi } from "./schema/runner";
 
 export const SIMULATOR = "simulator";
@@ -21,8 +20,6 @@ export type IndexedByRobot = RunnerApi["RobotKnowledge"];
 export type RobotLogLine = RunnerApi["RobotLogLine"];
 /** One thing that was looked at before a start. */
 export type PreflightItem = RunnerApi["Item"];
-/** The folder that a robot indexes, as the runner has it, and what could be written there. */
-export type IndexFolderLook = RunnerApi["FolderLook"];
 /** `override`: the codes that a person would have to answer for; `never`: something stands in the way
  * that cannot be overridden. */
 export type Preflight = RunnerApi["Preflight"];
@@ -73,15 +70,6 @@ export function useIndexedByRobots(
     combine: (answers) =>
       answers.map(({ data }, i) => ({ robot: robots[i] ?? "", indexed: data ?? null })),
   });
-}
-
-/** Has graphs inside of a task written into the folder that a robot indexes. */
-export function writeIntoIndex(
-  runner: string,
-  robot: string,
-  body: { digest: string; replace: string[] } & Inside,
-): Promise<RunnerApi["IndexWriteAnswer"]> {
-  return fetchJson(`${path(runner, robot)}/index`, { method: "POST", body, timeoutMs: 30_000 });
 }
 
 /** The file of an action that a robot has indexed. */

@@ -1,8 +1,6 @@
 /** The editor of a graph with the list on its left and its runs below. */
-import { Button } from "@mantine/core";
-import { IconMapOff } from "@tabler/icons-react";
 import { memo, type ReactNode, useEffect, useMemo, useRef, useState } from "react";
-import { Link, Redirect, useSearch } from "wouter";
+import { Redirect, useSearch } from "wouter";
 import { type GraphAsAction, useGraphsAsActions } from "../api/documents/library";
 import { useVersions, versionName } from "../api/graphs";
 import { newestRun, openRuns, useLive } from "../api/live/use-live";
@@ -17,22 +15,24 @@ import { useReplay } from "../review/replay/use-replay";
 import { askedDryRun } from "../review/run/dry-run-link";
 import { ConnectionStatus } from "../runs/connection-status";
 import { RunDrawer } from "../runs/drawer/run-drawer";
-import { RecordDryRun } from "../runs/start/record-dry-run";
 import { StartControl } from "../runs/start/start-control";
 import { type GraphInRun, isInRun, runOnCanvas } from "../status/progress-inside";
 import { useProgress } from "../status/use-progress";
 import { roomUrl } from "../sync/room-connection";
 import { RoomProvider, useLinkPart, useRoom, useThrottledGraph } from "../sync/use-room";
-import { Empty } from "../ui/empty";
 import { useStableCallback } from "../ui/hooks/use-stable-callback";
 import { lazyPart } from "../ui/parts/lazy-part";
 import { PartBoundary } from "../ui/parts/part-boundary";
 import { instant } from "../ui/times";
 import { useNewGraphs } from "./imports/new-graphs";
+import { Nowhere } from "./not-found";
 import { PageBar, PageFrame } from "./page-frame";
 import { useTitle } from "./use-title";
 
 const DraftStatus = lazyPart(() => import("../runs/draft-status").then((part) => part.DraftStatus));
+const RecordDryRun = lazyPart(() =>
+  import("../runs/start/record-dry-run").then((part) => part.RecordDryRun),
+);
 
 /** How long a start waits for the name of the moment on screen, ms. */
 const NAMED_MS = 3_000;
@@ -246,22 +246,9 @@ function TitledBar(props: { id: string } & Parameters<typeof PageBar>[0]) {
 
 function Gone() {
   return (
-    <>
-      <PageBar crumbs={[{ label: "Graphs", to: "/" }, { label: "Gone" }]} />
-      <main>
-        <Empty
-          icon={<IconMapOff size={22} />}
-          title="There is no such graph"
-          action={
-            <Button component={Link} to="/">
-              All graphs
-            </Button>
-          }
-        >
-          It was deleted, or the address is of another server.
-        </Empty>
-      </main>
-    </>
+    <Nowhere crumb="Gone" title="There is no such graph">
+      It was deleted, or the address is of another server.
+    </Nowhere>
   );
 }
 

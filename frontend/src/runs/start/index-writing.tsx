@@ -4,14 +4,10 @@ import { IconFilePencil } from "@tabler/icons-react";
 import { useMutation } from "@tanstack/react-query";
 import { useEffect, useRef, useState } from "react";
 import { fetchInside } from "../../api/documents/inside";
+import { type IndexFolderLook, writeIntoIndex } from "../../api/documents/robot-index";
 import { errorText } from "../../api/http";
 import { useLive } from "../../api/live/use-live";
-import {
-  type IndexFolderLook,
-  type Preflight,
-  type PreflightItem,
-  writeIntoIndex,
-} from "../../api/robots";
+import type { Preflight, PreflightItem } from "../../api/robots";
 import { useMay } from "../../api/use-person";
 import { HoldButton } from "../../ui/floating/hold-button";
 import type { MomentLookedAt } from "./inside-remedies";

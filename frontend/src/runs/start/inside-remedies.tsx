@@ -1,5 +1,5 @@
 /** What to do where a robot has not indexed the graphs inside, or would not look them up: its files, or one graph. */
-import { IconDownload, IconSitemapOff } from "@tabler/icons-react";
+import { IconDownload } from "@tabler/icons-react";
 import { Link } from "wouter";
 import { serverPath } from "../../api/page-url";
 import type { Preflight, PreflightItem } from "../../api/robots";
@@ -36,7 +36,7 @@ function OneGraph({ graph, onLeave }: Omit<MomentLookedAt, "seq" | "onLookAgain"
       to={`/graphs/${encodeURIComponent(graph)}?flat`}
       onClick={onLeave}
     >
-      <IconSitemapOff size={14} aria-hidden /> Make it one graph
+      Make it one graph
     </Link>
   );
 }
