@@ -21,7 +21,7 @@ from action_assistant.runner.archives import examples
 from action_assistant.runner.archives.archive_store import Archived, ArchiveStore
 from action_assistant.runner.archives.raw_messages import RawMessages, RawPut, raw_of, stream_of_raw
 from action_assistant.runner.clock import ClockUs
-from action_assistant.runner.review.ongoing_runs import OngoingRuns
+from action_assistant.runner.review.ongoing_runs import OngoingRuns, settled
 from action_assistant.runner.review.sum_up_loop import SumUpLoop
 from action_assistant.runner.robots.recordings import Recording, hours
 from action_assistant.runner.runs import views
@@ -307,8 +307,11 @@ class ReviewService:
         Conflict when the simulator does not take the same course as the run."""
         name = expected_runs.name_of(wanted.name)
         now = self._clock_us()
-        if wanted.run in self._control.open:
-            raise Conflict("The run is not over yet.")
+        opened = self._control.open.get(wanted.run)
+        if opened is not None:
+            if opened.run.end is None:
+                raise Conflict("The run is not over yet.")
+            await settled(opened)
         if self._asked is None:
             saved = await self.expected(wanted, name, author, now)
         else:
