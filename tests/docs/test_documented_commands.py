@@ -202,6 +202,8 @@ class Computer:
                 stdout=out,
                 stderr=out,
                 start_new_session=True,
+                # Scripts start what stays behind them deaf to it.
+                preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
             )
         awaited, deadline = LASTING[command.words[1]], time.monotonic() + SERVED_SECONDS
         try:
