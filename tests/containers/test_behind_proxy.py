@@ -281,8 +281,16 @@ def test_backups_are_made_by_themselves_and_hold_everything(proxied: Proxied) ->
         "backups", "action-assistant", "restore", "--rehearse", f"/backups/{file}"
     )
     assert rehearsed.returncode == 0, rehearsed.stdout + rehearsed.stderr
-    with proxied.asked() as editor:
-        assert file in editor.get("/api/status").text  # as the administrator's page tells it
+    with proxied.asked() as editor:  # it looks at them again and again
+
+        def told() -> dict[str, Any]:
+            return dict(editor.get("/api/status").json()["backups"])
+
+        until(lambda: told()["proven_at"], 120)
+        found = told()
+        assert found["made_at"]
+        assert found["next_at"]
+        assert (found["failed_at"], found["unsound"], found["is_late"]) == (None, None, False)
     say(f"{stack.log('backups').strip()}; rehearsed: {rehearsed.stdout.strip()}")
 
 
