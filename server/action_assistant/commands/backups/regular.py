@@ -5,7 +5,6 @@ import contextlib
 import os
 import select
 import shlex
-import shutil
 import signal
 import subprocess
 import sys
@@ -17,7 +16,8 @@ from typing import Final
 
 import msgspec
 
-from action_assistant.commands.backups.making import FinishedBackup, make_backup
+from action_assistant.commands.backups.data_folder import sweep
+from action_assistant.commands.backups.making import WORK, FinishedBackup, make_backup
 from action_assistant.commands.backups.progress import Progress
 from action_assistant.commands.backups.rotation import keeping, name_at, superfluous
 from action_assistant.errors import CannotStart
@@ -114,8 +114,7 @@ def _alone(into: Path) -> Iterator[None]:
     try:
         if not file_locks.take(lock):
             raise CannotStart(f"Another backup is just being made into {into}.")
-        for left in into.glob(".backup-*"):
-            shutil.rmtree(left, ignore_errors=True)
+        sweep(into, WORK)
         yield
     finally:
         os.close(lock)

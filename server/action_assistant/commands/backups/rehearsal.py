@@ -3,7 +3,6 @@ would, and throws it away. Nothing of it is served, and no robot is spoken to.""
 
 import asyncio
 import logging
-import shutil
 import tempfile
 import time
 from collections.abc import Awaitable, Callable
@@ -15,7 +14,7 @@ from sqlalchemy import func, select
 
 from action_assistant.commands.backups import restore
 from action_assistant.commands.backups.backup_file import ARCHIVE, FILES, NoRoom, Package
-from action_assistant.commands.backups.data_folder import checked, fold_of, workshop
+from action_assistant.commands.backups.data_folder import checked, fold_of, sweep, workshop
 from action_assistant.commands.backups.progress import Progress
 from action_assistant.errors import CannotStart, Refused
 from action_assistant.journal.copies import backup_state
@@ -45,8 +44,7 @@ def rehearse(source: Path, data: Path) -> int:
         raise CannotStart(f"There is no file {source}.")
     begun, at, progress, found = time.monotonic(), time.time(), Progress(), Findings()
     place = data if data.is_dir() else Path(tempfile.gettempdir())
-    for left in place.glob(f"{_PREFIX}*"):  # of one that was killed
-        shutil.rmtree(left, ignore_errors=True)
+    sweep(place, _PREFIX)
     logging.disable(logging.ERROR)  # what readers complain of is said below, once
     try:
         with workshop(place, _PREFIX) as folder:
@@ -99,9 +97,9 @@ def _look(source: Path, folder: Path, found: Findings, progress: Progress) -> No
         "editor": _look_at_graphs,
         "runner": _look_at_runs,
     }
-    for branch in about.journals:
+    for branch, held in about.journals.items():
         path = folder / f"{branch}.db"
-        events = checked(path, branch, progress)
+        events = checked(path, branch, progress, expected=held.events)
         found.looked_at.append(f"{branch}: {events} events, all of them sound")
         asyncio.run(_opened(path, branch, looks[branch], found, progress))
     token = folder / FILES / TOKEN_FILE
