@@ -24,9 +24,9 @@ from action_assistant.journal.databases import database_of
 from action_assistant.journal.events import Fold
 from action_assistant.journal.journal import Journal
 from action_assistant.journal.removal import StreamRemoved
+from action_assistant.private_files import opener
 from action_assistant.runner.archives.raw_messages import RawPut
 from action_assistant.schema.runner_tables import runner_event
-from action_assistant.private_files import opener
 from action_assistant.settings import ARCHIVE, RESTORING
 from action_assistant.system import file_locks
 from action_assistant.web.auth import keys, revocations
