@@ -2,7 +2,9 @@
 would, and throws it away. Nothing of it is served, and no robot is spoken to."""
 
 import asyncio
+import errno
 import logging
+import sqlite3
 import tempfile
 import time
 from collections.abc import Awaitable, Callable
@@ -25,6 +27,7 @@ from action_assistant.schema import editor_tables, runner_tables
 from action_assistant.web.auth.keys import TOKEN_FILE
 
 _PREFIX: Final = ".rehearsal-"
+_DISK: Final = frozenset({errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO})
 #: Says how far it has come.
 Tell: TypeAlias = Callable[[str], None]
 
@@ -52,6 +55,8 @@ def rehearse(source: Path, data: Path) -> int:
     except NoRoom:
         raise
     except CannotStart as error:
+        if _is_of_the_disk(error):
+            raise CannotStart(f"It cannot be told whether {source} is sound. {error}") from error
         found.wrong.append(str(error))
     finally:
         logging.disable(logging.NOTSET)
@@ -67,6 +72,21 @@ def rehearse(source: Path, data: Path) -> int:
     if data.is_dir():
         backup_state.rehearsed(data, done)
     return _tell(found, done)
+
+
+def _is_of_the_disk(error: BaseException | None) -> bool:
+    """Whether the disk of the scratch place is at fault, and not what is looked at."""
+    while error is not None:
+        if isinstance(error, OSError) and error.errno in _DISK:
+            return True
+        driver = getattr(error, "orig", error)
+        if getattr(driver, "sqlite_errorcode", 0) & 0xFF in {
+            sqlite3.SQLITE_FULL,
+            sqlite3.SQLITE_IOERR,
+        }:
+            return True
+        error = error.__cause__
+    return False
 
 
 def _tell(found: Findings, done: BackupRehearsed) -> int:

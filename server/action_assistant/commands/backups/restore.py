@@ -38,7 +38,7 @@ from action_assistant.commands.backups.progress import Progress
 from action_assistant.errors import CannotStart
 from action_assistant.journal.database import Branch
 from action_assistant.journal.databases import ask_once, database_of
-from action_assistant.private_files import sync
+from action_assistant.private_files import opener, sync
 from action_assistant.schema.editor_tables import editor_event
 from action_assistant.web.auth.keys import TOKEN_FILE
 
@@ -226,8 +226,8 @@ def _move(source: Path, target: Path) -> None:
     part = source
     if source.stat().st_dev != target.parent.stat().st_dev:
         part = target.with_name(f".{target.name}.part")
-        shutil.copyfile(source, part)
-        part.chmod(0o600)
+        with source.open("rb") as there, open(part, "wb", opener=opener) as here:
+            shutil.copyfileobj(there, here)
     for path in part.rglob("*") if part.is_dir() else [part]:
         sync(path)
     part.replace(target)
