@@ -23,6 +23,7 @@ from action_assistant.runner.analysis.keyframes import APART, KeyframeStore
 from action_assistant.runner.analysis.replay import run_replay
 from action_assistant.runner.archives import archive_file
 from action_assistant.runner.links.observations import NodeResult, NodeState
+from action_assistant.runner.review.keyframe_loop import due_after
 from action_assistant.runner.review.listing import numbers_with
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.runs import queries, views
@@ -196,10 +197,30 @@ async def _long_runs(folder: Path) -> Table:
         told = replay(events)
         folded = time.perf_counter() - started
         assert told is not None
-        rows.append([f"{size:,}", seconds(folded), *await _opening(journal, run, size)])
+        died = await _after_a_death(journal, _long_run(number + len(SIZES), size)[:-1])
+        rows.append([f"{size:,}", seconds(folded), *await _opening(journal, run, size), died])
     await journal.close()
     head = ("folded in memory", "opened the first time", "opened", "first page of its film")
-    return Table(["events", *head, "a page in the middle", "any moment"], rows)
+    head = (*head, "a page in the middle", "any moment", "opened when the runner has died")
+    return Table(["events", *head], rows)
+
+
+async def _after_a_death(journal: Journal, events: list[Any]) -> str:
+    """With as much left to fold as there may be: keyframes were kept while it went on."""
+    run, drafts, kept = events[0].run, _drafts(events), 0
+    while due_after(kept) * APART <= len(drafts):
+        kept = due_after(kept)
+    stream, upto = stream_of(run), kept * APART
+    for i in range(0, upto, APART):
+        await journal.append(stream, drafts[i : i + APART])
+    if upto:
+        await KeyframeStore(journal, _ASIDE).keyframes(run)
+    for i in range(upto, len(drafts), APART):
+        await journal.append(stream, drafts[i : i + APART])
+    started = time.perf_counter()
+    key = (await KeyframeStore(journal, _ASIDE).keyframes(run)).keys[-1]
+    msgspec.json.encode(views.whole(key.run, Sent("{}", {})))
+    return seconds(time.perf_counter() - started)
 
 
 async def _opening(journal: Journal, run: str, size: int) -> list[str]:

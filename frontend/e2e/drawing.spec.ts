@@ -29,6 +29,7 @@ const cards = (page: Page) => page.locator(CARD);
 
 /** Chooses an edit action by its name in the palette. */
 async function choose(page: Page, name: string): Promise<void> {
+  test.skip(LONG !== "", LONG);
   await page.keyboard.press("ControlOrMeta+k");
   const search = page.getByRole("combobox", { name: "Find a command, an action or a graph" });
   await search.fill(name);
@@ -72,6 +73,7 @@ const places = async (page: Page, id: string) => {
 test("pieces are copied with their arrows, here, to another graph, and as text", async ({
   browser,
 }) => {
+  test.skip(LONG !== "", LONG);
   const { page, context, failures } = await product.person(browser, "Ada");
   const id = await product.chain(3);
   await page.goto(`${product.url}/graphs/${id}`);
@@ -280,6 +282,7 @@ test("things are put in their place: aligned, spread, tidied, nudged, framed, no
 test("a decision that is led to the end ends either way, and what runs beside it is waited for", async ({
   browser,
 }) => {
+  test.skip(LONG !== "", LONG);
   const { page, context, failures } = await product.person(browser, "Ada");
   await page.getByRole("button", { name: "New graph" }).first().click();
   await page.waitForURL(/\/graphs\/.+/);

@@ -7,7 +7,7 @@ import { join, resolve } from "node:path";
 import { expect, type Page, test } from "@playwright/test";
 import { card, saved } from "./canvas";
 import { DOMAIN, NO_ROS, StandIn } from "./emulated-robot";
-import { Product } from "./product";
+import { LONG, Product } from "./product";
 
 const STUBS = resolve(import.meta.dirname, "../../tests/umrf/packages/stubs");
 const folder = mkdtempSync(join(tmpdir(), "first-action-"));
@@ -104,6 +104,7 @@ test("an action with a pose goes from nothing to a package that compiles", async
 });
 
 test("an action that only a robot has is taken over from it", async ({ browser }) => {
+  test.skip(LONG !== "", LONG);
   test.skip(NO_ROS !== "", NO_ROS);
   const index = join(folder, "index", "share");
   mkdirSync(index, { recursive: true });

@@ -191,6 +191,7 @@ test("100 edits without a network and those of others meet: nothing is lost, and
 test("the page opens without a server, with what the device keeps, and says what cannot be done", async ({
   browser,
 }) => {
+  test.skip(LONG !== "", LONG);
   const ada = await product.person(browser, "Ada", { serviceWorkers: "allow" });
   const graph = await newGraph("kept");
   await enter(ada.page, graph);

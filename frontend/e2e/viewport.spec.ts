@@ -2,7 +2,7 @@
 
 import { expect, type Page, test } from "@playwright/test";
 import { card, saved, start } from "./canvas";
-import { Product } from "./product";
+import { LONG, Product } from "./product";
 
 const product = new Product();
 
@@ -32,6 +32,7 @@ for (const [what, viewport, least] of [
   ["a phone", { width: 390, height: 844 }, 0.6],
 ] as const) {
   test(`a large graph opens at its beginning and readable on ${what}`, async ({ browser }) => {
+    test.skip(LONG !== "", LONG);
     const { page, context } = await product.person(browser, "Ada", { viewport });
     await page.goto(`${product.url}/graphs/${await product.chain(60)}`);
     await saved(page);
@@ -111,6 +112,7 @@ test("the view follows what runs until the person moves it, and again when asked
 test("whoever takes hold of the canvas while it glides holds what they see", async ({
   browser,
 }) => {
+  test.skip(LONG !== "", LONG);
   const { page, context } = await product.person(browser, "Ada");
   await page.goto(`${product.url}/graphs/${await product.chain(30)}`);
   await saved(page);

@@ -17,9 +17,10 @@ import httpx
 from containers.engine import FOLDER, ROOT, environment, inspect, podman, run
 
 PROJECT: Final = "temoto-action-assistant"
-PROFILES: Final = ("simulator", "robot", "proxy")
+PROFILES: Final = ("simulator", "robot", "proxy", "backups")
 #: Whose `ipc: host` podman-compose does not read, so that it is said to podman.
 _WITH_ROBOTS: Final = frozenset({"runner", "robot"})
+_WITHOUT_HEALTH_CHECK: Final = frozenset({"robot", "proxy", "backups"})
 _PATIENCE_S: Final = 120.0
 
 
@@ -58,7 +59,7 @@ class Stack:
                 if some:
                     self.compose("up", "--detach", "--no-build", *some, podman_run=run_with)
             for service in services:
-                if service not in {"robot", "proxy"}:
+                if service not in _WITHOUT_HEALTH_CHECK:
                     self.wait(service)
 
     def wait(self, service: str) -> None:

@@ -271,6 +271,21 @@ async def test_nothing_acknowledged_or_seen_is_lost_when_the_editor_is_killed(
         "acknowledged, 0 lost")  # fmt: skip
 
 
+def test_backups_are_made_by_themselves_and_hold_everything(proxied: Proxied) -> None:
+    stack = proxied.stack
+    stack.up("backups")
+    until(lambda: "proven" in stack.log("backups"))
+    assert "missing" not in stack.log("backups")
+    (file,) = podman("exec", stack.container("backups"), "ls", "/backups").split()
+    rehearsed = stack.execute(
+        "backups", "action-assistant", "restore", "--rehearse", f"/backups/{file}"
+    )
+    assert rehearsed.returncode == 0, rehearsed.stdout + rehearsed.stderr
+    with proxied.asked() as editor:
+        assert file in editor.get("/api/status").text  # as the administrator's page tells it
+    say(f"{stack.log('backups').strip()}; rehearsed: {rehearsed.stdout.strip()}")
+
+
 def test_a_backup_is_restored_into_empty_volumes_as_documented(
     proxied: Proxied, tmp_path: Path
 ) -> None:
@@ -285,7 +300,7 @@ def test_a_backup_is_restored_into_empty_volumes_as_documented(
         into = ("--entrypoint", "sh", "editor", "-c", "cat >/data/monday.zip")
         stack.compose("run", "--rm", "-T", *into, stdin=backup)
     stack.compose("run", "--rm", "editor", "restore", "/data/monday.zip")
-    stack.up("editor", "runner", "proxy", "robot")
+    stack.up("editor", "runner", "proxy", "robot", "backups")
     again = Proxied(stack, tmp_path)
     assert again.token == proxied.token
     proxied.trust, proxied.authority = again.trust, again.authority
@@ -295,7 +310,7 @@ def test_a_backup_is_restored_into_empty_volumes_as_documented(
 
 
 def test_hardening_holds(proxied: Proxied) -> None:
-    for service in ("editor", "runner", "db", "robot", "proxy"):
+    for service in ("editor", "runner", "db", "robot", "proxy", "backups"):
         found = state(proxied.stack.container(service))
         assert found["HostConfig"]["ReadonlyRootfs"], service
         rights = found["EffectiveCaps"] or []

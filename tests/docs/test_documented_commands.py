@@ -123,10 +123,8 @@ def reason(command: Command) -> str:
         return "needs a Postgres of the reader's: tests/commands has one"
     if command.is_placeholder and command.program == PROGRAM:
         return "somebody has to fill something in"
-    is_slow = (
-        len(command.words) > 2 if command.words[1:2] == ("serve",) else "doctor" in command.words
-    )
-    if IN_HASTE and is_slow and command.document != "docs/doctor.md":
+    is_slow = {"serve", "doctor"} & {*command.words} and len(command.words) > 2
+    if IN_HASTE and is_slow:
         return "takes seconds: tried outside of CI, or with TEST_LONG"
     return next((why for start, why in LISTED.items() if command.text_begins(start)), "")
 
@@ -204,6 +202,8 @@ class Computer:
                 stdout=out,
                 stderr=out,
                 start_new_session=True,
+                # Scripts start what stays behind them deaf to it.
+                preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
             )
         awaited, deadline = LASTING[command.words[1]], time.monotonic() + SERVED_SECONDS
         try:

@@ -161,7 +161,25 @@ async def test_keyframes_are_a_cache_that_may_vanish_or_be_of_another_fold() -> 
 
 
 @virtual
-async def test_a_reel_that_was_made_early_goes_on_with_the_run() -> None:
+async def test_of_a_run_that_goes_on_each_whole_multiple_is_kept_and_gone_on_from() -> None:
+    events = long_run(3 * APART)
+    ledger = await stored(events[: APART - 1])
+    followed = KeyframeStore(ledger, at_once)
+    await followed.keyframes("r1")
+    assert not ledger.snapshots  # nothing worth it yet
+    for upto, kept in ((APART + 5, APART + 5), (2 * APART - 1, APART + 5), (2 * APART, 2 * APART)):
+        there = await ledger.newest("run/r1")
+        rest = [Draft(each.kind, "x", encode(each)) for each in events[there:upto]]
+        await ledger.append("run/r1", rest)
+        await followed.keyframes("r1")
+        assert ledger.snapshots["run/r1"].seq == kept
+        again = await KeyframeStore(ledger, at_once).keyframes("r1")  # by who begins there
+        whole = KeyframeStore(await stored(events[:upto]), at_once)
+        assert again == await whole.keyframes("r1")
+
+
+@virtual
+async def test_keyframes_that_were_made_early_go_on_with_the_run() -> None:
     events = long_run(APART + 50)
     ledger = await stored(events[: APART // 2])
     keyframe_store = KeyframeStore(ledger, at_once)

@@ -3,14 +3,13 @@
 import json
 from typing import Any
 
-import anyio
 import httpx
 import msgspec
 import pytest
 
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Conditions, Graph
-from runner.harness import order, sequence, until
+from runner.harness import order, sequence
 from runner.process import RunnerProcess, over, started
 
 FAST = {"behaviours": {"*": [{"after_s": 0.02}]}}
@@ -84,7 +83,8 @@ def test_a_run_is_expected_of_its_graph_like_a_dry_run(empty: httpx.Client) -> N
     plan = sequence("measured")
     run = over(empty, started(empty, order(plan, graph="g1", script=FAST["behaviours"]))["id"])
     body = {"run": run["id"], "name": "as it ran"}
-    anyio.run(until, lambda: empty.post("/api/expectations", json=body).status_code == 201)
+    saved = empty.post("/api/expectations", json=body)
+    assert saved.status_code == 201, saved.text
     (found,) = checked(empty, plan)["courses"]
     assert (found["run"], found["same"]) == (run["id"], True)
 

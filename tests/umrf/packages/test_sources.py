@@ -59,7 +59,7 @@ def shape(action: Action) -> dict[str, object]:
 
 @pytest.mark.timeout(900)  # a compiler for each of them
 @given(action=odd_actions())
-@settings(max_examples=examples(40), deadline=None)
+@settings(max_examples=examples(16), deadline=None)
 def test_the_package_of_any_description_compiles_without_a_warning(action: Action) -> None:
     with tempfile.TemporaryDirectory() as folder:
         assert compile_errors(laid_out(package_files(action), Path(folder))) == ""
@@ -176,7 +176,7 @@ def test_real_actions_have_packages_or_a_reason_against_them(tmp_path: Path) -> 
                 refused.add(action.name)
     names = set(made.values())
     assert len(names) > 5 * len(refused - names)
-    tried = list(made)[:: max(1, len(made) // examples(12))]
+    tried = list(made)[:: max(1, len(made) // examples(6))]
     for number, files in enumerate(tried):
         package = laid_out(dict(files), tmp_path / str(number))
         assert compile_errors(package) == "", made[files]

@@ -167,7 +167,7 @@ class KeyframeStore:
             raise NotFound("There is no such run.")
         found = RunKeyframes(FOLD, tuple(keys), tuple(marks[:MARKS]))
         self._remember(run, found)
-        if keys[-1].run.end is not None and keys[-1].seq > max(had, _WORTH):
+        if _worth_keeping(keys[-1], had):
             await self._keep(stream, found)
         return found
 
@@ -195,6 +195,13 @@ class KeyframeStore:
         self._known.move_to_end(run)
         while len(self._known) > _KEPT:
             self._known.popitem(last=False)
+
+
+def _worth_keeping(newest: Keyframe, had: int) -> bool:
+    """Beside keyframes up to `had`: what is over, and each whole multiple of what goes on."""
+    if newest.run.end is None:
+        return newest.seq // APART > had // APART
+    return newest.seq > max(had, _WORTH)
 
 
 def fold(

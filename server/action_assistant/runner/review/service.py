@@ -5,6 +5,7 @@ from collections.abc import Awaitable, Callable, Sequence
 from datetime import datetime
 from typing import Any, Concatenate, Final, Literal, ParamSpec, Protocol, TypeAlias, TypeVar
 
+import anyio
 import msgspec
 from sqlalchemy import ColumnElement, Row, Select, select
 
@@ -21,7 +22,8 @@ from action_assistant.runner.archives import examples
 from action_assistant.runner.archives.archive_store import Archived, ArchiveStore
 from action_assistant.runner.archives.raw_messages import RawMessages, RawPut, raw_of, stream_of_raw
 from action_assistant.runner.clock import ClockUs
-from action_assistant.runner.review.ongoing_runs import OngoingRuns
+from action_assistant.runner.review.keyframe_loop import KeyframeLoop
+from action_assistant.runner.review.ongoing_runs import OngoingRuns, settled
 from action_assistant.runner.review.sum_up_loop import SumUpLoop
 from action_assistant.runner.robots.recordings import Recording, hours
 from action_assistant.runner.runs import views
@@ -102,10 +104,25 @@ class ReviewService:
         self._run_in_worker = run_in_worker
         self._clock_us = clock_us
         self._sums = SumUpLoop(ledger, control, clock_us, self._summed)
+        self._keyframes = KeyframeLoop(control, self._wind)
 
     async def run(self) -> None:
-        """Sum up runs that have ended, those of earlier processes too, until cancelled."""
-        await self._sums.run()
+        """Sum up runs that have ended, those of earlier processes too, and keep keyframes of long ones
+        that go on, until cancelled."""
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(self._sums.run)
+            tasks.start_soon(self._keyframes.run)
+
+    async def _wind(self, run_id: str) -> int:
+        return await (
+            self.wound(run_id)
+            if self._asked is None
+            else self._asked.value(ReviewService.wound, run_id)
+        )
+
+    async def wound(self, run_id: str) -> int:
+        """The event up to which there are keyframes of a run, now that they are made. Raises NotFound."""
+        return (await self.keyframe_store.keyframes(run_id)).keys[-1].seq
 
     async def _summed(self, run_id: str) -> annotations.SummedUp:
         if self._asked is None:
@@ -307,8 +324,11 @@ class ReviewService:
         Conflict when the simulator does not take the same course as the run."""
         name = expected_runs.name_of(wanted.name)
         now = self._clock_us()
-        if wanted.run in self._control.open:
-            raise Conflict("The run is not over yet.")
+        opened = self._control.open.get(wanted.run)
+        if opened is not None:
+            if opened.run.end is None:
+                raise Conflict("The run is not over yet.")
+            await settled(opened)
         if self._asked is None:
             saved = await self.expected(wanted, name, author, now)
         else:

@@ -9,9 +9,8 @@ from collections.abc import Awaitable, Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any, Concatenate, Final, NoReturn, ParamSpec, TypeVar
+from typing import Any, Concatenate, NoReturn, ParamSpec, TypeVar
 
-import anyio
 import msgspec
 
 from action_assistant.errors import Refused, Unavailable
@@ -19,7 +18,7 @@ from action_assistant.journal.events import Draft, StreamSnapshot
 from action_assistant.journal.reader import FileJournalReader
 from action_assistant.runner.analysis.keyframes import SnapshotJournal
 from action_assistant.runner.archives.archive_store import ArchiveStore
-from action_assistant.runner.review.ongoing_runs import OngoingRun
+from action_assistant.runner.review.ongoing_runs import OngoingRun, settled
 from action_assistant.runner.review.service import ReviewService
 from action_assistant.runner.runs.history import Ledger, RunHistory
 from action_assistant.runner.runs.recorder import stream_of
@@ -28,8 +27,6 @@ from action_assistant.web.workers.lanes import RunInWorker
 
 P = ParamSpec("P")
 T = TypeVar("T")
-
-_SETTLED_S: Final = 2.0  # for what was shown to be stored; then what is stored is told
 
 
 class StoragePaths(msgspec.Struct, frozen=True):
@@ -93,8 +90,7 @@ class WorkerQueries:
         for each in args:
             opened = self.opened.get(each) if isinstance(each, str) else None
             if opened is not None:
-                with anyio.move_on_after(_SETTLED_S):
-                    await opened.recorder.flushed()
+                await settled(opened)
 
     async def _keep(self, kept: Sequence[StreamSnapshot]) -> None:
         for each in kept:
