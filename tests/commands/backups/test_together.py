@@ -81,8 +81,12 @@ def test_what_is_left_of_one_that_was_killed_goes(tmp_path: Path) -> None:
     left = tmp_path / ".work-left"
     left.mkdir()
     (left / "editor.db").write_bytes(b"")
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    (tmp_path / ".work-link").symlink_to(elsewhere)
     with workshop(tmp_path, ".work-") as folder:
         sweep(tmp_path, ".work-")
         assert folder.is_dir()
         assert not left.exists()
-    assert list(tmp_path.iterdir()) == []
+    assert sorted(each.name for each in tmp_path.iterdir()) == [".work-link", "elsewhere"]
+    assert list(elsewhere.iterdir()) == []

@@ -212,6 +212,8 @@ def workshop(parent: Path, prefix: str) -> Iterator[Path]:
 def sweep(parent: Path, prefix: str) -> None:
     """What is left of workshops whose process was killed goes; those that somebody works in stay."""
     for left in parent.glob(f"{prefix}*"):
+        if left.is_symlink() or (left / _AT_WORK).is_symlink():
+            continue  # nothing of ours: it may be a folder of everybody's, such as /tmp
         try:
             held = opener(str(left / _AT_WORK), os.O_RDWR | os.O_CREAT)
         except OSError:
