@@ -30,7 +30,8 @@ PARTS: Final[dict[str, Part]] = {
         ("tests/journal/test_power.py", "-k", "power_cut"),
     ),
     "moves": Part(
-        "50 × kill -9 in a move, one in a migration each; 20 who write before and after a move",
+        "50 × kill -9 in a move, a migration, a backup, a restore each; 20 who write before and after a "
+        "move",
         {
             "TEST_MOVE_KILLS": "50",
             "TEST_MIGRATION_KILLS": "50",
@@ -43,8 +44,13 @@ PARTS: Final[dict[str, Part]] = {
             "tests/commands/backups/test_kills.py",
             "tests/test_upgrades.py",
             "-k",
-            "killed or many_wrote",
+            "(killed or many_wrote) and not killed_anywhere",
         ),
+    ),
+    "back": Part(
+        "50 × kill -9 at the steps of a `migrate --back`, 50 at any moment; 10 of one on Postgres",
+        {"TEST_BACK_KILLS": "50"},
+        ("-s", "tests/commands/databases/test_going_back.py", "-k", "killed"),
     ),
     "faults": Part(
         "500 writes that fail, full disks",

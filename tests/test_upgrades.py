@@ -20,12 +20,14 @@ from sqlalchemy import Connection, inspect, text
 
 from action_assistant.commands.databases.going_back import go_back
 from action_assistant.errors import CannotStart
+from action_assistant.journal import migrate as journal_migrate
 from action_assistant.journal.copies import before_upgrade
 from action_assistant.journal.copies.before_upgrade import FOLDER, copies_in
 from action_assistant.journal.database import Branch
 from action_assistant.journal.databases import database_of, migrate
 from action_assistant.journal.events import nothing
 from action_assistant.journal.journal import Journal
+from action_assistant.journal.lock import own
 from action_assistant.journal.migrate import recognize, revisions_of
 from action_assistant.journal.program_version import last_writer
 from action_assistant.journal.sqlite import inspected
@@ -244,6 +246,38 @@ def test_the_last_few_copies_stay(tmp_path: Path) -> None:
         "editor_0005-20260104",
     ]
     assert len(left) == 3 + 5
+
+
+def test_an_upgrade_that_fails_at_each_start_takes_no_older_copy_away(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    place, folder = old(tmp_path), tmp_path / FOLDER
+    folder.mkdir()
+    for number in (3, 4):
+        shutil.copy(
+            tmp_path / "editor.db", folder / f"editor_000{number}-2026010{number}-120000.db"
+        )
+
+    def fails(*_: object) -> str:
+        raise RuntimeError
+
+    monkeypatch.setattr(journal_migrate, "_upgraded", fails)
+    for _ in range(4):
+        with pytest.raises(RuntimeError):
+            place.opened()
+    left = [copy.revision for copy in copies_in(folder)]
+    assert left == ["editor_0005"] * 3 + ["editor_0004", "editor_0003"]
+
+
+def test_tables_do_not_change_under_a_version_that_runs(tmp_path: Path) -> None:
+    place = old(tmp_path)
+    lock = own(tmp_path / "editor.db")
+    try:
+        refused = command("migrate", "--data", tmp_path)
+    finally:
+        os.close(lock)
+    assert (refused.returncode, "in use by another process" in refused.stderr) == (2, True)
+    assert place.asked(recognize) == {"editor_0005"}
 
 
 def test_without_room_for_a_copy_nothing_changes(

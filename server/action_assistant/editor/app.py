@@ -1,5 +1,6 @@
 """The editor as an application."""
 
+import asyncio
 import logging
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -60,6 +61,13 @@ async def open_services(
     revoked = revoked or Revocations(settings.data)
     journal = await Journal.open(settings.database, branch="editor", fold=h.fold)
     try:
+        # Ours from here on; until now `move` may have taken the graphs elsewhere.
+        await asyncio.to_thread(
+            database_location.check,
+            settings.data,
+            settings.database,
+            switch=settings.switch_database,
+        )
         new = await journal.position() == 0
         async with (
             EditorWorkers.opened() as workers,
@@ -86,6 +94,7 @@ def create_app(settings: EditorSettings) -> ASGIApp:
     """The whole editor process. Raises CannotStart."""
     database_location.check(settings.data, settings.database, switch=settings.switch_database)
     Journal.prepare(settings.database, "editor", copies=settings.data / before_upgrade.FOLDER)
+    database_location.check(settings.data, settings.database, switch=settings.switch_database)
     database_location.remember(settings.data, settings.database)
     keys = Keys.of(settings.data)
     app_state = EditorState()

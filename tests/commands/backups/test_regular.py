@@ -124,6 +124,16 @@ def test_a_backup_that_fails_is_written_down(data: Path, tmp_path: Path) -> None
     assert "file" in failed.why
 
 
+def test_backups_of_another_server_in_the_same_folder_stay(data: Path, tmp_path: Path) -> None:
+    into, of_both = tmp_path / "b", []
+    for token in ("one", "two", "one", "two"):
+        (data / "token").write_text(token.ljust(43, "-"))
+        made = command("backup", "--into", into, "--keep", "1d", "--data", data)
+        assert made.returncode == 0, made.stderr
+        of_both.append(state_of(data).last)
+    assert [str(each) for each in backups(into)] == [each.file for each in of_both[2:] if each]
+
+
 def test_two_at_once_are_refused(data: Path, tmp_path: Path) -> None:
     into = tmp_path / "b"
     slow = subprocess.Popen(

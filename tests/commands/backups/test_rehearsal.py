@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from action_assistant.journal.copies.backup_state import backup_state
+from action_assistant.journal.copies.backup_state import BackupState, backup_state
 from support.product import COMMAND, running
 
 
@@ -97,3 +97,21 @@ def test_a_file_that_was_cut_is_not_sound(file: Path, tmp_path: Path) -> None:
     assert command("restore", "--rehearse", cut, "--data", tmp_path).returncode == 1
     gone = command("restore", "--rehearse", tmp_path / "gone.zip", "--data", tmp_path)
     assert (gone.returncode, "There is no file" in gone.stderr) == (2, True)
+
+
+def test_a_full_disk_says_nothing_about_the_backup(file: Path, tmp_path: Path) -> None:
+    with zipfile.ZipFile(file) as packed:
+        blocks = packed.getinfo("editor.db").file_size // 1024  # of 512 bytes: half of it
+    rehearse = ["restore", "--rehearse", str(file), "--data", str(tmp_path)]
+    done = subprocess.run(
+        ["sh", "-c", f'ulimit -f {blocks}; exec "$@"', "sh", *COMMAND, *rehearse],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+    told = done.stdout + done.stderr
+    assert (done.returncode, "cannot be told" in told, "NOT sound" in told) == (2, True, False), (
+        told
+    )
+    assert backup_state(tmp_path) == BackupState()

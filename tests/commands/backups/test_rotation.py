@@ -17,7 +17,7 @@ def paths(*ages: timedelta) -> list[Path]:
 
 
 def left(found: list[Path], rule: str) -> list[Path]:
-    return sorted(set(found) - set(superfluous(found, keeping(rule))), reverse=True)
+    return sorted(set(found) - set(superfluous(found, keeping(rule), NOW)), reverse=True)
 
 
 def test_a_year_of_nights_leaves_seventeen_at_most() -> None:
@@ -39,14 +39,28 @@ def test_nights_without_a_backup_use_up_none_of_those_that_stay() -> None:
     assert left(found, "3d") == found
 
 
-@pytest.mark.parametrize("name", ["monday.zip", "action-assistant-2026.zip", "notes.txt"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "monday.zip",
+        "notes.txt",
+        "action-assistant-2026.zip",
+        "action-assistant-20260199-000000Z.zip",
+    ],
+)
 def test_other_files_are_left_alone(name: str) -> None:
     old = [Path("/b") / name, *paths(timedelta(0), timedelta(hours=1))]
-    assert superfluous(old, keeping("1d")) == old[2:]
+    assert superfluous(old, keeping("1d"), NOW) == old[2:]
+
+
+def test_backups_of_a_clock_that_was_wrong_stay_and_none_goes_for_them() -> None:
+    of_tomorrow = paths(*(timedelta(days=-n) for n in range(1, 9)))
+    nights = paths(*(timedelta(days=n) for n in range(4)))
+    assert superfluous([*of_tomorrow, *nights], keeping("3d"), NOW) == nights[3:]
 
 
 def test_all_stay_if_somebody_says_so() -> None:
-    assert superfluous(paths(*(timedelta(hours=n) for n in range(99))), keeping("all")) == []
+    assert superfluous(paths(*(timedelta(hours=n) for n in range(99))), keeping("all"), NOW) == []
 
 
 @pytest.mark.parametrize("rule", ["", "0d", "7", "7x", "d", "7d 4w", "-1d"])

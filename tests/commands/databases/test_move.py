@@ -136,6 +136,20 @@ def test_there_and_back_nothing_is_lost_of_what_many_wrote(
     assert command("verify", "--data", data).returncode == 0
 
 
+def test_a_nul_in_a_name_keeps_no_graphs_from_a_server(tmp_path: Path, postgres: Server) -> None:
+    """JSON can say it, SQLite holds it, Postgres does not."""
+    data, url = tmp_path / "data", postgres.new_database()
+    with running(data) as product, product.editor() as editor:
+        editor.post("/api/graphs", json={"name": "a\0b \\u0000"}).raise_for_status()
+    there = move(data, url)
+    assert there.returncode == 0, there.stderr
+    with running(data, "--database", url) as product, product.editor() as editor:
+        editor.post("/api/graphs", json={"name": "c\0d"}).raise_for_status()
+        assert {"a\0b \\u0000", "c\0d"} <= set(written(product).values())
+    rows = ask_once(url, lambda c: set(c.scalars(text("SELECT name FROM graph"))))
+    assert {"a\ufffdb \\u0000", "c\ufffdd"} <= rows
+
+
 def test_a_database_with_other_events_is_left_alone(tmp_path: Path, postgres: Server) -> None:
     url = postgres.new_database()
     assert move(made(tmp_path / "one", 2), url).returncode == 0

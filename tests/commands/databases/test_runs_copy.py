@@ -72,6 +72,18 @@ def test_every_event_is_there_once_however_often_it_is_copied(data: Path, postgr
     assert asked[0].startswith("patrol")
 
 
+def test_a_note_with_a_nul_keeps_no_run_from_being_copied(data: Path, postgres: Server) -> None:
+    url = postgres.new_database()
+    with running(data) as product, product.runner() as runner:
+        run = runner.get("/api/runs").json()[0]["id"]
+        marks = {"note": "a\0b", "labels": ["c\0d"]}
+        runner.patch(f"/api/runs/{run}/marks", json=marks).raise_for_status()
+    done = command("runs", "copy", "--to", url, "--data", data)
+    assert done.returncode == 0, done.stderr
+    noted = f"SELECT note FROM action_assistant_runs.review WHERE run = '{run}'"
+    assert rows(url, noted) == [("a\ufffdb",)]
+
+
 def test_another_log_is_not_mixed_in(data: Path, tmp_path: Path, postgres: Server) -> None:
     url = postgres.new_database()
     assert command("runs", "copy", "--to", url, "--data", data).returncode == 0

@@ -3,11 +3,15 @@
 import asyncio
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from action_assistant.editor.app import create_app, open_services
 from action_assistant.editor.log import database_location
 from action_assistant.errors import CannotStart
+from action_assistant.journal.journal import Journal
+from action_assistant.settings import EditorSettings
 from editor.process import Editor, running
 from journal.servers import Server
 from support.product import COMMAND, Product
@@ -127,3 +131,30 @@ def test_a_file_elsewhere_that_is_not_there_now_is_no_empty_catalogue(
     with pytest.raises(CannotStart, match=r"The graphs of .* would not be seen without"):
         database_location.check(tmp_path, own, switch=False)
     database_location.check(tmp_path, database_location.of(tmp_path), switch=False)
+
+
+@pytest.mark.parametrize("step", ["prepare", "open"])
+def test_a_start_during_a_move_does_not_forget_where_the_graphs_went(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: str
+) -> None:
+    data, there = tmp_path / "data", tmp_path / "there.db"
+    with running(data) as editor, editor.client() as http:
+        http.post("/api/graphs", json={"name": "mine"}).raise_for_status()
+    settings = EditorSettings(data=data, database=f"sqlite:///{data / 'editor.db'}")
+    real = getattr(Journal, step)
+
+    def late(*arguments: Any, **options: Any) -> Any:
+        (data / "editor.db").rename(there)
+        database_location.remember(data, f"sqlite:///{there}")
+        return real(*arguments, **options)
+
+    monkeypatch.setattr(Journal, step, late)
+
+    async def serve() -> None:
+        async with open_services(settings):
+            raise AssertionError("an empty catalogue is served")
+
+    start = (lambda: create_app(settings)) if step == "prepare" else lambda: asyncio.run(serve())
+    with pytest.raises(CannotStart, match="would not be seen"):
+        start()
+    assert database_location.remembered(data) == f"sqlite:///{there}"

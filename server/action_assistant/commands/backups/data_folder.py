@@ -1,6 +1,8 @@
 """What a data folder holds, as `backup` and `restore` see it: journals, keys, archives, and the rest."""
 
 import asyncio
+import os
+import shutil
 import sqlite3
 import tempfile
 import time
@@ -22,9 +24,11 @@ from action_assistant.journal.databases import database_of
 from action_assistant.journal.events import Fold
 from action_assistant.journal.journal import Journal
 from action_assistant.journal.removal import StreamRemoved
+from action_assistant.private_files import opener
 from action_assistant.runner.archives.raw_messages import RawPut
 from action_assistant.schema.runner_tables import runner_event
 from action_assistant.settings import ARCHIVE, RESTORING
+from action_assistant.system import file_locks
 from action_assistant.web.auth import keys, revocations
 from action_assistant.web.network import certificate
 
@@ -48,6 +52,7 @@ ASIDE: Final = "before-restore-"
 MOVED: Final = "before-move-"
 _MAGIC: Final = b"SQLite format 3\0"
 _PAGES: Final = 5_000  # copied between two words about it
+_AT_WORK: Final = ".at-work"
 
 
 def belongings(data: Path) -> Iterator[tuple[str, Path]]:
@@ -110,9 +115,16 @@ def fold_of(branch: Branch) -> Fold:
     return runner_fold
 
 
-def checked(path: Path, branch: Branch, progress: Progress, *, anew: bool = False) -> int:
+def checked(
+    path: Path,
+    branch: Branch,
+    progress: Progress,
+    *,
+    expected: int | None = None,
+    anew: bool = False,
+) -> int:
     """The number of events of a copy, each of which is sound; its tables are those of this version.
-    `anew`: it begins another epoch. Raises CannotStart."""
+    `expected`: how many there have to be. `anew`: it begins another epoch. Raises CannotStart."""
     from action_assistant.editor.log import epochs
 
     async def look() -> int:
@@ -126,6 +138,10 @@ def checked(path: Path, branch: Branch, progress: Progress, *, anew: bool = Fals
                     "`verify` tells more."
                 )
             events = await journal.position()
+            if expected not in {None, events}:
+                raise CannotStart(
+                    f"The journal of the {branch} ends at event {events}, not at {expected}."
+                )
             if anew and branch == "editor":
                 await epochs.begin(journal, "a backup was restored")
             return events
@@ -178,11 +194,33 @@ def archived(runner: Path) -> dict[str, str]:
 
 @contextmanager
 def workshop(parent: Path, prefix: str) -> Iterator[Path]:
-    """A folder for the work, on the disk where its result will lie, for this user alone. Faults of
-    disk and databases become CannotStart."""
+    """A folder for the work, on the disk where its result will lie, for this user alone; nobody else
+    sweeps it away meanwhile. Faults of disk and databases become CannotStart."""
     try:
         with tempfile.TemporaryDirectory(prefix=prefix, dir=parent) as folder:
-            yield Path(folder)
+            held = opener(str(Path(folder) / _AT_WORK), os.O_RDWR | os.O_CREAT)
+            try:
+                file_locks.take(held)
+                yield Path(folder)
+            finally:
+                os.close(held)
     except (OSError, sqlite3.Error) as error:
         text = error.strerror if isinstance(error, OSError) else str(error)
         raise CannotStart(f"Cannot work in {parent}: {text}.") from error
+
+
+def sweep(parent: Path, prefix: str) -> None:
+    """What is left of workshops whose process was killed goes; those that somebody works in stay."""
+    for left in parent.glob(f"{prefix}*"):
+        if left.is_symlink() or (left / _AT_WORK).is_symlink():
+            continue  # nothing of ours: it may be a folder of everybody's, such as /tmp
+        try:
+            held = opener(str(left / _AT_WORK), os.O_RDWR | os.O_CREAT)
+        except OSError:
+            continue  # it has just gone, or is another user's
+        try:
+            is_left = file_locks.take(held)
+        finally:
+            os.close(held)
+        if is_left:
+            shutil.rmtree(left, ignore_errors=True)

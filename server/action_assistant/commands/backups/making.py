@@ -39,6 +39,7 @@ from action_assistant.schema.editor_tables import invitation
 from action_assistant.version import VERSION
 from action_assistant.web.auth.keys import TOKEN_FILE
 
+WORK: Final = ".backup-"
 #: What archives are of, in their folder.
 _ARCHIVES: Final = ("runs", "raw")
 #: Of the environment, and never in what a backup says of itself.
@@ -62,7 +63,7 @@ def make_backup(
     """Write a backup of a data folder to a file. Raises CannotStart, and then there is none."""
     begun, at, sources = time.monotonic(), time.time(), _sources(data, database)
     _check_room(data, sources, target.parent)
-    with workshop(target.parent, ".backup-") as folder:
+    with workshop(target.parent, WORK) as folder:
         events = {
             branch: _copied(source, branch, folder / f"{branch}.db", progress)
             for branch, source in sources.items()

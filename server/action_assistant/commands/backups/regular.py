@@ -5,11 +5,11 @@ import contextlib
 import os
 import select
 import shlex
-import shutil
 import signal
 import subprocess
 import sys
 import time
+import zipfile
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
@@ -17,14 +17,17 @@ from typing import Final
 
 import msgspec
 
-from action_assistant.commands.backups.making import FinishedBackup, make_backup
+from action_assistant.commands.backups.backup_file import FILES, Package
+from action_assistant.commands.backups.data_folder import sweep
+from action_assistant.commands.backups.making import WORK, FinishedBackup, make_backup
 from action_assistant.commands.backups.progress import Progress
-from action_assistant.commands.backups.rotation import keeping, name_at, superfluous
+from action_assistant.commands.backups.rotation import keeping, moment_of, name_at, superfluous
 from action_assistant.errors import CannotStart
 from action_assistant.journal.copies import backup_state
 from action_assistant.journal.copies.backup_state import BackupSchedule, OffSite
 from action_assistant.private_files import make_folder, opener
 from action_assistant.system import file_locks
+from action_assistant.web.auth.keys import TOKEN_FILE
 
 _LOCK: Final = ".action-assistant.lock"
 _PATIENCE: Final = 6 * 3600.0  # seconds that a command may take
@@ -49,13 +52,14 @@ def back_up(plan: RegularBackups, progress: Progress) -> tuple[FinishedBackup, O
     """Make one, write down what became of it, and let old ones go. Raises CannotStart."""
     try:
         with _alone(plan.into):
-            target = plan.into / name_at(datetime.now(UTC))
+            target = _free(plan.into)
             done = make_backup(plan.data, plan.database, target, progress)
             progress.end()
             off_site = _taken_away(plan.after, target)
             backup_state.made(plan.data, msgspec.structs.replace(done.made, off_site=off_site))
             if not done.made.missing:  # else an older one may have what this one lacks
-                for path in superfluous(plan.into.iterdir(), keeping(plan.keep)):
+                ours = (path for path in plan.into.iterdir() if not _is_anothers(path, done))
+                for path in superfluous(ours, keeping(plan.keep), datetime.now(UTC)):
                     path.unlink(missing_ok=True)
     except (CannotStart, OSError) as error:
         why = str(error) if isinstance(error, CannotStart) else f"{plan.into}: {error.strerror}."
@@ -114,11 +118,31 @@ def _alone(into: Path) -> Iterator[None]:
     try:
         if not file_locks.take(lock):
             raise CannotStart(f"Another backup is just being made into {into}.")
-        for left in into.glob(".backup-*"):
-            shutil.rmtree(left, ignore_errors=True)
+        sweep(into, WORK)
         yield
     finally:
         os.close(lock)
+
+
+def _free(into: Path) -> Path:
+    """A name that no backup has yet, also none of another server."""
+    while (target := into / name_at(datetime.now(UTC))).exists():
+        time.sleep(0.1)
+    return target
+
+
+def _is_anothers(path: Path, done: FinishedBackup) -> bool:
+    """Whether a backup is of another server, which has another token: servers may share a folder."""
+    if moment_of(path) is None or not zipfile.is_zipfile(path):
+        return False
+    try:
+        package = Package(path)
+    except CannotStart:
+        return True  # of a newer version, for one
+    package.close()
+    token = f"{FILES}/{TOKEN_FILE}"
+    held, ours = package.about.files.get(token), done.files.get(token)
+    return held is not None and held != ours
 
 
 def _taken_away(command: str | None, path: Path) -> OffSite | None:

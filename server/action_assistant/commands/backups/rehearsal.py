@@ -2,8 +2,9 @@
 would, and throws it away. Nothing of it is served, and no robot is spoken to."""
 
 import asyncio
+import errno
 import logging
-import shutil
+import sqlite3
 import tempfile
 import time
 from collections.abc import Awaitable, Callable
@@ -15,7 +16,7 @@ from sqlalchemy import func, select
 
 from action_assistant.commands.backups import restore
 from action_assistant.commands.backups.backup_file import ARCHIVE, FILES, NoRoom, Package
-from action_assistant.commands.backups.data_folder import checked, fold_of, workshop
+from action_assistant.commands.backups.data_folder import checked, fold_of, sweep, workshop
 from action_assistant.commands.backups.progress import Progress
 from action_assistant.errors import CannotStart, Refused
 from action_assistant.journal.copies import backup_state
@@ -26,6 +27,7 @@ from action_assistant.schema import editor_tables, runner_tables
 from action_assistant.web.auth.keys import TOKEN_FILE
 
 _PREFIX: Final = ".rehearsal-"
+_DISK: Final = frozenset({errno.ENOSPC, errno.EFBIG, errno.EDQUOT, errno.EIO})
 #: Says how far it has come.
 Tell: TypeAlias = Callable[[str], None]
 
@@ -45,8 +47,7 @@ def rehearse(source: Path, data: Path) -> int:
         raise CannotStart(f"There is no file {source}.")
     begun, at, progress, found = time.monotonic(), time.time(), Progress(), Findings()
     place = data if data.is_dir() else Path(tempfile.gettempdir())
-    for left in place.glob(f"{_PREFIX}*"):  # of one that was killed
-        shutil.rmtree(left, ignore_errors=True)
+    sweep(place, _PREFIX)
     logging.disable(logging.ERROR)  # what readers complain of is said below, once
     try:
         with workshop(place, _PREFIX) as folder:
@@ -54,6 +55,8 @@ def rehearse(source: Path, data: Path) -> int:
     except NoRoom:
         raise
     except CannotStart as error:
+        if _is_of_the_disk(error):
+            raise CannotStart(f"It cannot be told whether {source} is sound. {error}") from error
         found.wrong.append(str(error))
     finally:
         logging.disable(logging.NOTSET)
@@ -69,6 +72,21 @@ def rehearse(source: Path, data: Path) -> int:
     if data.is_dir():
         backup_state.rehearsed(data, done)
     return _tell(found, done)
+
+
+def _is_of_the_disk(error: BaseException | None) -> bool:
+    """Whether the disk of the scratch place is at fault, and not what is looked at."""
+    while error is not None:
+        if isinstance(error, OSError) and error.errno in _DISK:
+            return True
+        driver = getattr(error, "orig", error)
+        if getattr(driver, "sqlite_errorcode", 0) & 0xFF in {
+            sqlite3.SQLITE_FULL,
+            sqlite3.SQLITE_IOERR,
+        }:
+            return True
+        error = error.__cause__
+    return False
 
 
 def _tell(found: Findings, done: BackupRehearsed) -> int:
@@ -99,9 +117,9 @@ def _look(source: Path, folder: Path, found: Findings, progress: Progress) -> No
         "editor": _look_at_graphs,
         "runner": _look_at_runs,
     }
-    for branch in about.journals:
+    for branch, held in about.journals.items():
         path = folder / f"{branch}.db"
-        events = checked(path, branch, progress)
+        events = checked(path, branch, progress, expected=held.events)
         found.looked_at.append(f"{branch}: {events} events, all of them sound")
         asyncio.run(_opened(path, branch, looks[branch], found, progress))
     token = folder / FILES / TOKEN_FILE

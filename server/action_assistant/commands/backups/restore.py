@@ -31,13 +31,14 @@ from action_assistant.commands.backups.data_folder import (
     fold_of,
     left_out,
     rows_of,
+    sweep,
     workshop,
 )
 from action_assistant.commands.backups.progress import Progress
 from action_assistant.errors import CannotStart
 from action_assistant.journal.database import Branch
 from action_assistant.journal.databases import ask_once, database_of
-from action_assistant.private_files import sync
+from action_assistant.private_files import opener, sync
 from action_assistant.schema.editor_tables import editor_event
 from action_assistant.web.auth.keys import TOKEN_FILE
 
@@ -77,10 +78,11 @@ def restore(options: argparse.Namespace) -> int:
         with workshop(data, _WORK) as folder, ExitStack() as locks:
             for branch in about.journals:
                 locks.callback(os.close, _locked(data, branch))
-            _sweep(data, folder)
+            sweep(data, _WORK)
             package.unpack(folder, progress)
-            for branch in about.journals:
-                checked(folder / f"{branch}.db", branch, progress, anew=True)
+            for branch, held in about.journals.items():
+                path = folder / f"{branch}.db"
+                checked(path, branch, progress, expected=held.events, anew=True)
             aside, kept = _put(folder, data, url, about, progress)
     finally:
         package.close()
@@ -112,13 +114,6 @@ def _check_folder(data: Path, source: Path) -> None:
         raise CannotStart(
             f"{data} holds other things ({names}): name an empty folder, or one of this program."
         )
-
-
-def _sweep(data: Path, folder: Path) -> None:
-    """What is left of restores that were interrupted while they unpacked."""
-    for path in data.glob(f"{_WORK}*"):
-        if path != folder:
-            shutil.rmtree(path, ignore_errors=True)
 
 
 def _put(
@@ -231,8 +226,8 @@ def _move(source: Path, target: Path) -> None:
     part = source
     if source.stat().st_dev != target.parent.stat().st_dev:
         part = target.with_name(f".{target.name}.part")
-        shutil.copyfile(source, part)
-        part.chmod(0o600)
+        with source.open("rb") as there, open(part, "wb", opener=opener) as here:
+            shutil.copyfileobj(there, here)
     for path in part.rglob("*") if part.is_dir() else [part]:
         sync(path)
     part.replace(target)

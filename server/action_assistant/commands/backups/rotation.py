@@ -44,15 +44,22 @@ def name_at(moment: datetime) -> str:
     return f"action-assistant-{moment.astimezone(UTC).strftime(_STAMP)}Z.zip"
 
 
-def superfluous(paths: Iterable[Path], keep: Keeping) -> list[Path]:
-    """Those that may go. The newest one always stays."""
-    dated = []
-    for path in paths:
-        found = _NAME.fullmatch(path.name)
-        if found is not None:
-            dated.append((datetime.strptime(found[1], _STAMP).replace(tzinfo=UTC), path))
+def moment_of(path: Path) -> datetime | None:
+    """When a scheduled backup was begun; None for what is not named as one."""
+    found = _NAME.fullmatch(path.name)
+    try:
+        return found and datetime.strptime(found[1], _STAMP).replace(tzinfo=UTC)
+    except ValueError:  # such as the 99th of a month
+        return None
+
+
+def superfluous(paths: Iterable[Path], keep: Keeping, now: datetime) -> list[Path]:
+    """Those that may go. The newest one always stays; so do those of a clock that was wrong, after `now`,
+    and none goes for them."""
     if keep.days is None:
         return []
+    moments = ((moment_of(path), path) for path in paths)
+    dated = [(at, path) for at, path in moments if at is not None and at <= now]
     dated.sort(reverse=True)
     stays = {path for _, path in dated[:1]}
     periods = ((keep.days, "%Y-%m-%d"), (keep.weeks, "%G-%V"), (keep.months, "%Y-%m"))

@@ -8,16 +8,16 @@ import os
 import shutil
 import sqlite3
 from collections.abc import Iterator
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path
 from typing import Final
 
-from sqlalchemy import Connection, MetaData, NullPool, create_engine, insert, select
+from sqlalchemy import Connection, MetaData, NullPool, create_engine, insert, make_url, select
 
 from action_assistant import settings
 from action_assistant.commands.backups.data_folder import aside_folder
 from action_assistant.commands.backups.progress import Progress
-from action_assistant.errors import CannotStart
+from action_assistant.errors import CannotStart, NewerSchema
 from action_assistant.journal.copies.before_upgrade import (
     FOLDER,
     UpgradeCopy,
@@ -31,10 +31,12 @@ from action_assistant.journal.lock import own
 from action_assistant.journal.migrate import recognize, revisions_of
 from action_assistant.journal.program_version import last_writer
 from action_assistant.journal.sqlite import inspected, unchanged
-from action_assistant.private_files import sync
+from action_assistant.private_files import opener, sync
 from action_assistant.schema.branches import BRANCHES, VERSIONS
 
 _ROWS: Final = 500  # in memory
+#: What SQLite says of a file that is none of its own, or none of ours.
+_DAMAGED: Final = {sqlite3.SQLITE_ERROR, sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB}
 
 
 def go_back(data: Path, database: str | None, files: list[Path]) -> int:
@@ -43,16 +45,19 @@ def go_back(data: Path, database: str | None, files: list[Path]) -> int:
     if not files:
         return _list(data)
     copies = [_copy(data, file) for file in files]
+    if len({copy.branch for copy in copies}) < len(copies):
+        raise CannotStart("Name one copy of each journal at most. Nothing was changed.")
     progress = Progress()
     with ExitStack() as locks:
-        for copy in copies:
-            url = _url(data, database, copy)
-            if url.startswith("sqlite:"):
-                path = Path(url.removeprefix("sqlite:///"))
-                locks.callback(os.close, own(path))
-                _put_file(data, copy, path, progress)
+        places = [(copy, _place(_url(data, database, copy))) for copy in copies]
+        for _, place in places:
+            if isinstance(place, Path):
+                locks.callback(os.close, own(place))
+        for copy, place in places:
+            if isinstance(place, Path):
+                _put_file(data, copy, place, progress)
             else:
-                _put_rows(data, copy, url, progress)
+                _put_rows(data, copy, place, progress)
     return 0
 
 
@@ -106,39 +111,62 @@ def _url(data: Path, database: str | None, copy: UpgradeCopy) -> str:
     return database or database_location.of(data)
 
 
+def _place(url: str) -> Path | str:
+    """The file, or the URL of what is on a server."""
+    parsed = make_url(url)
+    return Path(parsed.database or "") if parsed.get_backend_name() == "sqlite" else url
+
+
 def _put_file(data: Path, copy: UpgradeCopy, path: Path, progress: Progress) -> None:
     part = path.with_name(f".{path.name}.part")
     with _told(path.parent):
-        progress.tell(f"{copy.path.name} is copied")
-        shutil.copyfile(copy.path, part)
-        part.chmod(0o600)
-        sync(part)
-        now = _emptied(path)
-        aside = aside_folder(data)
-        beside = [path.with_name(f"{path.name}{suffix}") for suffix in ("-wal", "-shm")]
-        for each in (path, *beside):
-            if each.exists():
-                os.link(each, aside / each.name)
-        sync(aside)
-        for each in beside:  # empty by now, unless the file is damaged
-            each.unlink(missing_ok=True)
-        part.replace(path)
-        sync(path.parent)
+        try:
+            progress.tell(f"{copy.path.name} is copied")
+            with copy.path.open("rb") as there, open(part, "wb", opener=opener) as here:
+                shutil.copyfileobj(there, here)
+            sync(part)
+            now = _emptied(path)
+            # Links lead to no other disk.
+            is_here = path.parent.stat().st_dev == data.stat().st_dev
+            aside = aside_folder(data if is_here else path.parent)
+            _exchange(part, path, aside)
+        finally:
+            part.unlink(missing_ok=True)
     progress.end()
     _tell(copy, str(path), inspected(path)[0], now, aside)
 
 
+def _exchange(part: Path, path: Path, aside: Path) -> None:
+    """One file in the place of another, which goes aside with what lies beside it."""
+    beside = [path.with_name(f"{path.name}{suffix}") for suffix in ("-wal", "-shm", "-journal")]
+    for each in (path, *beside):
+        if each.exists():
+            os.link(each, aside / each.name)
+    sync(aside)
+    sync(aside.parent)
+    for each in beside:  # empty by now, unless the file is damaged
+        each.unlink(missing_ok=True)
+    part.replace(path)
+    sync(path.parent)
+
+
 def _emptied(path: Path) -> int | None:
     """How many events are in what there is now; what waits in the log beside it goes into the file, so
-    that at no moment there is a file without it. None when it cannot be read."""
+    that at no moment there is a file without it. None when it is damaged. Raises CannotStart."""
     if not path.exists():
         return 0
     try:
         with closing(sqlite3.connect(path)) as database:
-            database.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()
+            (busy, *_) = database.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()
             (events,) = database.execute("SELECT count(*) FROM event").fetchone()
-    except sqlite3.Error:
-        return None
+    except sqlite3.Error as error:
+        if getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR) & 0xFF in _DAMAGED:
+            return None
+        raise CannotStart(f"{path} cannot be closed: {error}. Nothing was changed.") from error
+    if busy:
+        raise CannotStart(
+            f"Somebody else has {path} open, as for a backup: nothing was changed. Try again later."
+        )
     return int(events)
 
 
@@ -155,6 +183,10 @@ def _put_rows(data: Path, copy: UpgradeCopy, url: str, progress: Progress) -> No
             then, now = database.migrate(
                 lambda connection: _exchanged(connection, copy, aside, progress)
             )
+    except BaseException:
+        with suppress(OSError):  # one that holds a copy stays: a commit may have come to its end
+            aside.rmdir()
+        raise
     finally:
         session.close()
     progress.end()
@@ -165,7 +197,13 @@ def _exchanged(
     connection: Connection, copy: UpgradeCopy, aside: Path, progress: Progress
 ) -> tuple[int, int]:
     """All tables of ours are those of the copy; how many events there are, and were."""
-    current = recognize(connection)
+    try:
+        current = recognize(connection)
+    except NewerSchema as error:  # none of its tables may stay behind, and we do not know them
+        raise CannotStart(
+            f"Graphs on a server are put back by the version that made their tables, and this is an "
+            f"older one: nothing was changed. {error}"
+        ) from error
     now = 0
     if current:
         progress.tell("what is there now is copied aside")

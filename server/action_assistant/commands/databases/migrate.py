@@ -53,7 +53,8 @@ def _migrate(options: argparse.Namespace) -> int:
 def _forward(options: argparse.Namespace) -> int:
     from action_assistant.editor.log import database_location
     from action_assistant.journal.copies.before_upgrade import FOLDER, keep_copy
-    from action_assistant.journal.databases import database_of, migrate
+    from action_assistant.journal.databases import database_of
+    from action_assistant.journal.migrate import revisions_of
 
     logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(message)s")
     data = settings.data_folder(options.data.resolve())
@@ -61,7 +62,12 @@ def _forward(options: argparse.Namespace) -> int:
     database = options.database or database_location.of(data)
     urls: dict[Branch, str] = {"editor": database, "runner": f"sqlite:///{data / 'runner.db'}"}
     for branch, url in urls.items():
-        revision = migrate(url, branch, before=before)
-        name = database_of(url).name.removeprefix("The database ")
-        print(f"{branch}: {name} is at revision {revision}")
+        place = database_of(url)
+        try:
+            # As its only writer: an older version that runs would go on writing as it knows the tables.
+            place.open(branch, before).close()
+        finally:
+            place.disown()
+        name = place.name.removeprefix("The database ")
+        print(f"{branch}: {name} is at revision {revisions_of(branch)[-1]}")
     return 0

@@ -21,7 +21,13 @@ from sqlalchemy import make_url, text
 from sqlalchemy.exc import ArgumentError
 
 from action_assistant import paths, settings
-from action_assistant.commands.backups.data_folder import MOVED, aside_folder, fold_of, workshop
+from action_assistant.commands.backups.data_folder import (
+    MOVED,
+    aside_folder,
+    fold_of,
+    sweep,
+    workshop,
+)
 from action_assistant.commands.backups.progress import Progress
 from action_assistant.commands.databases.equality import differences
 from action_assistant.errors import CannotStart
@@ -157,7 +163,7 @@ def _into_folder(
     """The same, into a file that is made beside its place; also where a file is that was there."""
     with workshop(data, _WORK) as folder, ExitStack() as locks:
         locks.callback(os.close, own(data / "editor.db"))
-        _sweep(data, but=folder)
+        sweep(data, _WORK)
         _check_room(folder, source)
         file = folder / "editor.db"
         events = copy(
@@ -182,16 +188,10 @@ def _tidy(data: Path, target: str) -> None:
     except CannotStart:
         return  # somebody works in it
     try:
-        _sweep(data)
+        sweep(data, _WORK)
         _put_aside(data, keep=target)
     finally:
         os.close(lock)
-
-
-def _sweep(data: Path, but: Path | None = None) -> None:
-    for left in data.glob(f"{_WORK}*"):
-        if left != but:
-            shutil.rmtree(left, ignore_errors=True)
 
 
 def _check_room(folder: Path, source: str) -> None:

@@ -256,7 +256,15 @@ def _write(
         else:
             connection.execute(table.delete())
         if some:
-            connection.execute(table.insert(), some)
+            connection.execute(table.insert(), [_storable(row) for row in some])
+
+
+def _storable(row: dict[str, Any]) -> dict[str, Any]:
+    """A row without NUL in its texts, of which Postgres holds none. The event has it."""
+    return {
+        name: value.replace("\0", "\ufffd") if isinstance(value, str) else value
+        for name, value in row.items()
+    }
 
 
 def _run_of(stream: str) -> str | None:

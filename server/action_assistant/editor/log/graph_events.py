@@ -4,9 +4,10 @@ The stream `graph/ID` holds the document and nothing else, so that its `seq` cou
 document. Everything else about a graph is in `about/ID`; names of people are in `people`.
 """
 
+import re
 from collections.abc import Sequence
 from datetime import datetime
-from typing import Annotated, Any, Final, Literal, TypeAlias
+from typing import Annotated, Any, Final, Literal, TypeAlias, TypeVar
 
 import msgspec
 from sqlalchemy import Executable, delete, insert, update
@@ -17,6 +18,8 @@ from action_assistant.editor.log.document_events import when as when
 from action_assistant.journal.events import Draft, Event
 from action_assistant.schema import editor_tables
 from action_assistant.web.auth.roles import Role
+
+T = TypeVar("T")
 
 CREATED: Final = "graph.created.v1"
 IMPORTED: Final = "graph.imported.v1"  # the body is the file as it came
@@ -226,6 +229,18 @@ def draft(kind: str, author: str, body: msgspec.Struct | None = None) -> Draft:
     return Draft(kind, author, msgspec.json.encode(body) if body is not None else b"")
 
 
+#: A NUL as JSON has it, after whole pairs of backslashes.
+_NUL: Final = re.compile(rb"(?<!\\)((?:\\\\)*)\\u0000")
+
+
+def _read(event: Event, kind: type[T]) -> T:
+    """What an event says, as tables can hold it: Postgres has no NUL in a text. The event keeps it."""
+    body = event.body
+    if b"\\u0000" in body:
+        body = _NUL.sub(rb"\1\\ufffd", body)
+    return msgspec.json.decode(body, type=kind)
+
+
 def fold(event: Event) -> Sequence[Executable]:
     """What an event means for the tables."""
     if event.kind in {UPDATED, DEFERRED}:
@@ -234,7 +249,7 @@ def fold(event: Event) -> Sequence[Executable]:
     if stream == "about":
         return _about(event, name)
     if event.kind == NAMED:
-        named = msgspec.json.decode(event.body, type=PersonNamed)
+        named = _read(event, PersonNamed)
         row = {"id": event.author, "name": named.name, "seen_at": event.at}
         return [
             delete(editor_tables.person).where(editor_tables.person.c.id == event.author),
@@ -248,7 +263,7 @@ def fold(event: Event) -> Sequence[Executable]:
 def _invitation(event: Event) -> Sequence[Executable]:
     match event.kind:
         case "invitation.made.v1":
-            made = msgspec.json.decode(event.body, type=MadeInvitation)
+            made = _read(event, MadeInvitation)
             row: dict[str, Any] = {
                 "id": made.id,
                 "role": made.role,
@@ -258,7 +273,7 @@ def _invitation(event: Event) -> Sequence[Executable]:
             }
             return [insert(editor_tables.invitation).values(row)]
         case "invitation.accepted.v1":
-            came = msgspec.json.decode(event.body, type=AcceptedInvitation)
+            came = _read(event, AcceptedInvitation)
             row = {
                 "invitation": came.id,
                 "person": event.author,
@@ -274,7 +289,7 @@ def _invitation(event: Event) -> Sequence[Executable]:
                 insert(editor_tables.guest).values(row),
             ]
         case "invitation.revoked.v1":
-            gone = msgspec.json.decode(event.body, type=RevokedInvitation)
+            gone = _read(event, RevokedInvitation)
             this = update(editor_tables.invitation).where(editor_tables.invitation.c.id == gone.id)
             return [this.values(revoked_at=event.at, revoked_by=event.author)]
         case _:
@@ -285,7 +300,7 @@ def _about(event: Event, graph: str) -> Sequence[Executable]:
     this = update(editor_tables.graph).where(editor_tables.graph.c.id == graph)
     match event.kind:
         case "graph.created.v1":
-            created = msgspec.json.decode(event.body, type=GraphCreated)
+            created = _read(event, GraphCreated)
             row: dict[str, Any] = {
                 "id": graph,
                 "name": created.name,
@@ -296,15 +311,15 @@ def _about(event: Event, graph: str) -> Sequence[Executable]:
             }
             return [insert(editor_tables.graph).values(row)]
         case "graph.described.v1":
-            now = msgspec.json.decode(event.body, type=GraphDescribed)
+            now = _read(event, GraphDescribed)
             return [this.values(name=now.name, description=now.description)]
         case "graph.drafted.v1":
-            drafted = msgspec.json.decode(event.body, type=GraphDrafted)
+            drafted = _read(event, GraphDrafted)
             base: dict[str, Any] = {"base_graph": drafted.origin, "base_seq": drafted.seq}
             of = {"draft_of": drafted.origin, "draft_name": drafted.name}
             return [this.values(**of, **base, drafted_seq=drafted.seq)]
         case "graph.merged.v1":
-            return _merged(msgspec.json.decode(event.body, type=GraphMerged))
+            return _merged(_read(event, GraphMerged))
         case "graph.deleted.v1":
             return [this.values(deleted_at=event.at)]
         case "graph.recovered.v1":
@@ -325,7 +340,7 @@ def _merged(merged: GraphMerged) -> Sequence[Executable]:
 
 
 def _version(event: Event, graph: str) -> dict[str, Any]:
-    version = msgspec.json.decode(event.body, type=VersionPublished)
+    version = _read(event, VersionPublished)
     return {
         "id": version.id,
         "graph": graph,

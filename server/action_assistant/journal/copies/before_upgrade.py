@@ -29,7 +29,7 @@ from action_assistant.schema.branches import VERSIONS
 log: Final = logging.getLogger(__name__)
 
 FOLDER: Final = "before-upgrade"
-_KEPT: Final = 3  # of each journal
+_KEPT: Final = 3  # of each journal, and so many revisions
 _ROOM: Final = 64 << 20  # bytes that have to be left on the disk
 _PAGES: Final = 5_000  # copied between two words about it
 _ROWS: Final = 64  # in memory: an event has up to a MiB
@@ -76,7 +76,7 @@ def keep_copy(folder: Path, connection: Connection, branch: Branch, revision: st
         make_folder(folder)
         target = _free(folder, revision)
         events = _written(target, connection, branch, revision)
-        for old in [each for each in copies_in(folder) if each.branch == branch][_KEPT:]:
+        for old in _superfluous([each for each in copies_in(folder) if each.branch == branch]):
             old.path.unlink(missing_ok=True)
     except (OSError, sqlite3.Error) as error:
         why = error.strerror if isinstance(error, OSError) else str(error)
@@ -93,6 +93,16 @@ def keep_copy(folder: Path, connection: Connection, branch: Branch, revision: st
         time.monotonic() - begun,
     )
     return target
+
+
+def _superfluous(copies: list[UpgradeCopy]) -> list[UpgradeCopy]:
+    """All but the newest few, and the newest of each of the last few revisions: an upgrade that fails
+    at each start must not take away what was before."""
+    newest: dict[str, UpgradeCopy] = {}
+    for each in copies:
+        newest.setdefault(each.revision, each)
+    stays = {*copies[:_KEPT], *list(newest.values())[:_KEPT]}
+    return [each for each in copies if each not in stays]
 
 
 def _written(target: Path, connection: Connection, branch: Branch, revision: str) -> int:

@@ -1,0 +1,92 @@
+"""Several at once: nobody sweeps away what another one works in."""
+
+import signal
+import subprocess
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from action_assistant.commands.backups.data_folder import sweep, workshop
+from action_assistant.journal.databases import database_of, migrate
+from support.product import COMMAND
+from support.rows import write_events
+
+
+def command(*arguments: "str | Path") -> "subprocess.CompletedProcess[str]":
+    return subprocess.run(
+        [*COMMAND, *map(str, arguments)], capture_output=True, text=True, check=False, timeout=60
+    )
+
+
+def held_up(seen: Callable[[], Any], *arguments: "str | Path") -> "subprocess.Popen[str]":
+    """A command that stands still as soon as something is there."""
+    process = subprocess.Popen(
+        [*COMMAND, *map(str, arguments)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    while not seen():
+        assert process.poll() is None
+        time.sleep(0.002)
+    process.send_signal(signal.SIGSTOP)
+    return process
+
+
+def goes_on(process: "subprocess.Popen[str]") -> tuple[int, str]:
+    process.send_signal(signal.SIGCONT)
+    told = "".join(process.communicate(timeout=60))
+    return process.returncode, told
+
+
+@pytest.fixture
+def data(tmp_path: Path) -> Path:
+    folder = tmp_path / "data"
+    folder.mkdir()
+    url = f"sqlite:///{folder / 'editor.db'}"
+    migrate(url, "editor")
+    database_of(url).migrate(lambda c: write_events(c, each=1_500))
+    return folder
+
+
+def test_a_regular_backup_leaves_alone_one_that_is_just_being_made_there(
+    data: Path, tmp_path: Path
+) -> None:
+    into = tmp_path / "into"
+    into.mkdir()
+    by_hand = held_up(
+        lambda: list(into.glob(".backup-*/editor.db")), "backup", into / "m.zip", "--data", data
+    )
+    assert command("backup", "--into", into, "--data", data).returncode == 0
+    code, told = goes_on(by_hand)
+    assert code == 0, told
+    assert not list(into.glob(".backup-*"))
+
+
+def test_two_rehearsals_see_all_that_is_in_the_backup(data: Path, tmp_path: Path) -> None:
+    file = tmp_path / "m.zip"
+    assert command("backup", file, "--data", data).returncode == 0
+    rehearse = "restore", "--rehearse", file, "--data", data
+    first = held_up(lambda: list(data.glob(".rehearsal-*/editor.db")), *rehearse)
+    other = command(*rehearse)
+    assert "editor: 4500 events" in other.stdout
+    code, told = goes_on(first)
+    assert (code, "editor: 4500 events" in told) == (0, True), told
+
+
+def test_what_is_left_of_one_that_was_killed_goes(tmp_path: Path) -> None:
+    left = tmp_path / ".work-left"
+    left.mkdir()
+    (left / "editor.db").write_bytes(b"")
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    (tmp_path / ".work-link").symlink_to(elsewhere)
+    with workshop(tmp_path, ".work-") as folder:
+        sweep(tmp_path, ".work-")
+        assert folder.is_dir()
+        assert not left.exists()
+    assert sorted(each.name for each in tmp_path.iterdir()) == [".work-link", "elsewhere"]
+    assert list(elsewhere.iterdir()) == []
