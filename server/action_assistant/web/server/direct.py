@@ -32,7 +32,7 @@ _CONTINUED, _BINARY = (
 _KINDS: Final = frozenset({_CONTINUED, 1, _BINARY, 8, 9, 10})
 _PING: Final = 0x89  # the first byte of a whole one
 _WRITTEN_AT_ONCE: Final = 1 << 16  # bytes; more is written message by message
-_IN_A_TURN: Final = 64  # frames of one socket that are dealt with before others have their turn
+_IN_A_TURN: Final = 16  # frames of one socket that are dealt with before others have their turn
 _PIECES: Final = 10_000  # of one message; empty ones would not end at the limit of its bytes
 _TOO_BIG: Final = 1009
 
