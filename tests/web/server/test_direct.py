@@ -244,6 +244,25 @@ def test_it_hears_says_and_ends_as_the_usual_way_does(
         assert asyncio.run(usually(pieces, DirectSocket)) == usual
 
 
+async def test_an_upgrade_that_is_refused_is_no_error_of_ours(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    async def app(_: Any, receive: Any, send: Any) -> None:
+        await receive()
+        await send({"type": "websocket.http.response.start", "status": 401, "headers": []})
+        await send({"type": "websocket.http.response.body", "body": b"no"})
+
+    config = uvicorn.Config(app, log_config=None)
+    config.load()
+    protocol, wire = DirectSocket(config, ServerState(), {}), Wire()
+    protocol.connection_made(wire)
+    protocol.data_received(REQUEST)
+    await asyncio.gather(*protocol.tasks)
+    assert wire.written.startswith(b"HTTP/1.1 401 ")
+    assert wire.is_closing()
+    assert [each for each in caplog.records if each.levelno > logging.INFO] == []
+
+
 async def flooded(stream: bytes) -> tuple[Any, Wire]:
     """A socket that nobody has taken over, to which all of this has come at once."""
 

@@ -13,7 +13,7 @@ wait: a client could send hundreds of thousands at once, for which everybody wai
 from collections.abc import Mapping, MutableMapping
 from typing import Any, Final, Protocol
 
-from uvicorn._types import ASGIReceiveEvent
+from uvicorn._types import ASGIReceiveEvent, ASGISendEvent
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 try:
@@ -90,6 +90,12 @@ class DirectSocket(WebSocketsSansIOProtocol):
         if self._waits:
             self._pause_reading()  # the usual way goes on when all was fetched
         return event
+
+    async def send(self, message: ASGISendEvent) -> None:
+        """What an application says that takes nothing over."""
+        await super().send(message)
+        if message["type"] == "websocket.http.response.body" and self.close_sent:
+            self.handshake_complete = True  # refused: not the error that the usual way calls it
 
     # --- for whoever takes it over ------------------------------------------------------------
 
