@@ -8,6 +8,7 @@ pressed (default 20), `TEST_HOSTILE_SILENT` how many strangers say nothing (defa
 """
 
 import os
+import socket
 import subprocess
 import sys
 import threading
@@ -22,6 +23,7 @@ from typing import Any
 import httpx
 import psutil
 import pytest
+from websockets.sync.client import connect
 
 from action_assistant.web.auth.keys import Keys
 from runner.harness import order, sequence
@@ -210,6 +212,39 @@ def test_stop_is_taken_whatever_everybody_does(runner: RunnerProcess) -> None:
         assert p99 < 0.05
         assert longest < 0.15
     all_stopped(runner, runs)
+
+
+@pytest.mark.parametrize("first", [0x89, 0x8A, 0x81], ids=["pings", "pongs", "texts"])
+def test_stop_is_taken_while_a_socket_is_flooded(runner: RunnerProcess, first: int) -> None:
+    flood = b"".join([bytes((first, 0x80)), bytes(4)]) * 40_000
+    taken = 0
+    over = threading.Event()
+    headers = {"authorization": f"Bearer {TOKEN}"}
+    with connect(f"ws://127.0.0.1:{runner.port}/api/live", additional_headers=headers) as page:
+        raw = page.socket.dup()
+
+        def push() -> None:
+            nonlocal taken
+            with suppress(OSError):  # whoever says too much may be sent away
+                while not over.is_set():
+                    taken += raw.send(flood[taken % 6 :])
+
+        pusher = threading.Thread(target=push)
+        pusher.start()
+        try:
+            with runner.client() as client:
+                client.timeout = httpx.Timeout(120)
+                for number in range(10):
+                    answer = client.post("/api/stop", json={"stop_id": f"f{first}-{number}"})
+                    assert answer.status_code == 202
+        finally:
+            over.set()
+            with suppress(OSError):
+                raw.shutdown(socket.SHUT_RDWR)
+            pusher.join()
+            raw.close()
+    # What the kernel keeps, and what was dealt with before ten Stops.
+    assert taken < 20_000_000
 
 
 def _workers(runner: RunnerProcess) -> list[psutil.Process]:

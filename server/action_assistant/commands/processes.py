@@ -323,5 +323,6 @@ def _runner(options: argparse.Namespace) -> int:
         port=chosen.port,
         proxies=chosen.reached.proxies,
         identity=_identity(chosen, chosen.page_port),
+        direct=settings.direct_sockets(),  # for the turns of its sockets: nobody takes one over
     )
     return 0

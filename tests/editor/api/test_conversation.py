@@ -9,8 +9,10 @@ import pytest
 from pycrdt import Doc, Map
 
 from action_assistant.editor.crdt import messages as wire
+from action_assistant.web.auth.keys import Keys
 from editor.api.test_sockets import acks, closed, eventually, masked, things, upgraded
 from editor.process import Editor, running
+from support.product import TOKEN
 
 
 @pytest.fixture(scope="module", params=["direct", "asgi"])
@@ -46,6 +48,14 @@ async def test_stock_clients_converge(either: Editor) -> None:
     async with either.joined(graph, one), either.joined(graph, two):
         one.get("meta", type=Map)["name"] = "renamed"
         await eventually(lambda: things(one) == things(two) and things(two)["name"] == "renamed")
+
+
+async def test_whoever_only_looks_hears_at_once_which_history_this_is(either: Editor) -> None:
+    keys = Keys(TOKEN)
+    cookie = f"aa_{either.port}={keys.sealed(keys.new_session('Eve', role='viewer'))}"
+    who = {"cookie": cookie, "origin": either.url}
+    async with either.socket(new_graph(either), "?acks=1", **who) as session:
+        assert (await session.receive_bytes(4))[0] == wire.EPOCH  # the first beat comes after ten
 
 
 async def test_a_burst_is_taken_whole_and_in_order(either: Editor) -> None:

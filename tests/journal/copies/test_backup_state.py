@@ -25,8 +25,11 @@ def test_nothing_is_known_of_a_folder_without_backups(tmp_path: Path) -> None:
     assert backup_state(tmp_path) == BackupState()
 
 
-def test_what_cannot_be_read_is_not_the_same_as_nothing(tmp_path: Path) -> None:
-    (tmp_path / known.FILE).write_text("{")
+@pytest.mark.parametrize(
+    "text", [b"{", b'{"failed":{"at":1,"why":"\xff"}}', b'{"x":' + b"[" * 99_999]
+)
+def test_what_cannot_be_read_is_not_the_same_as_nothing(tmp_path: Path, text: bytes) -> None:
+    (tmp_path / known.FILE).write_bytes(text)
     assert backup_state(tmp_path) is None
     known.made(tmp_path, MONDAY)
     assert backup_state(tmp_path) == BackupState(last=MONDAY)

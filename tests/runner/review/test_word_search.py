@@ -1,7 +1,8 @@
 """A search by the index of words finds what reading through all runs would."""
 
+import sqlite3
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -165,4 +166,24 @@ async def test_runs_of_earlier_versions_are_found_before_and_after_their_words_a
     assert not await journal.query(select(unindexed_run))
     assert await words_of(journal) == before
     assert await found(journal, "chair") == ["r2"]
+    await journal.close()
+
+
+async def test_a_damaged_row_ends_the_looking_for_words_and_nothing_else(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    journal = await opened(tmp_path)
+    await add_run(journal, "r1", 1, 12, ended_at=3 * DAY_US)
+    await journal.close()
+    url = f"sqlite:///{tmp_path / 'runner.db'}"
+    database_of(url).migrate(
+        lambda connection: command.downgrade(config_for(connection, "runner"), "runner_0005")
+    )
+    with closing(sqlite3.connect(tmp_path / "runner.db")) as database, database:
+        database.execute("UPDATE run SET graph_name = x'00'")
+    journal = await opened(tmp_path)
+    await index_words(journal)
+    assert "until the next start" in caplog.text
+    assert len(await journal.query(select(unindexed_run))) == 1
+    assert await journal.health() is None
     await journal.close()

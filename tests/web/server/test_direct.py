@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from uvicorn.server import ServerState
 
+from action_assistant.web.server import direct
 from action_assistant.web.server.direct import DirectSocket, direct_socket, framed
 from support.doses import examples
 
@@ -68,10 +69,9 @@ class Ears:
             self._socket.pause_hearing()
 
     def go_on(self) -> None:
-        """The pause is over, and each that it leads to."""
-        while self.wants_a_pause:
-            self.wants_a_pause = False
-            self._socket.resume_hearing()
+        """The pause is over."""
+        self.wants_a_pause = False
+        self._socket.resume_hearing()
 
     def may_write(self) -> None:
         """Nothing waits."""
@@ -100,9 +100,19 @@ def said(message: Any) -> bytes | None:
     return found
 
 
-async def usually(stream: bytes) -> tuple[list[bytes | None], bytes, bool, bool]:
-    """What is heard by ASGI, what is answered, whether the client is gone, and the connection over.
-    Byte by byte: what is wrong costs all that came in one piece with it."""
+async def turns(protocol: Any, most: int = 10_000) -> int:
+    """Let the loop go round until everything that came was dealt with; how many turns that took."""
+    for turn in range(most):
+        if not getattr(protocol, "_waits", False):
+            return turn
+        await asyncio.sleep(0)
+    raise AssertionError("it never ends")
+
+
+async def usually(
+    pieces: list[bytes], kind: type[Any] = WebSocketsSansIOProtocol
+) -> tuple[list[bytes | None], bytes, bool, bool]:
+    """What is heard by ASGI, what is answered, whether the client is gone, and the connection over."""
     heard: list[bytes | None] = []
     gone: list[bool] = []
 
@@ -114,10 +124,11 @@ async def usually(stream: bytes) -> tuple[list[bytes | None], bytes, bool, bool]
         gone.append(True)
         await asyncio.Event().wait()
 
-    protocol, wire = await opened(WebSocketsSansIOProtocol, app)
-    for n in range(len(stream)):
+    protocol, wire = await opened(kind, app)
+    for piece in pieces:
         if not wire.is_closing():
-            protocol.data_received(stream[n : n + 1])
+            protocol.data_received(piece)
+        await turns(protocol)
     for _ in range(30):
         await asyncio.sleep(0)
     end(protocol)
@@ -150,8 +161,11 @@ async def directly(
                 await asyncio.sleep(0)
         if piece and not wire.is_closing():
             protocol.data_received(piece)
+        await turns(protocol)
         for ears in taken:
-            ears.go_on()
+            while ears.wants_a_pause:
+                ears.go_on()
+                await turns(protocol)
     (ears,) = taken
     end(protocol)
     return ears.heard_so_far, wire.written, ears.is_gone, wire.is_closing()
@@ -198,6 +212,11 @@ rare = st.builds(
 streams = st.lists(honest | honest | rare, min_size=1, max_size=8).map(b"".join)
 
 
+def bytes_of(stream: bytes) -> list[bytes]:
+    """One by one: the usual way loses, with what is wrong, all that came in one piece with it."""
+    return [stream[n : n + 1] for n in range(len(stream))]
+
+
 def pieces_of(stream: bytes, cuts: list[int]) -> list[bytes]:
     """The stream as it arrives."""
     places = sorted({0, len(stream), *(cut % (len(stream) + 1) for cut in cuts)})
@@ -210,14 +229,88 @@ def pieces_of(stream: bytes, cuts: list[int]) -> list[bytes]:
     st.lists(st.integers(0, 4000), max_size=6),
     st.integers(0, 3),
     st.frozensets(st.integers(1, 6), max_size=3),
+    st.sampled_from([1, 2, 64]),
 )
 def test_it_hears_says_and_ends_as_the_usual_way_does(
-    stream: bytes, cuts: list[int], before: int, stops: frozenset[int]
+    stream: bytes, cuts: list[int], before: int, stops: frozenset[int], in_a_turn: int
 ) -> None:
     pieces = pieces_of(stream, cuts)
-    usual = asyncio.run(usually(stream))
+    usual = asyncio.run(usually(bytes_of(stream)))
     before = min(before, len(pieces))
-    assert asyncio.run(directly(pieces, before=before, stops=stops)) == usual
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(direct, "_IN_A_TURN", in_a_turn)
+        assert asyncio.run(directly(pieces, before=before, stops=stops)) == usual
+        # Where nobody takes it over, too.
+        assert asyncio.run(usually(pieces, DirectSocket)) == usual
+
+
+async def test_an_upgrade_that_is_refused_is_no_error_of_ours(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    async def app(_: Any, receive: Any, send: Any) -> None:
+        await receive()
+        await send({"type": "websocket.http.response.start", "status": 401, "headers": []})
+        await send({"type": "websocket.http.response.body", "body": b"no"})
+
+    config = uvicorn.Config(app, log_config=None)
+    config.load()
+    protocol, wire = DirectSocket(config, ServerState(), {}), Wire()
+    protocol.connection_made(wire)
+    protocol.data_received(REQUEST)
+    await asyncio.gather(*protocol.tasks)
+    assert wire.written.startswith(b"HTTP/1.1 401 ")
+    assert wire.is_closing()
+    assert [each for each in caplog.records if each.levelno > logging.INFO] == []
+
+
+async def flooded(stream: bytes) -> tuple[Any, Wire]:
+    """A socket that nobody has taken over, to which all of this has come at once."""
+
+    async def app(_: Any, receive: Any, send: Any) -> None:
+        await receive()
+        await send({"type": "websocket.accept"})
+        while (await receive())["type"] == "websocket.receive":
+            pass
+        await asyncio.Event().wait()
+
+    protocol, wire = await opened(DirectSocket, app)
+    if stream:
+        protocol.data_received(stream)
+    return protocol, wire
+
+
+@pytest.mark.parametrize("first", [0x82, 0x81, 0x89])
+async def test_others_have_their_turn_while_a_client_floods(first: int) -> None:
+    protocol, wire = await flooded(frame(first, b"x", b"mask") * 6_400)
+    assert not wire.is_read
+    assert await turns(protocol) >= 99
+    await asyncio.sleep(0)
+    assert wire.is_read
+    assert wire.written == (b"\x8a\x01x" * 6_400 if first == 0x89 else b"")
+    end(protocol)
+
+
+async def test_pings_of_who_reads_nothing_do_not_pile_up() -> None:
+    protocol, wire = await flooded(b"")
+    protocol.pause_writing()
+    protocol.data_received(b"".join(frame(0x89, bytes([n]), b"mask") for n in range(200)))
+    await turns(protocol)
+    assert (wire.written, wire.is_read) == (b"", True)
+    protocol.resume_writing()
+    assert wire.written == b"\x8a\x01\xc7"
+    end(protocol)
+
+
+async def test_a_message_of_pieces_without_end_is_refused() -> None:
+    begun, piece = frame(0x02, b"", b"mask"), frame(0x00, b"", b"mask")
+    protocol, wire = await flooded(begun + piece * 9_000)
+    await turns(protocol)
+    assert not wire.is_closing()
+    protocol.data_received(piece * 2_000)
+    await turns(protocol)
+    assert wire.is_closing()
+    assert wire.written[2:4] == (1009).to_bytes(2, "big")
+    end(protocol)
 
 
 def test_every_byte_by_itself_makes_no_difference() -> None:
@@ -234,7 +327,7 @@ def test_every_byte_by_itself_makes_no_difference() -> None:
     )
     whole = asyncio.run(directly([stream]))
     assert whole[0] == [b"x" * 200, b"in pieces", b""]
-    assert asyncio.run(directly([stream[n : n + 1] for n in range(len(stream))])) == whole
+    assert asyncio.run(directly(bytes_of(stream))) == whole
 
 
 def test_pieces_beyond_the_limit_are_refused_by_the_head_of_the_last() -> None:

@@ -83,6 +83,7 @@ class _Directly:
         self._pause: asyncio.Task[None] | None = None
         self._failure: Exception | None = None
         talk.member.on_news = self._soon
+        self._soon()  # something may wait already
 
     def heard(self, message: bytes | None) -> None:
         """A message has come; None for text."""

@@ -117,7 +117,7 @@ class LogTail:
 
     async def _check_end(self) -> None:
         newest = await self._journal.newest(self._stream)
-        if self._upto is None and newest > self.seq:
+        if (newest if self._upto is None else min(newest, self._upto)) > self.seq:
             # Not what was added since we looked: that comes with the next look.
             if await self._ask(self.seq, 1):
                 return

@@ -98,7 +98,7 @@ def backup_state(data: Path) -> BackupState | None:
         return msgspec.json.decode((data / FILE).read_bytes(), type=BackupState)
     except FileNotFoundError:
         return BackupState()
-    except (OSError, msgspec.DecodeError):
+    except (OSError, ValueError, RecursionError):  # no JSON, no text, or too deep
         return None
 
 

@@ -27,7 +27,7 @@ class Deriving(Protocol):
 
 
 async def index_words(journal: Deriving) -> None:
-    """Until the words of all runs are in the index."""
+    """Until the words of all runs are in the index. Raises nothing: the process goes on without."""
     while True:
         try:
             if not await journal.derive(partial(index_some, most=_AT_ONCE)):
@@ -35,4 +35,7 @@ async def index_words(journal: Deriving) -> None:
         except Refused as refused:
             log.warning("the words of runs cannot be stored now: %s", refused.detail)
             await anyio.sleep(_PATIENCE_S)
+        except Exception:  # such as a damaged row; a search reads what is not in the index
+            log.exception("the words of earlier runs are not looked for until the next start")
+            return
         await anyio.sleep(_BREATH_S)

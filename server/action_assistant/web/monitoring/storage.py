@@ -37,7 +37,7 @@ class Storage(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class StorageWatch:
-    """Looks again and again. `folders` by what people call them; they are counted `run_in_worker`. With
+    """Looks again and again, whatever goes wrong. `folders` by what people call them; they are counted `run_in_worker`. With
     `backups` also at what is known of these; None while that cannot be read."""
 
     def __init__(
@@ -63,7 +63,11 @@ class StorageWatch:
         async with anyio.create_task_group() as tasks:
             tasks.start_soon(self._watch_folders)
             while True:
-                await self.look()
+                try:
+                    await self.look()
+                except Exception:  # whoever only watches must not end a process
+                    self.found = None
+                    log.exception("storage was not looked at")
                 await anyio.sleep(_LOOK_S)
 
     async def look(self) -> None:
@@ -72,6 +76,7 @@ class StorageWatch:
             disk = await to_thread.run_sync(shutil.disk_usage, self._data, abandon_on_cancel=True)
         except OSError as error:
             log.warning("the disk of %s cannot be looked at: %s", self._data, error.strerror)
+            self.found = None  # what was once so is not what is
             return
         if self._reads_backups:
             self.backups = await to_thread.run_sync(backup_state, self._data)
@@ -96,6 +101,8 @@ class StorageWatch:
                 self._counted = await self._run_in_worker(bytes_below, dict(self._folders))
             except Refused as error:
                 log.warning("folders were not counted: %s", error.detail)
+            except Exception:
+                log.exception("folders were not counted")
             await anyio.sleep(_FOLDERS_S)
 
     def families(self) -> Iterator[Family]:

@@ -5,11 +5,15 @@ everything that is wrong or rare are its own, and that of `websockets` below it.
 cut into frames. A whole binary message is unmasked and handed over; every other frame goes the usual
 way, whole, so that the usual parser always stands at the beginning of one. An application that takes
 nothing over sees no difference.
+
+Of each socket a few frames are dealt with in a turn of the loop, and pings of those who read nothing
+wait: a client could send hundreds of thousands at once, for which everybody waited, also for a Stop.
 """
 
 from collections.abc import Mapping, MutableMapping
 from typing import Any, Final, Protocol
 
+from uvicorn._types import ASGIReceiveEvent, ASGISendEvent
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 try:
@@ -26,7 +30,11 @@ _CONTINUED, _BINARY = (
     2,
 )  # kinds of frames: a second one of a message and those after it, a first one
 _KINDS: Final = frozenset({_CONTINUED, 1, _BINARY, 8, 9, 10})
+_PING: Final = 0x89  # the first byte of a whole one
 _WRITTEN_AT_ONCE: Final = 1 << 16  # bytes; more is written message by message
+_IN_A_TURN: Final = 16  # frames of one socket that are dealt with before others have their turn
+_PIECES: Final = 10_000  # of one message; empty ones would not end at the limit of its bytes
+_TOO_BIG: Final = 1009
 
 
 class Taker(Protocol):
@@ -64,7 +72,10 @@ class DirectSocket(WebSocketsSansIOProtocol):
         self._rest = bytearray()  # of a frame that is not complete, or not to be read yet
         #: Bytes of a message of several frames that has begun; None where none has.
         self._in_pieces: int | None = None
+        self._pieces = 0  # of that message
         self._is_held = False  # its taker wants to hear nothing now
+        self._waits = False  # until others had their turn
+        self._late_ping: bytes | None = None  # the newest, of who reads nothing
         self._limit: Final = self.config.ws_max_size
 
     async def run_asgi(self) -> None:
@@ -72,6 +83,19 @@ class DirectSocket(WebSocketsSansIOProtocol):
         extensions: MutableMapping[str, dict[object, object]] = self.scope["extensions"]
         extensions[_EXTENSION] = {"socket": self}
         await super().run_asgi()
+
+    async def receive(self) -> ASGIReceiveEvent:
+        """What an application is told that takes nothing over."""
+        event = await super().receive()
+        if self._waits:
+            self._pause_reading()  # the usual way goes on when all was fetched
+        return event
+
+    async def send(self, message: ASGISendEvent) -> None:
+        """What an application says that takes nothing over."""
+        await super().send(message)
+        if message["type"] == "websocket.http.response.body" and self.close_sent:
+            self.handshake_complete = True  # refused: not the error that the usual way calls it
 
     # --- for whoever takes it over ------------------------------------------------------------
 
@@ -88,9 +112,7 @@ class DirectSocket(WebSocketsSansIOProtocol):
     def pause_hearing(self) -> None:
         """Read nothing more, so that whoever sends has to wait."""
         self._is_held = True
-        if not self.read_paused and not self.transport.is_closing():
-            self.read_paused = True
-            self.transport.pause_reading()
+        self._pause_reading()
 
     def resume_hearing(self) -> None:
         """Go on, beginning with what has come already."""
@@ -134,11 +156,16 @@ class DirectSocket(WebSocketsSansIOProtocol):
                 self._tell(apply_mask(data[6:], data[2:6]))  # nearly always: one short message
                 return
         self._rest += data
+        if self._waits:
+            self._pause_reading()
         self._cut()
 
     def resume_writing(self) -> None:
         """There is room again."""
         super().resume_writing()
+        ping, self._late_ping = self._late_ping, None
+        if ping is not None and not self.transport.is_closing():
+            super().data_received(ping)
         if self._taker is not None:
             self._taker.may_write()
 
@@ -162,16 +189,28 @@ class DirectSocket(WebSocketsSansIOProtocol):
         self._cut()
 
     def _cut(self) -> None:
-        """Deal with every frame that is complete, unless nobody wants to hear."""
-        while not self._is_held and not self.transport.is_closing():
+        """Deal with frames that are complete, unless nobody wants to hear; then others have a turn."""
+        for _ in range(_IN_A_TURN):
+            if self._is_held or self._waits or self.transport.is_closing():
+                break
             start, end = self._frame()
             if end > len(self._rest):
                 return
             frame = bytes(self._rest[:end])
             del self._rest[:end]  # whoever hears it may have us go on
             self._deal_with(frame, start)
+        else:
+            self._waits = True
+            self._pause_reading()
+            self.loop.call_soon(self._next_turn)
         if self.transport.is_closing():
             self._rest.clear()
+
+    def _next_turn(self) -> None:
+        self._waits = False
+        self._cut()
+        if not self._is_held and self.queue.empty():
+            self._read_on()
 
     def _frame(self) -> tuple[int, int]:
         """Where the payload of the next frame begins, and where it ends: beyond what has come, where
@@ -200,11 +239,20 @@ class DirectSocket(WebSocketsSansIOProtocol):
         if first == _WHOLE_BINARY and start and not usual:
             self._tell(apply_mask(frame[start:], frame[start - 4 : start]))
             return
+        if first == _PING and 0 < start >= len(frame) - 125 and not self.writable.is_set():
+            self._late_ping = frame  # the newest of several may be answered alone (RFC 6455, 5.5.3)
+            return
         kind = first & 0x0F
         if kind <= _BINARY:  # a control frame may come between two pieces
             has_begun = kind != _CONTINUED or self._in_pieces is not None
             so_far = (self._in_pieces or 0) + len(frame) - start
             self._in_pieces = so_far if has_begun and not first & 0x80 else None
+            self._pieces = 0 if self._in_pieces is None else self._pieces + 1
+        if self._pieces > _PIECES:
+            self.conn.fail(_TOO_BIG, "too many pieces")
+            self.handle_parser_exception()
+            self._drain()
+            return
         super().data_received(frame)
         self._drain()
 
@@ -218,8 +266,13 @@ class DirectSocket(WebSocketsSansIOProtocol):
             elif event["type"] == "websocket.disconnect":
                 self._taker.gone()
 
+    def _pause_reading(self) -> None:
+        if not self.read_paused and not self.transport.is_closing():
+            self.read_paused = True
+            self.transport.pause_reading()
+
     def _read_on(self) -> None:
-        if self.read_paused:
+        if self.read_paused and not self._waits:
             self.read_paused = False
             if not self.transport.is_closing():
                 self.transport.resume_reading()

@@ -1,0 +1,53 @@
+"""Room on disks, looked at again and again: what goes wrong there is told, and ends nothing."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import anyio
+import pytest
+
+from action_assistant.web.monitoring import storage
+from action_assistant.web.monitoring.storage import StorageWatch
+
+
+async def until(seen: Callable[[], bool]) -> None:
+    """Wait for it."""
+    for _ in range(2_000):
+        if seen():
+            return
+        await anyio.sleep(0.01)
+    raise AssertionError("it was never so")
+
+
+async def test_whatever_goes_wrong_it_looks_again_and_shows_nothing_old(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(storage, "_LOOK_S", 0.01)
+    monkeypatch.setattr(storage, "_FOLDERS_S", 0.01)
+    fails = False
+    looked = 0
+
+    async def database() -> Mapping[str, int]:
+        nonlocal looked
+        looked += 1
+        if fails:
+            raise LookupError("nobody thought of this")
+        return {"database": 7}
+
+    async def counted(*_: Any) -> Any:
+        raise LookupError("nor of this")
+
+    watch = StorageWatch(tmp_path, database, {"archive": tmp_path}, counted, backups=False)
+    async with anyio.create_task_group() as tasks:
+        tasks.start_soon(watch.run)
+        await until(lambda: watch.found is not None)
+        fails, before = True, looked
+        await until(lambda: looked >= before + 3)
+        assert watch.found is None
+        assert list(watch.families()) == []
+        fails = False
+        await until(lambda: watch.found is not None)
+        tasks.cancel_scope.cancel()
+    assert "nobody thought of this" in caplog.text
+    assert "folders were not counted" in caplog.text
