@@ -9,8 +9,11 @@ from typing import Any
 
 import pytest
 
+from action_assistant.commands.backups import data_folder
 from action_assistant.commands.backups.data_folder import sweep, workshop
+from action_assistant.errors import CannotStart
 from action_assistant.journal.databases import database_of, migrate
+from action_assistant.system import file_locks
 from support.product import COMMAND
 from support.rows import write_events
 
@@ -90,3 +93,19 @@ def test_what_is_left_of_one_that_was_killed_goes(tmp_path: Path) -> None:
         assert not left.exists()
     assert sorted(each.name for each in tmp_path.iterdir()) == [".work-link", "elsewhere"]
     assert list(elsewhere.iterdir()) == []
+
+
+def test_who_begins_where_somebody_is_just_sweeping_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Between the folder and its lock there is a moment: a sweeper that comes then has the lock."""
+    opened = data_folder.opener
+
+    def meanwhile(path: str, flags: int) -> int:
+        held = opened(path, flags)
+        file_locks.take(held)
+        return opened(path, flags)
+
+    monkeypatch.setattr(data_folder, "opener", meanwhile)
+    with pytest.raises(CannotStart, match="tidied up"), workshop(tmp_path, ".work-"):
+        pytest.fail("it works where it is swept away")

@@ -200,7 +200,8 @@ def workshop(parent: Path, prefix: str) -> Iterator[Path]:
         with tempfile.TemporaryDirectory(prefix=prefix, dir=parent) as folder:
             held = opener(str(Path(folder) / _AT_WORK), os.O_RDWR | os.O_CREAT)
             try:
-                file_locks.take(held)
+                if not file_locks.take(held):
+                    raise CannotStart(f"{parent} is just being tidied up. Try it again.")
                 yield Path(folder)
             finally:
                 os.close(held)
@@ -219,8 +220,7 @@ def sweep(parent: Path, prefix: str) -> None:
         except OSError:
             continue  # it has just gone, or is another user's
         try:
-            is_left = file_locks.take(held)
+            if file_locks.take(held):  # kept until all is gone, for whoever is just beginning there
+                shutil.rmtree(left, ignore_errors=True)
         finally:
             os.close(held)
-        if is_left:
-            shutil.rmtree(left, ignore_errors=True)

@@ -127,7 +127,7 @@ def _alone(into: Path) -> Iterator[None]:
 def _free(into: Path) -> Path:
     """A name that no backup has yet, also none of another server."""
     while (target := into / name_at(datetime.now(UTC))).exists():
-        time.sleep(0.1)
+        time.sleep(0.1)  # names tell the second
     return target
 
 
