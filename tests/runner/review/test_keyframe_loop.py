@@ -42,14 +42,14 @@ async def test_they_are_asked_for_at_whole_multiples_and_not_once_a_run_is_over(
     ongoing: Any = Ongoing()
     asked: list[str] = []
 
-    async def wind(run: str) -> None:
+    async def make(run: str) -> None:
         asked.append(run)
         await anyio.sleep(1)
         if len(asked) == 1:
             raise Unavailable("the workers are busy")
 
     async with anyio.create_task_group() as tasks:
-        tasks.start_soon(KeyframeLoop(ongoing, wind).run)
+        tasks.start_soon(KeyframeLoop(ongoing, make).run)
         long, short = Going("long"), Going("short")
         for seq in (1, APART - 1, APART, APART + 1, 2 * APART - 1):
             ongoing.reached(long, seq)

@@ -111,7 +111,7 @@ class KeyframeStore:
         """The keyframes of a run, up to its newest event. Raises NotFound, Unavailable."""
         lock = self._asking.setdefault(run, asyncio.Lock())
         async with lock:
-            found = await self._wound(run)
+            found = await self._up_to_date(run)
         self._asking.pop(run, None)
         return found
 
@@ -142,7 +142,7 @@ class KeyframeStore:
         """Events of one page, those with `seq > after`."""
         return await self._ledger.read(stream_of(run), after=after, limit=APART)
 
-    async def _wound(self, run: str) -> RunKeyframes:
+    async def _up_to_date(self, run: str) -> RunKeyframes:
         stream = stream_of(run)
         newest = await self._ledger.newest(stream)
         if not newest:

@@ -15,7 +15,6 @@ from action_assistant.runner.review.ongoing_runs import OngoingRun, OngoingRuns
 
 log: Final = logging.getLogger(__name__)
 
-
 _PART: Final = 8  # of what there is, which may be left to fold
 
 
@@ -26,13 +25,13 @@ def due_after(kept: int) -> int:
 
 
 class KeyframeLoop:
-    """Goes on until cancelled. `wind` makes and keeps the keyframes of a run; it may be asked of a
+    """Goes on until cancelled. `make` makes and keeps the keyframes of a run; it may be asked of a
     worker."""
 
-    def __init__(self, ongoing: OngoingRuns, wind: Callable[[str], Awaitable[object]]) -> None:
-        self._wind = wind
+    def __init__(self, ongoing: OngoingRuns, make: Callable[[str], Awaitable[object]]) -> None:
+        self._make = make
         self._kept: dict[str, int] = {}  # keyframes of runs that go on
-        self._due: dict[str, int] = {}
+        self._due: set[str] = set()
         self._more = anyio.Event()
         ongoing.watch(self._saw)
 
@@ -40,9 +39,10 @@ class KeyframeLoop:
         run, there = opened.run.id, opened.recorder.seq // APART
         if opened.run.end is not None:  # it will be summed up
             self._kept.pop(run, None)
-            self._due.pop(run, None)
+            self._due.discard(run)
         elif there >= due_after(self._kept.get(run, 0)):
-            self._kept[run] = self._due[run] = there
+            self._kept[run] = there
+            self._due.add(run)
             self._more.set()
 
     async def run(self) -> None:
@@ -51,10 +51,9 @@ class KeyframeLoop:
             await self._more.wait()
             self._more = anyio.Event()
             while self._due:
-                run = next(iter(self._due))
-                del self._due[run]
+                run = self._due.pop()
                 try:
-                    await self._wind(run)
+                    await self._make(run)
                 except Refused as refused:  # the next ones are made with these
                     log.warning("no keyframes of run %s were kept: %s", run, refused.detail)
                 except Exception:  # a cache: what goes on does not end for it

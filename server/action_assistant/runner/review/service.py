@@ -104,7 +104,7 @@ class ReviewService:
         self._run_in_worker = run_in_worker
         self._clock_us = clock_us
         self._sums = SumUpLoop(ledger, control, clock_us, self._summed)
-        self._keyframes = KeyframeLoop(control, self._wind)
+        self._keyframes = KeyframeLoop(control, self._make_keyframes)
 
     async def run(self) -> None:
         """Sum up runs that have ended, those of earlier processes too, and keep keyframes of long ones
@@ -113,14 +113,14 @@ class ReviewService:
             tasks.start_soon(self._sums.run)
             tasks.start_soon(self._keyframes.run)
 
-    async def _wind(self, run_id: str) -> int:
+    async def _make_keyframes(self, run_id: str) -> int:
         return await (
-            self.wound(run_id)
+            self.made_keyframes(run_id)
             if self._asked is None
-            else self._asked.value(ReviewService.wound, run_id)
+            else self._asked.value(ReviewService.made_keyframes, run_id)
         )
 
-    async def wound(self, run_id: str) -> int:
+    async def made_keyframes(self, run_id: str) -> int:
         """The event up to which there are keyframes of a run, now that they are made. Raises NotFound."""
         return (await self.keyframe_store.keyframes(run_id)).keys[-1].seq
 
