@@ -7,7 +7,7 @@ import { join } from "node:path";
 import { expect, type Page, test } from "@playwright/test";
 import { card, saved } from "./canvas";
 import { DOMAIN, NO_ROS, StandIn } from "./emulated-robot";
-import { LONG, type Person, Product } from "./product";
+import { type Person, Product } from "./product";
 import { post, violations } from "./valves";
 
 const SLOWLY = { timeout: 30_000 };
@@ -174,7 +174,6 @@ async function lookedAtDavid(page: Page) {
 }
 
 test("where a robot lacks a graph inside its files are offered, and one graph without any", async () => {
-  test.skip(LONG !== "", LONG);
   test.skip(NO_ROS !== "", NO_ROS);
   const { page } = ada;
   const david = new StandIn("David", packagesOf(["Greet", "Drive", "OpenFingers", "CloseFingers"]));
@@ -228,7 +227,8 @@ test("where the runner has the robot's folder, what it lacks is written there an
       .getByRole("button", { name: `${NAME}, and replace grip.graph.json` })
       .last()
       .press("Enter");
-    await expect(looked.getByRole("status")).toContainText("Waiting until David has indexed it");
+    // Whoever is quick enough has never been waited for.
+    await expect(looked.getByRole("status")).toContainText(/Waiting until David|David has indexed/);
     await expect(looked).toContainText("Written, and David has indexed it.", SLOWLY);
     await expect(looked).toContainText("David has indexed Fetch, Grip as this version has it.");
     expect(await violations(page)).toEqual([]);

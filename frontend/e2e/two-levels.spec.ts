@@ -2,7 +2,7 @@
 
 import { expect, type Page, test } from "@playwright/test";
 import { add, boxOf, card, connect, move, pick, saved, start, tidy } from "./canvas";
-import { LONG, type Person, Product } from "./product";
+import { type Person, Product } from "./product";
 import { violations } from "./valves";
 
 const product = new Product();
@@ -24,7 +24,6 @@ const inner = (page: Page, name: string) => page.locator(`[data-inner][data-name
 const state = (page: Page, name: string) => card(page, name).locator("[data-state]");
 
 test("one draws it and takes a part out, the other goes on inside", async () => {
-  test.skip(LONG !== "", LONG);
   const { page } = ada;
   await page.goto(product.url);
   await page.getByRole("button", { name: "New graph" }).first().click();
