@@ -14,6 +14,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, Final
 
 import psutil
@@ -69,7 +70,7 @@ class Clients:
     def processor(self) -> float:
         """Seconds of processor that the server used, all its threads and children."""
         family = [self.process, *self.process.children(recursive=True)]
-        return sum(sum(each.cpu_times()[:2]) for each in family)
+        return sum(seconds_of(each) for each in family)
 
     def memory(self) -> float:
         """Resident MB of the server."""
@@ -80,6 +81,17 @@ class Clients:
         self.ending = True
         for person in self.people:
             person.transport.abort()
+
+
+def seconds_of(process: psutil.Process) -> float:
+    """Processor time of all threads, to the nanosecond where the kernel tells: what it counts by ticks of
+    10 ms misses much of what wakes for less."""
+    found = Path(f"/proc/{process.pid}/task").glob("*/schedstat")
+    try:
+        exact = sum(int(each.read_text().split()[0]) for each in found) / 1e9
+    except OSError:  # a thread that ended meanwhile
+        exact = 0.0
+    return exact or sum(process.cpu_times()[:2])
 
 
 def edits_of(name: int, count: int, kind: str) -> list[tuple[bytes, bytes]]:

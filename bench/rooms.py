@@ -1,63 +1,100 @@
-"""Rooms under load, against Hocuspocus with SQLite: cost, delay and memory."""
+"""Rooms under load, against Hocuspocus with SQLite, in turn: cost, delay and memory."""
 
 import os
 import statistics
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
 from peers import Hocuspocus, Ours, running
 from table import Table
 
 TITLE = "Rooms: ours at full durability, Hocuspocus with SQLite (which stores seconds later)"
-RUNS: Final = int(os.environ.get("BENCH_RUNS", "3"))  # of each, in turn
-LOADS: Final[dict[str, dict[str, Any]]] = {
+RUNS: Final = int(os.environ.get("BENCH_RUNS", "5"))  # of each, in turn
+Run = dict[str, Any]
+KINDS: Final = (Ours, Hocuspocus)
+#: Rounds in which some do something at the same time, and the next one comes when all has arrived.
+LOCKSTEP: Final[dict[str, dict[str, Any]]] = {
+    "50 people, one graph; 5 edit": {"people": 50, "count": 300, "burst": 5},
+    "100 people, 20 graphs; 10 edit": {"people": 100, "graphs": 20, "count": 200, "burst": 10},
+    "50 people; 15 drag by edits": {"people": 50, "count": 300, "burst": 15, "kind": "drag"},
+    "50 people; 10 by awareness": {"people": 50, "count": 300, "burst": 10, "kind": "presence"},
+}
+#: Everybody at a rate of their own, whatever the server does.
+OPEN: Final[dict[str, dict[str, Any]]] = {
+    "20 people, 5 graphs, 4 edits/s each": {"people": 20, "rate": 4, "graphs": 5},
     "50 people, one graph, 10 edits/s each": {"people": 50, "rate": 10},
     "100 people, 20 graphs, 10 edits/s each": {"people": 100, "rate": 10, "graphs": 20},
     "50 people drag by edits, 30/s each": {"people": 50, "rate": 30, "kind": "drag"},
     "50 people drag by awareness, 20/s each": {"people": 50, "rate": 20, "kind": "presence"},
 }
+#: What one editor can carry.
+MANY: Final[dict[str, dict[str, Any]]] = {
+    "500 people, 100 graphs, 5 edits/s each": {"people": 500, "rate": 5, "graphs": 100},
+    "500 people, 100 graphs, 14 edits/s each": {"people": 500, "rate": 14, "graphs": 100},
+    "2,000 people, 500 graphs, 1 edit/s each": {"people": 2000, "rate": 1, "graphs": 500},
+}
 IDLE: Final = 1000
 
 
 def tables() -> Iterator[Table]:
-    """Loads; then sockets that only stand there."""
-    head = ["load", "server", "CPU per delivered", "CPU", "p50", "p99", "missing", "memory"]
-    rows: list[list[str]] = []
-    for load, plan in LOADS.items():
-        found: dict[str, list[dict[str, Any]]] = {"ours": [], "Hocuspocus": []}
-        for _ in range(RUNS):
-            for kind in (Ours, Hocuspocus):
-                found[kind.name].append(one(kind, **plan))
-        rows += [row(load, name, runs) for name, runs in found.items()]
-    yield Table(head, rows)
+    """Rounds; loads; many people; sockets that only stand there."""
+    head = ["in rounds", "server", "CPU per delivered", "of Hocuspocus's", "p50", "p99", "missing"]
+    yield Table(head, list(_rows("lockstep", LOCKSTEP, RUNS, ("ratio", "p50", "p99", "missing"))))
+    figures = ("ratio", "share", "p50", "p99", "missing", "memory")
+    head = ["load", "server", "CPU per delivered", "of Hocuspocus's", "CPU", "p50", "p99"]
+    head += ["missing", "memory"]
+    yield Table(head, list(_rows("fan out", OPEN, RUNS, figures)))
+    yield Table(head, list(_rows("fan out", MANY, min(RUNS, 3), figures)))
     head = [f"{IDLE:,} idle sockets", "memory", "CPU per connection"]
-    rows = []
-    for kind in (Ours, Hocuspocus):
-        with running(kind) as peer:
-            cost = peer.under("idle", peer.rooms(100), people=IDLE)
-        rows.append([kind.name, f"{cost['memory_mb']:.1f} MB", f"{cost['connect_ms']:.2f} ms"])
-    yield Table(head, rows)
+    found = _in_turn("idle", {"people": IDLE, "graphs": 100}, RUNS)
+    yield Table(
+        head,
+        [
+            [name, f"{_median(runs, 'memory_mb'):.1f} MB", f"{_median(runs, 'connect_ms'):.2f} ms"]
+            for name, runs in found.items()
+        ],
+    )
 
 
-def one(server: type[Ours | Hocuspocus], *, graphs: int = 1, **plan: Any) -> dict[str, Any]:
-    """One run on a fresh server."""
-    with running(server) as peer:
-        return peer.under("fan out", peer.rooms(graphs), **plan)
+def _in_turn(operation: str, plan: dict[str, Any], count: int) -> dict[str, list[Run]]:
+    """Runs of each server, always on a fresh one."""
+    found: dict[str, list[Run]] = {kind.name: [] for kind in KINDS}
+    graphs = plan.get("graphs", 1)
+    rest = {name: value for name, value in plan.items() if name != "graphs"}
+    for _ in range(count):
+        for kind in KINDS:
+            with running(kind) as peer:
+                found[kind.name].append(peer.under(operation, peer.rooms(graphs), **rest))
+    return found
 
 
-def row(load: str, name: str, runs: list[dict[str, Any]]) -> list[str]:
-    """The median of each figure; of what went missing the sum."""
+def _rows(
+    operation: str, loads: dict[str, dict[str, Any]], count: int, figures: Sequence[str]
+) -> Iterator[list[str]]:
+    """The median of each figure; of the ratio of two runs in turn also the least and the most; of what
+    went missing the sum."""
+    for load, plan in loads.items():
+        found = _in_turn(operation, plan, count)
+        ratios = [
+            ours["cpu_us"] / theirs["cpu_us"]
+            for ours, theirs in zip(found[Ours.name], found[Hocuspocus.name], strict=True)
+        ]
+        for name, runs in found.items():
+            ratio = ""
+            if name == Ours.name:
+                least, most = min(ratios), max(ratios)
+                ratio = f"{statistics.median(ratios):.2f} ({least:.2f}–{most:.2f})"
+            told = {
+                "ratio": lambda ratio=ratio: ratio,
+                "share": lambda runs=runs: f"{_median(runs, 'cpu_share') * 100:.0f} %",
+                "p50": lambda runs=runs: f"{_median(runs, 'p50_ms'):.1f} ms",
+                "p99": lambda runs=runs: f"{_median(runs, 'p99_ms'):.1f} ms",
+                "missing": lambda runs=runs: str(sum(run["missing"] for run in runs)),
+                "memory": lambda runs=runs: f"{_median(runs, 'memory_mb'):.0f} MB",
+            }
+            cost = f"{_median(runs, 'cpu_us'):.1f} µs"
+            yield [load, name, cost, *(told[figure]() for figure in figures)]
 
-    def median(figure: str) -> float:
-        return statistics.median(run[figure] for run in runs)
 
-    return [
-        load,
-        name,
-        f"{median('cpu_us'):.1f} µs",
-        f"{median('cpu_share') * 100:.0f} %",
-        f"{median('p50_ms'):.1f} ms",
-        f"{median('p99_ms'):.1f} ms",
-        str(sum(run["missing"] for run in runs)),
-        f"{median('memory_mb'):.0f} MB",
-    ]
+def _median(runs: Sequence[Run], figure: str) -> float:
+    return statistics.median(run[figure] for run in runs)
