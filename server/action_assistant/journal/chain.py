@@ -14,7 +14,7 @@ START: Final = bytes(16)
 _TYPES: Final = (str, int, str, str, int, bytes, int, bytes)
 
 
-class Head(msgspec.Struct, frozen=True):
+class Head(msgspec.Struct, frozen=True, gc=False):
     """The last event of a stream: its `seq`, and the chain up to it (16 bytes)."""
 
     seq: int

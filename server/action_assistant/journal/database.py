@@ -1,13 +1,12 @@
 """What a journal needs of a database: the seam behind which SQLite and Postgres stand."""
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Literal, Protocol, TypeAlias, TypeVar
 
 from sqlalchemy import Connection
 from sqlalchemy.exc import DBAPIError
 
-from action_assistant.journal.chain import Head
 from action_assistant.journal.events import Event
 
 T = TypeVar("T")
@@ -41,8 +40,9 @@ class WriterSession(Protocol):
     def say(self, command: str) -> None:
         """A command without a result: COMMIT, SAVEPOINT …"""
 
-    def store(self, events: Sequence[tuple[Event, bytes]], heads: Mapping[str, Head]) -> None:
-        """Write events with their chain, and the new ends of their streams: all or nothing."""
+    def store(self, events: Sequence[tuple[Event, bytes]]) -> None:
+        """Write events with their chain, and the new ends of their streams: all or nothing. A transaction
+        of its own, which is committed, if none is open."""
 
     def close(self) -> None:
         """Let go, whatever state the connection is in."""

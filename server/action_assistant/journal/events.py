@@ -9,7 +9,7 @@ if TYPE_CHECKING:  # workers read events too, and need no database
     from sqlalchemy import Executable
 
 
-class Event(msgspec.Struct, frozen=True):
+class Event(msgspec.Struct, frozen=True, gc=False):
     """Something that happened. Never changed, never deleted.
 
     `seq` is gapless per stream from 1; `position` orders all streams of one journal. `kind` is past
@@ -26,7 +26,7 @@ class Event(msgspec.Struct, frozen=True):
     position: int
 
 
-class Draft(msgspec.Struct, frozen=True):
+class Draft(msgspec.Struct, frozen=True, gc=False):
     """An event before the journal has given it a place and a time."""
 
     kind: str

@@ -2,11 +2,12 @@
 
 import asyncio
 import contextlib
+import logging
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager
 from functools import partial
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Any, Final, TypeVar, cast
 
 import msgspec
 from sqlalchemy import Connection, delete, insert, select
@@ -33,6 +34,8 @@ from action_assistant.journal.writer import Job, Outcome, Transaction, Writer
 from action_assistant.schema.branches import BRANCHES
 from action_assistant.schema.editor_tables import editor_head, editor_snapshot
 from action_assistant.schema.log_tables import LOG
+
+log: Final = logging.getLogger(__name__)
 
 T = TypeVar("T")
 
@@ -108,6 +111,13 @@ class Journal(JournalReader):
         return await self._write(
             lambda transaction: [transaction.add(addition) for addition in additions]
         )
+
+    def append_then(
+        self, addition: Addition, done: Callable[[int | None, BaseException | None], None]
+    ) -> None:
+        """As `append`, for who does not wait: `done` is called on the loop after COMMIT with the newest
+        seq, or with what `append` would raise. It must not raise. Raises Unavailable if closed."""
+        self._queue(Job(lambda transaction: transaction.add(addition), done))
 
     def follow(self) -> AbstractAsyncContextManager[AsyncIterator[Event]]:
         """What is committed from now on, in order. Memory is bounded: who is slow reads later."""
@@ -235,14 +245,26 @@ class Journal(JournalReader):
         self._database.disown()
 
     async def _write(self, work: Callable[[Transaction], T]) -> T:
-        if self._closed:
-            raise Unavailable("The journal is closed.")
         future: asyncio.Future[T] = self._loop.create_future()
-        if not self._jobs:
-            self._loop.call_soon(self._submit)
-        self._jobs.append(Job(work, future))
+
+        def done(result: T | None, error: BaseException | None) -> None:
+            if future.done():  # whoever waited was cancelled
+                pass
+            elif error is None:
+                future.set_result(cast("T", result))
+            else:
+                future.set_exception(error)
+
+        self._queue(Job(work, done))
         # Whoever waits may be cancelled; the job may not: it is written or it is not.
         return await future
+
+    def _queue(self, job: Job[Any]) -> None:
+        if self._closed:
+            raise Unavailable("The journal is closed.")
+        if not self._jobs:
+            self._loop.call_soon(self._submit)
+        self._jobs.append(job)
 
     def _submit(self) -> None:
         if self._jobs:
@@ -254,12 +276,10 @@ class Journal(JournalReader):
 
     def _tell(self, outcomes: Sequence[tuple[Job[Any], Outcome]]) -> None:
         for job, (result, error, events) in outcomes:
-            if job.future.done():  # whoever waited was cancelled
-                pass
-            elif error is None:
-                job.future.set_result(result)
-            else:
-                job.future.set_exception(error)
+            try:
+                job.done(result, error)
+            except Exception:  # whose outcome it is: all others wait for theirs
+                log.exception("the outcome of a job was not heard")
             for follower in self._followers:
                 follower.hear(events)
 

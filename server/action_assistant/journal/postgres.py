@@ -5,7 +5,7 @@ import hashlib
 import os
 import secrets
 import time
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from typing import Any, Final, TypeVar
 
 import asyncpg  # type: ignore[import-untyped]
@@ -15,7 +15,6 @@ from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine, create_async_en
 from sqlalchemy.util import await_only
 
 from action_assistant.errors import CannotStart
-from action_assistant.journal.chain import Head
 from action_assistant.journal.database import Before, Branch, cause_of, no_copy
 from action_assistant.journal.events import Event
 from action_assistant.journal.migrate import upgrade_to
@@ -101,11 +100,12 @@ class PostgresSession:
         """A command without a result."""
         await_only(self._raw.execute(command))
 
-    def store(self, events: Sequence[tuple[Event, bytes]], heads: Mapping[str, Head]) -> None:
+    def store(self, events: Sequence[tuple[Event, bytes]]) -> None:
         """Write events and ends of streams; a transaction of its own if none is open."""
         columns = [(e.stream, e.seq, e.kind, e.author, e.at, e.body, e.position) for e, _ in events]
         values = [list(column) for column in zip(*columns, strict=True)]
-        ends = [list(heads), [end.seq for end in heads.values()], [e.chain for e in heads.values()]]
+        heads = {event.stream: (event.seq, chain) for event, chain in events}
+        ends = [list(heads), [seq for seq, _ in heads.values()], [end for _, end in heads.values()]]
         await_only(self._raw.execute(_STORE, *values, [chain for _, chain in events], *ends))
 
     def close(self) -> None:

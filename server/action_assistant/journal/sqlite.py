@@ -4,9 +4,10 @@ import asyncio
 import os
 import shutil
 import sqlite3
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
+from functools import lru_cache
 from itertools import chain
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -23,7 +24,7 @@ from sqlalchemy.exc import (
 )
 
 from action_assistant.errors import CannotStart
-from action_assistant.journal.chain import Damage, Head, Inspector
+from action_assistant.journal.chain import Damage, Inspector
 from action_assistant.journal.database import Before, Branch, cause_of, no_copy
 from action_assistant.journal.events import Event
 from action_assistant.journal.lock import own as own
@@ -38,7 +39,14 @@ _WAIT: Final = 5.0  # seconds for a lock that only a foreign process could hold
 _PRAGMAS: Final = ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON")
 _PAGE: Final = 500
 _INSERT: Final = "INSERT INTO event (stream, seq, kind, author, at, body, position, chain) VALUES "
-_END: Final = "INSERT OR REPLACE INTO head (stream, seq, chain) VALUES "
+#: Ends of streams follow their events by themselves. So what is usually stored is one statement, which is
+#: a transaction: the thread that writes has to wait for its turn in Python after each.
+_ENDS: Final = """
+CREATE TEMP TRIGGER ends AFTER INSERT ON main.event BEGIN
+    INSERT INTO head (stream, seq, chain) VALUES (new.stream, new.seq, new.chain)
+    ON CONFLICT (stream) DO UPDATE SET seq = excluded.seq, chain = excluded.chain;
+END
+"""
 _ROWS: Final = 50  # of one statement; for each number of rows there is one, which SQLite keeps
 #: In the order of the rows themselves: an index may be what is damaged.
 _SCAN: Final = (
@@ -67,6 +75,7 @@ class SqliteSession:
             # After a failed fsync the log file may hold what the disk does not: begin a new one.
             if raw.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()[0]:
                 raise sqlite3.OperationalError("somebody reads the database without end")
+            raw.execute(_ENDS)
         except BaseException:
             self.close()
             raise
@@ -87,28 +96,20 @@ class SqliteSession:
         """A command without a result."""
         self._raw.execute(command)
 
-    def store(self, events: Sequence[tuple[Event, bytes]], heads: Mapping[str, Head]) -> None:
-        """Write events and ends of streams."""
-        alone = not self._raw.in_transaction
+    def store(self, events: Sequence[tuple[Event, bytes]]) -> None:
+        """Write events; the ends of their streams follow."""
+        rows = [
+            (e.stream, e.seq, e.kind, e.author, e.at, e.body, e.position, link)
+            for e, link in events
+        ]
+        alone = len(rows) > _ROWS and not self._raw.in_transaction
         if alone:
             self.begin()
-        self._insert(
-            _INSERT,
-            [
-                (e.stream, e.seq, e.kind, e.author, e.at, e.body, e.position, link)
-                for e, link in events
-            ],
-        )
-        self._insert(_END, [(name, end.seq, end.chain) for name, end in heads.items()])
-        if alone:
-            self._raw.execute("COMMIT")
-
-    def _insert(self, command: str, rows: Sequence[tuple[Any, ...]]) -> None:
-        """Many rows by few statements: this thread has to wait for its turn after each."""
         for start in range(0, len(rows), _ROWS):
             some = rows[start : start + _ROWS]
-            places = f"({', '.join('?' * len(some[0]))})"
-            self._raw.execute(command + ", ".join([places] * len(some)), list(chain(*some)))
+            self._raw.execute(_insert_of(len(some)), list(chain(*some)))
+        if alone:
+            self._raw.execute("COMMIT")
 
     def close(self) -> None:
         """Let go; what is not committed has not happened."""
@@ -117,6 +118,12 @@ class SqliteSession:
         except (sqlite3.Error, DatabaseError):
             self.connection.invalidate()  # a broken file may refuse even the roll-back
         self._engine.dispose()
+
+
+@lru_cache(_ROWS)
+def _insert_of(rows: int) -> str:
+    """An INSERT of so many events."""
+    return _INSERT + ", ".join(["(?, ?, ?, ?, ?, ?, ?, ?)"] * rows)
 
 
 class Sqlite:

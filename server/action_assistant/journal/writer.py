@@ -1,12 +1,11 @@
 """The thread that writes a journal: one connection, one transaction for all who wait."""
 
-import asyncio
 import logging
 import queue
 import threading
 import time
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any, Final, Generic, TypeAlias, TypeVar
 
 from sqlalchemy import Connection, Select, func, select
@@ -39,11 +38,16 @@ def now() -> int:
 
 
 class Job(Generic[T]):
-    """Work for the writer's thread, and who waits for its result."""
+    """Work for the writer's thread. `done` is called with its result, or with why there is none; it must
+    not raise."""
 
-    def __init__(self, work: Callable[["Transaction"], T], future: "asyncio.Future[T]") -> None:
-        self.work = work
-        self.future = future
+    def __init__(
+        self,
+        work: Callable[["Transaction"], T],
+        done: Callable[[T | None, BaseException | None], None],
+    ) -> None:
+        self.work: Final = work
+        self.done: Final = done
 
 
 class Transaction:
@@ -63,6 +67,7 @@ class Transaction:
         self._before: dict[str, Head] = {}  # ends of streams before the job that is under way
         self._gathered: list[tuple[Event, bytes]] = []  # by earlier jobs
         self._own: list[tuple[Event, bytes]] = []  # by this job
+        self._weight = 0  # bytes since something was stored
         self._begun = self._entered = self._storing = False
         #: Whether the statement was sent after which everything is stored.
         self.committing = False
@@ -88,20 +93,23 @@ class Transaction:
     def add(self, addition: Addition) -> int:
         """Append to one stream and fold; the newest seq. Raises Conflict, BadInput."""
         stream = addition.stream
-        _check_text(stream, *(each.kind + each.author for each in addition.drafts))
+        _check_text(stream)
+        for each in addition.drafts:
+            _check_text(each.kind)
+            _check_text(each.author)
         head = self._head(stream)
         if addition.expected is not None and addition.expected != head.seq:
             raise Conflict(f"{stream} has gone on to {head.seq}; {addition.expected} was expected.")
-        at = self._clock()
+        at, seq, chain = self._clock(), head.seq, head.chain
         for draft in addition.drafts:
+            seq += 1
             self._position += 1
-            event = Event(
-                stream, head.seq + 1, draft.kind, draft.author, at, draft.body, self._position
-            )
-            head = Head(event.seq, link(head.chain, event))
-            self._own.append((event, head.chain))
+            event = Event(stream, seq, draft.kind, draft.author, at, draft.body, self._position)
+            chain = link(chain, event)
+            self._own.append((event, chain))
             for statement in self.fold(event):
                 self.connection.execute(statement)
+        head = Head(seq, chain)
         self._before.setdefault(stream, self._heads[stream])
         self._heads[stream] = head
         return head.seq
@@ -134,7 +142,8 @@ class Transaction:
         if not self._entered:
             self._gathered += own
         self._entered = False
-        if sum(len(event.body) for event, _ in self._gathered) > _HEAVY:
+        self._weight += sum(len(event.body) for event, _ in own)
+        if self._weight > _HEAVY:
             self._flush()
         return result, None, [event for event, _ in own]
 
@@ -160,11 +169,11 @@ class Transaction:
         self._store(gathered)
 
     def _store(self, events: list[tuple[Event, bytes]]) -> None:
+        self._weight = 0
         if events:
             self._storing = True
             self.last = events[-1]
-            heads = {event.stream: Head(event.seq, chain) for event, chain in events}
-            self._session.store(events, heads)
+            self._session.store(events)
             self._storing = False
 
     def _head(self, stream: str) -> Head:
@@ -319,10 +328,11 @@ def _scalar(session: WriterSession, chosen: Select[Any]) -> object:
     return session.connection.execute(chosen).scalar()
 
 
-def _check_text(*texts: str) -> None:
+@lru_cache(_KNOWN)  # the same names come again and again
+def _check_text(text: str) -> None:
     """Raise BadInput for what some database cannot hold: found at the commit, it would harm others."""
     try:
-        if b"\0" not in "".join(texts).encode():
+        if b"\0" not in text.encode():
             return
     except UnicodeEncodeError as error:
         raise BadInput("A name cannot hold half of a character.") from error
