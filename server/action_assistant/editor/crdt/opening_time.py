@@ -16,9 +16,12 @@ from action_assistant.editor.crdt.update_outline import UpdateOutline
 SECONDS: Final = 0.25
 _PER_MIB: Final = 0.2
 _MOST: Final = 2.0
-_SPARE: Final = 0.1  # seconds that may be added without being measured, beside what opening took
+#: Seconds that may be added without being measured, beside what opening took; or half of what is left.
+_SPARE: Final = 0.1
+_EARLY: Final = 0.4  # of that, from which on it is measured while there is time
 _STEP: Final = 75e-9  # seconds from one struct to the next
 _STORED: Final = 12  # bytes of a struct in a document; few are smaller
+_LEAST: Final = 4  # bytes of one that may stand beside others
 _SMALLEST: Final = 6  # bytes of a struct in an update
 
 
@@ -31,10 +34,19 @@ class OpeningTime:
         self._seconds = 0.0
         self._limit = SECONDS
 
-    def opened(self, seconds: float, size: int) -> None:
-        """So many bytes were applied in so many seconds to a document with nothing in it."""
-        self._structs = max(self._structs, size / _STORED)
-        self._measured_at, self._seconds = self._structs, seconds
+    @property
+    def structs(self) -> float:
+        """How many there are, about."""
+        return self._structs
+
+    def opened(self, seconds: float, size: int, structs: float | None = None) -> None:
+        """So many bytes were applied in so many seconds to a document with nothing in it. `structs`: how
+        many there were then; as many as there are now without."""
+        counted = self._structs if structs is None else structs
+        # What was overwritten is put together: a document may have fewer than were ever added.
+        there = min(max(counted, size / _STORED), size / _LEAST)
+        self._structs = max(self._structs - counted, 0.0) + there
+        self._measured_at, self._seconds = there, seconds
         self._limit = min(_MOST, SECONDS + _PER_MIB * size / (1 << 20))
 
     def took(self, structs: int) -> None:
@@ -45,9 +57,20 @@ class OpeningTime:
         """Whether it has to be measured before updates of so many bytes are applied."""
         if self.is_too_long:
             return True
-        structs = self._structs + size / _SMALLEST
-        pairs = (structs**2 - self._measured_at**2) / 4
-        return pairs * _STEP > _SPARE + self._seconds
+        return self._added(self._structs + size / _SMALLEST) > self._spare
+
+    @property
+    def is_due(self) -> bool:
+        """Whether it should be measured before that is in doubt."""
+        return self._added(self._structs) > self._spare * _EARLY
+
+    @property
+    def _spare(self) -> float:
+        return max(_SPARE + self._seconds, (self._limit - self._seconds) / 2)
+
+    def _added(self, structs: float) -> float:
+        """Seconds by which opening may take longer than measured, with so many structs."""
+        return (structs**2 - self._measured_at**2) / 4 * _STEP
 
     def refuse(self, read: UpdateOutline) -> None:
         """Raise QuotaExceeded for an update that brings something to a document that took too long."""
