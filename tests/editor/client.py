@@ -72,7 +72,7 @@ class Client:
 
     async def listen(self) -> bool:
         """Take in what the room has for us; whether there was anything."""
-        if self.member is None or not self.member._news.is_set():
+        if self.member is None or not (self.member.has_news or self.member.closed):
             return False
         frames = await self.member.take()
         for frame in frames:

@@ -18,6 +18,7 @@ from action_assistant.editor.crdt import messages
 from action_assistant.editor.rooms.member import Member
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.editor.rooms.room import Room
+from action_assistant.editor.rooms.room_news import RoomNews
 from action_assistant.journal.events import nothing
 from action_assistant.journal.journal import Journal
 from action_assistant.journal.sqlite import SqliteSession
@@ -44,6 +45,7 @@ class Trap:
     def __init__(self, point: str, count: int) -> None:
         self._point = point
         self._left = count
+        self._statement = ""
 
     def passes(self, point: str) -> None:
         if point == self._point:
@@ -70,9 +72,9 @@ class Trap:
     def set(self) -> None:
         """Put it into the way of every edit."""
         self.around(Room, "_take", before="before the edit is applied")
-        self.around(Journal, "append", before="before the append")
+        self.around(Journal, "append_then", before="before the append")
         self.around(SqliteSession, "store", after="after the commit")
-        self.around(Room, "_tell", before="before the broadcast")
+        self.around(RoomNews, "tell", before="before the broadcast")
         self.around(Member, "post", after="within the broadcast")
         self.around(Member, "post_ack", before="before the acknowledgement")
         original = SqliteSession.__init__
@@ -84,10 +86,12 @@ class Trap:
         SqliteSession.__init__ = opened  # type: ignore[method-assign]
 
     def _said(self, statement: str) -> None:
+        """SQLite is at a statement: at its beginning, then at each step of the trigger that it sets off, of
+        which the last one comes right before the commit."""
         if statement.startswith("INSERT INTO event"):
-            self.passes("within the transaction")
-        if statement == "COMMIT":
-            self.passes("before the commit")
+            again = statement == self._statement
+            self.passes("before the commit" if again else "within the transaction")
+            self._statement = statement
 
 
 class Pipe:

@@ -54,6 +54,30 @@ def test_any_bytes_are_a_message_or_malformed(content: bytes) -> None:
         wire.parse(content)
 
 
+one_word = st.builds(
+    lambda said, size: wire.presence(said)[: size or None],
+    st.lists(
+        st.builds(
+            PresenceEntry, st.integers(0, 2**40), st.integers(0, 2**40), st.binary(max_size=9)
+        ),
+        max_size=2,
+    ),
+    st.integers(-3, 30),
+)
+
+
+@given(one_word | data.map(lambda content: b"\x01" + content), st.binary(max_size=3))
+def test_what_one_client_says_is_read_quickly_and_just_the_same(cut: bytes, more: bytes) -> None:
+    quick = wire._one_entry(cut + more) if cut else None
+    if quick is not None:
+        assert (quick,) == tuple(wire._entries(ByteReader(cut[1:] + more).text()))
+
+
+def test_what_one_client_says_is_read_quickly() -> None:
+    said = PresenceEntry(2**32 - 1, 300, b'{"cursor":[1,2]}')
+    assert wire._one_entry(wire.presence([said])) == said
+
+
 @given(st.sampled_from([wire.question, wire.answer, wire.change]), st.binary(min_size=1))
 def test_a_message_that_was_cut_is_malformed(write: object, content: bytes) -> None:
     frame = write(content)  # type: ignore[operator]

@@ -5,8 +5,10 @@ import asyncio
 import pytest
 
 from action_assistant.editor.crdt import messages
+from action_assistant.editor.rooms.batch import Taken
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.editor.rooms.room import Room
+from action_assistant.editor.rooms.room_news import RoomNews
 from action_assistant.journal.journal import Journal
 from editor.client import STREAM, Client, bodies, settle
 
@@ -88,3 +90,45 @@ async def test_a_silent_socket_hears_something(
             assert await ada.member.take() == [messages.BEAT]
         ada.leave()
     await rooms.close()
+
+
+async def test_a_room_that_fails_closes_alone(
+    journal: Journal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also over a panic of the library, in the window and the transaction of the others."""
+    rooms = Rooms(journal, linger=60, window=0.01)
+    ada, bob = Client("ada"), Client("bob")
+    async with rooms.enter("graph/bad") as bad, rooms.enter("graph/good") as good:
+        for client, room in ((ada, bad), (bob, good)):
+            client.join(room)
+            client.speak()
+        await settle(ada, bob)
+        original = RoomNews.tell
+
+        def tell(self: RoomNews, taken: Taken, seq: int) -> None:
+            if ada.member in self._members:
+                raise Panic
+            original(self, taken, seq)
+
+        monkeypatch.setattr(RoomNews, "tell", tell)
+        for _ in range(2):  # the second within the window
+            ada.map["a"] = bob.map["a"] = "1"
+            ada.speak()
+            bob.speak()
+        assert ada.member is not None
+        assert await ada.member.ended() == messages.RESTARTING
+        await settle(bob)
+        assert bob.member is not None
+        assert not bob.member.closed
+        assert bob.durable == bob.sent
+    assert rooms.open_room("graph/bad") is None
+    monkeypatch.setattr(RoomNews, "tell", original)
+    async with rooms.enter("graph/bad") as again:  # what was stored is there
+        ada.join(again)
+        await settle(ada)
+        assert ada.things == {"a": "1"}
+    await rooms.close()
+
+
+class Panic(BaseException):
+    """As the library's: no Exception."""

@@ -143,3 +143,21 @@ async def test_of_many_words_of_one_person_only_the_last_waits(rooms: Rooms) -> 
         (frame,) = await slow.member.take()
         slow.take(frame)
         assert json.loads(slow.others[1])["cursor"] == [1999, 1999]
+
+
+async def test_of_several_who_speak_at_once_each_hears_all_and_one_alone_hears_nothing(
+    rooms: Rooms,
+) -> None:
+    """As stock servers have it: to a client its own word is no news."""
+    ada, bob, eve = Client("ada"), Client("bob"), Client("eve")
+    async with rooms.enter("graph/g") as room:
+        for client in (ada, bob, eve):
+            client.join(room)
+        await settle(ada, bob, eve)
+        ada.deliver(messages.presence([entry(1)]))
+        await settle(ada, bob, eve)
+        assert [set(c.others) for c in (ada, bob, eve)] == [set(), {1}, {1}]
+        ada.deliver(messages.presence([entry(1, 2)]))
+        bob.deliver(messages.presence([entry(2)]))
+        await settle(ada, bob, eve)
+        assert [set(c.others) for c in (ada, bob, eve)] == [{1, 2}] * 3

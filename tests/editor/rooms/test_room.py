@@ -2,7 +2,7 @@
 
 import asyncio
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -10,11 +10,11 @@ from pycrdt import Doc, Map
 
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.crdt.loading import load
-from action_assistant.editor.crdt.replica import Replica
+from action_assistant.editor.crdt.replica import Replica, ReplicaState
 from action_assistant.editor.rooms.member import WAITING_FRAMES
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import Unavailable
-from action_assistant.journal.events import Draft
+from action_assistant.journal.events import Addition, Draft
 from action_assistant.journal.journal import Journal
 from editor.client import STREAM, Client, bodies, settle, updates
 
@@ -26,17 +26,20 @@ class Gate:
         self.open = asyncio.Event()
         self.open.set()
         self.broken = False
-        original = journal.append
+        self._original = journal.append_then
+        self._tasks: set[asyncio.Task[None]] = set()
+        monkeypatch.setattr(journal, "append_then", self._append_then)
 
-        async def append(
-            stream: str, drafts: Sequence[Draft], *, expected: int | None = None
-        ) -> int:
-            await self.open.wait()
-            if self.broken:
-                raise Unavailable("disk full")
-            return await original(stream, drafts, expected=expected)
+    def _append_then(self, addition: Addition, done: Callable[..., None]) -> None:
+        task = asyncio.create_task(self._later(addition, done))
+        self._tasks.add(task)
 
-        monkeypatch.setattr(journal, "append", append)
+    async def _later(self, addition: Addition, done: Callable[..., None]) -> None:
+        await self.open.wait()
+        if self.broken:
+            done(None, Unavailable("disk full"))
+        else:
+            self._original(addition, done)
 
 
 @pytest.fixture
@@ -221,6 +224,37 @@ async def test_a_snapshot_is_made_every_thousand_events_and_changes_nothing(
     assert then.seq == 500
     assert then.replica.doc.get("things", type=Map).to_py()["k2"] == "499"
     then.replica.close()
+
+
+async def test_edits_go_on_while_a_snapshot_is_stored(
+    journal: Journal, rooms: Rooms, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is of the moment at which it was begun."""
+    monkeypatch.setattr("action_assistant.editor.rooms.room_snapshots.EVERY", 10)
+    may_be_stored, stored = asyncio.Event(), asyncio.Event()
+    keep = journal.keep_snapshot
+
+    async def slow(stream: str, seq: int, state: bytes) -> None:
+        await may_be_stored.wait()
+        await keep(stream, seq, state)
+        stored.set()
+
+    monkeypatch.setattr(journal, "keep_snapshot", slow)
+    many = updates(*(("k", str(n)) for n in range(15)))
+    async with rooms.enter(STREAM) as room:
+        for update in many:
+            await room.submit(update, "x")
+        assert room.seq == 15
+        assert await journal.snapshot(STREAM) is None
+        may_be_stored.set()
+        await stored.wait()
+        kept = await journal.snapshot(STREAM)
+        assert kept is not None
+        assert kept.seq == 10
+        replica = ReplicaState.replica(kept.state)
+        assert replica is not None
+        assert replica.doc.get("things", type=Map).to_py() == {"k": "9"}
+        replica.close()
 
 
 async def test_a_snapshot_that_cannot_be_applied_is_passed_over(journal: Journal) -> None:

@@ -78,11 +78,13 @@ class _Directly:
         self._member = talk.member
         self._socket = socket
         self._loop = asyncio.get_running_loop()
+        self._turn_end = talk.room.turn_end
         self._unsent: list[bytes] = []
         self._is_due = False
         self._pause: asyncio.Task[None] | None = None
         self._failure: Exception | None = None
         talk.member.on_news = self._soon
+        talk.member.write_now = self._write_now
         self._soon()  # something may wait already
 
     def heard(self, message: bytes | None) -> None:
@@ -124,20 +126,24 @@ class _Directly:
     def _soon(self) -> None:
         if not self._is_due:
             self._is_due = True
-            self._loop.call_soon(self._write)
+            self._turn_end.do(self._write)
+
+    def _write_now(self, framed: bytes) -> bool:
+        """What nothing waits before."""
+        return not self._is_due and not self._unsent and self._socket.write_framed(framed)
 
     def _write(self) -> None:
         """All that waits, as far as the client reads it."""
         self._is_due = False
         member, socket = self._member, self._socket
-        while socket.is_writable and not member.closed:
-            if not self._unsent:
-                member.all_sent()
-                self._unsent = member.gather()
-            if not self._unsent:
-                return
-            sent = socket.write(self._unsent)
-            self._unsent = self._unsent[sent:]
+        if member.closed or not socket.is_writable:
+            return
+        unsent = self._unsent or member.gather()
+        self._unsent = unsent[socket.write(unsent) :] if unsent else unsent
+        if not self._unsent and socket.is_writable:
+            member.all_sent()
+            if member.has_news:  # behind what could not be sent earlier
+                self._soon()
 
 
 def _nothing() -> None:

@@ -19,6 +19,7 @@ STEP_1: Final = 0
 STEP_2: Final = 1
 UPDATE: Final = 2
 _UPDATE: Final = bytes((SYNC, UPDATE))
+_AWARENESS: Final = bytes((AWARENESS,))
 
 #: Close codes of accepted sockets, by what they mean.
 UNREADABLE: Final = 1003  # a text frame
@@ -62,13 +63,13 @@ class Question(msgspec.Struct, frozen=True):
     state: bytes
 
 
-class Edit(msgspec.Struct, frozen=True):
+class Edit(msgspec.Struct, frozen=True, gc=False):
     """Sync step 2 or an update: something that the document may lack."""
 
     update: bytes
 
 
-class PresenceEntry(msgspec.Struct, frozen=True):
+class PresenceEntry(msgspec.Struct, frozen=True, gc=False):
     """What one client says about itself. `state` is JSON text; `null` means gone."""
 
     client: int
@@ -154,6 +155,8 @@ def parse(data: bytes) -> Message | None:
     # Most are updates of less than 128 bytes.
     if data[:2] == _UPDATE and len(data) > 2 and data[2] <= min(0x7F, len(data) - 3):
         return Edit(data[3 : 3 + data[2]])
+    if data[:1] == _AWARENESS and (entry := _one_entry(data)) is not None:
+        return Presence((entry,))
     reader = ByteReader(data)
     kind = reader.number()
     if kind == SYNC:
@@ -174,6 +177,38 @@ def _sync(reader: ByteReader) -> Message:
     if step in {STEP_2, UPDATE}:
         return Edit(reader.text())
     raise Malformed(f"there is no sync message {step}")
+
+
+def _one_entry(data: bytes) -> PresenceEntry | None:
+    """Of a whole message what one client says about itself, as nearly all of them are; None for others,
+    also for those that cannot be read."""
+    try:
+        size, at = _short(data, 1)
+        end = at + size
+        count, at = _short(data, at)
+        client, at = _short(data, at)
+        clock, at = _short(data, at)
+        size, at = _short(data, at)
+    except IndexError:
+        return None
+    if count != 1 or size < 0 or at + size != end or end > len(data):
+        return None
+    return PresenceEntry(client, clock, data[at:end])
+
+
+def _short(data: bytes, at: int) -> tuple[int, int]:
+    """A varUint of at most 35 bit, and the place after it. Raises IndexError, also for longer ones."""
+    byte = data[at]
+    if byte < 128:
+        return byte, at + 1
+    number, shift = byte & 127, 7
+    for place in range(at + 1, at + 5):
+        byte = data[place]
+        number |= (byte & 127) << shift
+        if byte < 128:
+            return number, place + 1
+        shift += 7
+    raise IndexError
 
 
 def _entries(data: bytes) -> Iterable[PresenceEntry]:

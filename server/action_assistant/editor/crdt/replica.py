@@ -63,6 +63,7 @@ class Replica:
         self._quota = DocumentQuota(self.doc)
         self._known: dict[int, int] = {}
         self._fired = False
+        self._is_news = False  # known before it is applied
         self._waiting: dict[bytes, tuple[UpdateOutline, str]] = {}
         self._released: list[bytes] = []
         self._subscription = self.doc.observe(self._observed)
@@ -226,6 +227,11 @@ class Replica:
         return list(freed)
 
     @property
+    def waits(self) -> bool:
+        """Whether anything waits for an earlier update."""
+        return bool(self._waiting)
+
+    @property
     def waiting_bytes(self) -> int:
         """How much waits."""
         return sum(map(len, self._waiting))
@@ -241,8 +247,10 @@ class Replica:
 
     def _applied(self, update: bytes, read: UpdateOutline) -> bool:
         """Apply what is ready; whether it changed anything."""
-        self._fired = False
-        depths = self.nesting.depths(read.placed, self._known)
+        known = self._known
+        self._is_news = any(end > known.get(client, 0) for client, _, end in read.brings)
+        self._fired = self._is_news
+        depths = self.nesting.depths(read.placed, known)
         self._apply(update)
         self.nesting.learn(depths)
         self._count(read, len(update))
@@ -298,8 +306,7 @@ class Replica:
         self.doc.unobserve(self._subscription)
 
     def _observed(self, event: object) -> None:
-        update: bytes = event.update  # type: ignore[attr-defined]
-        if update != NOTHING_NEW:
+        if not self._is_news and event.update != NOTHING_NEW:  # type: ignore[attr-defined]
             self._fired = True
 
 

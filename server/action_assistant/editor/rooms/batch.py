@@ -227,6 +227,13 @@ def before_doubt(items: Sequence[Item], is_doubtful: Callable[[int], bool]) -> i
 
 def next_batch(waiting: list[Item], replica: Replica) -> tuple[list[Item], list[Item], bool]:
     """What is taken next, what then waits, and whether the one is an edit that has to be tried first."""
+    match waiting:  # nearly always
+        case [Offer(update)] if (
+            len(update) <= LARGE
+            and not replica.waits
+            and not replica.opening.is_doubtful_with(len(update))
+        ):
+            return waiting, [], False
     much_waits = replica.waiting_bytes > LARGE
     batch, rest = batch_of(waiting, one=much_waits)
     freed = min(replica.waiting_bytes, LARGE)  # what more than that frees is looked at alone

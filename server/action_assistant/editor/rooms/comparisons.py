@@ -10,6 +10,7 @@ from action_assistant.editor.documents.contents import shown
 from action_assistant.editor.documents.fingerprint import Fingerprint
 from action_assistant.editor.rooms.batch import Compare
 from action_assistant.errors import Refused
+from action_assistant.logs.context import begin
 from action_assistant.web.workers.lanes import RunInWorker
 
 log: Final = logging.getLogger(__name__)
@@ -60,6 +61,7 @@ class Comparisons:
 
     async def _compare_all(self) -> None:
         """What a document shows is looked at aside: that takes a second for a large one."""
+        begin({"graph": self._room.stream.rpartition("/")[2]})
         try:
             while self._waiting:
                 found = await self._shown()

@@ -51,11 +51,13 @@ class Member:
         self._bytes = 0
         self._answer = _Answer.NONE
         self._presence: PresenceNews | None = None
-        self._ack: bytes | None = None
+        self._ack: tuple[int, int] | None = None
         self._said = -1, -1  # with the last acknowledgement
-        self._news = asyncio.Event()
+        self._news: asyncio.Event | None = None  # while somebody takes what there is
         #: Called when there is something to be sent, or the end has come.
-        self.on_news: Callable[[], None] = self._news.set
+        self.on_news: Callable[[], None] = self._tell_taker
+        #: Writes framed messages at once, where whoever owns the socket can: whether it did.
+        self.write_now: Callable[[bytes], bool] = _never
         self._room_again: asyncio.Event | None = None  # few sockets are ever far ahead
         self._loop = asyncio.get_running_loop()
         self._taken_at = self._loop.time()
@@ -63,7 +65,7 @@ class Member:
 
     def post(self, frame: bytes) -> None:
         """Send a message some time soon; who has too much waiting is closed."""
-        if self.closed:
+        if self._closed.done():
             return
         if len(self._frames) >= WAITING_FRAMES or self._bytes > WAITING_BYTES:
             self.close(messages.TOO_SLOW)
@@ -71,6 +73,16 @@ class Member:
         self._frames.append(frame)
         self._bytes += len(frame)
         self.on_news()
+
+    def sends(self, framed: bytes) -> bool:
+        """Send one or more framed messages at once, the same bytes as to many others; False where they
+        have to be posted, behind what waits."""
+        if self._frames or self._ack is not None or self._presence is not None:
+            return False
+        if self._closed.done() or not self.write_now(framed):
+            return False
+        self._taken_at = self._loop.time()
+        return True
 
     def asks(self) -> bool:
         """The socket wants the document; False when it is still on its way for an earlier wish.
@@ -107,26 +119,37 @@ class Member:
 
     def post_ack(self, seq: int) -> None:
         """Say what is durable, and that everything up to `seq` was sent; the last word counts."""
-        if self.acks and self.synced and (self.handled, seq) != self._said:
-            self._said = self.handled, seq
-            self._ack = messages.acks(self.handled, seq)
-            self.on_news()
+        if self.acks and self.synced:
+            says = self.handled, seq
+            if says != self._said:
+                self._said = self._ack = says
+                self.on_news()
 
     async def take(self) -> list[bytes]:
         """What is to be sent next, in order; waits until there is something. Whoever takes again has
         sent what was taken before."""
         self.all_sent()
-        await self._news.wait()
+        while not self.has_news and not self.closed:
+            self._news = asyncio.Event()
+            await self._news.wait()
         return self.gather()
+
+    def _tell_taker(self) -> None:
+        if self._news is not None:
+            self._news.set()
 
     def all_sent(self) -> None:
         """What was gathered has gone out."""
         if self._answer is _Answer.LEFT:
             self._answer = _Answer.NONE
 
+    @property
+    def has_news(self) -> bool:
+        """Whether there is something to be sent."""
+        return bool(self._frames or self._presence is not None or self._ack is not None)
+
     def gather(self) -> list[bytes]:
         """What is to be sent next, in order."""
-        self._news.clear()
         self._taken_at = self._loop.time()
         frames, self._frames = self._frames, []
         self._bytes = 0
@@ -136,7 +159,7 @@ class Member:
             frames.append(self._presence.frame)
             self._presence = None
         if self._ack is not None:
-            frames.append(self._ack)
+            frames.append(messages.acks(*self._ack))
             self._ack = None
         return frames
 
@@ -206,3 +229,8 @@ class Member:
     async def ended(self) -> int:
         """Wait for the end; the close code."""
         return await asyncio.shield(self._closed)
+
+
+def _never(_: bytes) -> bool:
+    """Nothing can be written at once."""
+    return False

@@ -7,7 +7,7 @@ from typing import Final
 
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.crdt.loading import load
-from action_assistant.editor.rooms.batch_window import LENGTH, BatchWindow
+from action_assistant.editor.rooms.batch_window import LONGEST, BatchWindow
 from action_assistant.editor.rooms.room import Room
 from action_assistant.editor.rooms.room_metrics import RoomMetrics
 from action_assistant.errors import Unavailable
@@ -30,7 +30,7 @@ class Rooms:
         journal: Journal,
         *,
         linger: float = LINGER,
-        window: float = LENGTH,
+        window: float = LONGEST,
         run_in_worker: RunInWorker = run_here,
         tried: RunInWorker = run_here,
     ) -> None:
@@ -38,7 +38,7 @@ class Rooms:
         self._run_in_worker = run_in_worker
         self._tried = tried
         self._window = BatchWindow(window)
-        self._moments = BatchWindow(_MOMENTS * window)
+        self._moments = _MOMENTS * window
         self._linger = linger
         self._rooms: dict[str, Room] = {}
         self._loading: dict[str, asyncio.Task[Room]] = {}

@@ -10,6 +10,7 @@ from action_assistant.editor.crdt import messages
 from action_assistant.editor.crdt.messages import PresenceEntry
 from action_assistant.editor.rooms.colours import NOBODYS
 from action_assistant.web.auth.keys import PersonRef
+from action_assistant.web.server.direct import framed
 
 STATE_LIMIT: Final = 32_768  # bytes of one client's entry
 _GONE: Final = b"null"
@@ -61,6 +62,11 @@ class PresenceNews:
     def frame(self) -> bytes:
         """As a message."""
         return messages.presence(self.entries.values())
+
+    @cached_property
+    def framed(self) -> bytes:
+        """As it goes over the wire."""
+        return framed(self.frame)
 
     def followed_by(self, later: "PresenceNews") -> "PresenceNews":
         """Both; what is later about the same client counts."""

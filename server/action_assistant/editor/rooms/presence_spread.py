@@ -26,9 +26,10 @@ class PresenceSpread:
     def _spread(self) -> None:
         said, self._said = self._said, {}
         speakers = {speaker for _, speaker in said.values()}
-        everything = PresenceNews(entry for entry, _ in said.values())
+        # Of several each hears its own words, too, as stock servers have it: they are no news to a client,
+        # and so there is one message for all.
+        alone = speakers.pop() if len(speakers) == 1 else None
+        everything = PresenceNews([entry for entry, _ in said.values()])
         for member in self._members:
-            if member not in speakers:
+            if member is not alone and not member.sends(everything.framed):
                 member.post_presence(everything)
-            elif others := [entry for entry, speaker in said.values() if speaker is not member]:
-                member.post_presence(PresenceNews(others))

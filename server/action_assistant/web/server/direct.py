@@ -125,11 +125,26 @@ class DirectSocket(WebSocketsSansIOProtocol):
         """Whether little enough waits to be sent."""
         return self.writable.is_set()
 
+    def write_framed(self, data: bytes) -> bool:
+        """Send whole frames at once, where little enough waits; whether they were sent."""
+        if (
+            self.close_sent
+            or self.disconnected
+            or self.transport.is_closing()
+            or not self.writable.is_set()
+        ):
+            return False
+        self.transport.write(data)
+        return True
+
     def write(self, messages: list[bytes]) -> int:
         """Send messages, as many as may wait; how many that are. Those after that are for
         `may_write`. Where nobody hears them any more, all are."""
         if self.close_sent or self.disconnected or self.transport.is_closing():
             return len(messages)
+        if len(messages) == 1:
+            self.transport.write(framed(messages[0]))
+            return 1
         if sum(map(len, messages)) <= _WRITTEN_AT_ONCE:
             self.transport.write(b"".join(map(framed, messages)))
             return len(messages)
