@@ -1,12 +1,23 @@
 """Reading a journal: events by stream or in order, the tables, what was cached."""
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, TypeVar
 from urllib.parse import quote
 
-from sqlalchemy import Connection, CursorResult, NullPool, Row, Select, create_engine, func, select
+from sqlalchemy import (
+    BindParameter,
+    Connection,
+    CursorResult,
+    NullPool,
+    Row,
+    Select,
+    bindparam,
+    create_engine,
+    func,
+    select,
+)
 from sqlalchemy.exc import DatabaseError
 
 from action_assistant.errors import Unavailable
@@ -22,6 +33,12 @@ _PAGE: Final = 500  # events that are read at once
 # The tables of the log are the same for both branches.
 _event, _head, _snapshot = editor_event.c, editor_head.c, editor_snapshot.c
 _EVENTS: Final = select(*(_event[name] for name in Event.__struct_fields__))
+_STREAM: Final[BindParameter[str]] = bindparam("stream")
+_NEWEST: Final = select(_head.seq).where(_head.stream == _STREAM)
+_BODY: Final = select(_event.body).where(_event.stream == _STREAM, _event.seq == bindparam("seq"))
+_KEPT: Final = select(_snapshot.seq, _snapshot.proof, _snapshot.state).where(
+    _snapshot.stream == _STREAM
+)
 
 
 class JournalReader:
@@ -46,28 +63,30 @@ class JournalReader:
 
     async def newest(self, stream: str) -> int:
         """The seq of a stream's last event; 0 when there is none."""
-        return await self._number(select(_head.seq).where(_head.stream == stream))
+        return await self._number(_NEWEST, {"stream": stream})
 
     async def position(self) -> int:
         """The position of the last event of all."""
         return await self._number(select(func.max(_event.position)))
 
-    async def query(self, statement: Select[Any]) -> list[Row[Any]]:
-        """Ask the tables."""
-        return await self._ask(lambda connection: list(connection.execute(statement).all()))
+    async def query(
+        self, statement: Select[Any], values: Mapping[str, Any] | None = None
+    ) -> list[Row[Any]]:
+        """Ask the tables. `values`: of the parameters that a statement was made with once for all, since
+        to make one takes longer than to run it."""
+        return await self._ask(lambda connection: list(connection.execute(statement, values).all()))
 
-    async def plain_rows(self, statement: Select[Any]) -> list[Sequence[Any]]:
+    async def plain_rows(
+        self, statement: Select[Any], values: Mapping[str, Any] | None = None
+    ) -> list[Sequence[Any]]:
         """Ask for many rows, as the driver gives them out: no value is converted."""
-        return await self._ask(lambda connection: _plain(connection.execute(statement)))
+        return await self._ask(lambda connection: _plain(connection.execute(statement, values)))
 
     async def snapshot(self, stream: str) -> StreamSnapshot | None:
         """The cached sum of a stream; None when there is none, or when it does not fit the log."""
-        chosen = select(_snapshot.seq, _snapshot.proof, _snapshot.state).where(
-            _snapshot.stream == stream
-        )
 
         def find(connection: Connection) -> StreamSnapshot | None:
-            row = connection.execute(chosen).first()
+            row = connection.execute(_KEPT, {"stream": stream}).first()
             if row is None:
                 return None
             seal = seal_of(body_of(connection, stream, row.seq), row.state)
@@ -84,8 +103,8 @@ class JournalReader:
     async def _events(self, chosen: Select[Any]) -> list[Event]:
         return await self._ask(lambda c: [Event(*row) for row in c.execute(chosen)])
 
-    async def _number(self, chosen: Select[Any]) -> int:
-        found: int | None = await self._ask(lambda c: c.execute(chosen).scalar())
+    async def _number(self, chosen: Select[Any], values: Mapping[str, Any] | None = None) -> int:
+        found: int | None = await self._ask(lambda c: c.execute(chosen, values).scalar())
         return found or 0
 
 
@@ -122,8 +141,7 @@ def following(position: int, limit: int) -> Select[Any]:
 
 def body_of(connection: Connection, stream: str, seq: int) -> bytes:
     """The bytes of an event; none when it is not there."""
-    chosen = select(_event.body).where(_event.stream == stream, _event.seq == seq)
-    return connection.execute(chosen).scalar() or b""
+    return connection.execute(_BODY, {"stream": stream, "seq": seq}).scalar() or b""
 
 
 def seal_of(event: bytes, state: bytes) -> bytes:

@@ -1,10 +1,11 @@
 """The graphs that there are, and the documents of the library's actions: made, imported, named, deleted and brought back."""
 
+from collections.abc import Sequence
 from datetime import datetime
 from typing import Any, Final
 
 import msgspec
-from sqlalchemy import Row, Select, func, select
+from sqlalchemy import Row, Select, bindparam, func, select
 
 from action_assistant.editor.catalogue import server_edits
 from action_assistant.editor.catalogue.graph_checks import GraphChecks
@@ -92,7 +93,9 @@ class Catalogue:
 
     async def require(self, graph: str, kind: h.DocumentKind | None = None) -> h.DocumentKind:
         """Be sure that there is such a document; what it is of."""
-        found: h.DocumentKind = (await self._row(graph, kind=kind)).kind
+        found: h.DocumentKind = _there(
+            graph, await self._journal.query(_KIND, {"id": graph}), kind
+        ).kind
         return found
 
     async def get(self, graph: str) -> GraphView:
@@ -217,12 +220,8 @@ class Catalogue:
     async def _row(
         self, graph: str, *, deleted: bool = False, kind: h.DocumentKind | None = None
     ) -> Row[Any]:
-        rows = await self._journal.query(_rows().where(editor_tables.graph.c.id == graph))
-        if not rows or (rows[0].deleted_at is not None and not deleted):
-            raise NotFound(f"There is no {kind or 'graph'} {graph!r}.")
-        if kind not in {None, rows[0].kind}:
-            raise NotFound(f"{graph!r} is no {kind}; it is a {rows[0].kind}.")
-        return rows[0]
+        rows = await self._journal.query(_ONE, {"id": graph})
+        return _there(graph, rows, kind, deleted=deleted)
 
     async def _view(self, row: Row[Any]) -> GraphView:
         summary = await self._checks.summary(row.id, row.seq)
@@ -260,6 +259,17 @@ class Catalogue:
         )
 
 
+def _there(
+    graph: str, rows: Sequence[Row[Any]], kind: h.DocumentKind | None, *, deleted: bool = False
+) -> Row[Any]:
+    """The one row of a graph. Raises NotFound."""
+    if not rows or (rows[0].deleted_at is not None and not deleted):
+        raise NotFound(f"There is no {kind or 'graph'} {graph!r}.")
+    if kind not in {None, rows[0].kind}:
+        raise NotFound(f"{graph!r} is no {kind}; it is a {rows[0].kind}.")
+    return rows[0]
+
+
 def _rows() -> Select[Any]:
     """Graphs with the number and time of their document's last change."""
     event, graph = editor_tables.editor_event, editor_tables.graph
@@ -278,6 +288,11 @@ def _rows() -> Select[Any]:
         at.scalar_subquery().label("at"),
         drafts.scalar_subquery().label("drafts"),
     )
+
+
+_ID: Final = editor_tables.graph.c.id == bindparam("id")
+_ONE: Final = _rows().where(_ID)
+_KIND: Final = select(editor_tables.graph.c.kind, editor_tables.graph.c.deleted_at).where(_ID)
 
 
 def fit(name: str, description: str) -> tuple[str, str]:

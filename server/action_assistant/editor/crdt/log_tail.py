@@ -5,7 +5,7 @@ import logging
 from collections.abc import Sequence
 from typing import Any, Final
 
-from sqlalchemy import Select, select
+from sqlalchemy import bindparam, select
 
 from action_assistant.editor.crdt.event_columns import EventColumns
 from action_assistant.editor.crdt.folding import StreamDamage
@@ -22,6 +22,16 @@ TOGETHER: Final = 200_000  # events, or
 TOGETHER_BYTES: Final = 16 << 20  # in their bodies, after which those so far are put together
 _COLUMNS: Final = (*Event.__struct_fields__, "chain")
 _TYPES: Final = (str, int, str, str, int, bytes, int, bytes)
+_event = editor_tables.editor_event.c
+_ROWS: Final = (
+    select(*(_event[name] for name in _COLUMNS))
+    .where(
+        _event.stream == bindparam("stream"),
+        _event.seq > bindparam("after"),
+        _event.seq <= bindparam("last"),
+    )
+    .order_by(_event.seq)
+)
 
 
 class LogTail:
@@ -111,9 +121,8 @@ class LogTail:
         last = after + limit  # without it Postgres may sort all that follows, for each slice anew
         if self._upto is not None:
             last = min(last, self._upto)
-        seq = editor_tables.editor_event.c.seq
-        chosen = _rows_of(self._stream).where(seq > after, seq <= last)
-        return await self._journal.plain_rows(chosen)
+        place = {"stream": self._stream, "after": after, "last": last}
+        return await self._journal.plain_rows(_ROWS, place)
 
     async def _check_end(self) -> None:
         newest = await self._journal.newest(self._stream)
@@ -126,12 +135,6 @@ class LogTail:
     def _stop(self, why: str) -> None:
         self.damaged = StreamDamage(self.seq + 1, why)
         log.error("%s %d is damaged: %s", self._stream, self.seq + 1, why)
-
-
-def _rows_of(stream: str) -> Select[Any]:
-    columns = editor_tables.editor_event.c
-    chosen = select(*(columns[name] for name in _COLUMNS))
-    return chosen.where(columns.stream == stream).order_by(columns.seq)
 
 
 def _columns(rows: Sequence[Sequence[Any]]) -> EventColumns:

@@ -172,7 +172,9 @@ class Access:
             await _answer(send, 204, [(b"cache-control", b"no-store")], b"")
             return
         session: Session | None = scope["state"].get("session")
-        if session is None or not _lasts(scope, headers):
+        lasts = _lasts(scope, headers)
+        del headers  # of a socket they would be kept for as long as it is open
+        if session is None or not lasts:
             await self._app(scope, receive, send)
         else:
             await self._leashed(session, scope, receive, send)
