@@ -30,6 +30,7 @@ _EVENTS: Final = 1000  # looked at in one go
 _BYTES: Final = 4 << 20  # of them
 _OWNERS: Final = 400  # that one question names
 _PERIOD: Final = 20.0  # seconds between two looks at what is behind
+_FAR: Final = 5_000  # events behind, from which on it is not left for later
 
 _c = key_change.c
 _CHANGE: Final = select(_c.seq, _c.author, _c.at, _c.root, _c.key, _c.before, _c.after)
@@ -116,8 +117,16 @@ class ChangeIndex:
     # --- bringing it up ----------------------------------------------------------------------------
 
     async def _keep_up(self) -> None:
+        seen: dict[str, int] = {}
         while True:
-            for graph in await self._behind():
+            behind = await self._behind()
+            # What is being edited is left until it rests, unless there is much of it: who edits needs the
+            # time, and who asks for its history now has it brought up.
+            ripe = [
+                g for g, (newest, more) in behind.items() if seen.get(g) == newest or more > _FAR
+            ]
+            seen = {graph: newest for graph, (newest, _) in behind.items()}
+            for graph in ripe:
                 try:
                     await self.upto(graph)
                 except Refused as error:
@@ -126,19 +135,21 @@ class ChangeIndex:
                     log.exception("%s: its changes cannot be indexed", graph)
             await anyio.sleep(_PERIOD)
 
-    async def _behind(self) -> list[str]:
-        """Graphs whose newest events are not in the index."""
+    async def _behind(self) -> dict[str, tuple[int, int]]:
+        """Graphs whose newest events are not in the index: which the newest is, and how many there are."""
         stream, newest = editor_head.c.stream, editor_head.c.seq
-        behind = newest > func.coalesce(key_change_head.c.seq, 0)
+        indexed = func.coalesce(key_change_head.c.seq, 0)
         same = stream == graph_stream("") + key_change_head.c.graph
         joined = editor_head.outerjoin(key_change_head, same)
-        chosen = select(stream).select_from(joined).where(behind, stream.startswith("graph/"))
+        chosen = select(stream, newest, (newest - indexed).label("more")).select_from(joined)
+        chosen = chosen.where(newest > indexed, stream.startswith("graph/"))
         try:
             rows = await self._journal.query(chosen)
         except Refused as error:
             log.warning("changes are not indexed: %s", error.detail)
-            return []
-        return [graph for row in rows if (graph := graph_of(row.stream)) is not None]
+            return {}
+        found = {graph_of(row.stream): (row.seq, row.more) for row in rows}
+        return {graph: numbers for graph, numbers in found.items() if graph is not None}
 
     async def _head(self, graph: str) -> tuple[int, bytes]:
         head = key_change_head.c
