@@ -33,11 +33,10 @@ MANY: Final[dict[str, dict[str, Any]]] = {
     "500 people, 100 graphs, 14 edits/s each": {"people": 500, "rate": 14, "graphs": 100},
     "2,000 people, 500 graphs, 1 edit/s each": {"people": 2000, "rate": 1, "graphs": 500},
 }
-IDLE: Final = 1000
 
 
 def tables() -> Iterator[Table]:
-    """Rounds; loads; many people; sockets that only stand there."""
+    """Rounds; loads; many people."""
     head = ["in rounds", "server", "CPU per delivered", "of Hocuspocus's", "p50", "p99", "missing"]
     yield Table(head, list(_rows("lockstep", LOCKSTEP, RUNS, ("ratio", "p50", "p99", "missing"))))
     figures = ("ratio", "share", "p50", "p99", "missing", "memory")
@@ -45,18 +44,9 @@ def tables() -> Iterator[Table]:
     head += ["missing", "memory"]
     yield Table(head, list(_rows("fan out", OPEN, RUNS, figures)))
     yield Table(head, list(_rows("fan out", MANY, min(RUNS, 3), figures)))
-    head = [f"{IDLE:,} idle sockets", "memory", "CPU per connection"]
-    found = _in_turn("idle", {"people": IDLE, "graphs": 100}, RUNS)
-    yield Table(
-        head,
-        [
-            [name, f"{_median(runs, 'memory_mb'):.1f} MB", f"{_median(runs, 'connect_ms'):.2f} ms"]
-            for name, runs in found.items()
-        ],
-    )
 
 
-def _in_turn(operation: str, plan: dict[str, Any], count: int) -> dict[str, list[Run]]:
+def in_turn(operation: str, plan: dict[str, Any], count: int) -> dict[str, list[Run]]:
     """Runs of each server, always on a fresh one."""
     found: dict[str, list[Run]] = {kind.name: [] for kind in KINDS}
     graphs = plan.get("graphs", 1)
@@ -74,7 +64,7 @@ def _rows(
     """The median of each figure; of the ratio of two runs in turn also the least and the most; of what
     went missing the sum."""
     for load, plan in loads.items():
-        found = _in_turn(operation, plan, count)
+        found = in_turn(operation, plan, count)
         ratios = [
             ours["cpu_us"] / theirs["cpu_us"]
             for ours, theirs in zip(found[Ours.name], found[Hocuspocus.name], strict=True)
@@ -86,15 +76,15 @@ def _rows(
                 ratio = f"{statistics.median(ratios):.2f} ({least:.2f}–{most:.2f})"
             told = {
                 "ratio": lambda ratio=ratio: ratio,
-                "share": lambda runs=runs: f"{_median(runs, 'cpu_share') * 100:.0f} %",
-                "p50": lambda runs=runs: f"{_median(runs, 'p50_ms'):.1f} ms",
-                "p99": lambda runs=runs: f"{_median(runs, 'p99_ms'):.1f} ms",
+                "share": lambda runs=runs: f"{median(runs, 'cpu_share') * 100:.0f} %",
+                "p50": lambda runs=runs: f"{median(runs, 'p50_ms'):.1f} ms",
+                "p99": lambda runs=runs: f"{median(runs, 'p99_ms'):.1f} ms",
                 "missing": lambda runs=runs: str(sum(run["missing"] for run in runs)),
-                "memory": lambda runs=runs: f"{_median(runs, 'memory_mb'):.0f} MB",
+                "memory": lambda runs=runs: f"{median(runs, 'memory_mb'):.0f} MB",
             }
-            cost = f"{_median(runs, 'cpu_us'):.1f} µs"
+            cost = f"{median(runs, 'cpu_us'):.1f} µs"
             yield [load, name, cost, *(told[figure]() for figure in figures)]
 
 
-def _median(runs: Sequence[Run], figure: str) -> float:
+def median(runs: Sequence[Run], figure: str) -> float:
     return statistics.median(run[figure] for run in runs)
