@@ -15,6 +15,7 @@ from typing import Any, Final, Protocol
 
 from uvicorn._types import ASGIReceiveEvent, ASGISendEvent
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+from websockets.http11 import Request
 
 try:
     from websockets.speedups import apply_mask
@@ -84,6 +85,11 @@ class DirectSocket(WebSocketsSansIOProtocol):
         extensions[_EXTENSION] = {"socket": self}
         await super().run_asgi()
 
+    def handle_connect(self, event: Request) -> None:
+        """The request for an upgrade has come."""
+        super().handle_connect(event)
+        event.headers.clear()  # the parser keeps it for as long as the socket is open
+
     async def receive(self) -> ASGIReceiveEvent:
         """What an application is told that takes nothing over."""
         event = await super().receive()
@@ -94,6 +100,8 @@ class DirectSocket(WebSocketsSansIOProtocol):
     async def send(self, message: ASGISendEvent) -> None:
         """What an application says that takes nothing over."""
         await super().send(message)
+        if message["type"] == "websocket.accept" and self.handshake_complete:
+            self.response.headers.clear()  # sent
         if message["type"] == "websocket.http.response.body" and self.close_sent:
             self.handshake_complete = True  # refused: not the error that the usual way calls it
 
@@ -102,6 +110,7 @@ class DirectSocket(WebSocketsSansIOProtocol):
     def take_over(self, taker: Taker) -> None:
         """From now on, once the handshake is over, `taker` hears what comes, and nobody else."""
         self._taker = taker
+        self.scope["headers"] = []  # whoever is let in was asked for everything
         self._go_on()
 
     def let_go(self) -> None:
