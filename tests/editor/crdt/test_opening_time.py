@@ -25,7 +25,7 @@ def test_without_doubt_no_more_is_added_than_may_be(history: list[tuple[int, int
             limit = min(2.0, 0.25 + 0.2 * 10 * measured / (1 << 20))
             most = max(0.1 + seconds, (limit - seconds) / 2)
             assert (structs**2 - measured**2) / 4 * STEP <= most * (1 + 1e-9)
-        then = opening.structs
+        then = opening.came
         opening.took(meanwhile)
         opening.opened(took, 10 * structs, then)
         measured, seconds = structs, took
@@ -37,7 +37,7 @@ def test_it_is_due_long_before_it_is_in_doubt() -> None:
     while not opening.is_due:
         opening.took(10)
     assert not opening.is_doubtful_with(5_000)
-    opening.opened(0.001, 50_000, opening.structs)
+    opening.opened(0.001, 50_000, opening.came)
     assert not opening.is_due
 
 
@@ -49,6 +49,19 @@ def test_a_value_that_is_written_again_and_again_makes_no_doubt() -> None:
         opening.took(1)
         if opening.is_due:
             asked += 1
-            opening.opened(0.001, 400, opening.structs)
+            opening.opened(0.001, 400, opening.came)
         assert not opening.is_doubtful_with(60)
     assert asked < 100
+
+
+def test_what_came_while_an_older_measurement_went_on_stays_counted() -> None:
+    """A newer one was faster: the older one tells nothing of what came after it."""
+    opening = OpeningTime()
+    opening.took(2_000)
+    began = opening.came
+    opening.took(10)
+    opening.opened(0.001, 400)
+    opening.took(2_400)
+    assert opening.is_doubtful_with(0)
+    opening.opened(0.001, 400, began)
+    assert opening.is_doubtful_with(0)

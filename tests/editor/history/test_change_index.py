@@ -140,7 +140,6 @@ async def test_what_is_being_edited_is_left_until_it_rests(
     """Unless there is too much of it; whoever asks has it at once."""
     module = "action_assistant.editor.history.change_index"
     look, looked = anyio.Semaphore(0), anyio.Semaphore(0)
-    pause = anyio.sleep
 
     async def sleep(_: float) -> None:
         looked.release()
@@ -150,26 +149,26 @@ async def test_what_is_being_edited_is_left_until_it_rests(
         look.release()
         await looked.acquire()
 
-    monkeypatch.setattr(f"{module}.anyio.sleep", sleep)
     monkeypatch.setattr(f"{module}._FAR", 40)
     index = ChangeIndex(journal)
 
     async def indexed() -> int:
         return (await index._head(GRAPH))[0]
 
-    async with index.kept_up():
-        await looked.acquire()
-        for nth in range(2):
-            await edited(rooms, nth, 8)
+    with monkeypatch.context() as patch:
+        patch.setattr(anyio, "sleep", sleep)
+        async with index.kept_up():
+            await looked.acquire()
+            for nth in range(2):
+                await edited(rooms, nth, 8)
+                await next_look()
+                assert await indexed() == 0
+            await next_look()  # nothing was edited since
+            rests = await indexed()
+            assert rests == await journal.newest(graph_stream(GRAPH))
+            await edited(rooms, 5, 80)
             await next_look()
-            assert await indexed() == 0
-        await next_look()  # nothing was edited since
-        rests = await indexed()
-        assert rests == await journal.newest(graph_stream(GRAPH))
-        await edited(rooms, 5, 80)
-        await next_look()
-        assert await indexed() > rests
-    monkeypatch.setattr(f"{module}.anyio.sleep", pause)
+            assert await indexed() > rests
 
 
 async def test_a_document_that_cannot_be_read_ends_nothing(

@@ -53,7 +53,7 @@ class Wire(asyncio.Transport):
         self.is_read = True
 
 
-class Ears:
+class RecordingTaker:
     """Keeps what it hears; after each message in `stops` it wants a pause."""
 
     def __init__(self, socket: DirectSocket, stops: frozenset[int] = frozenset()) -> None:
@@ -139,7 +139,7 @@ async def directly(
     pieces: list[bytes], *, before: int = 0, stops: frozenset[int] = frozenset()
 ) -> tuple[list[bytes | None], bytes, bool, bool]:
     """As `usually`, by a socket that is taken over after `before` pieces have come."""
-    taken: list[Ears] = []
+    taken: list[RecordingTaker] = []
     go = asyncio.Event()
 
     async def app(scope: Any, receive: Any, send: Any) -> None:
@@ -148,9 +148,9 @@ async def directly(
         await go.wait()
         socket = direct_socket(scope["extensions"])
         assert socket is not None
-        ears = Ears(socket, stops)
-        taken.append(ears)
-        socket.take_over(ears)
+        taker = RecordingTaker(socket, stops)
+        taken.append(taker)
+        socket.take_over(taker)
         await asyncio.Event().wait()
 
     protocol, wire = await opened(DirectSocket, app)
@@ -162,13 +162,13 @@ async def directly(
         if piece and not wire.is_closing():
             protocol.data_received(piece)
         await turns(protocol)
-        for ears in taken:
-            while ears.wants_a_pause:
-                ears.go_on()
+        for taker in taken:
+            while taker.wants_a_pause:
+                taker.go_on()
                 await turns(protocol)
-    (ears,) = taken
+    (taker,) = taken
     end(protocol)
-    return ears.heard_so_far, wire.written, ears.is_gone, wire.is_closing()
+    return taker.heard_so_far, wire.written, taker.is_gone, wire.is_closing()
 
 
 def end(protocol: Any) -> None:

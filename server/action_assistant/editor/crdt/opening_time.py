@@ -29,29 +29,33 @@ class OpeningTime:
     """Of one document: what opening it took when that was measured, and what has come since."""
 
     def __init__(self) -> None:
-        self._structs = 0.0
-        self._measured_at = 0.0  # structs
+        self._came = 0  # structs that were ever added
+        self._came_then = 0  # of these, when it was measured last
+        self._measured_at = 0.0  # structs that there were then
         self._seconds = 0.0
         self._limit = SECONDS
 
     @property
-    def structs(self) -> float:
-        """How many there are, about."""
-        return self._structs
+    def came(self) -> int:
+        """How many structs were ever added: says when something was measured."""
+        return self._came
 
-    def opened(self, seconds: float, size: int, structs: float | None = None) -> None:
-        """So many bytes were applied in so many seconds to a document with nothing in it. `structs`: how
-        many there were then; as many as there are now without."""
-        counted = self._structs if structs is None else structs
+    def opened(self, seconds: float, size: int, came: int | None = None) -> None:
+        """So many bytes were applied in so many seconds to a document with nothing in it: as it was when
+        so many structs had come, or as it is now. What is older than the newest measurement counts for
+        nothing."""
+        then = self._came if came is None else came
+        if then < self._came_then:
+            return
+        counted = self._measured_at + then - self._came_then
         # What was overwritten is put together: a document may have fewer than were ever added.
-        there = min(max(counted, size / _STORED), size / _LEAST)
-        self._structs = max(self._structs - counted, 0.0) + there
-        self._measured_at, self._seconds = there, seconds
+        self._measured_at = min(max(counted, size / _STORED), size / _LEAST)
+        self._came_then, self._seconds = then, seconds
         self._limit = min(_MOST, SECONDS + _PER_MIB * size / (1 << 20))
 
     def took(self, structs: int) -> None:
         """So many structs were added."""
-        self._structs += structs
+        self._came += structs
 
     def is_doubtful_with(self, size: int) -> bool:
         """Whether it has to be measured before updates of so many bytes are applied."""
@@ -67,6 +71,10 @@ class OpeningTime:
     @property
     def _spare(self) -> float:
         return max(_SPARE + self._seconds, (self._limit - self._seconds) / 2)
+
+    @property
+    def _structs(self) -> float:
+        return self._measured_at + self._came - self._came_then
 
     def _added(self, structs: float) -> float:
         """Seconds by which opening may take longer than measured, with so many structs."""

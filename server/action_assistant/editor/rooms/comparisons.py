@@ -9,8 +9,8 @@ from action_assistant.editor.crdt.replica import Replica
 from action_assistant.editor.documents.contents import shown
 from action_assistant.editor.documents.fingerprint import Fingerprint
 from action_assistant.editor.rooms.batch import Compare
+from action_assistant.editor.rooms.room_task import begin_room_task
 from action_assistant.errors import Refused
-from action_assistant.logs.context import begin
 from action_assistant.web.workers.lanes import RunInWorker
 
 log: Final = logging.getLogger(__name__)
@@ -61,7 +61,7 @@ class Comparisons:
 
     async def _compare_all(self) -> None:
         """What a document shows is looked at aside: that takes a second for a large one."""
-        begin({"graph": self._room.stream.rpartition("/")[2]})
+        begin_room_task(self._room.stream)
         try:
             while self._waiting:
                 found = await self._shown()

@@ -7,9 +7,8 @@ from typing import Final
 from action_assistant.editor.crdt.messages import NOTHING_NEW, Malformed
 from action_assistant.editor.crdt.replica import Panicked, Replica
 from action_assistant.editor.crdt.trial import TooSlow, tried
+from action_assistant.editor.rooms.room_task import begin_room_task
 from action_assistant.errors import Refused
-from action_assistant.logs.context import begin
-from action_assistant.web.auth.caller import done_for_nobody
 from action_assistant.web.workers.lanes import RunInWorker
 
 log: Final = logging.getLogger(__name__)
@@ -21,8 +20,8 @@ _SHARE: Final = 20  # times as long as it took it is not measured again
 class MeasuredAhead:
     """Of one room. Where nothing comes of it, the edit that raises a doubt is tried first, as ever."""
 
-    def __init__(self, graph: str, run_in_worker: RunInWorker) -> None:
-        self._graph = graph
+    def __init__(self, stream: str, run_in_worker: RunInWorker) -> None:
+        self._stream = stream
         self._run_in_worker = run_in_worker
         self._loop = asyncio.get_running_loop()
         self._not_before = 0.0
@@ -39,16 +38,15 @@ class MeasuredAhead:
             self._task.cancel()
 
     async def _measure(self, replica: Replica) -> None:
-        done_for_nobody()
-        begin({"graph": self._graph})
-        structs, state = replica.opening.structs, replica.doc.get_update()
+        begin_room_task(self._stream)
+        came, state = replica.opening.came, replica.doc.get_update()
         try:
             found = await self._run_in_worker(tried, state, NOTHING_NEW, ())
         except (Refused, Malformed, Panicked, TooSlow) as error:
-            log.warning("how long graph %s takes to be opened is not known: %r", self._graph, error)
+            log.warning("%s: how long it takes to be opened is not known: %r", self._stream, error)
             self._not_before = self._loop.time() + _AGAIN
         else:
-            replica.opening.opened(found.opening, len(state), structs)
+            replica.opening.opened(found.opening, len(state), came)
             self._not_before = self._loop.time() + _SHARE * found.opening
         finally:
             self._task = None

@@ -16,7 +16,7 @@ from action_assistant.editor.crdt import messages
 from action_assistant.editor.crdt.loading import Loaded, load
 from action_assistant.editor.crdt.replica import Panicked, Replica, UpdateEffect
 from action_assistant.editor.crdt.update_outline import UpdateOutline
-from action_assistant.editor.log.graph_events import DEFERRED, UPDATED
+from action_assistant.editor.log.graph_events import DEFERRED, UPDATED, graph_of
 from action_assistant.editor.rooms.batch import (
     OBJECTIONS,
     Ask,
@@ -41,11 +41,11 @@ from action_assistant.editor.rooms.presence_spread import PresenceSpread
 from action_assistant.editor.rooms.room_metrics import RoomMetrics
 from action_assistant.editor.rooms.room_news import RoomNews, answer_all
 from action_assistant.editor.rooms.room_snapshots import RoomSnapshots
+from action_assistant.editor.rooms.room_task import begin_room_task
 from action_assistant.errors import Conflict, Refused, Unavailable
 from action_assistant.journal.events import Addition, Draft
 from action_assistant.journal.journal import Journal
-from action_assistant.logs.context import about, begin
-from action_assistant.web.auth.caller import done_for_nobody
+from action_assistant.logs.context import about
 from action_assistant.web.workers.lanes import RunInWorker, run_here
 
 log: Final = logging.getLogger(__name__)
@@ -73,7 +73,7 @@ class Room:
         metrics: RoomMetrics | None = None,
     ) -> None:
         self.stream: Final = stream
-        self._graph: Final = stream.rpartition("/")[2]
+        self._graph: Final = graph_of(stream) or stream
         self._metrics = metrics or RoomMetrics()
         self.seq = loaded.seq
         self.members: set[Member] = set()
@@ -97,7 +97,7 @@ class Room:
         self._quiet = asyncio.Event()
         self._quiet.set()
         self._aside: asyncio.Task[None] | None = None  # what takes long of the batch in hand
-        self._measured: Final = MeasuredAhead(self._graph, tried)
+        self._measured: Final = MeasuredAhead(stream, tried)
 
     # --- people ---------------------------------------------------------------------------------
 
@@ -137,7 +137,7 @@ class Room:
             case messages.WhoIsThere():
                 member.post_presence(PresenceNews(self.attendance.everyone()))
 
-    # --- the door -------------------------------------------------------------------------------
+    # --- what the server itself asks for --------------------------------------------------------
 
     async def submit(self, update: bytes, author: str) -> int:
         """An edit of the server's own (rule R9); the seq up to which the log then goes.
@@ -261,8 +261,7 @@ class Room:
         """What takes long, in a task; nothing else of this room is done meanwhile."""
 
         async def guarded() -> None:
-            done_for_nobody()  # whoever came first may leave
-            begin({"graph": self._graph})
+            begin_room_task(self.stream)
             try:
                 await work
             except BaseException as error:  # noqa: BLE001 - as in `_act`

@@ -5,10 +5,9 @@ import logging
 from typing import Final
 
 from action_assistant.editor.crdt.replica import Replica, ReplicaState
+from action_assistant.editor.rooms.room_task import begin_room_task
 from action_assistant.errors import Refused
 from action_assistant.journal.journal import Journal
-from action_assistant.logs.context import begin
-from action_assistant.web.auth.caller import done_for_nobody
 
 log: Final = logging.getLogger(__name__)
 
@@ -47,8 +46,7 @@ class RoomSnapshots:
         return ReplicaState.of(replica)
 
     async def _store(self, seq: int, state: bytes) -> None:
-        done_for_nobody()
-        begin({"graph": self._stream.rpartition("/")[2]})
+        begin_room_task(self._stream)
         try:
             await self._journal.keep_snapshot(self._stream, seq, state)
         except Refused as error:

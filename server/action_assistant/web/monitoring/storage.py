@@ -37,8 +37,8 @@ class Storage(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class StorageWatch:
-    """Looks again and again, whatever goes wrong. `folders` by what people call them; they are counted `run_in_worker`. With
-    `backups` also at what is known of these; None while that cannot be read."""
+    """Looks again and again, whatever goes wrong. `folders` by what people call them; they are counted
+    `run_in_worker`. With `backups` also at what is known of these; None while that cannot be read."""
 
     def __init__(
         self,

@@ -26,10 +26,8 @@ except ImportError:  # where it was not compiled
 _EXTENSION: Final = "action_assistant.direct"
 _WHOLE_BINARY: Final = 0x82  # the first byte of a message in one frame
 _SHORT: Final = 126
-_CONTINUED, _BINARY = (
-    0,
-    2,
-)  # kinds of frames: a second one of a message and those after it, a first one
+#: Kinds of frames: a second one of a message and those after it, a first one.
+_CONTINUED, _BINARY = 0, 2
 _KINDS: Final = frozenset({_CONTINUED, 1, _BINARY, 8, 9, 10})
 _PING: Final = 0x89  # the first byte of a whole one
 _WRITTEN_AT_ONCE: Final = 1 << 16  # bytes; more is written message by message
