@@ -61,7 +61,7 @@ def test_what_came_while_an_older_measurement_went_on_stays_counted() -> None:
     began = opening.came
     opening.took(10)
     opening.opened(0.001, 400)
-    opening.took(2_400)
+    opening.took(3_000)
     assert opening.is_doubtful_with(0)
     opening.opened(0.001, 400, began)
     assert opening.is_doubtful_with(0)

@@ -5,8 +5,7 @@ import time
 
 import pytest
 
-from action_assistant.editor.rooms.batch_window import BatchWindow
-from action_assistant.editor.rooms.turn_end import TurnEnd
+from action_assistant.editor.rooms.batch_window import BatchWindow, TurnEnd
 
 
 async def test_what_comes_at_the_same_time_is_done_in_one_window() -> None:

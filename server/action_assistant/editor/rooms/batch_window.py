@@ -6,16 +6,42 @@ while there is time, so that nobody waits; longer the less there is, since what 
 """
 
 import asyncio
+import logging
 import time
 from collections.abc import Callable
+from contextvars import Context
 from typing import Final
 
-from action_assistant.editor.rooms.turn_end import TurnEnd
+log: Final = logging.getLogger(__name__)
 
 LONGEST: Final = 0.01  # seconds; nobody sees it, and a busy room needs a fifth of the work
 SHORTEST: Final = 0.001  # seconds in which what people do at the same time arrives
 _BUSY: Final = 0.5  # share of its processor that the loop works, from which on windows are longest
 _MEMORY: Final = 0.1  # seconds over which that is looked at
+
+
+class TurnEnd:
+    """The end of a turn of the event loop: what many rooms and sockets have to do then is one call of it,
+    each once, in the order in which it was put here."""
+
+    def __init__(self) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._context = Context()  # it is done for nobody
+        self._work: list[Callable[[], None]] = []
+
+    def do(self, work: Callable[[], None]) -> None:
+        """Call this soon, behind what is on its way in this turn."""
+        if not self._work:
+            self._loop.call_soon(self._all, context=self._context)
+        self._work.append(work)
+
+    def _all(self) -> None:
+        work, self._work = self._work, []
+        for each in work:
+            try:
+                each()
+            except Exception:  # that one's; all others have their turn
+                log.exception("something failed at the end of a turn")
 
 
 class BatchWindow:
