@@ -48,6 +48,10 @@ test("a graph is made in the outline", async ({ browser }) => {
   await page.waitForURL(/\/graphs\/.+/);
   const id = page.url().split("/").at(-1)?.split(/[?#]/)[0];
   await pane(page, "Outline");
+  const names = page.getByRole("radiogroup").first().locator("span");
+  const cut = names.evaluateAll((all) => all.filter((each) => each.scrollWidth > each.clientWidth));
+  expect(await names.count()).toBe(5);
+  expect(await cut).toHaveLength(0);
   await add(page, "Spot");
   await add(page, "Take");
 
