@@ -7,7 +7,7 @@ from typing import Any, Final
 from litestar.enums import ScopeType
 from litestar.types import ASGIApp, HTTPScope, Receive, Scope, Send
 
-from action_assistant.web.http.static_files import File, file_of, send_file
+from action_assistant.web.http.static_files import File, send_file
 
 _HELP: Final = "/help"
 #: Stricter than the page's: nothing inline, and no other origin, not even the runner's.
@@ -78,7 +78,7 @@ class HelpSite:
             return None
         if name not in self._files:
             try:
-                self._files[name] = file_of(path.read_bytes(), path.suffix, lasting=False)
+                self._files[name] = File(path.read_bytes(), path.suffix, lasting=False)
             except OSError:  # it is being built anew
                 return None
         return self._files[name]
@@ -97,7 +97,7 @@ class HelpSite:
 
 def _message(body: str) -> File:
     text = f'<!doctype html><html lang="en"><meta charset="utf-8"><title>Help</title>{body}'
-    return file_of(text.encode(), ".html", lasting=False)
+    return File(text.encode(), ".html", lasting=False)
 
 
 async def _lead_below(send: Send) -> None:

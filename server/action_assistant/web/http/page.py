@@ -7,7 +7,7 @@ from typing import Final
 from litestar.enums import ScopeType
 from litestar.types import ASGIApp, HTTPScope, Receive, Scope, Send
 
-from action_assistant.web.http.static_files import File, file_of, send_file
+from action_assistant.web.http.static_files import File, send_file
 
 _NOT_PAGES: Final = ("/api/", "/runner/", "/schema", "/healthz", "/readyz", "/metrics")
 _UNBUILT: Final = b"""<!doctype html><meta charset="utf-8"><title>Page not built</title>
@@ -29,7 +29,7 @@ class Page:
         self._root_of = root_of
         self._built: float | None = None
         self._files: dict[str, File] = {}
-        self._index = file_of(_UNBUILT, ".html", lasting=False)
+        self._index = File(_UNBUILT, ".html", lasting=False)
         self._rooted: dict[str, File] = {}
         self._renew()
 
@@ -48,7 +48,7 @@ class Page:
         """The page itself. What it names beside it is at its root, whichever address it is opened by."""
         if root not in self._rooted:
             body = self._index.body.replace(b'="./', f'="{root}/'.encode())
-            self._rooted[root] = file_of(body, ".html", lasting=False)
+            self._rooted[root] = File(body, ".html", lasting=False)
         return self._rooted[root]
 
     def knows(self, path: str, accepts_html: bool) -> bool:
@@ -75,7 +75,7 @@ class Page:
 
 def _load(folder: Path) -> dict[str, File]:
     return {
-        f"/{path.relative_to(folder).as_posix()}": file_of(
+        f"/{path.relative_to(folder).as_posix()}": File(
             path.read_bytes(), path.suffix, lasting="assets" in path.parts
         )
         for path in folder.rglob("*")

@@ -3,35 +3,35 @@
 import gzip
 import hashlib
 import mimetypes
+from functools import cached_property
 from typing import Any, Final
 
-import msgspec
 from litestar.types import HTTPScope, Send
 
 _COMPRESSED: Final = frozenset({".html", ".js", ".css", ".svg", ".json", ".webmanifest"})
+_TEXTS: Final = frozenset({".html", ".js", ".css"})
+_WORTH: Final = 1000  # bytes
 _MEDIA: Final = {**mimetypes.types_map, ".webmanifest": "application/manifest+json"}
 
 Fields = tuple[tuple[bytes, bytes], ...]
 
 
-class File(msgspec.Struct, frozen=True):
-    """One file as it is sent. `zipped` is empty where compression does not pay."""
+class File:
+    """One file as it is sent. `lasting`: its name says its content."""
 
-    body: bytes
-    zipped: bytes
-    media: str
-    etag: str
-    lasting: bool
+    def __init__(self, body: bytes, suffix: str, *, lasting: bool) -> None:
+        media = _MEDIA.get(suffix, "application/octet-stream")
+        self.media: Final = f"{media}; charset=utf-8" if suffix in _TEXTS else media
+        self.body: Final = body
+        self.etag: Final = f'"{hashlib.sha256(body).hexdigest()[:20]}"'
+        self.lasting: Final = lasting
+        self._pays: Final = suffix in _COMPRESSED and len(body) > _WORTH
 
-
-def file_of(body: bytes, suffix: str, *, lasting: bool) -> File:
-    """A file from what it holds and the end of its name. `lasting`: its name says its content."""
-    media = _MEDIA.get(suffix, "application/octet-stream")
-    if suffix in {".html", ".js", ".css"}:
-        media += "; charset=utf-8"
-    zipped = gzip.compress(body, mtime=0) if suffix in _COMPRESSED and len(body) > 1000 else b""
-    etag = f'"{hashlib.sha256(body).hexdigest()[:20]}"'
-    return File(body, zipped, media, etag, lasting)
+    @cached_property
+    def zipped(self) -> bytes:
+        """Compressed; empty where that does not pay. When it is asked for first: a start has no time for
+        all files of the page."""
+        return gzip.compress(self.body, mtime=0) if self._pays else b""
 
 
 async def send_file(
@@ -50,7 +50,7 @@ async def send_file(
         body, status = b"", 304
     else:
         fields.append((b"content-type", file.media.encode()))
-        if file.zipped and b"gzip" in asked.get(b"accept-encoding", b""):
+        if b"gzip" in asked.get(b"accept-encoding", b"") and file.zipped:
             body = file.zipped
             fields.append((b"content-encoding", b"gzip"))
         fields.append((b"content-length", str(len(body)).encode()))

@@ -44,6 +44,7 @@ T = TypeVar("T")
 _WAITING: Final = 32  # requests of one person
 _ALL_WAITING: Final = 256
 _START_S: Final = 30.0
+_FIRST_S: Final = 2.0  # after the start, which has enough to do by itself
 _ENDING_S: Final = 5.0  # for which a process whose wire is closed may still be ending
 
 
@@ -248,6 +249,7 @@ async def kept_warm(*lanes: Lane) -> AsyncIterator[None]:
 
 async def _keep_warm(lane: Lane) -> None:
     """Whoever comes next shall not have to wait for a worker to be made."""
+    await anyio.sleep(_FIRST_S)
     while True:
         try:
             await lane.warm()
