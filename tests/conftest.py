@@ -1,12 +1,16 @@
 """What every test may ask for."""
 
 import os
+import ssl
 import subprocess
 import tempfile
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator
+from functools import cache
 from pathlib import Path
+from typing import Any
 
+import httpx
 import pytest
 from hypothesis import settings
 
@@ -24,6 +28,20 @@ os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 # Machines are slow at times; a test that is too slow is found by its time limit, not by chance.
 settings.register_profile("default", deadline=None)
 settings.load_profile("default")
+
+
+@cache
+def _context(verify: Any, cert: Any, trust_env: bool, *_: str | None) -> ssl.SSLContext:
+    return httpx.create_ssl_context(verify=verify, cert=cert, trust_env=trust_env)
+
+
+def _context_once(verify: Any = True, cert: Any = None, trust_env: bool = True) -> ssl.SSLContext:
+    named = map(os.environ.get, ("SSL_CERT_FILE", "SSL_CERT_DIR"))
+    return _context(verify, cert, trust_env, *named)
+
+
+# Each client of httpx would read all certificates of the machine, 30 ms of a processor, also for plain http.
+httpx._transports.default.create_ssl_context = _context_once
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -138,7 +138,9 @@ def test_on_windows_a_graph_is_brought_to_a_server_and_run(tmp_path: Path) -> No
     assert answer.stdout.count("\n+ 0\n") == 4, answer.stdout + answer.stderr
 
 
-@pytest.mark.parametrize(("kind", "offset"), [("editor", 0), ("runner", 1)])
+@pytest.mark.parametrize(
+    ("kind", "offset"), [pytest.param("editor", 0, marks=pytest.mark.long), ("runner", 1)]
+)
 def test_on_macos_both_processes_serve(tmp_path: Path, kind: str, offset: int) -> None:
     port = free_ports() + offset
     command = [sys.executable, elsewhere.__file__, "darwin", kind, "--data", str(tmp_path / "data")]

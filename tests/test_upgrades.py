@@ -84,13 +84,15 @@ def command(*arguments: "str | Path") -> "subprocess.CompletedProcess[str]":
     )
 
 
+#: With the first and the last two of each in CI.
 EACH = [
-    *(
-        (f"editor on {kind}", each)
-        for kind in ("SQLite", "Postgres")
-        for each in revisions_of("editor")
-    ),
-    *(("runner on SQLite", each) for each in revisions_of("runner")),
+    pytest.param(place, each, marks=() if each in {all_of[0], *all_of[-2:]} else pytest.mark.long)
+    for place, all_of in (
+        ("editor on SQLite", revisions_of("editor")),
+        ("editor on Postgres", revisions_of("editor")),
+        ("runner on SQLite", revisions_of("runner")),
+    )
+    for each in all_of
 ]
 
 

@@ -161,6 +161,7 @@ for (const scheme of ["light", "dark"] as const) {
 test("at 320 px, which is a desktop at 400 %, nothing has to be scrolled sideways", async ({
   browser,
 }) => {
+  test.skip(LONG !== "", LONG);
   const { page, context } = await product.person(browser, "Ada", {
     viewport: { width: 320, height: 640 },
   });

@@ -38,6 +38,7 @@ async function addParameter(page: Page, name: string, type: string): Promise<voi
 }
 
 test("an action with a pose goes from nothing to a package that compiles", async ({ browser }) => {
+  test.skip(LONG !== "", LONG);
   const { page, context, failures } = await product.person(browser, "Ada");
   await page.goto(`${product.url}/actions`);
   await page.getByRole("button", { name: "New action" }).click();

@@ -161,6 +161,7 @@ test("edits of an action are undone, and its history leads back", async ({ brows
 });
 
 test("two people edit an action at once, and see each other", async ({ browser }) => {
+  test.skip(LONG !== "", LONG);
   const { id } = await post(product, "/api/actions", action("Together", { depth: leaf("number") }));
   const ada = await product.person(browser, "Ada");
   const ben = await product.person(browser, "Ben");
@@ -180,6 +181,7 @@ test("two people edit an action at once, and see each other", async ({ browser }
 });
 
 test("an action is talked about, also one of its parameters", async ({ browser }) => {
+  test.skip(LONG !== "", LONG);
   const { id } = await post(
     product,
     "/api/actions",
@@ -211,6 +213,7 @@ test("an action is talked about, also one of its parameters", async ({ browser }
 });
 
 test("files of actions are imported into the library, many at once", async ({ browser }) => {
+  test.skip(LONG !== "", LONG);
   const { page, context, failures } = await product.person(browser, "Ada");
   await page.goto(`${product.url}/actions`);
   await choose(page, [
@@ -236,6 +239,7 @@ test("files of actions are imported into the library, many at once", async ({ br
 });
 
 test("an action is made, found and deleted by keys alone", async ({ browser }) => {
+  test.skip(LONG !== "", LONG);
   const { page, context, failures } = await product.person(browser, "Ada");
   await page.goto(`${product.url}/actions`);
   await expect(list(page)).toBeVisible();

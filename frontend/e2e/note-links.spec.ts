@@ -70,6 +70,7 @@ for (const scheme of ["light", "dark"] as const) {
 }
 
 test("by mouse on the canvas and in the details, by a finger too", async ({ browser }) => {
+  test.skip(LONG !== "", LONG);
   const { page, context, failures } = await product.person(browser, "Ada", { hasTouch: true });
   await opened(page);
   const text = page.getByRole("textbox", { name: "Text of the note" });

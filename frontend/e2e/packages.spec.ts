@@ -6,7 +6,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { expect, type Page, test } from "@playwright/test";
 import { card, chosen, saved } from "./canvas";
-import { Product } from "./product";
+import { LONG, Product } from "./product";
 
 const product = new Product();
 
@@ -86,6 +86,7 @@ test("the packages of a graph are looked at, downloaded, and what has none is sh
 test("an action leads to its own package, by its form and by the menu of its card", async ({
   browser,
 }) => {
+  test.skip(LONG !== "", LONG);
   const { page, context, failures } = await product.person(browser, "Ada");
   await page.goto(`${product.url}/graphs/${await kitchen()}`);
   await saved(page);

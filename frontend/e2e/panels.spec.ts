@@ -2,7 +2,7 @@
 
 import { expect, test } from "@playwright/test";
 import { card, saved } from "./canvas";
-import { Product } from "./product";
+import { LONG, Product } from "./product";
 
 const product = new Product();
 
@@ -71,6 +71,7 @@ test("the lists fold to a rail by which each is opened and put away, also by key
 test("beside the rail the details are there while something is chosen, or when asked for", async ({
   browser,
 }) => {
+  test.skip(LONG !== "", LONG);
   const { page, context, failures } = await product.person(browser, "Ada");
   await page.addInitScript(() => localStorage.setItem("aa.list-folded", "true"));
   await page.goto(`${product.url}/graphs/${await product.chain(4)}`);

@@ -2,7 +2,7 @@
 
 import { type CDPSession, expect, type Locator, type Page, test } from "@playwright/test";
 import { arrows, card, saved } from "./canvas";
-import { Product, pause } from "./product";
+import { LONG, Product, pause } from "./product";
 
 const product = new Product();
 
@@ -173,6 +173,7 @@ test("a tablet: open, add, connect, set a parameter, start, stop", async ({ brow
 test("a tablet: two fingers zoom, a resting one opens the menu, taps choose several", async ({
   browser,
 }) => {
+  test.skip(LONG !== "", LONG);
   const { page, context, failures } = await product.person(browser, "Ada", tablet);
   const fingers = await Fingers.on(page);
   await page.goto(`${product.url}/graphs/${await product.chain(2)}`);
@@ -220,6 +221,7 @@ test("a tablet: two fingers zoom, a resting one opens the menu, taps choose seve
 });
 
 test("a tablet: a finger bends the line of an arrow that was tapped", async ({ browser }) => {
+  test.skip(LONG !== "", LONG);
   const { page, context, failures } = await product.person(browser, "Ada", tablet);
   const fingers = await Fingers.on(page);
   await page.goto(`${product.url}/graphs/${await product.chain(2)}`);

@@ -65,6 +65,7 @@ for (const [what, viewport, least] of [
 test("Fit shows all of a graph also when it is pressed before the graph has places", async ({
   browser,
 }) => {
+  test.skip(LONG !== "", LONG);
   const { page, context } = await product.person(browser, "Ada");
   await page.goto(`${product.url}/graphs/${await product.chain(80)}`);
   await page.getByRole("button", { name: "Fit", exact: true }).click();

@@ -9,4 +9,4 @@ _SHARE: Final = float(os.environ.get("TEST_EXAMPLES", "1"))
 
 def examples(usual: int) -> int:
     """How many generated examples a property is tried on."""
-    return max(10, round(usual * _SHARE))
+    return max(5, round(usual * _SHARE))

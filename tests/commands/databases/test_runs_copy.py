@@ -72,6 +72,7 @@ def test_every_event_is_there_once_however_often_it_is_copied(data: Path, postgr
     assert asked[0].startswith("patrol")
 
 
+@pytest.mark.long
 def test_a_note_with_a_nul_keeps_no_run_from_being_copied(data: Path, postgres: Server) -> None:
     url = postgres.new_database()
     with running(data) as product, product.runner() as runner:
@@ -84,6 +85,7 @@ def test_a_note_with_a_nul_keeps_no_run_from_being_copied(data: Path, postgres: 
     assert rows(url, noted) == [("a\ufffdb",)]
 
 
+@pytest.mark.long
 def test_another_log_is_not_mixed_in(data: Path, tmp_path: Path, postgres: Server) -> None:
     url = postgres.new_database()
     assert command("runs", "copy", "--to", url, "--data", data).returncode == 0

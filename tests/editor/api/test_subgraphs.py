@@ -18,7 +18,7 @@ from editor.process import running
 from journal.servers import Server
 
 
-@pytest.fixture(params=["sqlite", "postgres"])
+@pytest.fixture(params=["sqlite", pytest.param("postgres", marks=pytest.mark.long)])
 def client(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[httpx.Client]:
     """A program at an editor of its own, on either database."""
     server: Server | None = None

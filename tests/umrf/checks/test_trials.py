@@ -132,7 +132,13 @@ def test_a_trap_is_found_wherever_it_stands(count: int, at: int) -> None:
     assert found[0].where.path == f"/actions/{at}"
 
 
-@pytest.mark.parametrize("shape", GROWING)
+@pytest.mark.parametrize(
+    "shape",
+    [
+        pytest.param(each, marks=pytest.mark.long if each.endswith("-default") else ())
+        for each in GROWING
+    ],
+)
 def test_every_way_through_a_large_graph_of_any_shape_is_tried(shape: str) -> None:
     graph = read(json.dumps(GROWING[shape](1_000))).graph
     started = time.process_time()

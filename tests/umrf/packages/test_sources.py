@@ -57,6 +57,7 @@ def shape(action: Action) -> dict[str, object]:
     return found
 
 
+@pytest.mark.long
 @pytest.mark.timeout(900)  # a compiler for each of them
 @given(action=odd_actions())
 @settings(max_examples=examples(16), deadline=None)
@@ -159,6 +160,7 @@ def test_no_name_leads_out_of_the_package(name: str) -> None:
         assert all(path.isascii() and path.isprintable() for path in files)
 
 
+@pytest.mark.long
 def test_real_actions_have_packages_or_a_reason_against_them(tmp_path: Path) -> None:
     if not CORPUS.is_dir():
         pytest.skip(NO_CORPUS)

@@ -119,7 +119,7 @@ class House:
 _STREAMS = (h.graph_stream, h.about_stream)
 
 
-@pytest.fixture(params=["SQLite", "Postgres"])
+@pytest.fixture(params=["SQLite", pytest.param("Postgres", marks=pytest.mark.long)])
 async def house(request: pytest.FixtureRequest, tmp_path: Path) -> AsyncIterator[House]:
     """On each kind of database that there is."""
     url = f"sqlite:///{tmp_path / 'editor.db'}"
