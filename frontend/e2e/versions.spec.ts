@@ -2,7 +2,7 @@
 
 import { expect, type Page, test } from "@playwright/test";
 import { boxOf, card, saved, start, umrfOf } from "./canvas";
-import { LONG, type Person, Product } from "./product";
+import { type Person, Product } from "./product";
 import { begun, choose, post, ran, setSpeed, VALVES, violations } from "./valves";
 
 const product = new Product();
@@ -122,7 +122,6 @@ test("a value is set back from the chart of all that it was", async () => {
 });
 
 test("two moments stand side by side, with one view, and are walked by keys", async () => {
-  test.skip(LONG !== "", LONG);
   const { page } = ada;
   await choose(mari.page, "Cool");
   await mari.page.keyboard.press("Delete");
