@@ -43,7 +43,7 @@ class EditorWorkers:
     @classmethod
     @asynccontextmanager
     async def opened(cls) -> "AsyncIterator[EditorWorkers]":
-        """Workers, as long as you are inside. The first ones are made meanwhile."""
+        """Workers, as long as you are inside. The first ones are made soon after."""
         lanes = cls()
         async with kept_warm(lanes.files, lanes.graphs, lanes.edits):
             yield lanes

@@ -38,7 +38,7 @@ class RunnerWorkers:
     @classmethod
     @asynccontextmanager
     async def opened(cls) -> "AsyncIterator[RunnerWorkers]":
-        """Workers, as long as you are inside. The first ones are made meanwhile."""
+        """Workers, as long as you are inside. The first ones are made soon after."""
         lanes = cls()
         async with kept_warm(lanes.starts, lanes.looks, lanes.ours):
             yield lanes

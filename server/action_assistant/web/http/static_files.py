@@ -3,9 +3,10 @@
 import gzip
 import hashlib
 import mimetypes
-from functools import cached_property
+from functools import partial
 from typing import Any, Final
 
+from anyio import to_thread
 from litestar.types import HTTPScope, Send
 
 _COMPRESSED: Final = frozenset({".html", ".js", ".css", ".svg", ".json", ".webmanifest"})
@@ -25,13 +26,15 @@ class File:
         self.body: Final = body
         self.etag: Final = f'"{hashlib.sha256(body).hexdigest()[:20]}"'
         self.lasting: Final = lasting
-        self._pays: Final = suffix in _COMPRESSED and len(body) > _WORTH
+        pays = suffix in _COMPRESSED and len(body) > _WORTH
+        self._zipped: bytes | None = None if pays else b""
 
-    @cached_property
-    def zipped(self) -> bytes:
-        """Compressed; empty where that does not pay. When it is asked for first: a start has no time for
-        all files of the page."""
-        return gzip.compress(self.body, mtime=0) if self._pays else b""
+    async def zipped(self) -> bytes:
+        """Compressed; empty where that does not pay. Made when it is asked for first, on a thread: a start
+        has no time for all files of the page, and the largest takes a tenth of a second."""
+        if self._zipped is None:
+            self._zipped = await to_thread.run_sync(partial(gzip.compress, self.body, mtime=0))
+        return self._zipped
 
 
 async def send_file(
@@ -50,8 +53,8 @@ async def send_file(
         body, status = b"", 304
     else:
         fields.append((b"content-type", file.media.encode()))
-        if b"gzip" in asked.get(b"accept-encoding", b"") and file.zipped:
-            body = file.zipped
+        if b"gzip" in asked.get(b"accept-encoding", b"") and (zipped := await file.zipped()):
+            body = zipped
             fields.append((b"content-encoding", b"gzip"))
         fields.append((b"content-length", str(len(body)).encode()))
     start: Any = {"type": "http.response.start", "status": status, "headers": fields}

@@ -235,7 +235,7 @@ class Lane:
 
 @asynccontextmanager
 async def kept_warm(*lanes: Lane) -> AsyncIterator[None]:
-    """Workers for these lanes, as long as you are inside. The first ones are made meanwhile."""
+    """Workers for these lanes, as long as you are inside. The first ones are made soon after."""
     tasks = [asyncio.create_task(_keep_warm(lane)) for lane in lanes]
     try:
         yield
