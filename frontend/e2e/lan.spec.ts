@@ -139,7 +139,6 @@ test.describe("on plain http", () => {
   });
 
   test("a viewer sees and stops, changes nothing, and is put out at once", async ({ browser }) => {
-    test.skip(LONG !== "", LONG);
     test.setTimeout(120_000);
     const graph = await product.chain(70);
     const invitation = await invite(product, "viewer");

@@ -106,7 +106,6 @@ def wrote(data: Path, *flags: str) -> dict[str, str]:
         return Writers(product).write(SECONDS)
 
 
-@pytest.mark.long
 def test_there_and_back_nothing_is_lost_of_what_many_wrote(
     tmp_path: Path, postgres: Server
 ) -> None:
