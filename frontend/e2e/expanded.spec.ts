@@ -161,9 +161,11 @@ test("a dry-run and a run show their states on all levels", async () => {
   const { page } = ada;
   await page.getByRole("button", { name: "Dry-run", exact: true }).click();
   const bar = page.getByRole("region", { name: "Dry-run" });
-  await bar.getByRole("slider", { name: "Moment" }).press("End");
+  const moment = bar.getByRole("slider", { name: "Moment" });
+  await expect(moment).toBeEnabled(); // worked out: before that it has no end
+  await moment.press("End");
   await expect(inner(page, "CloseFingers")).toHaveAttribute("data-state", "true");
-  await bar.getByRole("slider", { name: "Moment" }).press("Home");
+  await moment.press("Home");
   await expect(inner(page, "CloseFingers")).toHaveAttribute("data-state", "waits");
   await bar.getByRole("button", { name: "Close the dry-run" }).click();
   await saved(page);
