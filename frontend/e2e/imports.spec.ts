@@ -130,6 +130,10 @@ test("a folder dropped on the page of actions brings all that lie in it, however
     const list = page.getByRole("navigation", { name: "Actions" });
     await expect(list).toBeVisible();
     await dropFromDisk(page, join(folder, "src"));
+    // One after the other, with progress: on a busy machine that is an eighth of a second each.
+    await expect(page.getByText(/^123 of 123|broken\.umrf\.json/).first()).toBeVisible({
+      timeout: 60_000,
+    });
     for (const name of ["OpenDoor", "ShutDoor", "Many0", "Many119"]) {
       await expect(list.getByRole("link", { name: new RegExp(`^${name}\\b`) })).toBeVisible();
     }
