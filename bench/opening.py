@@ -89,7 +89,6 @@ async def _opened(url: str, stream: str) -> list[str]:
             times.append(time.perf_counter() - started)
             own.append(time.process_time() - spent)
             assert loaded.damaged is None
-            loaded.replica.close()
             workers_.append(await _folded(journal, stream))
     opened, spent, folded = (statistics.median(each[1:]) for each in (times, own, workers_))
     return [seconds(each) for each in (opened, min(times[1:]), spent, folded)]

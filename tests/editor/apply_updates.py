@@ -29,13 +29,10 @@ def fate(base: bytes, update: bytes) -> str:
         things = copy.doc.get("things", type=Map)
         for key in list(things.keys()):
             del things[key]
-        copy.close()
     except Malformed:
         return "refused"
     except Panicked:
         return "panicked"
-    finally:
-        replica.close()
     return "taken"
 
 

@@ -95,7 +95,6 @@ async def stored(data: Path, graph: str) -> set[str]:
     things = set(loaded.replica.doc.get("things", type=Map).keys())
     events = await journal.read(f"graph/{graph}")
     assert [event.seq for event in events] == list(range(1, len(events) + 1))
-    loaded.replica.close()
     await journal.close()
     return things
 

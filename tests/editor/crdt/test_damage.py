@@ -73,10 +73,8 @@ async def test_a_gap_wider_than_what_is_read_at_once_is_seen_in_a_past_state_too
         assert loaded.seq == 7
         assert loaded.damaged is not None, upto
         assert loaded.damaged.seq == 8
-        loaded.replica.close()
     before = await load(journal, STREAM, upto=7)
     assert (before.seq, before.damaged) == (7, None)
-    before.replica.close()
     await journal.close()
 
 
@@ -89,7 +87,6 @@ async def test_a_damaged_row_leaves_what_was_before_it(folder: Path, change: str
     assert loaded.damaged is not None
     assert loaded.damaged.seq == 12
     assert loaded.replica.doc.get("things", type=Map).to_py() == {"k": 10.0}
-    loaded.replica.close()
     await journal.close()
 
 
@@ -101,7 +98,6 @@ async def test_a_row_that_was_stored_but_cannot_be_applied_is_damage_too(folder:
     assert loaded.seq == EVENTS
     assert loaded.damaged is not None
     assert loaded.damaged.seq == EVENTS + 1
-    loaded.replica.close()
     await journal.close()
 
 
@@ -120,7 +116,6 @@ async def test_each_flipped_byte_of_a_body_is_found(folder: Path, tmp_path: Path
         journal = await opened(copy)
         loaded = await load(journal, STREAM)
         assert (loaded.seq, loaded.replica.doc.get("things", type=Map).to_py()) == (19, {"k": 18.0})
-        loaded.replica.close()
         await journal.close()
 
 

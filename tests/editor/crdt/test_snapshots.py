@@ -80,7 +80,6 @@ def held(loaded: Loaded) -> tuple[Any, ...]:
     replica = loaded.replica
     things = replica.doc.get("things", type=Map).to_py()
     state = replica.doc.get_state()
-    replica.close()
     return loaded.seq, things, sorted(state), replica.owners, loaded.damaged
 
 
@@ -137,7 +136,6 @@ async def test_what_waits_for_ever_does_not_stop_snapshots(tmp_path: Path) -> No
     loaded = await load(journal, "graph/g")
     assert loaded.kept == newest
     assert set(loaded.replica.waiting) == {second, third}
-    loaded.replica.close()
     rooms = Rooms(journal, linger=60, window=0)
     async with rooms.enter("graph/g") as room:
         await room.submit(first, "late")

@@ -112,7 +112,7 @@ def known(folded: Folded | None) -> Any:
     assert replica is not None
     doc = replica.doc
     roots = {name: doc.get(name, type=Map).to_py() for name in ("actions", "things")}
-    shown = (
+    return (
         folded.seq,
         folded.damaged,
         kept.owners,
@@ -121,8 +121,6 @@ def known(folded: Folded | None) -> Any:
         roots,
         doc.get_update(),
     )
-    replica.close()
-    return shown
 
 
 @settings(max_examples=examples(150), deadline=None)

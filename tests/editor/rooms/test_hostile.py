@@ -128,7 +128,6 @@ def test_no_forged_header_is_taken() -> None:
             replica.take(forged_updates.entry(client, clock, "forged", "x"), "eve")
     assert replica.doc.get_update() == before
     assert replica.waiting == ()
-    replica.close()
 
 
 async def test_viewers_change_nothing_and_are_not_asked(rooms: Rooms) -> None:
@@ -186,7 +185,6 @@ def test_types_may_lie_in_one_another_but_not_deeply() -> None:
         replica.take(
             forged_updates.nested_types(1, start=DEEPEST_TYPES + 1, below=DEEPEST_TYPES), "eve"
         )
-    replica.close()
 
 
 async def test_depth_is_known_after_a_snapshot(journal: Journal) -> None:
@@ -203,7 +201,6 @@ async def test_depth_is_known_after_a_snapshot(journal: Journal) -> None:
         loaded.replica.take(
             forged_updates.nested_types(1, start=DEEPEST_TYPES + 1, below=DEEPEST_TYPES), "eve"
         )
-    loaded.replica.close()
 
 
 def test_ordinary_nesting_is_taken() -> None:
@@ -223,7 +220,6 @@ def test_ordinary_nesting_is_taken() -> None:
     whole.take(doc.get_update(), "ada")
     for replica in (one, whole):
         assert replica.doc.get("things", type=Map).to_py() == things.to_py()
-        replica.close()
 
 
 async def test_what_never_comes_is_not_waited_for_without_end(rooms: Rooms) -> None:

@@ -157,7 +157,6 @@ async def test_edits_in_the_wrong_order_end_as_in_the_right_one(
             ada.leave()
         loaded = await load(journal, stream)
         assert loaded.replica.doc.get("things", type=Map).to_py() == {"b": "3", "c": "4"}
-        loaded.replica.close()
 
 
 async def test_an_edit_that_waits_for_an_earlier_one_is_stored(
@@ -200,7 +199,6 @@ async def test_a_snapshot_is_made_of_a_document_that_waits_and_of_what_waits(
         loaded = await load(journal, STREAM)
         assert (loaded.kept, loaded.seq, loaded.replica.waiting) == (1, 2, ())
         assert loaded.replica.doc.get("things", type=Map).to_py() == {}
-        loaded.replica.close()
 
 
 async def test_a_snapshot_is_made_every_thousand_events_and_changes_nothing(
@@ -219,11 +217,9 @@ async def test_a_snapshot_is_made_every_thousand_events_and_changes_nothing(
     things = plain.get("things", type=Map).to_py()
     assert loaded.kept == kept.seq
     assert loaded.replica.doc.get("things", type=Map).to_py() == things
-    loaded.replica.close()
     then = await load(journal, STREAM, upto=500)
     assert then.seq == 500
     assert then.replica.doc.get("things", type=Map).to_py()["k2"] == "499"
-    then.replica.close()
 
 
 async def test_edits_go_on_while_a_snapshot_is_stored(
@@ -254,7 +250,6 @@ async def test_edits_go_on_while_a_snapshot_is_stored(
         replica = ReplicaState.replica(kept.state)
         assert replica is not None
         assert replica.doc.get("things", type=Map).to_py() == {"k": "9"}
-        replica.close()
 
 
 async def test_a_snapshot_that_cannot_be_applied_is_passed_over(journal: Journal) -> None:
@@ -262,7 +257,6 @@ async def test_a_snapshot_that_cannot_be_applied_is_passed_over(journal: Journal
     await journal.keep_snapshot(STREAM, 1, b"\x01\x01nonsense")
     loaded = await load(journal, STREAM)
     assert loaded.replica.doc.get("things", type=Map).to_py() == {"a": "1"}
-    loaded.replica.close()
 
 
 async def test_who_reads_too_slowly_is_let_go_and_nobody_waits(rooms: Rooms) -> None:

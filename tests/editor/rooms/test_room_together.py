@@ -138,8 +138,6 @@ async def agree_on_log(journal: Journal, rooms: Rooms, stream: str) -> None:
         if other is not None:
             assert shown(other.doc) == shown(plain.doc)
             assert sorted(other.waiting) == sorted(plain.waiting)
-    loaded.replica.close()
-    plain.close()
 
 
 async def those_here_know_all(rooms: Rooms, stream: str, clients: list[Client]) -> None:

@@ -35,8 +35,6 @@ def fold_sound(document: bytes, events: EventColumns) -> Folded | None:
         return Folded(ReplicaState.of(replica), events.last)
     except (Malformed, Panicked, Uncertain):
         return fold(document, events, learn=True)
-    finally:
-        replica.close()
 
 
 def fold(document: bytes, events: EventColumns, learn: bool) -> Folded | None:
@@ -50,8 +48,6 @@ def fold(document: bytes, events: EventColumns, learn: bool) -> Folded | None:
         return Folded(ReplicaState.of(replica), events.last)
     except (Malformed, Panicked):
         return _before_the_bad(document, events, learn=learn)
-    finally:
-        replica.close()
 
 
 def _before_the_bad(document: bytes, events: EventColumns, *, learn: bool) -> Folded:
@@ -64,23 +60,17 @@ def _before_the_bad(document: bytes, events: EventColumns, *, learn: bool) -> Fo
     good = events.part(0, bad)
     replica = ReplicaState.replica(document) if document else Replica()
     assert replica is not None
-    try:
-        replica.replay(good, learn=learn)
-        return Folded(ReplicaState.of(replica), good.last, damaged)
-    finally:
-        replica.close()
+    replica.replay(good, learn=learn)
+    return Folded(ReplicaState.of(replica), good.last, damaged)
 
 
 def _first_bad(document: bytes, events: EventColumns) -> tuple[int, str]:
     """The place of the one among these events that cannot be applied, and why."""
     replica = ReplicaState.replica(document) if document else Replica()
     assert replica is not None
-    try:
-        for n in range(len(events)):
-            try:
-                replica.replay(events.part(n, n + 1))
-            except (Malformed, Panicked) as error:
-                return n, str(error)
-    finally:
-        replica.close()
+    for n in range(len(events)):
+        try:
+            replica.replay(events.part(n, n + 1))
+        except (Malformed, Panicked) as error:
+            return n, str(error)
     raise Unavailable("A log reads otherwise each time.")

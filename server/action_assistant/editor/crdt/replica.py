@@ -48,7 +48,7 @@ class Panicked(Exception):
 
 
 class Replica:
-    """A Yjs document. Always `close` it: a document that is observed is never freed.
+    """A Yjs document.
 
     What waits for an earlier update is held back here: the library loses edits when it holds several
     that wait. So the document never has anything pending. `owners` says whose a client is: that of
@@ -62,11 +62,8 @@ class Replica:
         self.opening = OpeningTime()
         self._quota = DocumentQuota(self.doc)
         self._known: dict[int, int] = {}
-        self._fired = False
-        self._is_news = False  # known before it is applied
         self._waiting: dict[bytes, tuple[UpdateOutline, str]] = {}
         self._released: list[bytes] = []
-        self._subscription = self.doc.observe(self._observed)
 
     def take(
         self,
@@ -248,15 +245,33 @@ class Replica:
     def _applied(self, update: bytes, read: UpdateOutline) -> bool:
         """Apply what is ready; whether it changed anything."""
         known = self._known
-        self._is_news = any(end > known.get(client, 0) for client, _, end in read.brings)
-        self._fired = self._is_news
         depths = self.nesting.depths(read.placed, known)
-        self._apply(update)
+        if any(end > known.get(client, 0) for client, _, end in read.brings):
+            self._apply(update)
+            changed = True
+        else:
+            changed = self._deletes(update)
         self.nesting.learn(depths)
         self._count(read, len(update))
-        if self._fired:
+        if changed:
             self.opening.took(read.structs)
-        return self._fired
+        return changed
+
+    def _deletes(self, update: bytes) -> bool:
+        """Apply what brings no clocks that are not known; whether it changed anything all the same. Only
+        the document can tell; it is not watched all the time, since that costs as much as applying."""
+        changed = False
+
+        def observed(event: Any) -> None:
+            nonlocal changed
+            changed = changed or event.update != NOTHING_NEW
+
+        subscription = self.doc.observe(observed)
+        try:
+            self._apply(update)
+        finally:
+            self.doc.unobserve(subscription)
+        return changed
 
     def _count(self, read: UpdateOutline, size: int) -> None:
         self._quota.took(size, read.actions, read.fields)
@@ -300,14 +315,6 @@ class Replica:
             raise Malformed("more clients than bytes")
         with applying():
             return self.doc.get_update(state)
-
-    def close(self) -> None:
-        """Let the document be freed."""
-        self.doc.unobserve(self._subscription)
-
-    def _observed(self, event: object) -> None:
-        if not self._is_news and event.update != NOTHING_NEW:  # type: ignore[attr-defined]
-            self._fired = True
 
 
 class _Applying:
@@ -365,7 +372,6 @@ class ReplicaState(msgspec.Struct, frozen=True, array_like=True):
         try:
             replica.begin(found)
         except (Malformed, Panicked):
-            replica.close()
             return None
         return replica
 

@@ -69,7 +69,6 @@ def observed(document: bytes, events: Sequence[Event]) -> ObservedEvents | None:
     finally:
         seen.close()
         kept = b"" if damaged else ReplicaState.of(replica)
-        replica.close()
     if damaged and seq >= events[0].seq:  # what failed may have left something behind
         again = observed(document, [event for event in events if event.seq <= seq])
         kept = document if again is None else again.document

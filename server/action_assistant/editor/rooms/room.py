@@ -358,7 +358,6 @@ class Room:
     # --- memory ---------------------------------------------------------------------------------
 
     async def _reload(self) -> None:
-        self._replica.close()
         loaded = await load(self._journal, self.stream, run_in_worker=self._run_in_worker)
         self._replica, self.seq = loaded.replica, loaded.seq
 
@@ -378,5 +377,4 @@ class Room:
         self._quiet.set()
         for member in self.members:
             member.close(messages.RESTARTING)
-        self._replica.close()
         self._gone(self)
