@@ -3,12 +3,14 @@
 import asyncio
 from collections.abc import Callable
 from enum import Enum
+from functools import lru_cache
 from typing import Final
 
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.rooms.colours import NOBODYS
 from action_assistant.editor.rooms.presence import PresenceNews, Seat
 from action_assistant.web.auth.keys import PersonRef
+from action_assistant.web.server.direct import framed
 
 WAITING_FRAMES: Final = 256
 WAITING_BYTES: Final = 1 << 20
@@ -74,13 +76,21 @@ class Member:
         self._bytes += len(frame)
         self.on_news()
 
-    def sends(self, framed: bytes) -> bool:
-        """Send one or more framed messages at once, the same bytes as to many others; False where they
-        have to be posted, behind what waits."""
+    def sends(self, news: bytes, durable: int | None = None) -> bool:
+        """Send framed messages at once, the same bytes as to many others, and behind them up to which
+        event all is durable; False where that has to be posted, behind what waits."""
         if self._frames or self._ack is not None or self._presence is not None:
             return False
-        if self._closed.done() or not self.write_now(framed):
+        says = self._said
+        if durable is not None and self.acks and self.synced:
+            says = self.handled, durable
+            if says != self._said:
+                news += _framed_acks(*says)
+        if not news:
+            return True
+        if self._closed.done() or not self.write_now(news):
             return False
+        self._said = says
         self._taken_at = self._loop.time()
         return True
 
@@ -229,6 +239,11 @@ class Member:
     async def ended(self) -> int:
         """Wait for the end; the close code."""
         return await asyncio.shield(self._closed)
+
+
+@lru_cache(64)  # those who only listen all hear the same
+def _framed_acks(handled: int, seq: int) -> bytes:
+    return framed(messages.acks(handled, seq))
 
 
 def _never(_: bytes) -> bool:

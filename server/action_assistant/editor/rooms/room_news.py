@@ -41,19 +41,18 @@ class RoomNews:
                 offer.done.set_result(seq)
         frames = [messages.change(update) for update in merged(taken.shown)]
         names = bool(taken.news) and self._names_moment()
-        if frames:
-            own = {offer.member for offer, _ in taken.news}
-            alone = own.pop() if len(own) == 1 and not taken.for_all else None
-            packed = b"".join(map(framed, frames))
-            for member in self._members:
-                if member is alone or not member.synced:
-                    continue
-                # More goes to authors, and with the moment to all: in one write.
-                if names or member in authors or not member.sends(packed):
-                    for frame in frames:
-                        member.post(frame)
-        for member in self._members if names else authors:
-            member.post_ack(seq)
+        own = {offer.member for offer, _ in taken.news}
+        alone = own.pop() if len(own) == 1 and not taken.for_all else None
+        packed = b"".join(map(framed, frames))
+        for member in self._members if frames or names else authors:
+            hears = member is not alone and member.synced
+            durable = seq if names or member in authors else None
+            if member.sends(packed if hears else b"", durable):
+                continue
+            for frame in frames if hears else ():
+                member.post(frame)
+            if durable is not None:
+                member.post_ack(seq)
         self._metrics.acknowledged(taken.handled)
 
     def end(self) -> None:

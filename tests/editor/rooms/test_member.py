@@ -1,0 +1,56 @@
+"""What a socket is sent at once, and what has to wait its turn."""
+
+from action_assistant.editor.crdt import messages
+from action_assistant.editor.rooms.member import Member
+from action_assistant.web.auth.keys import Person
+from action_assistant.web.server.direct import framed
+
+NEWS = framed(messages.change(b"\x00\x00"))
+
+
+def writing(*, acks: bool = True) -> tuple[Member, list[bytes]]:
+    """A member in sync whose socket takes everything, and what was written to it."""
+    written: list[bytes] = []
+    member = Member(Person("ada", "Ada"), acks=acks)
+    member.synced = True
+    member.write_now = lambda data: written.append(data) is None
+    return member, written
+
+
+async def test_an_acknowledgement_goes_in_one_write_with_the_news() -> None:
+    member, written = writing()
+    member.edit_handled()
+    assert member.sends(NEWS, 7)
+    assert written == [NEWS + framed(messages.acks(1, 7))]
+
+
+async def test_nothing_is_acknowledged_twice() -> None:
+    member, written = writing()
+    assert member.sends(b"", 7)
+    assert member.sends(b"", 7)
+    member.post_ack(7)
+    assert (len(written), member.has_news) == (1, False)
+
+
+async def test_an_acknowledgement_never_overtakes_what_waits() -> None:
+    member, written = writing()
+    member.post(messages.BEAT)
+    assert not member.sends(NEWS, 7)
+    member.post(messages.change(b"\x00\x00"))
+    member.post_ack(7)
+    assert written == []
+    assert member.gather() == [messages.BEAT, messages.change(b"\x00\x00"), messages.acks(0, 7)]
+
+
+async def test_what_could_not_be_written_is_not_taken_for_said() -> None:
+    member, _ = writing()
+    member.write_now = lambda _: False
+    assert not member.sends(NEWS, 7)
+    member.post_ack(7)
+    assert member.gather() == [messages.acks(0, 7)]
+
+
+async def test_who_knows_no_acknowledgements_hears_the_news_alone() -> None:
+    member, written = writing(acks=False)
+    assert member.sends(NEWS, 7)
+    assert written == [NEWS]
