@@ -4,8 +4,8 @@ from prometheus_client import CollectorRegistry
 
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.rooms.open_rooms import Rooms
+from action_assistant.journal.health.thread_histogram import ThreadHistogram
 from action_assistant.journal.journal import Journal
-from action_assistant.web.monitoring.loop_histogram import LoopHistogram
 from editor.client import STREAM, Client, settle
 
 
@@ -38,7 +38,7 @@ async def test_each_edit_is_counted_once_refused_or_acknowledged(journal: Journa
 
 
 def test_a_histogram_of_one_thread_adds_up_as_others_do() -> None:
-    histogram = LoopHistogram("x_seconds", "x", (0.1, 1))
+    histogram = ThreadHistogram("x_seconds", "x", (0.1, 1))
     histogram.observe([0.05, 0.1, 0.5, 7])
     registry = CollectorRegistry()
     registry.register(histogram)

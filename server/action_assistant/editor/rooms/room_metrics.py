@@ -9,7 +9,7 @@ from prometheus_client import Metric
 from prometheus_client.registry import Collector
 
 from action_assistant.editor.rooms.batch import Objection, Offer
-from action_assistant.web.monitoring.loop_histogram import LoopHistogram
+from action_assistant.journal.health.thread_histogram import ThreadHistogram
 
 _BUCKETS: Final = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 30)
 
@@ -22,7 +22,7 @@ class RoomMetrics(Collector):
         self.unloaded = 0
         self.refused: Final[Counter[str]] = Counter()  # edits, by why
         self.closed: Final[Counter[int]] = Counter()  # sockets, by close code
-        self._acks = LoopHistogram(
+        self._acks = ThreadHistogram(
             "action_assistant_ack_seconds",
             "Time from an edit's arrival at its room until it was durable and acknowledged.",
             _BUCKETS,

@@ -10,7 +10,7 @@ from prometheus_client.registry import Collector
 from prometheus_client.utils import floatToGoString
 
 
-class LoopHistogram(Collector):
+class ThreadHistogram(Collector):
     """`bounds` are the upper ones of its buckets, in order; what is above them all counts, too."""
 
     def __init__(self, name: str, documentation: str, bounds: Sequence[float]) -> None:
