@@ -218,12 +218,16 @@ def _entries(data: bytes) -> Iterable[PresenceEntry]:
 
 
 _SMALL: Final = tuple(bytes((value,)) for value in range(128))
+_QUESTION, _ANSWER = (bytes((SYNC, step)) for step in (STEP_1, STEP_2))
+_ACKS: Final = bytes((ACKS,))
 
 
 def number(value: int) -> bytes:
     """A varUint."""
     if value < 128:
         return _SMALL[value]
+    if value < 1 << 14:
+        return bytes((0x80 | value & 0x7F, value >> 7))
     out = bytearray()
     while value > 0x7F:
         out.append(0x80 | (value & 0x7F))
@@ -239,17 +243,17 @@ def text(value: bytes) -> bytes:
 
 def question(state: bytes) -> bytes:
     """Sync step 1."""
-    return bytes((SYNC, STEP_1)) + text(state)
+    return _QUESTION + text(state)
 
 
 def answer(update: bytes) -> bytes:
     """Sync step 2."""
-    return bytes((SYNC, STEP_2)) + text(update)
+    return _ANSWER + text(update)
 
 
 def change(update: bytes) -> bytes:
     """An update."""
-    return bytes((SYNC, UPDATE)) + text(update)
+    return _UPDATE + text(update)
 
 
 def presence(entries: Iterable[PresenceEntry]) -> bytes:
@@ -260,7 +264,7 @@ def presence(entries: Iterable[PresenceEntry]) -> bytes:
 
 def acks(messages: int, seq: int) -> bytes:
     """The first `messages` edits of this socket are durable; it was sent the log up to `seq`."""
-    return bytes((ACKS,)) + number(messages) + number(seq)
+    return _ACKS + number(messages) + number(seq)
 
 
 def compared(seq: int, entries: int, total: int) -> bytes:

@@ -6,6 +6,7 @@ whenever it is opened. Work beyond what is linear is at most that of each struct
 where so much could have come since the last measurement that it matters, it is measured again.
 """
 
+import math
 from typing import Final
 
 from action_assistant.editor.crdt.document_quota import QuotaExceeded
@@ -34,6 +35,7 @@ class OpeningTime:
         self._measured_at = 0.0  # structs that there were then
         self._seconds = 0.0
         self._limit = SECONDS
+        self._bound()
 
     @property
     def came(self) -> int:
@@ -52,6 +54,7 @@ class OpeningTime:
         self._measured_at = min(max(counted, size / _STORED), size / _LEAST)
         self._came_then, self._seconds = then, seconds
         self._limit = min(_MOST, SECONDS + _PER_MIB * size / (1 << 20))
+        self._bound()
 
     def took(self, structs: int) -> None:
         """So many structs were added."""
@@ -59,26 +62,24 @@ class OpeningTime:
 
     def is_doubtful_with(self, size: int) -> bool:
         """Whether it has to be measured before updates of so many bytes are applied."""
-        if self.is_too_long:
-            return True
-        return self._added(self._structs + size / _SMALLEST) > self._spare
+        return self._came + size / _SMALLEST > self._doubtful_from
 
     @property
     def is_due(self) -> bool:
         """Whether it should be measured before that is in doubt."""
-        return self._added(self._structs) > self._spare * _EARLY
+        return self._came > self._due_from
 
-    @property
-    def _spare(self) -> float:
-        return max(_SPARE + self._seconds, (self._limit - self._seconds) / 2)
+    def _bound(self) -> None:
+        """After how many structs that ever came it is due, and in doubt: asked for with each edit, and
+        counted with each measurement."""
+        spare = max(_SPARE + self._seconds, (self._limit - self._seconds) / 2)
+        self._due_from = self._after(spare * _EARLY)
+        self._doubtful_from = -1.0 if self.is_too_long else self._after(spare)
 
-    @property
-    def _structs(self) -> float:
-        return self._measured_at + self._came - self._came_then
-
-    def _added(self, structs: float) -> float:
-        """Seconds by which opening may take longer than measured, with so many structs."""
-        return (structs**2 - self._measured_at**2) / 4 * _STEP
+    def _after(self, seconds: float) -> float:
+        """How many structs will have come when opening may take so much longer than it was measured."""
+        structs = math.sqrt(self._measured_at**2 + 4 * seconds / _STEP)
+        return structs - self._measured_at + self._came_then
 
     def refuse(self, read: UpdateOutline) -> None:
         """Raise QuotaExceeded for an update that brings something to a document that took too long."""

@@ -26,6 +26,7 @@ except ImportError:  # where it was not compiled
 _EXTENSION: Final = "action_assistant.direct"
 _WHOLE_BINARY: Final = 0x82  # the first byte of a message in one frame
 _SHORT: Final = 126
+_SHORT_HEADS: Final = tuple(bytes((_WHOLE_BINARY, size)) for size in range(_SHORT))
 #: Kinds of frames: a second one of a message and those after it, a first one.
 _CONTINUED, _BINARY = 0, 2
 _KINDS: Final = frozenset({_CONTINUED, 1, _BINARY, 8, 9, 10})
@@ -316,7 +317,7 @@ def framed(message: bytes) -> bytes:
     """A binary message as a server sends it."""
     size = len(message)
     if size < _SHORT:
-        return bytes((_WHOLE_BINARY, size)) + message
+        return _SHORT_HEADS[size] + message
     if size < 1 << 16:
         return b"\x82\x7e" + size.to_bytes(2, "big") + message
     return b"\x82\x7f" + size.to_bytes(8, "big") + message
