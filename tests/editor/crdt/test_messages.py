@@ -3,7 +3,7 @@
 import contextlib
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from pycrdt import Decoder, YMessageType, YSyncMessageType, create_update_message
 
@@ -24,6 +24,10 @@ entries = st.lists(
 
 
 @given(st.integers(0, 2**64 - 1))
+@example(127)
+@example(128)
+@example(2**14 - 1)
+@example(2**14)
 def test_a_number_survives(value: int) -> None:
     assert ByteReader(wire.number(value)).number() == value
 
