@@ -1,0 +1,28 @@
+"""That work grows with what it is given, not with its square: measured against itself, on any machine."""
+
+import time
+from collections.abc import Callable
+from typing import Final
+
+#: So many times as much takes as many times as long, or the square of it: the middle is a bound that a
+#: machine of changing speed does not reach.
+_TIMES: Final = 16
+_MOST: Final = 64
+
+
+def grows_with_its_size(work: Callable[[int], Callable[[], object]], size: int) -> None:
+    """Fail where work on `size` takes more than four times as long as a sixteenth of it lets expect.
+    `work` prepares that of a size, and gives what is timed."""
+    small = min(_seconds(work(size // _TIMES)) for _ in range(3))
+    whole = work(size)
+    took = _seconds(whole)
+    if took > _MOST * small:  # the machine may have been slower meanwhile
+        took = min(took, _seconds(whole))
+    assert took <= _MOST * small, f"{size:,}: {took:.3f} s; a sixteenth of it: {small:.3f} s"
+
+
+def _seconds(work: Callable[[], object]) -> float:
+    """Of the processor."""
+    begun = time.process_time()
+    work()
+    return time.process_time() - begun
