@@ -2,13 +2,14 @@
 
 from collections.abc import Iterator
 from operator import add
+from typing import Any
 
 import anyio
 import pytest
 from anyio import CapacityLimiter
 
 from action_assistant.web.workers import lanes
-from action_assistant.web.workers.lanes import Lane, kept_warm
+from action_assistant.web.workers.lanes import Crashed, Lane, kept_warm
 
 
 class Watched(Lane):
@@ -49,3 +50,19 @@ async def test_who_asks_earlier_has_one_made(lane: Watched) -> None:
     async with kept_warm(lane):
         assert await lane(add, 2, 3) == 5
     assert lane.begun == 0
+
+
+async def test_one_that_dies_before_it_is_told_anything_has_died_like_any_other(
+    lane: Watched, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its number is written to it when it is made: there the one who makes it finds it gone."""
+
+    def dying(*_: Any, **__: Any) -> Any:
+        raise BrokenPipeError(32, "Broken pipe")
+
+    with monkeypatch.context() as killed:
+        killed.setattr(lanes, "child", dying)
+        with pytest.raises(Crashed, match="has died; nothing came of it"):
+            await lane(add, 2, 3)
+    assert lane.deaths == 1
+    assert await lane(add, 2, 3) == 5

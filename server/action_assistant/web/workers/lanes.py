@@ -46,6 +46,7 @@ _ALL_WAITING: Final = 256
 _START_S: Final = 30.0
 _FIRST_S: Final = 2.0  # after the start, which has enough to do by itself
 _ENDING_S: Final = 5.0  # for which a process whose wire is closed may still be ending
+_DIED: Final = "The process that worked on this has died; nothing came of it."
 
 
 class RunInWorker(Protocol):
@@ -181,9 +182,7 @@ class Lane:
             log.error("%s: a worker has died (%r)", self._name, error)
             if await to_thread.run_sync(worker.ran_out, limiter=self._threads):
                 raise OutOfTime("The process that worked on this took too long.") from error
-            raise Crashed(
-                "The process that worked on this has died; nothing came of it."
-            ) from error
+            raise Crashed(_DIED) from error
         finally:
             self._busy.discard(worker)
             if finished:
@@ -223,7 +222,10 @@ class Lane:
                     abandon_on_cancel=True,
                     limiter=self._threads,
                 )
-        except (OSError, EOFError, TimeoutError) as error:
+        except (ConnectionError, EOFError) as error:  # before it had been told what to do
+            self.deaths += 1
+            raise Crashed(_DIED) from error
+        except (OSError, TimeoutError) as error:
             raise Crashed(f"No process can be started to work on this: {error!r}.") from error
 
     def close(self) -> None:
