@@ -248,8 +248,13 @@ def test_stop_is_taken_while_a_socket_is_flooded(runner: RunnerProcess, first: i
 
 
 def _workers(runner: RunnerProcess) -> list[psutil.Process]:
-    children = psutil.Process(runner.pid).children(recursive=True)
-    return [each for each in children if each.ppid() != runner.pid]
+    """Those that live, without the process they are forked from."""
+    workers = []
+    for child in psutil.Process(runner.pid).children(recursive=True):
+        with suppress(psutil.NoSuchProcess):  # it may die between the two questions
+            if child.ppid() != runner.pid:
+                workers.append(child)
+    return workers
 
 
 def test_a_start_whose_worker_dies_is_refused_and_nothing_was_sent(runner: RunnerProcess) -> None:
@@ -263,7 +268,7 @@ def test_a_start_whose_worker_dies_is_refused_and_nothing_was_sent(runner: Runne
                 for worker in _workers(runner):
                     with suppress(psutil.NoSuchProcess):
                         worker.kill()
-                        killed.append(worker)
+                    killed.append(worker)
                 time.sleep(0.02)
             answer = asking.result()
         # The next question may not find one that is about to die.
