@@ -101,7 +101,7 @@ class JournalReader:
         return Head(*row) if row is not None else NOTHING
 
     async def _events(self, chosen: Select[Any]) -> list[Event]:
-        return await self._ask(lambda c: [Event(*row) for row in c.execute(chosen)])
+        return await self._ask(lambda c: [Event(*row) for row in _plain(c.execute(chosen))])
 
     async def _number(self, chosen: Select[Any], values: Mapping[str, Any] | None = None) -> int:
         found: int | None = await self._ask(lambda c: c.execute(chosen, values).scalar())

@@ -179,6 +179,20 @@ async def test_of_a_run_that_goes_on_each_whole_multiple_is_kept_and_gone_on_fro
 
 
 @virtual
+async def test_keyframes_stand_at_whole_multiples_however_many_events_are_read_at_once() -> None:
+    events = long_run(6 * APART)
+    ledger = await stored(events[:700])
+    keyframe_store = KeyframeStore(ledger, at_once)
+    await keyframe_store.keyframes("r1")
+    rest = [Draft(each.kind, "x", encode(each)) for each in events[700:]]
+    await ledger.append("run/r1", rest)
+    keys = (await keyframe_store.keyframes("r1")).keys
+    assert [key.seq for key in keys] == [*range(APART, len(events), APART), len(events)]
+    for key in keys:
+        assert key.run == replay(events[: key.seq])
+
+
+@virtual
 async def test_keyframes_that_were_made_early_go_on_with_the_run() -> None:
     events = long_run(APART + 50)
     ledger = await stored(events[: APART // 2])

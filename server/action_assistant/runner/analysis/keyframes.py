@@ -30,7 +30,7 @@ from action_assistant.runner.runs.events import (
     StopSent,
     decode,
 )
-from action_assistant.runner.runs.fold import begin, follow
+from action_assistant.runner.runs.fold import begin, follow, replay
 from action_assistant.runner.runs.history import Ledger
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.runner.runs.run import Run
@@ -40,6 +40,7 @@ from action_assistant.web.workers.lanes import RunInWorker
 FOLD: Final = 3
 #: Events between two keyframes, and in one page of a replay.
 APART: Final = 2_000
+_READ: Final = 5 * APART  # events that are read at once
 #: Marks that are kept of one run.
 MARKS: Final = 2_000
 #: Shorter runs are folded anew; that takes less time than looking for keyframes.
@@ -155,14 +156,15 @@ class KeyframeStore:
             last = keys[-1] if keys else None
             after = last.seq if last else 0
             room = APART - after % APART  # keyframes stand at whole multiples, and at the end
-            events = await self._ledger.read(stream, after=after, limit=room)
+            events = await self._ledger.read(stream, after=after, limit=room + _READ - APART)
             if not events:
                 break
-            key = await self.run_in_worker(lambda last=last, events=events: _next(last, events))
-            marks += marks_of(events)
             if last is not None and last.seq % APART:
                 keys.pop()  # an end that has gone on is no keyframe
-            keys.append(key)
+            keys += await self.run_in_worker(
+                lambda last=last, events=events, room=room: _following(last, events, room)
+            )
+            marks += marks_of(events)
         if not keys:
             raise NotFound("There is no such run.")
         found = RunKeyframes(FOLD, tuple(keys), tuple(marks[:MARKS]))
@@ -256,14 +258,19 @@ def words(told: RunEvent) -> tuple[str, str]:
             return "", ""
 
 
+def _following(last: Keyframe | None, events: Sequence[Event], room: int) -> list[Keyframe]:
+    """Those after `last`: the first one after `room` events."""
+    keys: list[Keyframe] = []
+    for start in (0, *range(room, len(events), APART)):
+        last = _next(last, events[start : start + APART if start else room])
+        keys.append(last)
+    return keys
+
+
 def _next(last: Keyframe | None, events: Sequence[Event]) -> Keyframe:
-    at = last.at if last is not None else 0
-
-    def see(event: Event, told: RunEvent, _: Run | None, __: Run) -> None:
-        nonlocal at
-        at = max(at, getattr(told, "at", event.at))
-
-    run = fold(last.run if last is not None else None, events, see)
+    told = [decode(event.kind, event.body) for event in events]
+    run = replay(told, last.run if last is not None else None)
     if run is None:
         raise NotFound("There is no such run.")
-    return Keyframe(events[-1].seq, at, run)
+    at = max(getattr(each, "at", event.at) for each, event in zip(told, events, strict=True))
+    return Keyframe(events[-1].seq, max(at, last.at) if last is not None else at, run)

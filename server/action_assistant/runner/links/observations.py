@@ -31,7 +31,7 @@ TERMINAL: Final = frozenset({"FINISHED", "HALTED", "STOPPED", "ERROR"})
 
 
 class NodeState(
-    msgspec.Struct, frozen=True, omit_defaults=True, tag="node_state", tag_field="kind"
+    msgspec.Struct, frozen=True, gc=False, omit_defaults=True, tag="node_state", tag_field="kind"
 ):
     """A node changed its state at exactly this time. `inputs`: the values it began with, where they
     could be seen (flat name → JSON text)."""
@@ -44,7 +44,7 @@ class NodeState(
 
 
 class NodeResult(
-    msgspec.Struct, frozen=True, omit_defaults=True, tag="node_result", tag_field="kind"
+    msgspec.Struct, frozen=True, gc=False, omit_defaults=True, tag="node_result", tag_field="kind"
 ):
     """A node ended with this result (`on_true`, …); `message` is what it had to say."""
 
@@ -55,7 +55,7 @@ class NodeResult(
     message: str | None = None
 
 
-class GraphState(msgspec.Struct, frozen=True, tag="graph_state", tag_field="kind"):
+class GraphState(msgspec.Struct, frozen=True, gc=False, tag="graph_state", tag_field="kind"):
     """A graph changed its state at exactly this time."""
 
     at: int
@@ -63,7 +63,7 @@ class GraphState(msgspec.Struct, frozen=True, tag="graph_state", tag_field="kind
     state: str
 
 
-class GraphResult(msgspec.Struct, frozen=True, tag="graph_result", tag_field="kind"):
+class GraphResult(msgspec.Struct, frozen=True, gc=False, tag="graph_result", tag_field="kind"):
     """A graph ended with this result."""
 
     at: int
@@ -71,7 +71,9 @@ class GraphResult(msgspec.Struct, frozen=True, tag="graph_result", tag_field="ki
     result: str
 
 
-class Hazard(msgspec.Struct, frozen=True, omit_defaults=True, tag="hazard", tag_field="kind"):
+class Hazard(
+    msgspec.Struct, frozen=True, gc=False, omit_defaults=True, tag="hazard", tag_field="kind"
+):
     """The engine did something it should not (codes `H1` …, docs/umrf-and-the-engine.md 3).
 
     `effect`: `crash` and `hang` end all its answers, `goes on` is a warning.
@@ -85,7 +87,9 @@ class Hazard(msgspec.Struct, frozen=True, omit_defaults=True, tag="hazard", tag_
     message: str = ""
 
 
-class Snapshot(msgspec.Struct, frozen=True, omit_defaults=True, tag="snapshot", tag_field="kind"):
+class Snapshot(
+    msgspec.Struct, frozen=True, gc=False, omit_defaults=True, tag="snapshot", tag_field="kind"
+):
     """One graph as the engine showed it at `at`; what happened in between is not known.
 
     `source`: `get` was asked for by us at `asked_at`, `feedback` came by itself and may be late.

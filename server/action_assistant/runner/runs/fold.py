@@ -4,8 +4,10 @@ The same function serves the live view and the history, so both always show the 
 knows a clock, a link or a database.
 """
 
-from collections.abc import Iterable
-from typing import assert_never
+from collections.abc import Callable, Iterable
+from itertools import chain, groupby
+from operator import attrgetter
+from typing import Final, assert_never
 
 from msgspec.structs import replace
 
@@ -45,15 +47,21 @@ from action_assistant.runner.runs.visits import (
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.laps import Laps, laps
 
+_SEEN: Final[Callable[[RunEvent], tuple[Seen, ...]]] = attrgetter("seen")  # of what was observed
 
-def replay(events: Iterable[RunEvent]) -> Run | None:
-    """The run that these events tell; None before it was requested."""
-    run: Run | None = None
-    for event in events:
-        if run is not None:
-            run = follow(run, event)
-        elif isinstance(event, Requested):
-            run = begin(event)
+
+def replay(events: Iterable[RunEvent], run: Run | None = None) -> Run | None:
+    """The run that these events tell, going on from `run`; None before it was requested. What was
+    observed in a row is folded in one go, since each go copies all actions."""
+    for kind, row in groupby(events, key=type):
+        if run is not None and run.end is None and kind is Observed:
+            run = observe(run, chain.from_iterable(map(_SEEN, row)))
+            continue
+        for event in row:
+            if run is not None:
+                run = follow(run, event)
+            elif isinstance(event, Requested):
+                run = begin(event)
     return run
 
 

@@ -27,6 +27,8 @@ from action_assistant.runner.runs.visits import (
 
 #: An answer that took longer was given up.
 _ASKED_US: Final = 1_000_000
+#: What is known of an action of which nothing has been seen.
+_UNSEEN: Final = ActionRun()
 
 
 def observe(run: Run, seen: Iterable[Seen]) -> Run:
@@ -37,12 +39,12 @@ def observe(run: Run, seen: Iterable[Seen]) -> Run:
         match item:
             case NodeState():
                 name = key_of(run, item.graph, item.node)
-                before = actions.get(name, ActionRun())
-                actions[name] = changed(before, item.state, item.at, item.inputs)
+                action = actions.get(name, _UNSEEN)
+                actions[name] = changed(action, item.state, item.at, item.inputs)
                 run = _timed(run, item.at, item.at)
             case NodeResult():
                 name = key_of(run, item.graph, item.node)
-                actions[name] = resulted(actions.get(name, ActionRun()), item)
+                actions[name] = resulted(actions.get(name, _UNSEEN), item)
             case GraphState():
                 run = _timed(_state_of(run, item.graph, item.state), item.at, item.at)
             case GraphResult():
@@ -74,7 +76,7 @@ def _shown(run: Run, actions: dict[str, ActionRun], item: Snapshot) -> Run:
     asked = _asked(item)
     for node, state in item.nodes.items():
         name = key_of(run, item.graph, node)
-        action = actions.get(name, ActionRun())
+        action = actions.get(name, _UNSEEN)
         sight = SnapshotEvidence(
             at=item.at,
             asked=asked,

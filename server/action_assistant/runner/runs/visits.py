@@ -25,12 +25,14 @@ an upper bound each, and a bound that nothing proves is none:
 Pure, and part of the fold of a run: what stands in old streams folds by the same rules.
 """
 
-from typing import Final, Literal, TypeAlias
+from typing import Final, Literal, TypeAlias, TypeVar
 
 import msgspec
 from msgspec.structs import replace
 
 from action_assistant.runner.links.observations import ACTIVE, FAR, NodeResult
+
+T = TypeVar("T")
 
 Outcome: TypeAlias = Literal["true", "false", "error", "stopped"]
 How: TypeAlias = Literal["observed", "inferred"]
@@ -53,7 +55,7 @@ _OUTCOMES: Final[dict[str, Outcome]] = {
 }
 
 
-class Visit(msgspec.Struct, frozen=True, kw_only=True):
+class Visit(msgspec.Struct, frozen=True, gc=False, kw_only=True):
     """One execution of an action, in microseconds UTC.
 
     It began at `not_before` or later and at `start` or earlier; it ended at `until` or later (None:
@@ -82,7 +84,7 @@ class Visit(msgspec.Struct, frozen=True, kw_only=True):
         return None if self.not_after is None else self.not_after - self.not_before
 
 
-class SnapshotEvidence(msgspec.Struct, frozen=True, kw_only=True):
+class SnapshotEvidence(msgspec.Struct, frozen=True, gc=False, kw_only=True):
     """A snapshot as evidence. `asked`: when it was asked for; None for feedback. `looked`: when the
     newest answer was asked for that showed the graph as it was known until now. `begun`: when nothing
     can have happened before. `once`: the action runs at most once. `stoppable`: somebody or something
@@ -98,14 +100,14 @@ class SnapshotEvidence(msgspec.Struct, frozen=True, kw_only=True):
     followed: bool = True
 
 
-class Message(msgspec.Struct, frozen=True):
+class Message(msgspec.Struct, frozen=True, gc=False):
     """What an action had to say."""
 
     at: int
     text: str
 
 
-class RestEvidence(msgspec.Struct, frozen=True, array_like=True):
+class RestEvidence(msgspec.Struct, frozen=True, gc=False, array_like=True):
     """When answers were asked for that showed an action at rest: the newest, and two older ones that
     lie at least `_OLD_US` apart."""
 
@@ -127,7 +129,7 @@ class RestEvidence(msgspec.Struct, frozen=True, array_like=True):
         return next((each for each in kept if each <= moment), 0)
 
 
-class ActionRun(msgspec.Struct, frozen=True, kw_only=True):
+class ActionRun(msgspec.Struct, frozen=True, gc=False, kw_only=True):
     """One action of the run. `older` counts visits that are not listed any more.
 
     `going`: the visit that is open ended at that moment or later. `since`: up to which answer (the
@@ -161,11 +163,11 @@ def changed(
         if not is_open(action):
             visits, older = _kept(visits, older, Visit(start=at, not_before=at, inputs=inputs))
         elif inputs is not None and visits[-1].inputs is None:  # an answer had shown it before
-            visits = (*visits[:-1], replace(visits[-1], inputs=inputs))
+            visits = _and(visits[:-1], replace(visits[-1], inputs=inputs))
     elif is_open(action):
         result = visits[-1].result or _implied(action.state, state)
         after = None if state == "ERROR" and action.state == "STOPPING" else at  # its code goes on
-        visits = (*visits[:-1], replace(visits[-1], until=at, not_after=after, result=result))
+        visits = _and(visits[:-1], replace(visits[-1], until=at, not_after=after, result=result))
     elif state == "ERROR" and action.state != "ERROR":  # thrown while it was made ready
         visit = Visit(start=at, not_before=at, until=at, not_after=at, result="error")
         visits, older = _kept(visits, older, visit)
@@ -187,10 +189,10 @@ def resulted(action: ActionRun, item: NodeResult) -> ActionRun:
     """After an exact result; it comes while the visit is still open, or right after its end."""
     visits = action.visits
     if visits:
-        visits = (*visits[:-1], replace(visits[-1], result=_OUTCOMES.get(item.result)))
+        visits = _and(visits[:-1], replace(visits[-1], result=_OUTCOMES.get(item.result)))
     messages = action.messages
     if item.message is not None:
-        messages = (*messages, Message(item.at, item.message))[-KEPT:]
+        messages = _and(messages[1 - KEPT :], Message(item.at, item.message))
     return replace(action, visits=visits, messages=messages)
 
 
@@ -274,7 +276,7 @@ def _confirmed(action: ActionRun, sight: SnapshotEvidence) -> ActionRun:
     last = action.visits[-1]
     before = min(sight.at, max(last.not_before, action.rests.newest))
     anchored = replace(last, not_before=before, start=sight.at + MOMENT_US)
-    return replace(action, visits=(*action.visits[:-1], anchored), by="get", going=before)
+    return replace(action, visits=_and(action.visits[:-1], anchored), by="get", going=before)
 
 
 def _opened(action: ActionRun, sight: SnapshotEvidence, inputs: dict[str, str] | None) -> ActionRun:
@@ -302,7 +304,7 @@ def _closed(action: ActionRun, state: str, sight: SnapshotEvidence) -> ActionRun
         result=implied,
         how=how,
     )
-    return replace(action, visits=(*action.visits[:-1], ended))
+    return replace(action, visits=_and(action.visits[:-1], ended))
 
 
 def _ran_meanwhile(action: ActionRun, sight: SnapshotEvidence) -> bool:
@@ -371,6 +373,10 @@ def _implied(before: str, after: str) -> Outcome | None:
     return "stopped" if before == "STOPPING" else None
 
 
+def _and(items: tuple[T, ...], item: T) -> tuple[T, ...]:
+    return items + (item,)  # noqa: RUF005 - the other way copies all of them twice
+
+
 def _kept(visits: tuple[Visit, ...], older: int, visit: Visit) -> tuple[tuple[Visit, ...], int]:
     over = len(visits) + 1 - KEPT
-    return ((*visits[over:], visit), older + over) if over > 0 else ((*visits, visit), older)
+    return (_and(visits[over:], visit), older + over) if over > 0 else (_and(visits, visit), older)
