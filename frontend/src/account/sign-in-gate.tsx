@@ -27,7 +27,7 @@ import {
 import { sessionEnd } from "../api/session-end";
 import { PersonContext } from "../api/use-person";
 import { lazyPart } from "../ui/parts/lazy-part";
-import { PartBoundary } from "../ui/parts/part-boundary";
+import { OverlayBoundary, PartBoundary } from "../ui/parts/part-boundary";
 import { OfflineBar } from "./offline-bar";
 
 const SignIn = lazyPart(() => import("./sign-in").then((part) => part.SignIn));
@@ -176,7 +176,9 @@ export function SignInGate({ children }: { children: ReactNode }) {
   }, []);
   useLooks({ on: gate.at === "inside", wanting: ended || offline, onFound: letIn, putOut });
   useEffect(() => {
-    if (gate.at === "inside" && !gate.offline) rememberPerson(gate.person);
+    if (gate.at !== "inside" || gate.offline) return;
+    rememberPerson(gate.person);
+    void SignInBar.preload(); // when it is needed, the server may not answer
   }, [gate]);
   const hold = useMemo(
     () =>
@@ -203,9 +205,9 @@ export function SignInGate({ children }: { children: ReactNode }) {
       {children}
       {offline && <OfflineBar />}
       {ended && (
-        <PartBoundary>
+        <OverlayBoundary>
           <SignInBar onOpen={letIn} />
-        </PartBoundary>
+        </OverlayBoundary>
       )}
     </PersonContext>
   );

@@ -5,10 +5,13 @@ import { type ComponentType, use } from "react";
 export class PartMissing extends Error {
   /** The next one who needs the part asks for it again. */
   readonly forget: () => void;
-  constructor(cause: unknown, forget: () => void) {
+  /** Asks for it again; whether it is there now. */
+  readonly again: () => Promise<boolean>;
+  constructor(cause: unknown, forget: () => void, again: () => Promise<boolean>) {
     super("A part of the page did not arrive.", { cause });
     this.name = "PartMissing";
     this.forget = forget;
+    this.again = again;
   }
 }
 
@@ -40,6 +43,14 @@ export function lazyPart<P extends object>(
   const forget = () => {
     loading = null;
   };
+  const again = () =>
+    get().then(
+      () => true,
+      () => {
+        forget();
+        return false;
+      },
+    );
   const get = () => {
     loading ??= load().then(
       (part) => {
@@ -47,7 +58,7 @@ export function lazyPart<P extends object>(
         return part;
       },
       (cause: unknown) => {
-        throw new PartMissing(cause, forget);
+        throw new PartMissing(cause, forget, again);
       },
     );
     return loading;
@@ -58,7 +69,7 @@ export function lazyPart<P extends object>(
     const Loaded = loaded ?? use(get());
     return <Loaded {...props} />;
   }
-  const preload = () => get().then(() => {}, forget);
+  const preload = async () => void (await again());
   if (!heavy) unloaded.push(preload);
   return Object.assign(Part, { preload });
 }

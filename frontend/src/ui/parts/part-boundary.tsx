@@ -43,15 +43,55 @@ interface Props {
   waiting?: ReactNode;
 }
 
+/** A part that did not arrive is asked for again after so long, then after twice as long, and so on. */
+const FIRST_RETRY_MS = 2_000;
+const LAST_RETRY_MS = 30_000;
+
 export class PartBoundary extends Component<Props, { error: unknown }> {
   override state = { error: null };
+  private stopAsking = () => {};
 
   static getDerivedStateFromError(error: unknown): { error: unknown } {
     return { error };
   }
 
   override componentDidCatch(error: unknown): void {
-    if (error instanceof PartMissing) error.forget();
+    if (!(error instanceof PartMissing)) return;
+    error.forget();
+    this.askAgain(error);
+  }
+
+  override componentWillUnmount(): void {
+    this.stopAsking();
+  }
+
+  /** Until it is there: soon, later and later, and whenever there is a network again. */
+  private askAgain(missing: PartMissing): void {
+    let wait = FIRST_RETRY_MS;
+    let timer: ReturnType<typeof setTimeout>;
+    const ask = async () => {
+      clearTimeout(timer);
+      const there = await missing.again();
+      if (stop !== this.stopAsking) return;
+      if (there) {
+        stop();
+        this.setState({ error: null });
+      } else later();
+    };
+    const later = () => {
+      clearTimeout(timer);
+      timer = setTimeout(ask, wait);
+      wait = Math.min(2 * wait, LAST_RETRY_MS);
+    };
+    const stop = () => {
+      clearTimeout(timer);
+      window.removeEventListener("online", ask);
+      this.stopAsking = () => {};
+    };
+    this.stopAsking();
+    this.stopAsking = stop;
+    window.addEventListener("online", ask);
+    later();
   }
 
   override render(): ReactNode {
