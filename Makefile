@@ -21,6 +21,7 @@ PROCESSES ?= 4
 ROS := .venv-ros/bin
 # Tests see nothing of a sourced ROS 2 either; `make run` does.
 BARE := env -u AMENT_PREFIX_PATH -u COLCON_PREFIX_PATH -u LD_LIBRARY_PATH
+KEEPING := $(BARE) -u PYTHONDONTWRITEBYTECODE
 NODE := scripts/with-node
 # Tests take the one without windows where it is there: it is quicker, and not in every distribution.
 BROWSER = command -v chromium-headless-shell >/dev/null || scripts/need chromium=chromium
@@ -93,7 +94,9 @@ test: setup ros ## every check and every test, also in a real browser
 .PHONY: unit
 unit: setup ## the tests of the server and of the page's pure parts
 	@echo "» pytest"
-	@$(BARE) $(BIN)/pytest -q --numprocesses $(PROCESSES) --dist loadfile $(STRUCTURE:%=--ignore=%) $(PYTEST)
+	@# One reads all tests and keeps what pytest makes of them, or each process would make it for itself.
+	@$(KEEPING) $(BIN)/pytest -q --collect-only $(STRUCTURE:%=--ignore=%) $(PYTEST) > /dev/null 2>&1 || true
+	@$(KEEPING) $(BIN)/pytest -q --numprocesses $(PROCESSES) --dist loadfile $(STRUCTURE:%=--ignore=%) $(PYTEST)
 	@echo "» vitest"
 	@$(NPM) run --silent test
 
