@@ -15,6 +15,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
+import psutil
+
 FOLDER: Final = Path(__file__).parent
 #: Where rivals are installed: outside of the repository, kept for the next time.
 RIVALS: Final = Path(os.environ.get("BENCH_RIVALS", Path(tempfile.gettempdir()) / "rivals"))
@@ -73,7 +75,6 @@ class Peer:
         while time.monotonic() < until and self._process.poll() is None:
             with socket.socket() as probe:
                 if probe.connect_ex(("127.0.0.1", self.port)) == 0:
-                    time.sleep(1)
                     return
             time.sleep(0.05)
         raise RuntimeError(f"{self.name} did not start: {(self.data / 'log').read_text()[-2000:]}")
@@ -85,8 +86,10 @@ class Peer:
             self._process.wait(30)
 
     def under(self, operation: str, rooms: list[str], **more: Any) -> dict[str, Any]:
-        """What clients find that do something here."""
+        """What clients find that do something here, once the server has done what a start leaves to do:
+        ours makes its workers two seconds later."""
         assert self._process is not None
+        _wait_for_rest(psutil.Process(self._process.pid))
         plan = {
             "port": self.port,
             "pid": self._process.pid,
@@ -158,6 +161,19 @@ class Hocuspocus(Peer):
         npm = [str(FOLDER.parent / "scripts" / "with-node"), "npm", "install", "--no-audit"]
         subprocess.run([*npm, "--no-fund", "--silent", *PACKAGES], cwd=RIVALS, check=True)
         (RIVALS / "server.mjs").write_text(_SERVER)
+
+
+def _wait_for_rest(server: psutil.Process) -> None:
+    """Until it has done next to nothing for longer than anything is put off for (seconds)."""
+    rested, used = 0.0, -1.0
+    for _ in range(120):
+        now = sum(sum(each.cpu_times()[:2]) for each in (server, *server.children(recursive=True)))
+        rested = rested + 0.25 if now - used < 0.02 else 0.0
+        if rested >= 2.5:
+            return
+        used = now
+        time.sleep(0.25)
+    raise RuntimeError(f"{server.pid} does not come to rest")
 
 
 @contextmanager
