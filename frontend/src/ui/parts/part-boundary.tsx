@@ -28,8 +28,8 @@ function Missing() {
           </Button>
         }
       >
-        The server does not answer, or it was updated while this page was open. What you changed and
-        is not saved yet waits on this device; where it cannot, the browser asks before it reloads.
+        The server does not answer, or was updated meanwhile. It is asked again by itself; what is
+        not saved yet waits on this device.
       </Empty>
     </div>
   );
@@ -43,9 +43,8 @@ interface Props {
   waiting?: ReactNode;
 }
 
-/** A part that did not arrive is asked for again after so long, then after twice as long, and so on. */
-const FIRST_RETRY_MS = 2_000;
-const LAST_RETRY_MS = 30_000;
+/** A part that did not arrive is asked for again this often. */
+const RETRY_MS = 5_000;
 
 export class PartBoundary extends Component<Props, { error: unknown }> {
   override state = { error: null };
@@ -58,40 +57,24 @@ export class PartBoundary extends Component<Props, { error: unknown }> {
   override componentDidCatch(error: unknown): void {
     if (!(error instanceof PartMissing)) return;
     error.forget();
-    this.askAgain(error);
+    const ask = async () => {
+      if (await error.again()) this.setState({ error: null });
+    };
+    const timer = setInterval(ask, RETRY_MS);
+    window.addEventListener("online", ask);
+    this.stopAsking = () => {
+      clearInterval(timer);
+      window.removeEventListener("online", ask);
+    };
+  }
+
+  /** It has arrived, or nobody looks any more. */
+  override componentDidUpdate(): void {
+    if (this.state.error === null) this.stopAsking();
   }
 
   override componentWillUnmount(): void {
     this.stopAsking();
-  }
-
-  /** Until it is there: soon, later and later, and whenever there is a network again. */
-  private askAgain(missing: PartMissing): void {
-    let wait = FIRST_RETRY_MS;
-    let timer: ReturnType<typeof setTimeout>;
-    const ask = async () => {
-      clearTimeout(timer);
-      const there = await missing.again();
-      if (stop !== this.stopAsking) return;
-      if (there) {
-        stop();
-        this.setState({ error: null });
-      } else later();
-    };
-    const later = () => {
-      clearTimeout(timer);
-      timer = setTimeout(ask, wait);
-      wait = Math.min(2 * wait, LAST_RETRY_MS);
-    };
-    const stop = () => {
-      clearTimeout(timer);
-      window.removeEventListener("online", ask);
-      this.stopAsking = () => {};
-    };
-    this.stopAsking();
-    this.stopAsking = stop;
-    window.addEventListener("online", ask);
-    later();
   }
 
   override render(): ReactNode {
