@@ -28,8 +28,9 @@ function Missing() {
           </Button>
         }
       >
-        The server does not answer, or was updated meanwhile. It is asked again by itself; what is
-        not saved yet waits on this device.
+        The server does not answer, or it was updated while this page was open. It is asked again by
+        itself. What you changed and is not saved yet waits on this device; where it cannot, the
+        browser asks before it reloads.
       </Empty>
     </div>
   );
