@@ -5,13 +5,10 @@ import { type ComponentType, use } from "react";
 export class PartMissing extends Error {
   /** The next one who needs the part asks for it again. */
   readonly forget: () => void;
-  /** Asks for it again; whether it is there now. */
-  readonly again: () => Promise<boolean>;
-  constructor(cause: unknown, forget: () => void, again: () => Promise<boolean>) {
+  constructor(cause: unknown, forget: () => void) {
     super("A part of the page did not arrive.", { cause });
     this.name = "PartMissing";
     this.forget = forget;
-    this.again = again;
   }
 }
 
@@ -43,14 +40,6 @@ export function lazyPart<P extends object>(
   const forget = () => {
     loading = null;
   };
-  const again = () =>
-    get().then(
-      () => true,
-      () => {
-        forget();
-        return false;
-      },
-    );
   const get = () => {
     loading ??= load().then(
       (part) => {
@@ -58,7 +47,7 @@ export function lazyPart<P extends object>(
         return part;
       },
       (cause: unknown) => {
-        throw new PartMissing(cause, forget, again);
+        throw new PartMissing(cause, forget);
       },
     );
     return loading;
@@ -69,7 +58,7 @@ export function lazyPart<P extends object>(
     const Loaded = loaded ?? use(get());
     return <Loaded {...props} />;
   }
-  const preload = async () => void (await again());
+  const preload = () => get().then(() => {}, forget);
   if (!heavy) unloaded.push(preload);
   return Object.assign(Part, { preload });
 }

@@ -65,43 +65,6 @@ test("a part that does not arrive is said, and asked for again by the next one",
   expect(times).toBe(2);
 });
 
-test("a part that did not arrive is asked for again, and at once when there is a network", async () => {
-  vi.useFakeTimers();
-  vi.spyOn(console, "error").mockImplementation(() => {});
-  let times = 0;
-  let network = false;
-  const Part = lazyPart<{ word: string }>(async () => {
-    times += 1;
-    if (!network) throw new TypeError("Failed to fetch dynamically imported module");
-    return Word;
-  });
-  const place = document.createElement("div");
-  const root = createRoot(place);
-  await act(async () =>
-    root.render(
-      <MantineProvider>
-        <PartBoundary>
-          <Part word="here" />
-        </PartBoundary>
-      </MantineProvider>,
-    ),
-  );
-  expect(place.textContent).toContain("did not arrive");
-  const before = times;
-  await act(() => vi.advanceTimersByTimeAsync(2 * 5_000));
-  expect(times).toBe(before + 2);
-  expect(place.textContent).toContain("did not arrive");
-
-  network = true;
-  await act(async () => window.dispatchEvent(new Event("online")));
-  expect(place.querySelector("p")?.textContent).toBe("here");
-  const arrived = times;
-  await act(() => vi.advanceTimersByTimeAsync(120_000));
-  expect(times).toBe(arrived);
-  await act(async () => root.unmount());
-  vi.useRealTimers();
-});
-
 test("idle pages load what may be needed next, newest first, and what is heavy never", async () => {
   const loaded: string[] = [];
   const part =

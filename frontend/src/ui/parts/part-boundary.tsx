@@ -28,9 +28,8 @@ function Missing() {
           </Button>
         }
       >
-        The server does not answer, or it was updated while this page was open. It is asked again by
-        itself. What you changed and is not saved yet waits on this device; where it cannot, the
-        browser asks before it reloads.
+        The server does not answer, or it was updated while this page was open. What you changed and
+        is not saved yet waits on this device; where it cannot, the browser asks before it reloads.
       </Empty>
     </div>
   );
@@ -44,38 +43,15 @@ interface Props {
   waiting?: ReactNode;
 }
 
-/** A part that did not arrive is asked for again this often. */
-const RETRY_MS = 5_000;
-
 export class PartBoundary extends Component<Props, { error: unknown }> {
   override state = { error: null };
-  private stopAsking = () => {};
 
   static getDerivedStateFromError(error: unknown): { error: unknown } {
     return { error };
   }
 
   override componentDidCatch(error: unknown): void {
-    if (!(error instanceof PartMissing)) return;
-    error.forget();
-    const ask = async () => {
-      if (await error.again()) this.setState({ error: null });
-    };
-    const timer = setInterval(ask, RETRY_MS);
-    window.addEventListener("online", ask);
-    this.stopAsking = () => {
-      clearInterval(timer);
-      window.removeEventListener("online", ask);
-    };
-  }
-
-  /** It has arrived, or nobody looks any more. */
-  override componentDidUpdate(): void {
-    if (this.state.error === null) this.stopAsking();
-  }
-
-  override componentWillUnmount(): void {
-    this.stopAsking();
+    if (error instanceof PartMissing) error.forget();
   }
 
   override render(): ReactNode {
