@@ -27,7 +27,7 @@ import {
 import { sessionEnd } from "../api/session-end";
 import { PersonContext } from "../api/use-person";
 import { lazyPart } from "../ui/parts/lazy-part";
-import { OverlayBoundary, PartBoundary } from "../ui/parts/part-boundary";
+import { PartBoundary } from "../ui/parts/part-boundary";
 import { OfflineBar } from "./offline-bar";
 
 const SignIn = lazyPart(() => import("./sign-in").then((part) => part.SignIn));
@@ -205,9 +205,9 @@ export function SignInGate({ children }: { children: ReactNode }) {
       {children}
       {offline && <OfflineBar />}
       {ended && (
-        <OverlayBoundary>
+        <PartBoundary>
           <SignInBar onOpen={letIn} />
-        </OverlayBoundary>
+        </PartBoundary>
       )}
     </PersonContext>
   );
