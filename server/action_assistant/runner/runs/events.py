@@ -319,4 +319,7 @@ def encode(event: RunEvent) -> bytes:
 def decode(kind: str, body: bytes) -> RunEvent:
     """The event of a stored body. Raises msgspec.DecodeError when the body is not of its kind."""
     known = _DECODERS.get(kind)
-    return Unknown() if known is None else known.decode(body)
+    try:
+        return Unknown() if known is None else known.decode(body)
+    except TypeError as error:  # a damaged database may give out a number
+        raise msgspec.DecodeError(str(error)) from error
