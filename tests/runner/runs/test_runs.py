@@ -1,7 +1,5 @@
 """A run is what its events tell, wherever they stop."""
 
-from typing import Any
-
 import msgspec
 import pytest
 from hypothesis import given
@@ -280,12 +278,6 @@ def test_a_loop_of_a_thousand_laps_keeps_the_newest_visits_and_counts_the_others
 def test_a_node_of_a_sub_graph_stands_beside_ours_of_the_same_name() -> None:
     run = run_of(node(5, "RUNNING"), NodeState(6, "patrol__Sub__0", "Go_0", "RUNNING"))
     assert run.active == ("Go_0", "patrol__Sub__0/Go_0")
-
-
-@pytest.mark.parametrize("body", [b"{", b"\xff", 5, 1.5, None])
-def test_what_is_no_body_is_told_as_such_whatever_a_database_gives_out(body: Any) -> None:
-    with pytest.raises(msgspec.DecodeError):
-        decode("run.observed.v1", body)
 
 
 def test_events_of_a_later_version_are_passed_over() -> None:
