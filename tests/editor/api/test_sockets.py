@@ -189,6 +189,31 @@ async def test_a_graph_that_is_deleted_sends_everyone_away(
         assert await closed(session) == wire.NO_SUCH_GRAPH
 
 
+async def test_nobody_stays_in_a_graph_that_is_deleted_while_they_come(
+    editor: Editor, http: httpx.Client, graph: str
+) -> None:
+    async def come(after: float) -> int:
+        """How it ended: the status of the refusal, or the code of the close."""
+        await asyncio.sleep(after)
+        try:
+            async with editor.socket(graph) as session:
+                return await closed(session)
+        except httpx_ws.WebSocketUpgradeError as refused:
+            return refused.response.status_code
+
+    for _ in range(3):
+        crowd = [asyncio.create_task(come(n / 1000)) for n in range(0, 60, 3)]
+        await asyncio.sleep(0.03)
+        assert (await asyncio.to_thread(http.delete, f"/api/graphs/{graph}")).status_code == 204
+        assert {*await asyncio.gather(*crowd)} <= {404, wire.NO_SUCH_GRAPH}
+        assert await come(0) == 404
+        back = await asyncio.to_thread(http.post, f"/api/graphs/{graph}/recover")
+        assert back.is_success
+        async with editor.socket(graph) as session, editor.socket(graph) as another:
+            await session.receive_bytes(timeout=5)
+            await another.receive_bytes(timeout=5)
+
+
 async def test_a_socket_that_vanishes_takes_its_entry_along(editor: Editor, graph: str) -> None:
     async with editor.socket(graph) as watcher:
         raw = upgraded(editor, graph)

@@ -60,6 +60,27 @@ async def test_an_empty_room_is_let_go_after_a_while_and_its_memory_freed(
     await rooms.close()
 
 
+async def test_a_room_vouches_for_its_graph_while_somebody_is_in_it_and_it_is_not_deleted(
+    rooms: Rooms,
+) -> None:
+    ada = Client()
+    assert not rooms.is_joined(STREAM)
+    async with rooms.enter(STREAM) as room:
+        assert not rooms.is_joined(STREAM)  # nobody was asked whether there is such a graph
+        ada.join(room)
+        assert rooms.is_joined(STREAM)
+        rooms.expel(STREAM)
+        assert ada.member is not None
+        assert await ada.member.ended() == messages.NO_SUCH_GRAPH
+        assert room.members  # not gone yet
+        assert not rooms.is_joined(STREAM)
+        assert rooms.is_deleted(STREAM)
+        rooms.readmit(STREAM)
+        assert rooms.is_joined(STREAM)
+        ada.leave()
+        assert not rooms.is_joined(STREAM)
+
+
 async def test_when_the_server_ends_everyone_is_told_to_come_again(journal: Journal) -> None:
     rooms = Rooms(journal)
     ada = Client("ada")

@@ -34,12 +34,14 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
     @websocket("/api/graphs/{graph_id:str}/room")
     async def room(socket: Socket, graph_id: str) -> None:
         services, person = app_state.services, person_of(socket)
+        stream = h.graph_stream(graph_id)
         address = socket.client.host if socket.client is not None else ""
         try:
             with services.connection_limits.admitted(person.id, address):
-                await services.catalogue.require(graph_id)
+                if not services.rooms.is_joined(stream):  # to ask is a fifth of what coming costs
+                    await services.catalogue.require(graph_id)
                 await services.people.seen(person)
-                async with services.rooms.enter(h.graph_stream(graph_id)) as found:
+                async with services.rooms.enter(stream) as found:
                     await socket.accept()
                     if _knows_another(socket, services.epoch, found):
                         await _part(socket, services.epoch)
@@ -49,6 +51,8 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
                     with services.colours.held(person.id) as colour:
                         member = Member(person, edits=edits, acks=acks, colour=colour)
                         member.post_epoch(services.epoch)
+                        if services.rooms.is_deleted(stream):  # while this socket was let in
+                            member.close(messages.NO_SUCH_GRAPH)
                         talk = Conversation(found, member, services.rate_limits)
                         with about("graph", graph_id):
                             code = await _converse(socket, talk)

@@ -178,7 +178,10 @@ class Catalogue:
         """Bring a deleted graph back."""
         row = await self._row(graph, deleted=True)
         if row.deleted_at is not None:
-            await self._journal.append(h.about_stream(graph), [h.draft(h.RECOVERED, author)])
+            try:
+                await self._journal.append(h.about_stream(graph), [h.draft(h.RECOVERED, author)])
+            finally:  # where it is not known whether that was stored, the tables tell
+                self._rooms.readmit(h.graph_stream(graph))
         return await self.get(graph)
 
     async def add_action(

@@ -45,6 +45,7 @@ class Rooms:
         self._holders: dict[str, int] = {}
         self._tasks: set[asyncio.Task[None]] = set()
         self._timers: dict[str, asyncio.TimerHandle] = {}
+        self._deleted: set[str] = set()  # since this process began
         self._closed = False
         self._divergences = 0
         self.metrics: Final = RoomMetrics()
@@ -80,11 +81,26 @@ class Rooms:
         """How often a page showed something else than its room, since this process began."""
         return self._divergences + sum(room.comparisons.divergences for room in self.open_rooms())
 
+    def is_joined(self, stream: str) -> bool:
+        """Whether sockets are in the room of a graph that was there when they came, and is not deleted:
+        whoever else comes needs not be asked whether there is such a graph."""
+        room = self._rooms.get(stream)
+        return room is not None and bool(room.members) and not self.is_deleted(stream)
+
     def expel(self, stream: str) -> None:
-        """Send everyone away from a graph that is no more."""
+        """The graph was deleted: send everyone away, also who is on the way in."""
+        self._deleted.add(stream)
         room = self._rooms.get(stream)
         for member in list(room.members) if room is not None else []:
             member.close(messages.NO_SUCH_GRAPH)
+
+    def readmit(self, stream: str) -> None:
+        """The graph is there again."""
+        self._deleted.discard(stream)
+
+    def is_deleted(self, stream: str) -> bool:
+        """Whether everyone was sent away from this graph."""
+        return stream in self._deleted
 
     async def close(self) -> None:
         """Finish and let go of every room."""
