@@ -134,6 +134,7 @@ soak: setup ## what takes longer than CI may, by the thousand (ARGS="kills image
 soak-ros: ros ## the same over real rclpy: 200 histories, hundreds of stops
 	TEST_ROS_HISTORIES=200 TEST_ROS_AT_ONCE=4 TEST_STOP_CLICKS=50 $(BARE) $(ROS)/python -m pytest -q -s \
 		--timeout=0 tests/ros/test_false_confirmations.py tests/ros/test_stop_latency.py
+	TEST_LONG=1 $(BARE) $(ROS)/python -m pytest -q -m long tests/ros
 
 .PHONY: containers
 containers: setup ## build the images and drive docker-compose.yml with podman, as root on Debian (ARGS="-k proxy")

@@ -124,6 +124,7 @@ def test_on_windows_commands_reach_a_server_and_nothing_is_served() -> None:
     assert "docs/installing.md" in answer.stderr
 
 
+@pytest.mark.long
 def test_on_windows_a_graph_is_brought_to_a_server_and_run(tmp_path: Path) -> None:
     words = ("import", str(EXAMPLES[0]), "+", "graphs", "+", "stop", "--all", "+", "people", "list")
     with running(tmp_path / "data") as product:

@@ -104,7 +104,7 @@ def _bare_environment(folder: Path) -> dict[str, str]:
     }
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.timeout(300)
 def test_an_installed_wheel_serves_the_page_without_node(wheel: Path, tmp_path: Path) -> None:
     environment, package = tmp_path / "venv", tmp_path / "package"

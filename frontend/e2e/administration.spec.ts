@@ -7,6 +7,7 @@ import { violations } from "./valves";
 const product = new Product();
 const PICTURES = process.env.PICTURES_OF_ADMINISTRATION;
 
+test.skip(LONG !== "", LONG);
 test.beforeAll(() => product.start());
 test.afterAll(() => product.dispose());
 
@@ -45,7 +46,6 @@ test("an owner sees both processes, and what doctor finds, without a mouse", asy
 test("a process that does not answer is said to, beside what was known of it", async ({
   browser,
 }) => {
-  test.skip(LONG !== "", LONG);
   const { page } = await product.person(browser, "Eve");
   await page.goto(`${product.url}/admin`);
   const runner = page.getByRole("region", { name: "Runner" });

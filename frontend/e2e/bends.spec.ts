@@ -6,6 +6,7 @@ import { LONG, Product } from "./product";
 
 const product = new Product();
 
+test.skip(LONG !== "", LONG);
 test.beforeAll(() => product.start());
 test.afterAll(() => product.dispose());
 
@@ -21,7 +22,6 @@ async function waypoints(id: string): Promise<readonly (readonly [number, number
 test("a line is bent by hand, stays so for everybody, and is moved by keys", async ({
   browser,
 }) => {
-  test.skip(LONG !== "", LONG);
   const { page, context, failures } = await product.person(browser, "Ada");
   const mari = await product.person(browser, "Mari");
   const id = await product.chain(2);

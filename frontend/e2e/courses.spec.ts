@@ -5,12 +5,13 @@ import { createRequire } from "node:module";
 import { expect, type Page, test } from "@playwright/test";
 import type { AxeResults } from "axe-core";
 import { card } from "./canvas";
-import { type Person, Product } from "./product";
+import { LONG, type Person, Product } from "./product";
 
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 const product = new Product();
 let ada: Person;
 
+test.skip(LONG !== "", LONG);
 test.beforeAll(async ({ browser }) => {
   await product.start();
   ada = await product.person(browser, "Ada");

@@ -9,6 +9,7 @@ import { LONG, Product } from "./product";
 
 const product = new Product();
 
+test.skip(LONG !== "", LONG);
 test.beforeAll(() => product.start());
 test.afterAll(() => product.dispose());
 
@@ -77,7 +78,6 @@ test("an old file is cancelled and leaves nothing, or kept and opens", async ({ 
 });
 
 test("of two files dropped at once only the old one is asked about", async ({ browser }) => {
-  test.skip(LONG !== "", LONG);
   const { page, context } = await product.person(browser, "Ada");
   const before = await count();
   const fresh = {
@@ -111,7 +111,6 @@ async function dropFromDisk(page: Page, ...paths: string[]): Promise<void> {
 test("a folder dropped on the page of actions brings all that lie in it, however deep", async ({
   browser,
 }) => {
-  test.skip(LONG !== "", LONG);
   const folder = mkdtempSync(join(tmpdir(), "dropped-"));
   const file = (path: string, body: object | string) => {
     mkdirSync(dirname(join(folder, path)), { recursive: true });

@@ -7,6 +7,7 @@ import { LONG, Product } from "./product";
 
 const product = new Product();
 
+test.skip(LONG !== "", LONG);
 test.beforeAll(() => product.start());
 test.afterAll(() => product.dispose());
 
@@ -52,7 +53,6 @@ test("another graph is found below the actions, and placed by keys as one edit",
 });
 
 test("a finger places a graph, and a phone has it in the search", async ({ browser }) => {
-  test.skip(LONG !== "", LONG);
   await using(product, "clean_hall", action("Sweep", {}));
   await using(product, "wash_hall", action("Sweep", {}));
   const day = await using(product, "day_round", action("Wait", {}));
@@ -87,7 +87,6 @@ test("a finger places a graph, and a phone has it in the search", async ({ brows
 });
 
 test("of a thousand actions only those near what is in sight are laid out", async ({ browser }) => {
-  test.skip(LONG !== "", LONG);
   const graph = await using(product, "long_list", action("Wait", {}));
   const { page, context, failures } = await product.person(browser, "Ada");
   await page.route("**/api/actions", async (route) => {

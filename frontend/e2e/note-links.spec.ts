@@ -10,6 +10,7 @@ import { LONG, Product } from "./product";
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 const product = new Product();
 
+test.skip(LONG !== "", LONG);
 test.beforeAll(() => product.start());
 test.afterAll(() => product.dispose());
 
@@ -70,7 +71,6 @@ for (const scheme of ["light", "dark"] as const) {
 }
 
 test("by mouse on the canvas and in the details, by a finger too", async ({ browser }) => {
-  test.skip(LONG !== "", LONG);
   const { page, context, failures } = await product.person(browser, "Ada", { hasTouch: true });
   await opened(page);
   const text = page.getByRole("textbox", { name: "Text of the note" });

@@ -10,6 +10,7 @@ import { LONG, Product } from "./product";
 
 const product = new Product();
 
+test.skip(LONG !== "", LONG);
 test.beforeAll(() => product.start());
 test.afterAll(() => product.dispose());
 
@@ -86,7 +87,6 @@ test("the packages of a graph are looked at, downloaded, and what has none is sh
 test("an action leads to its own package, by its form and by the menu of its card", async ({
   browser,
 }) => {
-  test.skip(LONG !== "", LONG);
   const { page, context, failures } = await product.person(browser, "Ada");
   await page.goto(`${product.url}/graphs/${await kitchen()}`);
   await saved(page);

@@ -6,6 +6,7 @@ import { LONG, Product } from "./product";
 
 const product = new Product();
 
+test.skip(LONG !== "", LONG);
 test.beforeAll(() => product.start());
 test.afterAll(() => product.dispose());
 
@@ -71,7 +72,6 @@ test("the lists fold to a rail by which each is opened and put away, also by key
 test("beside the rail the details are there while something is chosen, or when asked for", async ({
   browser,
 }) => {
-  test.skip(LONG !== "", LONG);
   const { page, context, failures } = await product.person(browser, "Ada");
   await page.addInitScript(() => localStorage.setItem("aa.list-folded", "true"));
   await page.goto(`${product.url}/graphs/${await product.chain(4)}`);

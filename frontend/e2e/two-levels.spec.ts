@@ -2,13 +2,14 @@
 
 import { expect, type Page, test } from "@playwright/test";
 import { add, boxOf, card, connect, move, pick, saved, start, tidy } from "./canvas";
-import { type Person, Product } from "./product";
+import { LONG, type Person, Product } from "./product";
 import { violations } from "./valves";
 
 const product = new Product();
 let ada: Person;
 let mari: Person;
 
+test.skip(LONG !== "", LONG);
 test.describe.configure({ mode: "serial" });
 test.beforeAll(async ({ browser }) => {
   await product.start();

@@ -246,12 +246,16 @@ def _runnable(document: Path) -> list[Command]:
     return list(found.values())
 
 
-TRIED: Final = [each for each in DOCUMENTS if _runnable(each)]
+TRIED: Final = [
+    pytest.param(each, id=each.name, marks=() if each.name == "README.md" else pytest.mark.long)
+    for each in DOCUMENTS
+    if _runnable(each)
+]
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(240)
-@pytest.mark.parametrize("document", TRIED, ids=lambda each: each.name)
+@pytest.mark.parametrize("document", TRIED)
 def test_what_a_document_tells_to_type_works(
     document: Path, computer: Computer, tmp_path: Path
 ) -> None:

@@ -69,6 +69,7 @@ def test_what_is_wrong_with_each_robot_is_told_apart(tmp_path: Path, domains: li
     assert others == {"engine-odd", "engine-unregistered"}
 
 
+@pytest.mark.long
 def test_an_engine_on_another_domain_than_its_robot_is_registered_on_is_named(
     tmp_path: Path, domains: list[int]
 ) -> None:

@@ -109,6 +109,7 @@ def test_what_a_robot_lacks_is_written_indexed_and_run_inside(domain: int, tmp_p
         robot.end()
 
 
+@pytest.mark.long
 def test_an_engine_that_looks_only_at_its_start_goes_on_lacking_it(
     domain: int, tmp_path: Path
 ) -> None:

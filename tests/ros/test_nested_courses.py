@@ -28,6 +28,8 @@ OURS = ("sub_seq", "sub_error", "sub_fast", "sub_params", "sub_halt", "sub_stop"
 #: Graphs of the engine's own repository: they stand where its files are.
 ENGINES = ("semantics_test_6", "semantics_test_9")
 _ENGINE = CORPUS / "graphs" / "temoto-framework+temoto_action_engine"
+#: Of each kind one, where there is no time for all: with a flat one, without it, and stopped from outside.
+QUICKLY = {"sub_error", "sub_stop", "semantics_test_9"}
 #: These go on until somebody stops them: a graph inside that is HALTED tells nobody.
 ENDLESS = {"sub_halt", "sub_stop"}
 #: Why there is no one graph of these that would do the same.
@@ -43,7 +45,8 @@ pytestmark = pytest.mark.timeout(240)
 
 def needs(name: str) -> Any:
     here = name in OURS or _ENGINE.is_dir()
-    return pytest.param(name, marks=[] if here else [pytest.mark.skip(reason=NO_CORPUS)])
+    marks = [] if here else [pytest.mark.skip(reason=NO_CORPUS)]
+    return pytest.param(name, marks=marks if name in QUICKLY else [*marks, pytest.mark.long])
 
 
 def files(name: str) -> tuple[dict[str, Any], list[dict[str, Any]]]:

@@ -96,6 +96,7 @@ def assert_rehearsed(file: Path, data: Path) -> None:
     assert [path for path in data.iterdir() if path.name.startswith(".")] == []
 
 
+@pytest.mark.long
 def test_everything_is_there_again_on_an_empty_machine(tmp_path: Path, postgres: Server) -> None:
     """Events, answers, archived runs, keys, links, sessions, certificates."""
     old, new = tmp_path / "old", tmp_path / "new"

@@ -106,6 +106,7 @@ def wrote(data: Path, *flags: str) -> dict[str, str]:
         return Writers(product).write(SECONDS)
 
 
+@pytest.mark.long
 def test_there_and_back_nothing_is_lost_of_what_many_wrote(
     tmp_path: Path, postgres: Server
 ) -> None:
@@ -136,6 +137,7 @@ def test_there_and_back_nothing_is_lost_of_what_many_wrote(
     assert command("verify", "--data", data).returncode == 0
 
 
+@pytest.mark.long
 def test_a_nul_in_a_name_keeps_no_graphs_from_a_server(tmp_path: Path, postgres: Server) -> None:
     """JSON can say it, SQLite holds it, Postgres does not."""
     data, url = tmp_path / "data", postgres.new_database()

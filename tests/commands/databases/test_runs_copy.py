@@ -96,6 +96,7 @@ def test_another_log_is_not_mixed_in(data: Path, tmp_path: Path, postgres: Serve
     assert "is a copy of another log" in refused.stderr
 
 
+@pytest.mark.long
 def test_what_comes_is_copied_also_after_the_database_was_away(
     data: Path, tmp_path: Path, postgres: Server
 ) -> None:

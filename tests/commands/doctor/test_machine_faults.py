@@ -68,6 +68,7 @@ def test_a_page_that_is_not_built_not_whole_or_of_other_sources_is_named(
     assert "assets/" in fault(data).message
 
 
+@pytest.mark.long
 @pytest.mark.skipif(rclpy_fits(), reason="this Python speaks ROS 2 by itself")
 def test_a_missing_rclpy_matters_only_where_there_are_robots(data: Path, tmp_path: Path) -> None:
     without = {VARIABLE: sys.executable}
