@@ -14,12 +14,12 @@ from table import Table
 
 TITLE = "What one editor carries"
 PATIENCE_MS: Final = 100.0  # in which nearly all edits (the 99th percentile) reach everybody
-STEP: Final = 1.2  # times as many edits from one load to the next
+STEP: Final = 1.25  # times as many edits from one load to the next
 RUNS: Final = int(os.environ.get("BENCH_RUNS", "3"))
 #: With how many edits a second of each person it begins.
 CROWDS: Final[dict[str, tuple[dict[str, Any], float]]] = {
-    "500 people, 100 graphs": ({"people": 500, "graphs": 100}, 10),
-    "2,000 people, 500 graphs": ({"people": 2000, "graphs": 500}, 1),
+    "500 people, 100 graphs": ({"people": 500, "graphs": 100}, 6),
+    "2,000 people, 500 graphs": ({"people": 2000, "graphs": 500}, 0.6),
 }
 
 
@@ -52,13 +52,18 @@ def tables() -> Iterator[Table]:
 
 
 def climbed(kind: type[Peer], plan: dict[str, Any], rate: float) -> Mapping[str, float]:
-    """The last run before one in which edits were late or missing."""
-    people = {name: value for name, value in plan.items() if name != "graphs"}
+    """The last run before a load at which edits were late or missing, twice: once may be the disk's."""
     best: dict[str, float] = {"rate": 0.0, "delivered_per_s": 0.0, "p99_ms": 0.0, "cpu_share": 0.0}
-    while True:
-        with running(kind) as peer:
-            found = peer.under("fan out", peer.rooms(plan["graphs"]), rate=rate, **people)
-        if found["p99_ms"] > PATIENCE_MS or found["missing"] or found["disconnected"]:
-            return best
+    while (found := carried(kind, plan, rate) or carried(kind, plan, rate)) is not None:
         best = {**found, "rate": rate}
         rate *= STEP
+    return best
+
+
+def carried(kind: type[Peer], plan: dict[str, Any], rate: float) -> Mapping[str, float] | None:
+    """What a fresh server did under this load; None where that was too much."""
+    people = {name: value for name, value in plan.items() if name != "graphs"}
+    with running(kind) as peer:
+        found = peer.under("fan out", peer.rooms(plan["graphs"]), rate=rate, **people)
+    late = found["p99_ms"] > PATIENCE_MS or found["missing"] or found["disconnected"]
+    return None if late else found

@@ -24,6 +24,7 @@ export class Product {
   private readonly flags: readonly string[];
   private readonly hosts: string;
   private process: ChildProcess | undefined;
+  private readonly contexts: BrowserContext[] = [];
 
   /** `hosts` are names that lead here, for others on the network. */
   constructor(flags: readonly string[] = [], hosts = "") {
@@ -120,8 +121,10 @@ export class Product {
     throw new Error(`no ${which}`);
   }
 
-  /** Kills it and throws its data away. */
+  /** Kills it and throws its data away; whoever was at a browser has left. Pages that nobody closes would go on
+   * asking for it, beside all tests that come after them. */
   async dispose(): Promise<void> {
+    await Promise.all(this.contexts.map((context) => context.close()));
     await this.kill();
     rmSync(this.data, { recursive: true, force: true, maxRetries: 5 });
   }
@@ -163,6 +166,7 @@ export class Product {
     options: Parameters<Browser["newContext"]>[0] = {},
   ): Promise<Person> {
     const context = await browser.newContext(options);
+    this.contexts.push(context);
     const page = await context.newPage();
     const failures: string[] = [];
     page.on("pageerror", (error) => failures.push(error.message));

@@ -183,6 +183,10 @@ test("the answer to a start on two robots gets lost: both runs are found, and no
     await expect(notice).toContainText(new RegExp(`Started after all: run \\d+ on ${robot}`));
   }
   await page.screenshot({ path: test.info().outputPath("unsure-group.png") });
+  // What is stopped before its robot has told of it is not proven to be stopped.
+  await expect
+    .poll(async () => (await runs()).slice(0, 2).map(({ state }) => state))
+    .toEqual(["running", "running"]);
   expect(sent).toHaveLength(1);
   await expect(page.getByText("Not started")).toHaveCount(0);
   await page.unrouteAll();
