@@ -85,6 +85,7 @@ def test_what_is_inside_of_a_graph_runs_with_it(product: Product, files: dict[st
     assert {"around__pair__0/A_0: FINISHED", "around__pair__0/B_0: FINISHED"} <= set(told)
 
 
+@pytest.mark.long
 def test_expected_courses_are_simulated_again_and_a_changed_graph_is_told(
     product: Product, files: dict[str, str]
 ) -> None:
@@ -104,6 +105,7 @@ def test_expected_courses_are_simulated_again_and_a_changed_graph_is_told(
     assert "B_0 is told to run" in now["why"]
 
 
+@pytest.mark.long
 def test_the_edit_that_made_a_run_go_another_way_is_named(
     product: Product, files: dict[str, str]
 ) -> None:

@@ -322,6 +322,7 @@ def test_what_check_says_can_never_run_does_not_run(graph: Graph) -> None:
         assert not (isinstance(trace, NodeStateEvent) and trace.node in names)
 
 
+@pytest.mark.long
 def test_checking_ten_thousand_actions_costs_no_more_than_their_number() -> None:
     def checking(size: int) -> Callable[[], None]:
         names = [f"A{i}" for i in range(size)]

@@ -180,6 +180,7 @@ def test_killed_anywhere_a_file_is_as_it_was_or_as_it_shall_be(tmp_path: Path) -
     assert KILLS < 10 or len(set(found)) > 1
 
 
+@pytest.mark.long
 @pytest.mark.timeout(0)
 def test_killed_anywhere_a_server_has_what_was_or_what_shall_be(
     tmp_path: Path, postgres: Server

@@ -207,6 +207,7 @@ def test_every_row_counts_whatever_the_order(tmp_path: Path) -> None:
 
 
 @pytest.mark.timeout(0)
+@pytest.mark.long
 def test_killed_at_any_moment_one_of_both_is_the_truth(tmp_path: Path, postgres: Server) -> None:
     data, url = made(tmp_path / "data"), postgres.new_database()
     before = truth(data)

@@ -318,7 +318,10 @@ def test_bytes_that_are_no_utf_8_are_refused() -> None:
         ("", "[", "", 900_000),
         ("", '"\\"', "", 3_000_000),
         ("{", '"a":1,', "", 100_000),
-        ('{"graph_name":"g","actions":[{"name":"A"}', ',{"name":"A"}', "]}", 40_000),
+        pytest.param(
+            *('{"graph_name":"g","actions":[{"name":"A"}', ',{"name":"A"}', "]}", 40_000),
+            marks=pytest.mark.long,
+        ),
         ('{"graph_name":"g","graph_entry":[{"name":"A"}', ',{"name":"A"}', "]}", 40_000),
     ],
 )
