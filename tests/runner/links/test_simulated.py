@@ -121,7 +121,7 @@ async def test_a_simulation_that_says_very_much_leaves_the_loop_free() -> None:
             pass
 
     make, script = Simulators(), '{"behaviours":{"*":[{"after_s":0.01}]}}'
-    links = [make(SIMULATED, script, lambda: time.time_ns() // 1000) for _ in range(5)]
+    links = [make(SIMULATED, script, lambda: time.time_ns() // 1000) for _ in range(10)]
     async with AsyncExitStack() as stack:
         for i, link in enumerate(links):
             stack.push_async_callback(link.aclose)
