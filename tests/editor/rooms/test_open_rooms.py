@@ -76,9 +76,21 @@ async def test_a_room_vouches_for_its_graph_while_somebody_is_in_it_and_it_is_no
         assert not rooms.is_joined(STREAM)
         assert rooms.is_deleted(STREAM)
         rooms.readmit(STREAM)
-        assert rooms.is_joined(STREAM)
-        ada.leave()
+        assert not rooms.is_deleted(STREAM)
+        assert not rooms.is_joined(STREAM)  # the next one asks
+
+
+async def test_where_a_graph_may_be_deleted_whoever_comes_asks_and_whoever_is_there_stays(
+    rooms: Rooms,
+) -> None:
+    ada = Client()
+    async with rooms.enter(STREAM) as room:
+        ada.join(room)
+        rooms.doubt(STREAM)
         assert not rooms.is_joined(STREAM)
+        assert not rooms.is_deleted(STREAM)
+        assert ada.member is not None
+        assert not ada.member.closed
 
 
 async def test_when_the_server_ends_everyone_is_told_to_come_again(journal: Journal) -> None:

@@ -171,8 +171,10 @@ class Catalogue:
     async def delete(self, graph: str, author: str) -> None:
         """Take a graph out of sight; everyone in it has to leave."""
         await self._row(graph)
+        stream = h.graph_stream(graph)
+        self._rooms.doubt(stream)  # also where it is never known whether this was stored
         await self._journal.append(h.about_stream(graph), [h.draft(h.DELETED, author)])
-        self._rooms.expel(h.graph_stream(graph))
+        self._rooms.expel(stream)
 
     async def recover(self, graph: str, author: str) -> GraphView:
         """Bring a deleted graph back."""

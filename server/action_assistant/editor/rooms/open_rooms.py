@@ -82,14 +82,21 @@ class Rooms:
         return self._divergences + sum(room.comparisons.divergences for room in self.open_rooms())
 
     def is_joined(self, stream: str) -> bool:
-        """Whether sockets are in the room of a graph that was there when they came, and is not deleted:
-        whoever else comes needs not be asked whether there is such a graph."""
+        """Whether sockets are in the room of a graph that was there when they came, and that nobody has
+        begun to delete since: for whoever else comes the tables need not be asked."""
         room = self._rooms.get(stream)
-        return room is not None and bool(room.members) and not self.is_deleted(stream)
+        return room is not None and bool(room.members) and room.is_of_sure_graph
+
+    def doubt(self, stream: str) -> None:
+        """The graph may be deleted: from now on the tables tell whether it is there."""
+        room = self._rooms.get(stream)
+        if room is not None:
+            room.is_of_sure_graph = False
 
     def expel(self, stream: str) -> None:
         """The graph was deleted: send everyone away, also who is on the way in."""
         self._deleted.add(stream)
+        self.doubt(stream)
         room = self._rooms.get(stream)
         for member in list(room.members) if room is not None else []:
             member.close(messages.NO_SUCH_GRAPH)

@@ -82,6 +82,7 @@ class Room:
         self._replica = loaded.replica
         self._snapshots: Final = RoomSnapshots(stream, journal, loaded.kept)
         self.damaged: Final = loaded.damaged
+        self.is_of_sure_graph = True  # nobody has begun to delete it
         self._gone = gone
         self._window = window
         self.turn_end: Final = window.turn_end
