@@ -55,6 +55,7 @@ class EchoEngine:
         self.running: list[str] = []
         self.asked = 0
         self.holding = threading.Event()  # while set, gets wait
+        self.is_quiet = False  # its log does not say what it receives
         self._context = Context()
         self._context.init(domain_id=domain)
         self._node = rclpy.create_node(
@@ -77,6 +78,8 @@ class EchoEngine:
     def _keep(self, command: str) -> Any:
         def heard(message: Any) -> None:
             self.heard.append((time.monotonic(), command, message))
+            if not self.is_quiet:
+                self.log(f"Received request to {command} UMRF graph: {message.umrf_graph_name}")
 
         return heard
 

@@ -13,11 +13,13 @@ from action_assistant.runner.links.port import (
     EngineLog,
     Feedback,
     ForeignCommand,
+    Leaves,
     NoAnswer,
     NotSent,
     Order,
     Report,
     Standing,
+    unwatched,
 )
 from action_assistant.runner.links.ros2.ros_values import LogLine, OverheardCommand
 from runner.fake_network import HASH, FakeNetwork
@@ -55,14 +57,19 @@ class FakeLink:
             others=len(self._network.publishers("start")),
         )
 
-    async def start(self, order: Order) -> None:
+    async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
         """Publish one start."""
         if self.standing.generation == "older":
             raise NotSent("its messages are another generation")
         if not self._network.servers(self._path):
             raise NotSent("nobody listens")
         message = Start(graph_name=order.graph.name, targets=(self._name,), graph_json=order.umrf)
-        await self._network.outlets.start.send(lambda: message)
+
+        def leaving() -> Start:
+            leaves()
+            return message
+
+        await self._network.outlets.start.send(leaving)
 
     async def stop(self, graph_name: str) -> None:
         """Publish one stop, also when nobody seems to listen."""

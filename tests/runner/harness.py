@@ -26,11 +26,13 @@ from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import (
     Answer,
     EngineRefused,
+    Leaves,
     Link,
     NoAnswer,
     Order,
     Report,
     Standing,
+    unwatched,
 )
 from action_assistant.runner.links.simulator import SimulatorLink
 from action_assistant.runner.robots.registry import Robots
@@ -218,8 +220,9 @@ class Robot:
         self.delivered = 0
         self._began: dict[str, float] = {}
 
-    async def start(self, order: Order) -> None:
+    async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
         """One message, which arrives, unless it gets lost."""
+        leaves()
         self.starts.append(order)
         if self.chance.random() < self.start_loss:
             return

@@ -22,10 +22,12 @@ from action_assistant.runner.links.port import (
     Answer,
     EngineLog,
     Feedback,
+    Leaves,
     NoAnswer,
     Order,
     Report,
     Standing,
+    unwatched,
 )
 from action_assistant.runner.runs.events import Requested
 from action_assistant.runner.runs.fold import begin
@@ -183,7 +185,7 @@ class Recording:
         """Everything that came by itself."""
         return self._subscribers.listening(hear)
 
-    async def start(self, order: Order) -> None:
+    async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
         """It was."""
 
     async def stop(self, graph_name: str) -> None:

@@ -4,7 +4,7 @@ import anyio
 import pytest
 
 from action_assistant.errors import BadInput, Conflict, Unavailable
-from action_assistant.runner.links.port import Order
+from action_assistant.runner.links.port import Leaves, Order, unwatched
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.events import Published, Requested
 from action_assistant.runner.runs.run import ENDED
@@ -190,10 +190,10 @@ async def test_a_robot_nobody_knows_and_one_without_a_link_are_refused() -> None
 @virtual
 async def test_what_the_engine_refuses_is_told_as_refused() -> None:
     class Contested(Robot):
-        async def start(self, order: Order) -> None:
+        async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
             """Somebody else's start is quicker."""
             await self.engine.start(Order(run="theirs", graph=sequence("busy"), umrf=""))
-            await super().start(order)
+            await super().start(order, leaves)
 
     harness = Harness({"David": Contested(engine())})
     async with harness.runner() as control:

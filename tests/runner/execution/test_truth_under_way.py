@@ -5,7 +5,7 @@ import anyio
 import msgspec
 
 from action_assistant.runner.emulator.messages import EngineTraits, Start
-from action_assistant.runner.links.port import Answer, Feedback, Order
+from action_assistant.runner.links.port import Answer, Feedback, Leaves, Order, unwatched
 from action_assistant.umrf.files import codec
 from runner.harness import ANN, BEN, Harness, order, sequence, until, virtual
 from runner.registered_robots import NEVER, Open, fleet
@@ -17,9 +17,9 @@ class Overtaken(Open):
 
     slow = False
 
-    async def start(self, order: Order) -> None:
+    async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
         """The message takes longer than a question does."""
-        await super().start(order)
+        await super().start(order, leaves)
         self.slow = True
 
     async def get(self) -> Answer:

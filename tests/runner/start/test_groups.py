@@ -4,9 +4,7 @@ import anyio
 import pytest
 
 from action_assistant.errors import Conflict
-from action_assistant.runner.links.port import (
-    Order,
-)
+from action_assistant.runner.links.port import Leaves, Order, unwatched
 from action_assistant.runner.runs import queries
 from runner.harness import ANN, BEN, Harness, sequence, until, virtual
 from runner.registered_robots import NEVER, Open, fleet, group
@@ -67,10 +65,10 @@ async def test_a_group_that_starts_in_part_says_which_robot_was_left_out() -> No
     harness, eve = Harness(), Open(NEVER)
 
     class Breaks(Open):
-        async def start(self, order: Order) -> None:
+        async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
             """The disk is full right after it."""
             harness.ledger.down = True
-            await super().start(order)
+            await super().start(order, leaves)
 
     david = Breaks(NEVER)
     async with fleet(harness, David=david, Eve=eve) as control:

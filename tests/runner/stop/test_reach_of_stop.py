@@ -9,7 +9,7 @@ import pytest
 from action_assistant.errors import Conflict
 from action_assistant.runner.emulator.messages import Start
 from action_assistant.runner.execution.service import ExecutionService
-from action_assistant.runner.links.port import Link, NotSent, Order, Registration
+from action_assistant.runner.links.port import Leaves, Link, NotSent, Order, Registration, unwatched
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.files import codec
@@ -186,10 +186,11 @@ async def test_a_robot_is_neither_changed_nor_forgotten_while_something_is_stopp
 class Slow(Open):
     """A robot whose start takes its time to leave."""
 
-    async def start(self, order: Order) -> None:
-        """Two seconds."""
+    async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
+        """Two seconds, in any moment of which it may have left."""
+        leaves()
         await anyio.sleep(2)
-        await super().start(order)
+        await super().start(order, leaves)
 
 
 @virtual
@@ -243,3 +244,47 @@ async def test_a_start_that_is_being_handed_over_holds_up_no_stop() -> None:
         assert david.starts == []
         assert control.open[run].run.state == "unknown"  # whether it had left cannot be told here
         await until(lambda: control.open[run].run.state == "lost")
+
+
+class Waiting(Open):
+    """A robot whose start waits for those of others, `turn_s` seconds."""
+
+    turn_s = 2.0
+
+    async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
+        """It leaves when its turn has come."""
+        await anyio.sleep(self.turn_s)
+        await super().start(order, leaves)
+
+
+@virtual
+async def test_a_start_that_is_stopped_before_its_turn_was_never_sent_and_no_alarm_is_raised() -> (
+    None
+):
+    david = Waiting(NEVER)
+    async with fleet(Harness(), David=david) as control, anyio.create_task_group() as tasks:
+        tasks.start_soon(control.start, order(sequence(), engine="David"), ANN)
+        await until(lambda: bool(control.open))
+        ((run, opened),) = control.open.items()
+        await anyio.sleep(0.5)
+        await control.stop(run, BEN)
+        await until(lambda: run not in control.open)
+        assert (opened.run.state, opened.run.detail) == (
+            "stopped",
+            "Stopped before anything was sent.",
+        )
+        assert not opened.run.alarms
+        await anyio.sleep(5)
+        assert david.starts == []
+        assert (await control.start(order(sequence("next"), engine="David"), ANN)).fresh
+
+
+@virtual
+async def test_a_start_whose_turn_does_not_come_is_refused_and_was_never_sent() -> None:
+    david = Waiting(NEVER)
+    david.turn_s = 10
+    async with fleet(Harness(), David=david) as control:
+        run = (await control.start(order(sequence(), engine="David"), ANN)).run
+        assert (run.state, "its turn" in run.detail) == ("refused", True)
+        await anyio.sleep(10)
+        assert david.starts == []

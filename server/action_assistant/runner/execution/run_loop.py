@@ -62,6 +62,10 @@ log: Final = logging.getLogger(__name__)
 _TOLD: Final = frozenset({"H7", "H8"})  # the run goes nowhere, and the engine says nothing
 _LOOK_AT_IT: Final = "Look at the robot; its hardware stop is the one to use."
 
+_HAND_OVER_S: Final = 5.0
+_NO_TURN: Final = (
+    "It was not sent: its turn among the starts on its domain did not come within 5 seconds."
+)
 _LINES: Final = 2_000  # of the engine's log, kept with one run
 _LONGEST_LINE: Final = 2_000  # characters
 
@@ -297,15 +301,22 @@ class OpenRun:
         if self.run.desired == "stopped":
             self.end("stopped", "Stopped before anything was sent.")
             return
+        leaving = anyio.Event()
         try:
-            with anyio.fail_after(5), self._handing:
-                await self._link.start(order)
+            with anyio.fail_after(_HAND_OVER_S), self._handing:
+                await self._link.start(order, leaving.set)
+            if self._handing.cancelled_caught and not leaving.is_set():
+                self.end("stopped", "Stopped before anything was sent.")
+                return
             if self._handing.cancelled_caught:
                 raise TimeoutError("somebody stopped it while it was handed over")
         except (EngineRefused, NotSent, NoAnswer) as refused:
             self.end("refused", str(refused))
             return
         except Exception as error:  # also a deadline: the message may have left
+            if isinstance(error, TimeoutError) and not leaving.is_set():
+                self.end("refused", _NO_TURN)
+                return
             log.exception("run %s: the start may or may not have left", self.run.id)
             self.tell(self._published(at, incarnation))
             self.tell(

@@ -12,6 +12,9 @@ import msgspec
 from action_assistant.runner.links.observations import ACTIVE, Snapshot
 from action_assistant.runner.links.parameter_texts import Values, reported
 
+#: What an engine's log says as soon as it takes a start in, before it does anything of it.
+RECEIVED_START: Final = "Received request to start UMRF graph: "
+
 #: Responses of a relation that end or hold an action which runs.
 _HALTING: Final = frozenset({"stop", "pause"})
 

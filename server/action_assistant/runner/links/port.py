@@ -149,6 +149,14 @@ class ForeignCommand(msgspec.Struct, frozen=True, kw_only=True):
 Report: TypeAlias = Transitions | Feedback | EngineLog | EngineChanged | ForeignCommand
 
 
+#: Is called right before a message leaves.
+Leaves: TypeAlias = Callable[[], None]
+
+
+def unwatched() -> None:
+    """What leaves, with nobody who must know the moment."""
+
+
 class Link(Protocol):
     """An engine within reach."""
 
@@ -167,8 +175,9 @@ class Link(Protocol):
         """What is known of the engine now; every change of its state is also reported."""
         ...
 
-    async def start(self, order: Order) -> None:
-        """Publish one start message. Raises NotSent, EngineRefused."""
+    async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
+        """Publish one start message. `leaves` is called right before it leaves: a start that is given
+        up until then has certainly not left. Raises NotSent, EngineRefused."""
         ...
 
     async def stop(self, graph_name: str) -> None:

@@ -33,12 +33,14 @@ from action_assistant.runner.links.port import (
     EngineChanged,
     EngineRefused,
     EngineState,
+    Leaves,
     NoAnswer,
     NotSent,
     Order,
     Report,
     Standing,
     Transitions,
+    unwatched,
 )
 from action_assistant.runner.links.simulator import SimulatorLink, engine_of
 from action_assistant.runner.workers import child
@@ -149,8 +151,9 @@ class SimulatedLink:
         """Whether actions of it may be processes of their own."""
         return self._made.behaviours is not None
 
-    async def start(self, order: Order) -> None:
+    async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
         """Start at this moment; the first start begins the process. Raises NotSent, EngineRefused."""
+        leaves()
         with anyio.CancelScope(shield=True):  # a Stop that comes meanwhile finds something to stop
             if self._process is None and not self._why:
                 await self._begin()

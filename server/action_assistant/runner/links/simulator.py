@@ -32,6 +32,7 @@ from action_assistant.runner.links.port import (
     EngineChanged,
     EngineRefused,
     EngineState,
+    Leaves,
     Link,
     NoAnswer,
     NotSent,
@@ -39,6 +40,7 @@ from action_assistant.runner.links.port import (
     Report,
     Standing,
     Transitions,
+    unwatched,
 )
 from action_assistant.umrf import semantics
 from action_assistant.umrf.facts import EngineFacts
@@ -125,9 +127,10 @@ class SimulatorLink:
             state="answering", incarnation=self._incarnation, generation="current", servers=1
         )
 
-    async def start(self, order: Order) -> None:
+    async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
         """Start at this moment. Raises EngineRefused."""
         self._alive()
+        leaves()
         graph = _whole(order)
         before = self._runs.get(order.graph.name)
         self._runs[order.graph.name] = order.run

@@ -6,7 +6,16 @@ from typing import Final
 
 import anyio
 
-from action_assistant.runner.links.port import Answer, NoAnswer, NotSent, Order, Report, Standing
+from action_assistant.runner.links.port import (
+    Answer,
+    Leaves,
+    NoAnswer,
+    NotSent,
+    Order,
+    Report,
+    Standing,
+    unwatched,
+)
 
 
 class UnreachableLink:
@@ -23,7 +32,7 @@ class UnreachableLink:
         """Gone, for all anybody knows."""
         return Standing(state="gone", why=self._why)
 
-    async def start(self, order: Order) -> None:
+    async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
         """Refuses."""
         raise NotSent(self._why)
 

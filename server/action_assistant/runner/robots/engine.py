@@ -19,12 +19,14 @@ from action_assistant.runner.links.port import (
     EngineState,
     Feedback,
     ForeignCommand,
+    Leaves,
     Link,
     NoAnswer,
     Order,
     Registration,
     Report,
     Standing,
+    unwatched,
 )
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.umrf.facts import EngineFacts
@@ -118,9 +120,9 @@ class KnownEngine:
         """What is known without asking."""
         return self._link.standing
 
-    async def start(self, order: Order) -> None:
+    async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
         """Publish one start message. Raises NotSent, EngineRefused."""
-        await self._link.start(order)
+        await self._link.start(order, leaves)
 
     async def stop(self, graph_name: str) -> None:
         """Publish one stop message. Raises NotSent."""

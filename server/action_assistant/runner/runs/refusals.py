@@ -8,6 +8,7 @@ before anything else of its own, why it did not follow; only the end of some gra
 import re
 from typing import Final
 
+from action_assistant.runner.links.engine_text import RECEIVED_START
 from action_assistant.runner.runs.run import Run
 
 #: The alarm with the engine's words. It is journaled, so that they outlive this process.
@@ -16,7 +17,6 @@ REFUSED: Final = "start_refused"
 HALF_BEGUN: Final = "half_begun"
 
 _STARTED_BY_OTHERS: Final = frozenset({"foreign_start", "foreign_other"})
-_START: Final = "Received request to start UMRF graph: "
 _RECEIVED: Final = "Received request to "
 _ANOTHER_LIFE: Final = "The Action Engine is initialized."
 _OF_OTHERS: Final = re.compile(r"Graph '.*' finished\.")
@@ -53,7 +53,7 @@ class StartLog:
         if self._over or _OF_OTHERS.fullmatch(text):
             return False
         if not self._next:
-            self._next = text == f"{_START}{self._graph}"
+            self._next = text == f"{RECEIVED_START}{self._graph}"
             return False
         self._over = True
         followed = text.startswith(_RECEIVED) or text == _ANOTHER_LIFE

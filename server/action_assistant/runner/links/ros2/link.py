@@ -14,7 +14,7 @@ import anyio
 from temoto_msgs.msg import UmrfGraphModify, UmrfGraphPause, UmrfGraphResume, UmrfGraphStart
 
 from action_assistant.runner.links.engine_process import engine_process
-from action_assistant.runner.links.engine_text import NotAGraph
+from action_assistant.runner.links.engine_text import RECEIVED_START, NotAGraph
 from action_assistant.runner.links.listeners import Listeners
 from action_assistant.runner.links.port import (
     Answer,
@@ -23,12 +23,14 @@ from action_assistant.runner.links.port import (
     EngineState,
     Feedback,
     ForeignCommand,
+    Leaves,
     NoAnswer,
     NotSent,
     Order,
     Registration,
     Report,
     Standing,
+    unwatched,
 )
 from action_assistant.runner.links.ros2.domain import Domain
 from action_assistant.runner.links.ros2.outlets import Topics
@@ -81,6 +83,7 @@ class Ros2Link:
         self._subscribers = Listeners[Report]()
         self._domain: Domain | None = None
         self._runs: set[str] = set()
+        self._last: Order | None = None  # the last start
         self._known_since = 0.0  # when this incarnation was first seen, by the monotonic clock
         self._answered = False
         self._restarted = False
@@ -100,7 +103,7 @@ class Ros2Link:
 
     # --- commands -----------------------------------------------------------------------------
 
-    async def start(self, order: Order) -> None:
+    async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
         """Publish one start. Raises NotSent."""
         domain = self._reachable("start", self._topics.start)
         message = UmrfGraphStart(
@@ -110,7 +113,8 @@ class Ros2Link:
         )
         await anyio.sleep(max(0.0, self._known_since + _SETTLE_S - time.monotonic()))
         self._runs.add(order.run)
-        await domain.outlets.start.send(lambda: message)
+        self._last = order
+        await domain.outlets.send_start(order.run, message, leaves)
 
     async def stop(self, graph_name: str) -> None:
         """Publish one stop, also when nobody seems to listen: what is seen may lag behind what is.
@@ -189,6 +193,7 @@ class Ros2Link:
             raise NoAnswer("while it was asked, another engine came or went on its path")
         self._answered, self._unanswered_since = True, None
         self._look()
+        domain.outlets.shown(got.graphs)
         return Answer(
             asked_at=asked_at,
             at=self._clock_us(),
@@ -351,6 +356,7 @@ class Ros2Link:
                     )
             case LogLine():
                 if self._said(sound.logger):
+                    self._hear_receipt(sound.text)
                     self._subscribers.tell(
                         EngineLog(at=self._clock_us(), text=sound.text.strip(), graph=sound.graph)
                     )
@@ -368,7 +374,13 @@ class Ros2Link:
             if not ours:
                 return
             sound = Feedback(actor=sound.actor, snapshots=ours)
+        domain.outlets.shown(sound.snapshots)
         self._subscribers.tell(sound)
+
+    def _hear_receipt(self, line: str) -> None:
+        last, domain = self._last, self._domain
+        if last and domain and line.strip() == f"{RECEIVED_START}{last.graph.name}":
+            domain.outlets.taken(last.run)
 
     def _said(self, logger: str) -> bool:
         """Whether a line can only be this engine's: nodes of one name cannot be told apart."""

@@ -2,7 +2,7 @@
 
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Final, Generic, TypeAlias, TypeVar
 
 import anyio
@@ -18,9 +18,14 @@ from temoto_msgs.msg import (
     UmrfGraphStop,
 )
 
+from action_assistant.runner.links.observations import Snapshot
+
 #: Seconds between two messages on one topic: an engine keeps one only, and of two that come within
 #: 2 ms it loses the first (28 of 30, recorded).
 GAP_S: Final = 0.05
+#: Seconds at most that a start waits for a sign that its engine took the one before: an engine that
+#: is busy for longer than a gap would lose it to the next one, which need not be for it.
+TAKEN_S: Final = 2.0
 _ECHO_S: Final = 30.0  # for so long a message of ours is known when it comes back
 
 Message: TypeAlias = (
@@ -105,7 +110,36 @@ class Outlets:
         self.pause = Outlet(publish(UmrfGraphPause, topics.pause, each))
         self.resume = Outlet(publish(UmrfGraphResume, topics.resume, each))
         self.modify = Outlet(publish(UmrfGraphModify, topics.modify, each))
+        self._start_turn = anyio.Lock()
+        self._untaken: _Untaken | None = None
         self._stopping: dict[str, _Stops] = {}
+
+    async def send_start(
+        self, run: str, message: UmrfGraphStart, leaves: Callable[[], None]
+    ) -> None:
+        """Publish the start of a run when the one before was taken, or `TAKEN_S` after it. `leaves` is
+        called right before it leaves."""
+
+        def leaving() -> UmrfGraphStart:
+            leaves()
+            self._untaken = _Untaken(run)
+            return message
+
+        async with self._start_turn:
+            if self._untaken is not None:
+                with anyio.move_on_after(self._untaken.until - time.monotonic()):
+                    await self._untaken.taken.wait()
+            await self.start.send(leaving)
+
+    def taken(self, run: str) -> None:
+        """The engine of this run shows that it took its start in."""
+        if self._untaken is not None and self._untaken.run == run:
+            self._untaken.taken.set()
+
+    def shown(self, graphs: Iterable[Snapshot]) -> None:
+        """Engines show these."""
+        for run in {each.run for each in graphs if each.run is not None}:
+            self.taken(run)
 
     async def send_stop(self, graph: str, target: str) -> None:
         """Publish a stop. Those of one graph that wait for their turn leave as one message, with
@@ -136,6 +170,15 @@ class Outlets:
         stops.left = True
         if self._stopping.get(graph) is stops:
             del self._stopping[graph]
+
+
+class _Untaken:
+    """A start that has left, and nothing shows yet that its engine took it in."""
+
+    def __init__(self, run: str) -> None:
+        self.run = run
+        self.until = time.monotonic() + TAKEN_S
+        self.taken = anyio.Event()
 
 
 class _Stops:
