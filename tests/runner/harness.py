@@ -17,7 +17,7 @@ from anyio.abc import TaskGroup
 from sqlalchemy import Row, Select, StaticPool, create_engine
 
 from action_assistant.errors import Conflict, Unavailable
-from action_assistant.journal.events import Draft, Event
+from action_assistant.journal.events import BareEvent, Draft, Event, bare
 from action_assistant.journal.events import StreamSnapshot as Kept
 from action_assistant.runner import projection
 from action_assistant.runner.execution.run_loop import OpenRun
@@ -165,6 +165,10 @@ class MemoryLedger:
         """As the journal's."""
         events = self.streams.get(stream, [])[after:upto]
         return events if limit is None else events[:limit]
+
+    async def bare(self, stream: str, usual: str, *, after: int, upto: int) -> list[BareEvent]:
+        """As the journal's."""
+        return bare(await self.read(stream, after=after, upto=upto), usual)
 
     async def newest(self, stream: str) -> int:
         """As the journal's."""

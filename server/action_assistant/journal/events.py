@@ -1,6 +1,6 @@
 """What a journal keeps: events in streams, and caches of what a stream adds up to."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, TypeAlias
 
 import msgspec
@@ -26,6 +26,11 @@ class Event(msgspec.Struct, frozen=True, gc=False):
     position: int
 
 
+#: An event of a stream most of whose events are of one kind, without what need not be said: its body,
+#: and where it is of another kind, that and `at`. To make the rest takes longer than to read it.
+BareEvent: TypeAlias = tuple[bytes, str | None, int | None]
+
+
 class Draft(msgspec.Struct, frozen=True, gc=False):
     """An event before the journal has given it a place and a time."""
 
@@ -40,6 +45,11 @@ class Addition(msgspec.Struct, frozen=True):
     stream: str
     drafts: tuple[Draft, ...]
     expected: int | None = None
+
+
+def bare(events: Iterable[Event], usual: str) -> list[BareEvent]:
+    """The same, without what is usual."""
+    return [(e.body, *((None, None) if e.kind == usual else (e.kind, e.at))) for e in events]
 
 
 class StreamSnapshot(msgspec.Struct, frozen=True):

@@ -3,7 +3,7 @@
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Any, Final, TypeVar, cast
 from urllib.parse import quote
 
 from sqlalchemy import (
@@ -14,6 +14,7 @@ from sqlalchemy import (
     Row,
     Select,
     bindparam,
+    case,
     create_engine,
     func,
     select,
@@ -23,7 +24,7 @@ from sqlalchemy.exc import DatabaseError
 from action_assistant.errors import Unavailable
 from action_assistant.journal.chain import NOTHING, Head
 from action_assistant.journal.database import cause_of
-from action_assistant.journal.events import Event, StreamSnapshot
+from action_assistant.journal.events import BareEvent, Event, StreamSnapshot
 from action_assistant.schema.editor_tables import editor_event, editor_head, editor_snapshot
 
 T = TypeVar("T")
@@ -36,6 +37,18 @@ _EVENTS: Final = select(*(_event[name] for name in Event.__struct_fields__))
 _STREAM: Final[BindParameter[str]] = bindparam("stream")
 _NEWEST: Final = select(_head.seq).where(_head.stream == _STREAM)
 _BODY: Final = select(_event.body).where(_event.stream == _STREAM, _event.seq == bindparam("seq"))
+_USUAL: Final[BindParameter[str]] = bindparam("usual")
+_BARE: Final = (
+    select(
+        _event.body,
+        func.nullif(_event.kind, _USUAL),
+        case((_event.kind != _USUAL, _event.at)),
+    )
+    .where(
+        _event.stream == _STREAM, _event.seq > bindparam("after"), _event.seq <= bindparam("upto")
+    )
+    .order_by(_event.seq)
+)
 _KEPT: Final = select(_snapshot.seq, _snapshot.proof, _snapshot.state).where(
     _snapshot.stream == _STREAM
 )
@@ -56,6 +69,12 @@ class JournalReader:
         if upto is not None:
             chosen = chosen.where(_event.seq <= upto)
         return await self._events(chosen.order_by(_event.seq).limit(limit))
+
+    async def bare(self, stream: str, usual: str, *, after: int, upto: int) -> list[BareEvent]:
+        """The events of a stream with `after < seq <= upto`, in order, most of them of the kind
+        `usual`. Fewer than that when some are missing."""
+        place = {"stream": stream, "usual": usual, "after": after, "upto": upto}
+        return cast("list[BareEvent]", await self.plain_rows(_BARE, place))
 
     async def read_all(self, *, after: int = 0, limit: int = _PAGE) -> list[Event]:
         """The events of all streams with `position > after`, in order."""

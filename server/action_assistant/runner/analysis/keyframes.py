@@ -8,12 +8,12 @@ import asyncio
 import bisect
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
-from typing import Final, Protocol
+from typing import Final, NamedTuple, Protocol
 
 import msgspec
 
 from action_assistant.errors import BadInput, NotFound, Refused
-from action_assistant.journal.events import Event, StreamSnapshot
+from action_assistant.journal.events import BareEvent, Event, StreamSnapshot
 from action_assistant.runner.runs.events import (
     AlarmRaised,
     Ended,
@@ -29,6 +29,7 @@ from action_assistant.runner.runs.events import (
     StopRequested,
     StopSent,
     decode,
+    decode_all,
 )
 from action_assistant.runner.runs.fold import begin, follow, replay
 from action_assistant.runner.runs.history import Ledger
@@ -90,6 +91,10 @@ class RunKeyframes(msgspec.Struct, frozen=True):
 class SnapshotJournal(Ledger, Protocol):
     """A ledger that also keeps what a stream adds up to."""
 
+    async def bare(self, stream: str, usual: str, *, after: int, upto: int) -> list[BareEvent]:
+        """Events with `after < seq <= upto`, in order; fewer when some are missing."""
+        ...
+
     async def snapshot(self, stream: str) -> StreamSnapshot | None:
         """What was kept, if it still fits the stream."""
         ...
@@ -124,7 +129,7 @@ class KeyframeStore:
         if key is not None and key.seq == seq:
             return key.run
         events = await self._ledger.read(stream_of(run), after=key.seq if key else 0, upto=seq)
-        return (await self.run_in_worker(lambda: _next(key, events))).run
+        return (await self.run_in_worker(lambda: _next(key, _whole(events)))).run
 
     async def seq_at(self, run: str, at: int) -> int:
         """The first event by which this moment had come. Raises NotFound, Unavailable."""
@@ -156,15 +161,15 @@ class KeyframeStore:
             last = keys[-1] if keys else None
             after = last.seq if last else 0
             room = APART - after % APART  # keyframes stand at whole multiples, and at the end
-            events = await self._ledger.read(stream, after=after, limit=room + _READ - APART)
-            if not events:
+            read = await self._part(stream, after, min(newest, after + room + _READ - APART))
+            if not read.events:
                 break
             if last is not None and last.seq % APART:
                 keys.pop()  # an end that has gone on is no keyframe
             keys += await self.run_in_worker(
-                lambda last=last, events=events, room=room: _following(last, events, room)
+                lambda last=last, read=read, room=room: _following(last, read, room)
             )
-            marks += marks_of(events)
+            marks += _marks_of(read)
         if not keys:
             raise NotFound("There is no such run.")
         found = RunKeyframes(FOLD, tuple(keys), tuple(marks[:MARKS]))
@@ -172,6 +177,12 @@ class KeyframeStore:
         if _worth_keeping(keys[-1], had):
             await self._keep(stream, found)
         return found
+
+    async def _part(self, stream: str, after: int, upto: int) -> "_Part":
+        events = await self._ledger.bare(stream, Observed.kind, after=after, upto=upto)
+        if len(events) == upto - after:
+            return _Part(range(after + 1, upto + 1), events)
+        return _whole(await self._ledger.read(stream, after=after, upto=upto))
 
     async def _kept(self, stream: str) -> RunKeyframes | None:
         kept = await self._ledger.snapshot(stream)
@@ -224,18 +235,27 @@ def fold(
     return run
 
 
-def marks_of(events: Sequence[Event]) -> list[ReplayMark]:
-    """The marks among these events."""
+class _Part(NamedTuple):
+    """A part of a stream: the seq of each event, and the event."""
+
+    seqs: Sequence[int]
+    events: Sequence[BareEvent]
+
+
+def _whole(events: Sequence[Event]) -> _Part:
+    """Also where some are missing."""
+    return _Part([each.seq for each in events], [(e.body, e.kind, e.at) for e in events])
+
+
+def _marks_of(part: _Part) -> list[ReplayMark]:
     marks: list[ReplayMark] = []
-    for event in events:
-        if event.kind == Observed.kind:
+    for seq, (body, kind, at) in zip(part.seqs, part.events, strict=True):
+        if kind is None or kind == Observed.kind:
             continue
-        told = decode(event.kind, event.body)
+        told = decode(kind, body)
         by, text = words(told)
         since = told.since if isinstance(told, Silent) else None
-        marks.append(
-            ReplayMark(event.seq, getattr(told, "at", event.at), event.kind, by, text, since)
-        )
+        marks.append(ReplayMark(seq, getattr(told, "at", at or 0), kind, by, text, since))
     return marks
 
 
@@ -258,19 +278,23 @@ def words(told: RunEvent) -> tuple[str, str]:
             return "", ""
 
 
-def _following(last: Keyframe | None, events: Sequence[Event], room: int) -> list[Keyframe]:
+def _following(last: Keyframe | None, part: _Part, room: int) -> list[Keyframe]:
     """Those after `last`: the first one after `room` events."""
     keys: list[Keyframe] = []
-    for start in (0, *range(room, len(events), APART)):
-        last = _next(last, events[start : start + APART if start else room])
+    for start in (0, *range(room, len(part.events), APART)):
+        end = start + APART if start else room
+        last = _next(last, _Part(part.seqs[start:end], part.events[start:end]))
         keys.append(last)
     return keys
 
 
-def _next(last: Keyframe | None, events: Sequence[Event]) -> Keyframe:
-    told = [decode(event.kind, event.body) for event in events]
+def _next(last: Keyframe | None, part: _Part) -> Keyframe:
+    told = decode_all(Observed.kind, part.events)
     run = replay(told, last.run if last is not None else None)
     if run is None:
         raise NotFound("There is no such run.")
-    at = max(getattr(each, "at", event.at) for each, event in zip(told, events, strict=True))
-    return Keyframe(events[-1].seq, max(at, last.at) if last is not None else at, run)
+    at = max(
+        getattr(each, "at", stored or 0)
+        for each, (_, _, stored) in zip(told, part.events, strict=True)
+    )
+    return Keyframe(part.seqs[-1], max(at, last.at) if last is not None else at, run)

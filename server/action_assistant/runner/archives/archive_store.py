@@ -12,7 +12,14 @@ from sqlalchemy import Row, Select, select
 
 from action_assistant.errors import Refused
 from action_assistant.journal.chain import Head
-from action_assistant.journal.events import Addition, Draft, Event, StreamSnapshot
+from action_assistant.journal.events import (
+    Addition,
+    BareEvent,
+    Draft,
+    Event,
+    StreamSnapshot,
+    bare,
+)
 from action_assistant.journal.removal import StreamRemoved
 from action_assistant.runner.analysis.keyframes import SnapshotJournal
 from action_assistant.runner.archives import archive_file
@@ -89,6 +96,12 @@ class ArchiveStore:
         events = await self._events(stream, place)
         last = len(events) if upto is None else min(upto, len(events))
         return list(islice(events, after, last if limit is None else min(last, after + limit)))
+
+    async def bare(self, stream: str, usual: str, *, after: int, upto: int) -> list[BareEvent]:
+        """As `read`, without what is usual."""
+        if await self.place(stream) is None:
+            return await self._journal.bare(stream, usual, after=after, upto=upto)
+        return bare(await self.read(stream, after=after, upto=upto), usual)
 
     async def place(self, stream: str) -> Row[Any] | None:
         """Number of a run, when it was archived and as which file; None when it is here."""

@@ -5,11 +5,12 @@ with a default: streams of older versions must fold the same for ever. `at` is m
 taken when the thing happened, which may be before it was stored.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import ClassVar, Final, Literal, TypeAlias
 
 import msgspec
 
+from action_assistant.journal.events import BareEvent
 from action_assistant.runner.links.engine_process import EngineProcess
 from action_assistant.runner.links.observations import Seen
 from action_assistant.umrf.laps import Laps
@@ -314,6 +315,15 @@ _DECODERS: Final[Mapping[str, msgspec.json.Decoder[RunEvent]]] = {
 def encode(event: RunEvent) -> bytes:
     """The body of an event."""
     return msgspec.json.encode(event)
+
+
+def decode_all(usual: str, events: Iterable[BareEvent]) -> list[RunEvent]:
+    """The events of stored bodies, most of which are of the kind `usual`. Raises as `decode`."""
+    read = _DECODERS[usual].decode
+    try:
+        return [read(body) if kind is None else decode(kind, body) for body, kind, _ in events]
+    except TypeError as error:
+        raise msgspec.DecodeError(str(error)) from error
 
 
 def decode(kind: str, body: bytes) -> RunEvent:

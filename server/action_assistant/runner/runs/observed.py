@@ -27,6 +27,7 @@ from action_assistant.runner.runs.visits import (
 
 #: An answer that took longer was given up.
 _ASKED_US: Final = 1_000_000
+_OF_ACTIONS: Final = (NodeState, NodeResult)
 #: What is known of an action of which nothing has been seen.
 _UNSEEN: Final = ActionRun()
 
@@ -34,16 +35,23 @@ _UNSEEN: Final = ActionRun()
 def observe(run: Run, seen: Iterable[Seen]) -> Run:
     """The run after this was seen, in this order."""
     actions = dict(run.actions)
+    main = run.graph_name
     run = replace(run, actions=actions)  # nobody else has it yet: the loop fills it
+    going: int | None = None  # when it was seen to go on, until that is noted: a run is large
     for item in seen:
+        if going is not None and not isinstance(item, _OF_ACTIONS):
+            run, going = _timed(run, going, going), None
         match item:
             case NodeState():
-                name = key_of(run, item.graph, item.node)
+                name = item.node if item.graph == main else key_of(run, item.graph, item.node)
                 action = actions.get(name, _UNSEEN)
                 actions[name] = changed(action, item.state, item.at, item.inputs)
-                run = _timed(run, item.at, item.at)
+                if run.graph_state in TERMINAL:
+                    run = _timed(run, item.at, item.at)
+                elif going is None or item.at > going:
+                    going = item.at
             case NodeResult():
-                name = key_of(run, item.graph, item.node)
+                name = item.node if item.graph == main else key_of(run, item.graph, item.node)
                 actions[name] = resulted(actions.get(name, _UNSEEN), item)
             case GraphState():
                 run = _timed(_state_of(run, item.graph, item.state), item.at, item.at)
@@ -58,7 +66,7 @@ def observe(run: Run, seen: Iterable[Seen]) -> Run:
                 pass  # the alarm that comes with it is an event of its own
             case _:
                 assert_never(item)
-    return run
+    return run if going is None else _timed(run, going, going)
 
 
 def _state_of(run: Run, graph: str, state: str) -> Run:
