@@ -1,6 +1,7 @@
 """Runs looked back on: lists of many, runs of many events, and what all of it takes on the disk."""
 
 import asyncio
+import contextlib
 import itertools
 import statistics
 import sys
@@ -16,6 +17,7 @@ import msgspec
 from sqlalchemy import NullPool, create_engine, insert, select
 from table import Table, seconds
 
+from action_assistant.errors import NotFound
 from action_assistant.journal.events import Draft
 from action_assistant.journal.journal import Journal
 from action_assistant.runner.analysis import statistics as sums
@@ -25,6 +27,8 @@ from action_assistant.runner.archives import archive_file
 from action_assistant.runner.links.observations import NodeResult, NodeState
 from action_assistant.runner.review.keyframe_loop import due_after
 from action_assistant.runner.review.listing import numbers_with
+from action_assistant.runner.review.service import ReviewService
+from action_assistant.runner.review.worker_queries import StoragePaths, WorkerQueries
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.runs import queries, views
 from action_assistant.runner.runs.events import (
@@ -39,6 +43,7 @@ from action_assistant.runner.runs.fold import replay
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.runner.runs.sent_views import Sent
 from action_assistant.runner.runs.word_index import index_some
+from action_assistant.runner.workers import RunnerWorkers
 from action_assistant.schema.runner_tables import action_sum, review, run_label, unindexed_run
 from action_assistant.schema.runner_tables import run as runs
 from action_assistant.web.workers.lanes import RunInWorker
@@ -186,7 +191,19 @@ def _asked(number: int) -> Requested:
 
 
 async def _long_runs(folder: Path) -> Table:
-    journal = await _opened(folder)
+    async with (
+        RunnerWorkers.opened() as workers,
+        anyio.create_task_group() as tasks,
+    ):
+        journal = await _opened(folder)
+        place = StoragePaths(folder / "runner.db", folder / "archive")
+        asked = WorkerQueries(workers.looks, place, journal, tasks)
+        table = await _long_runs_with(journal, asked)
+        await journal.close()
+    return table
+
+
+async def _long_runs_with(journal: Journal, asked: WorkerQueries) -> Table:
     rows: list[list[str]] = []
     for number, size in enumerate(SIZES, 1):
         events = _long_run(number, size)
@@ -198,8 +215,9 @@ async def _long_runs(folder: Path) -> Table:
         folded = time.perf_counter() - started
         assert told is not None
         died = await _after_a_death(journal, _long_run(number + len(SIZES), size)[:-1])
-        rows.append([f"{size:,}", seconds(folded), *await _opening(journal, run, size), died])
-    await journal.close()
+        rows.append(
+            [f"{size:,}", seconds(folded), *await _opening(journal, asked, run, size), died]
+        )
     head = ("folded in memory", "opened the first time", "opened", "first page of its film")
     head = (*head, "a page in the middle", "any moment", "opened when the runner has died")
     return Table(["events", *head], rows)
@@ -223,16 +241,21 @@ async def _after_a_death(journal: Journal, events: list[Any]) -> str:
     return seconds(time.perf_counter() - started)
 
 
-async def _opening(journal: Journal, run: str, size: int) -> list[str]:
-    """The first time keyframes are made; after that they are in the journal."""
+async def _opening(journal: Journal, asked: WorkerQueries, run: str, size: int) -> list[str]:
+    """The first time keyframes are made, by a worker, and stored when whoever asked has the answer;
+    after that they are in the journal."""
 
     async def opened(keyframe_store: KeyframeStore) -> None:
         key = (await keyframe_store.keyframes(run)).keys[-1]
         msgspec.json.encode(views.whole(key.run, Sent("{}", {})))
 
+    with contextlib.suppress(NotFound):
+        await asked.text(ReviewService.whole, "none")  # the worker is there
     started = time.perf_counter()
-    await opened(KeyframeStore(journal, _ASIDE))
+    await asked.text(ReviewService.whole, run)
     first = seconds(time.perf_counter() - started)
+    while await journal.snapshot(stream_of(run)) is None:  # noqa: ASYNC110 in another process
+        await anyio.sleep(0.01)
     known = KeyframeStore(journal, _ASIDE)
     middle = size // 2 - size // 2 % APART
 

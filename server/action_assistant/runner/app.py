@@ -102,11 +102,12 @@ async def _executing(
     place: StoragePaths,
 ) -> AsyncIterator[ExecutionService]:
     """Workers, robots, and what drives runs on them."""
-    async with RunnerWorkers.opened() as workers:
+    async with RunnerWorkers.opened() as workers, anyio.create_task_group() as tasks:
         services.run_in_worker = workers.looks
         services.lanes = (workers.starts, workers.ours, workers.looks)
-        asked = WorkerQueries(workers.looks, place, archive_store)
-        ours = WorkerQueries(workers.ours, place, archive_store)  # waits behind nobody's questions
+        asked = WorkerQueries(workers.looks, place, archive_store, tasks)
+        # Waits behind nobody's questions.
+        ours = WorkerQueries(workers.ours, place, archive_store, tasks)
         reach = ros2_reach(utc_us)
         async with (
             _kept(reach),
@@ -136,6 +137,7 @@ async def _executing(
                 on_disk=anyio.to_thread.run_sync,
             )
             yield control
+        tasks.cancel_scope.cancel()
 
 
 @asynccontextmanager

@@ -8,6 +8,7 @@ import asyncio
 import bisect
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
+from operator import attrgetter
 from typing import Final, NamedTuple, Protocol
 
 import msgspec
@@ -46,6 +47,7 @@ _READ: Final = 5 * APART  # events that are read at once
 MARKS: Final = 2_000
 #: Shorter runs are folded anew; that takes less time than looking for keyframes.
 _WORTH: Final = 500
+_AT: Final[Callable[[object], int]] = attrgetter("at")
 _KEPT: Final = 8  # runs whose keyframes stay in memory
 
 
@@ -249,7 +251,8 @@ def _whole(events: Sequence[Event]) -> _Part:
 
 def _marks_of(part: _Part) -> list[ReplayMark]:
     marks: list[ReplayMark] = []
-    for seq, (body, kind, at) in zip(part.seqs, part.events, strict=True):
+    numbered = zip(part.seqs, part.events, strict=True)
+    for seq, (body, kind, at) in [each for each in numbered if each[1][1] is not None]:
         if kind is None or kind == Observed.kind:
             continue
         told = decode(kind, body)
@@ -293,8 +296,9 @@ def _next(last: Keyframe | None, part: _Part) -> Keyframe:
     run = replay(told, last.run if last is not None else None)
     if run is None:
         raise NotFound("There is no such run.")
-    at = max(
-        getattr(each, "at", stored or 0)
-        for each, (_, _, stored) in zip(told, part.events, strict=True)
-    )
+    try:
+        at = max(map(_AT, told))
+    except AttributeError:  # one of a kind that a newer version knows
+        stored = (each[2] or 0 for each in part.events)
+        at = max(getattr(one, "at", own) for one, own in zip(told, stored, strict=True))
     return Keyframe(part.seqs[-1], max(at, last.at) if last is not None else at, run)

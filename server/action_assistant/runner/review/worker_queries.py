@@ -5,13 +5,14 @@ before it asks, and keeps what the worker folded on the way.
 """
 
 import asyncio
+import logging
 from collections.abc import Awaitable, Callable, Mapping, Sequence
-from contextlib import suppress
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any, Concatenate, NoReturn, ParamSpec, TypeVar
+from typing import Any, Concatenate, Final, NoReturn, ParamSpec, TypeVar
 
 import msgspec
+from anyio.abc import TaskGroup
 
 from action_assistant.errors import Refused, Unavailable
 from action_assistant.journal.events import Draft, StreamSnapshot
@@ -23,7 +24,10 @@ from action_assistant.runner.review.service import ReviewService
 from action_assistant.runner.runs.history import Ledger, RunHistory
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.runner.runs.run import Run
+from action_assistant.web.auth.caller import done_for_nobody
 from action_assistant.web.workers.lanes import RunInWorker
+
+log: Final = logging.getLogger(__name__)
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -37,15 +41,21 @@ class StoragePaths(msgspec.Struct, frozen=True):
 
 
 class WorkerQueries:
-    """Asks a worker. `opened` are the runs that go on, once that is known."""
+    """Asks a worker. `opened` are the runs that go on, once that is known. What is worth keeping is
+    stored in `tasks`, when whoever asked has the answer."""
 
     def __init__(
-        self, run_in_worker: RunInWorker, place: StoragePaths, ledger: SnapshotJournal
+        self,
+        run_in_worker: RunInWorker,
+        place: StoragePaths,
+        ledger: SnapshotJournal,
+        tasks: TaskGroup,
     ) -> None:
         self.opened: Mapping[str, OngoingRun] = {}
         self._run_in_worker = run_in_worker
         self._place = place
         self._ledger = ledger
+        self._tasks = tasks
 
     async def value(
         self,
@@ -58,7 +68,7 @@ class WorkerQueries:
         found, kept = await self._run_in_worker(
             answered, self._place, partial(question, **kw) if kw else question, args
         )
-        await self._keep(kept)
+        self._keep(kept)
         value: T = found
         return value
 
@@ -73,7 +83,7 @@ class WorkerQueries:
         found, kept = await self._run_in_worker(
             encoded, self._place, partial(question, **kw) if kw else question, args
         )
-        await self._keep(kept)
+        self._keep(kept)
         text: bytes = found
         return text
 
@@ -92,10 +102,20 @@ class WorkerQueries:
             if opened is not None:
                 await settled(opened)
 
-    async def _keep(self, kept: Sequence[StreamSnapshot]) -> None:
+    def _keep(self, kept: Sequence[StreamSnapshot]) -> None:
+        if kept:
+            self._tasks.start_soon(self._store, kept)
+
+    async def _store(self, kept: Sequence[StreamSnapshot]) -> None:
+        """A cache: it is made again when the journal can be written, and its loss ends nothing."""
+        done_for_nobody()
         for each in kept:
-            with suppress(Refused):  # a cache: it is made again when the journal can be written
+            try:
                 await self._ledger.keep_snapshot(each.stream, each.seq, each.state)
+            except Refused as why:
+                log.info("what %s adds up to is not kept: %s", each.stream, why.detail)
+            except Exception:
+                log.exception("what %s adds up to is not kept", each.stream)
 
 
 def answered(

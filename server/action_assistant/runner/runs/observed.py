@@ -27,7 +27,6 @@ from action_assistant.runner.runs.visits import (
 
 #: An answer that took longer was given up.
 _ASKED_US: Final = 1_000_000
-_OF_ACTIONS: Final = (NodeState, NodeResult)
 #: What is known of an action of which nothing has been seen.
 _UNSEEN: Final = ActionRun()
 
@@ -39,8 +38,6 @@ def observe(run: Run, seen: Iterable[Seen]) -> Run:
     run = replace(run, actions=actions)  # nobody else has it yet: the loop fills it
     going: int | None = None  # when it was seen to go on, until that is noted: a run is large
     for item in seen:
-        if going is not None and not isinstance(item, _OF_ACTIONS):
-            run, going = _timed(run, going, going), None
         match item:
             case NodeState():
                 name = item.node if item.graph == main else key_of(run, item.graph, item.node)
@@ -50,9 +47,14 @@ def observe(run: Run, seen: Iterable[Seen]) -> Run:
                     run = _timed(run, item.at, item.at)
                 elif going is None or item.at > going:
                     going = item.at
+                continue
             case NodeResult():
                 name = item.node if item.graph == main else key_of(run, item.graph, item.node)
                 actions[name] = resulted(actions.get(name, _UNSEEN), item)
+                continue
+        if going is not None:
+            run, going = _timed(run, going, going), None
+        match item:
             case GraphState():
                 run = _timed(_state_of(run, item.graph, item.state), item.at, item.at)
             case GraphResult():
