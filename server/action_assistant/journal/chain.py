@@ -1,16 +1,18 @@
 """The chain through each stream, by which every change of a stored event shows."""
 
+import itertools
 from collections.abc import Callable, Iterable, Sequence
 from functools import lru_cache
 from hashlib import blake2b
-from struct import pack
-from typing import Any, Final
+from struct import Struct, pack
+from typing import Any, Final, NamedTuple
 
 import msgspec
 
 from action_assistant.journal.events import Event
 
 START: Final = bytes(16)
+_PLACE: Final = Struct(">qqq").pack
 _TYPES: Final = (str, int, str, str, int, bytes, int, bytes)
 
 
@@ -34,9 +36,37 @@ class Damage(msgspec.Struct, frozen=True):
 
 def link(before: bytes, event: Event) -> bytes:
     """The chain at an event: a digest of everything it holds and of the chain before it."""
-    place = pack(">qqq", event.seq, event.at, event.position)
+    place = _PLACE(event.seq, event.at, event.position)
     names = _names(event.stream, event.kind, event.author)
     return blake2b(b"".join((before, names, place, event.body)), digest_size=16).digest()
+
+
+class StoredColumns(NamedTuple):
+    """Events of one stream that follow one another, as a database has them, column by column."""
+
+    seqs: Sequence[int]
+    kinds: Sequence[str]
+    authors: Sequence[str]
+    ats: Sequence[int]
+    bodies: Sequence[bytes]
+    positions: Sequence[int]
+    chains: Sequence[bytes]
+
+
+def linked(before: bytes, stream: str, events: StoredColumns) -> int:
+    """How many of these events, from the first one on, are in the chain that goes on from `before`. As
+    `link` for each says, in half the time."""
+    told = {
+        pair: _names(stream, *pair) for pair in set(zip(events.kinds, events.authors, strict=True))
+    }
+    names = map(told.__getitem__, zip(events.kinds, events.authors, strict=True))
+    places = map(_PLACE, events.seqs, events.ats, events.positions)
+    befores = itertools.chain((before,), events.chains)  # one more than there are events
+    texts = map(b"".join, zip(befores, names, places, events.bodies, strict=False))
+    for n, (text, written) in enumerate(zip(texts, events.chains, strict=True)):
+        if blake2b(text, digest_size=16).digest() != written:
+            return n
+    return len(events.seqs)
 
 
 @lru_cache(maxsize=1024)

@@ -10,8 +10,7 @@ from sqlalchemy import bindparam, select
 from action_assistant.editor.crdt.event_columns import EventColumns
 from action_assistant.editor.crdt.folding import StreamDamage
 from action_assistant.errors import Unavailable
-from action_assistant.journal.chain import START, link
-from action_assistant.journal.events import Event
+from action_assistant.journal.chain import START, StoredColumns, linked
 from action_assistant.journal.journal import Journal
 from action_assistant.schema import editor_tables
 
@@ -20,8 +19,8 @@ log: Final = logging.getLogger(__name__)
 SLICES: Final = (2_000, 500)  # events read at once; fewer where not all of those can be read
 TOGETHER: Final = 200_000  # events, or
 TOGETHER_BYTES: Final = 16 << 20  # in their bodies, after which those so far are put together
-_COLUMNS: Final = (*Event.__struct_fields__, "chain")
-_TYPES: Final = (str, int, str, str, int, bytes, int, bytes)
+_COLUMNS: Final = ("seq", "kind", "author", "at", "body", "position", "chain")
+_TYPES: Final = (int, str, str, int, bytes, int, bytes)
 _event = editor_tables.editor_event.c
 _ROWS: Final = (
     select(*(_event[name] for name in _COLUMNS))
@@ -44,54 +43,67 @@ class LogTail:
         self._stream = stream
         self._upto = upto
         self._chain = START if after == 0 else None
-        self._unchecked: list[Sequence[Any]] = []
+        self._unchecked: list[StoredColumns] = []
         self._ended = False
 
     async def next(self) -> EventColumns | None:
         """The next events, as many as one should put together at once; None when there are no more.
         Which of them are as they were written `sound` says. Raises Unavailable."""
-        rows: list[Sequence[Any]] = []
-        size = 0
-        while not self._ended and len(rows) < TOGETHER and size < TOGETHER_BYTES:
+        slices: list[StoredColumns] = []
+        count = size = 0
+        while not self._ended and count < TOGETHER and size < TOGETHER_BYTES:
             more = self._in_place(await self._rows())
-            size += sum(len(row[5]) for row in more)
-            rows += more
-            if not more and self.damaged is None:
+            if more is not None:
+                slices.append(more)
+                count += len(more.seqs)
+                size += sum(map(len, more.bodies))
+            elif self.damaged is None:
                 await self._check_end()
-            if not more or self.damaged is not None:
+            if more is None or self.damaged is not None:
                 self._ended = True
-        self._unchecked = rows
-        return _columns(rows) if rows else None
+        self._unchecked = slices
+        return _columns(slices) if slices else None
 
     async def sound(self) -> int:
         """How many of the events that were given out last are as they were written, from the first
         one on; there are no more where not all are."""
-        rows, self._unchecked = self._unchecked, []
-        good = await asyncio.to_thread(_linked, rows, self._chain or START)
-        if good < len(rows):
+        slices, self._unchecked = self._unchecked, []
+        good = await asyncio.to_thread(_linked, self._chain or START, self._stream, slices)
+        if good < sum(len(each.seqs) for each in slices):
             self._ended = True
-            self.seq = rows[good][1] - 1
+            self.seq = slices[0].seqs[0] + good - 1
             self._stop("it is not what was written")
-        elif rows:
-            self._chain = rows[-1][7]
+        elif slices:
+            self._chain = slices[-1].chains[-1]
         return good
 
-    def _in_place(self, rows: Sequence[Sequence[Any]]) -> Sequence[Sequence[Any]]:
-        """Those before the first that is no event, or not the next one."""
+    def _in_place(self, rows: Sequence[Sequence[Any]]) -> StoredColumns | None:
+        """Those before the first that is no event, or not the next one; None when there are none."""
+        if not rows:
+            return None
+        columns = StoredColumns(*zip(*rows, strict=True))
+        expected = range(self.seq + 1, self.seq + 1 + len(rows))
+        kinds = [set(map(type, column)) for column in columns]
+        if kinds == [{each} for each in _TYPES] and columns.seqs == tuple(expected):
+            self.seq += len(rows)
+            return columns
+        return self._in_place(rows[: self._good(rows)])
+
+    def _good(self, rows: Sequence[Sequence[Any]]) -> int:
+        """How many of these, of which not all are what follows, and that."""
         for n, row in enumerate(rows):
             if tuple(map(type, row)) != _TYPES:
-                self._stop("it holds values of the wrong kind")
-                return rows[:n]
-            if row[1] != self.seq + 1:
-                self._stop(f"{row[1]} stands in its place")
-                return rows[:n]
-            self.seq += 1
-        return rows
+                self._stop("it holds values of the wrong kind", n)
+                return n
+            if row[0] != self.seq + 1 + n:
+                self._stop(f"{row[0]} stands in its place", n)
+                return n
+        return len(rows)
 
     async def _rows(self) -> Sequence[Sequence[Any]]:
         if self._chain is None:
             before = await self._ask(self.seq - 1, 1)
-            self._chain = before[0][7] if before and isinstance(before[0][7], bytes) else START
+            self._chain = before[0][6] if before and isinstance(before[0][6], bytes) else START
         for limit in SLICES:
             try:
                 return await self._ask(self.seq, limit)
@@ -132,21 +144,28 @@ class LogTail:
                 return
             self._stop("it is missing")
 
-    def _stop(self, why: str) -> None:
-        self.damaged = StreamDamage(self.seq + 1, why)
-        log.error("%s %d is damaged: %s", self._stream, self.seq + 1, why)
+    def _stop(self, why: str, after: int = 0) -> None:
+        self.damaged = StreamDamage(self.seq + after + 1, why)
+        log.error("%s %d is damaged: %s", self._stream, self.damaged.seq, why)
 
 
-def _columns(rows: Sequence[Sequence[Any]]) -> EventColumns:
+def _columns(slices: Sequence[StoredColumns]) -> EventColumns:
     same: dict[str, str] = {}  # of equal texts one: they travel as such
-    kinds, authors = ([same.setdefault(row[n], row[n]) for row in rows] for n in (2, 3))
-    return EventColumns(rows[0][1], kinds, authors, [row[5] for row in rows])
+    kinds, authors, bodies = list[str](), list[str](), list[bytes]()
+    for each in slices:
+        kinds += map(same.setdefault, each.kinds, each.kinds)
+        authors += map(same.setdefault, each.authors, each.authors)
+        bodies += each.bodies
+    return EventColumns(slices[0].seqs[0], kinds, authors, bodies)
 
 
-def _linked(rows: Sequence[Sequence[Any]], chain: bytes) -> int:
-    """How many of these rows are in the chain that goes on from here."""
-    for n, row in enumerate(rows):
-        if row[7] != link(chain, Event(*row[:7])):
-            return n
-        chain = row[7]
-    return len(rows)
+def _linked(chain: bytes, stream: str, slices: Sequence[StoredColumns]) -> int:
+    """How many of these events are in the chain that goes on from here."""
+    count = 0
+    for each in slices:
+        good = linked(chain, stream, each)
+        count += good
+        if good < len(each.seqs):
+            break
+        chain = each.chains[-1]
+    return count
