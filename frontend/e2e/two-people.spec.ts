@@ -1,6 +1,6 @@
 /** Two people build a graph from nothing, run it, lose both processes in between, and lose nothing. */
 
-import { expect, test } from "@playwright/test";
+import { expect, type Locator, test } from "@playwright/test";
 import { add, card, connect, enter, give, move, saved, seenRunning, start, watch } from "./canvas";
 import { type Person, Product } from "./product";
 
@@ -61,6 +61,17 @@ test("two people build, run and review a graph; kill -9 loses nothing", async ()
   await product.start();
   await saved(page);
   await expect(card(mari.page, "Report")).toBeVisible();
+  // Whoever came back first has the first colour now.
+  const color = (face: Locator) => face.evaluate((it) => getComputedStyle(it).backgroundColor);
+  const faces = (of: Person, other: string) => [
+    of.page.getByRole("button", { name: /^You are/ }).locator("[aria-hidden]"),
+    of.page.getByRole("button", { name: `Follow ${other}` }),
+  ];
+  await expect(async () => {
+    const [adas, maris] = await Promise.all(faces(ada, "Mari").map(color));
+    expect(adas).not.toBe(maris);
+    expect(await Promise.all(faces(mari, "Ada").map(color))).toEqual([maris, adas]);
+  }).toPass();
   await move(page, "Report", [0, 320], "Look");
   // Only one of the two branches comes, so Report must not wait for both.
   for (const branch of ["Grip", "Search"]) {

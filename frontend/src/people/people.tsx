@@ -5,7 +5,7 @@ import { checkedColor } from "../api/people";
 import { CARD, type Positions, type Sizes } from "../canvas/geometry/arrange";
 import { splitKey } from "../graph/document-keys";
 import type { Participant } from "../sync/presence/presence";
-import { useFollowing, usePeople } from "../sync/use-room";
+import { useColorsAfterReturn, useFollowing, usePeople } from "../sync/use-room";
 import { Tooltip } from "../ui/floating/tooltip";
 import { initials } from "../ui/name-colors";
 import style from "./people.module.css";
@@ -29,6 +29,7 @@ export function onePerId<T extends { readonly id: string }>(people: readonly T[]
 export const colored = (color: string | undefined) => ({ "--c": color }) as CSSProperties;
 
 export function People({ me }: { me: string }) {
+  useColorsAfterReturn();
   const { whom, follow } = useFollowing();
   const people = usePeople().filter((person) => person.id !== me);
   const leader = people.find(({ client }) => client === whom);
@@ -74,6 +75,7 @@ export function People({ me }: { me: string }) {
 
 /** Around the canvas while it shows what somebody else sees. */
 export function FollowFrame() {
+  useColorsAfterReturn();
   const { whom, follow } = useFollowing();
   const people = usePeople();
   const leader = people.find(({ client }) => client === whom);

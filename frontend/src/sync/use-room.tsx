@@ -1,5 +1,6 @@
 /** A room for React: one provider, and hooks that draw again only what changed. */
 
+import { useQueryClient } from "@tanstack/react-query";
 import {
   createContext,
   type ReactNode,
@@ -187,6 +188,20 @@ export function usePersonColors(ids: readonly string[] = NO_IDS): (id: string) =
   });
   const known = useKnownPeople(ids);
   return useMemo(() => colorsOf(here, known), [here, known]);
+}
+
+/**
+ * Asks for the colours of people again when the room is back: a server that was started anew gives
+ * them in the order in which people come.
+ */
+export function useColorsAfterReturn(): void {
+  const isLive = useLinkPart(({ state }) => state === "live");
+  const wasLive = useRef(false);
+  const client = useQueryClient();
+  useEffect(() => {
+    if (isLive && wasLive.current) void client.invalidateQueries({ queryKey: ["people"] });
+    wasLive.current ||= isLive;
+  }, [isLive, client]);
 }
 
 const NO_IDS: readonly string[] = [];
