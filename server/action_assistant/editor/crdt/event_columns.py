@@ -53,6 +53,9 @@ class EventColumns(msgspec.Struct, frozen=True):
 
     def by_kind(self) -> Iterator["EventColumns"]:
         """Parts of one kind each, in order."""
+        if self.kinds.count(self.kinds[0]) == len(self):  # as nearly always, and at once
+            yield self
+            return
         start = 0
         for _, same in itertools.groupby(self.kinds):
             end = start + sum(1 for _ in same)
