@@ -14,7 +14,7 @@ import anyio
 from temoto_msgs.msg import UmrfGraphModify, UmrfGraphPause, UmrfGraphResume, UmrfGraphStart
 
 from action_assistant.runner.links.engine_process import engine_process
-from action_assistant.runner.links.engine_text import RECEIVED_START, NotAGraph
+from action_assistant.runner.links.engine_text import NotAGraph
 from action_assistant.runner.links.listeners import Listeners
 from action_assistant.runner.links.port import (
     Answer,
@@ -83,7 +83,6 @@ class Ros2Link:
         self._subscribers = Listeners[Report]()
         self._domain: Domain | None = None
         self._runs: set[str] = set()
-        self._last: Order | None = None  # the last start
         self._known_since = 0.0  # when this incarnation was first seen, by the monotonic clock
         self._answered = False
         self._restarted = False
@@ -113,8 +112,7 @@ class Ros2Link:
         )
         await anyio.sleep(max(0.0, self._known_since + _SETTLE_S - time.monotonic()))
         self._runs.add(order.run)
-        self._last = order
-        await domain.outlets.send_start(order.run, message, leaves)
+        await domain.outlets.send_start(self._name, order.run, message, leaves)
 
     async def stop(self, graph_name: str) -> None:
         """Publish one stop, also when nobody seems to listen: what is seen may lag behind what is.
@@ -355,8 +353,8 @@ class Ros2Link:
                         )
                     )
             case LogLine():
-                if self._said(sound.logger):
-                    self._hear_receipt(sound.text)
+                if self._domain and self._said(sound.logger):
+                    self._domain.outlets.said(self._name, sound.text)
                     self._subscribers.tell(
                         EngineLog(at=self._clock_us(), text=sound.text.strip(), graph=sound.graph)
                     )
@@ -376,11 +374,6 @@ class Ros2Link:
             sound = Feedback(actor=sound.actor, snapshots=ours)
         domain.outlets.shown(sound.snapshots)
         self._subscribers.tell(sound)
-
-    def _hear_receipt(self, line: str) -> None:
-        last, domain = self._last, self._domain
-        if last and domain and line.strip() == f"{RECEIVED_START}{last.graph.name}":
-            domain.outlets.taken(last.run)
 
     def _said(self, logger: str) -> bool:
         """Whether a line can only be this engine's: nodes of one name cannot be told apart."""

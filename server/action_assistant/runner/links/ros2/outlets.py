@@ -18,6 +18,7 @@ from temoto_msgs.msg import (
     UmrfGraphStop,
 )
 
+from action_assistant.runner.links.engine_text import RECEIVED_START
 from action_assistant.runner.links.observations import Snapshot
 
 #: Seconds between two messages on one topic: an engine keeps one only, and of two that come within
@@ -115,14 +116,14 @@ class Outlets:
         self._stopping: dict[str, _Stops] = {}
 
     async def send_start(
-        self, run: str, message: UmrfGraphStart, leaves: Callable[[], None]
+        self, robot: str, run: str, message: UmrfGraphStart, leaves: Callable[[], None]
     ) -> None:
-        """Publish the start of a run when the one before was taken, or `TAKEN_S` after it. `leaves` is
-        called right before it leaves."""
+        """Publish the start of a run when the one before was taken in, or `TAKEN_S` after it. `leaves`
+        is called right before it leaves."""
 
         def leaving() -> UmrfGraphStart:
             leaves()
-            self._untaken = _Untaken(run)
+            self._untaken = _Untaken(robot, run, f"{RECEIVED_START}{message.umrf_graph_name}")
             return message
 
         async with self._start_turn:
@@ -131,15 +132,17 @@ class Outlets:
                     await self._untaken.taken.wait()
             await self.start.send(leaving)
 
-    def taken(self, run: str) -> None:
-        """The engine of this run shows that it took its start in."""
-        if self._untaken is not None and self._untaken.run == run:
-            self._untaken.taken.set()
-
     def shown(self, graphs: Iterable[Snapshot]) -> None:
-        """Engines show these."""
-        for run in {each.run for each in graphs if each.run is not None}:
-            self.taken(run)
+        """Engines show these graphs: whose start was taken in."""
+        last = self._untaken
+        if last is not None and any(each.run == last.run for each in graphs):
+            last.taken.set()
+
+    def said(self, robot: str, line: str) -> None:
+        """The engine of a robot says this in its log."""
+        last = self._untaken
+        if last is not None and (last.robot, last.receipt) == (robot, line.strip()):
+            last.taken.set()
 
     async def send_stop(self, graph: str, target: str) -> None:
         """Publish a stop. Those of one graph that wait for their turn leave as one message, with
@@ -175,8 +178,9 @@ class Outlets:
 class _Untaken:
     """A start that has left, and nothing shows yet that its engine took it in."""
 
-    def __init__(self, run: str) -> None:
-        self.run = run
+    def __init__(self, robot: str, run: str, receipt: str) -> None:
+        self.robot, self.run = robot, run
+        self.receipt = receipt  # the line by which its engine would say so
         self.until = time.monotonic() + TAKEN_S
         self.taken = anyio.Event()
 
