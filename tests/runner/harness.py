@@ -17,8 +17,7 @@ from anyio.abc import TaskGroup
 from sqlalchemy import Row, Select, StaticPool, create_engine
 
 from action_assistant.errors import Conflict, Unavailable
-from action_assistant.journal.events import BareEvent, Draft, Event, bare
-from action_assistant.journal.events import StreamSnapshot as Kept
+from action_assistant.journal.events import BareEvent, Draft, Event, StreamSnapshot, bare
 from action_assistant.runner import projection
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.execution.service import ExecutionService
@@ -126,7 +125,7 @@ class MemoryLedger:
         self.forgetful = False
         self.slow = 0.0
         self.position = 0
-        self.snapshots: dict[str, Kept] = {}
+        self.snapshots: dict[str, StreamSnapshot] = {}
         self._engine = create_engine("sqlite://", poolclass=StaticPool)
         RUNNER.create_all(self._engine)
 
@@ -168,7 +167,7 @@ class MemoryLedger:
 
     async def bare(self, stream: str, usual: str, *, after: int, upto: int) -> list[BareEvent]:
         """As the journal's."""
-        return bare(await self.read(stream, after=after, upto=upto), usual)
+        return bare(self.streams.get(stream, [])[after:upto], usual)
 
     async def newest(self, stream: str) -> int:
         """As the journal's."""
@@ -180,13 +179,13 @@ class MemoryLedger:
         with self._engine.connect() as connection:
             return list(connection.execute(statement).all())
 
-    async def snapshot(self, stream: str) -> Kept | None:
+    async def snapshot(self, stream: str) -> StreamSnapshot | None:
         """As the journal's."""
         return self.snapshots.get(stream)
 
     async def keep_snapshot(self, stream: str, seq: int, state: bytes) -> None:
         """As the journal's."""
-        self.snapshots[stream] = Kept(stream, seq, state)
+        self.snapshots[stream] = StreamSnapshot(stream, seq, state)
 
     def told(self, run: str) -> list[RunEvent]:
         """The events of a run."""

@@ -102,12 +102,10 @@ async def _executing(
     place: StoragePaths,
 ) -> AsyncIterator[ExecutionService]:
     """Workers, robots, and what drives runs on them."""
-    async with RunnerWorkers.opened() as workers, anyio.create_task_group() as tasks:
+    async with RunnerWorkers.opened() as workers, _asking(workers, place, archive_store) as asking:
+        asked, ours = asking
         services.run_in_worker = workers.looks
         services.lanes = (workers.starts, workers.ours, workers.looks)
-        asked = WorkerQueries(workers.looks, place, archive_store, tasks)
-        # Waits behind nobody's questions.
-        ours = WorkerQueries(workers.ours, place, archive_store, tasks)
         reach = ros2_reach(utc_us)
         async with (
             _kept(reach),
@@ -137,6 +135,18 @@ async def _executing(
                 on_disk=anyio.to_thread.run_sync,
             )
             yield control
+
+
+@asynccontextmanager
+async def _asking(
+    workers: RunnerWorkers, place: StoragePaths, archive_store: ArchiveStore
+) -> AsyncIterator[tuple[WorkerQueries, WorkerQueries]]:
+    """What asks for people, and what asks for ourselves and waits behind nobody's questions."""
+    async with anyio.create_task_group() as tasks:
+        yield (
+            WorkerQueries(workers.looks, place, archive_store, tasks),
+            WorkerQueries(workers.ours, place, archive_store, tasks),
+        )
         tasks.cancel_scope.cancel()
 
 
