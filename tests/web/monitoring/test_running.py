@@ -191,9 +191,13 @@ def test_answers_problems_and_lines_of_the_log_share_an_id(product: Product) -> 
         name = answer.headers["x-request-id"]
         assert name != "from-a-stranger"
         assert answer.json()["request_id"] == name
-        lines = [json.loads(line) for line in product.log.read_text().splitlines()]
-        mine = [line for line in lines if line.get("request") == name]
-        assert mine
+        mine: list[dict[str, Any]] = []
+        deadline = time.monotonic() + 30
+        while not mine:  # a line is written when the answer has left
+            assert time.monotonic() < deadline
+            time.sleep(0.02)
+            lines = [json.loads(line) for line in product.log.read_text().splitlines()]
+            mine = [line for line in lines if line.get("request") == name]
         assert all(line["run"] == "nothing" for line in mine)
 
 
