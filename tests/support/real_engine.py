@@ -44,16 +44,18 @@ def browser(product: Product, name: str) -> httpx.Client:
 
 
 @contextmanager
-def real_engine(folder: Path, domain: int) -> Iterator[Callable[[], list[str]]]:
+def real_engine(
+    folder: Path, domain: int, name: str = "David"
+) -> Iterator[Callable[[], list[str]]]:
     """Yield what the code of the engine's action has done so far, as it wrote it down itself."""
-    truth = folder / "truth"
-    command = [sys.executable, str(PROGRAM), "David", str(domain), "--truth", str(truth)]
+    truth = folder / f"truth-{name}"
+    command = [sys.executable, str(PROGRAM), name, str(domain), "--truth", str(truth)]
 
     def events() -> list[str]:
         lines = truth.read_text().splitlines() if truth.exists() else []
         return [line.split()[2] for line in lines]
 
-    with (folder / "engine.log").open("w") as log:
+    with (folder / f"engine-{name}.log").open("w") as log:
         engine = subprocess.Popen(command, stdout=log, stderr=log)
     try:
         yield events
