@@ -10,8 +10,9 @@ import time
 
 from pycrdt import Map
 
+from action_assistant.editor.crdt.applying import Panicked
 from action_assistant.editor.crdt.messages import Malformed
-from action_assistant.editor.crdt.replica import Panicked, Replica
+from action_assistant.editor.crdt.replica import Replica
 from action_assistant.editor.documents import document
 
 

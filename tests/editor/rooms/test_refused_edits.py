@@ -1,10 +1,12 @@
 """What a room refuses, and whom that ends: its sender, and nobody else."""
 
+from typing import Any
+
 import pytest
-from pycrdt import Map
+from pycrdt import Doc, Map
 
 from action_assistant.editor.crdt import messages, replica
-from action_assistant.editor.crdt.replica import Replica
+from action_assistant.editor.crdt.applying import apply_alone
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import BadInput
 from action_assistant.journal.journal import Journal
@@ -38,15 +40,13 @@ async def test_an_update_that_breaks_the_library_is_refused_and_harms_nobody(
     journal: Journal, rooms: Rooms, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (poison,) = updates(("poison", "1"))
-    original = Replica._apply
 
-    def apply(self: Replica, *given: bytes) -> None:
-        with replica.applying():
-            if poison in given:
-                raise PanicException("index out of bounds")
-        original(self, *given)
+    def apply(doc: Doc[Any], update: bytes) -> None:
+        if update == poison:
+            raise PanicException("index out of bounds")
+        apply_alone(doc, update)
 
-    monkeypatch.setattr(Replica, "_apply", apply)
+    monkeypatch.setattr(replica, "apply_alone", apply)
     ada, eve = Client("ada"), Client("eve")
     async with rooms.enter(STREAM) as room:
         ada.join(room)

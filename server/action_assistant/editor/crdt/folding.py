@@ -2,9 +2,10 @@
 
 import msgspec
 
+from action_assistant.editor.crdt.applying import Panicked
 from action_assistant.editor.crdt.event_columns import EventColumns
 from action_assistant.editor.crdt.messages import Malformed
-from action_assistant.editor.crdt.replica import Panicked, Replica, ReplicaState
+from action_assistant.editor.crdt.replica import Replica, ReplicaState
 from action_assistant.editor.crdt.sound_updates import Uncertain
 from action_assistant.errors import Unavailable
 

@@ -3,13 +3,14 @@
 import logging
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import AbstractContextManager, suppress
+from contextlib import suppress
 from enum import Enum
 from typing import Any, Final, Literal
 
 import msgspec
 from pycrdt import Doc, get_update
 
+from action_assistant.editor.crdt.applying import Panicked, apply_alone, applying
 from action_assistant.editor.crdt.document_quota import DocumentQuota
 from action_assistant.editor.crdt.event_columns import EventColumns, Told
 from action_assistant.editor.crdt.messages import NOTHING_NEW, ByteReader, Malformed
@@ -41,10 +42,6 @@ class ForeignClient(Exception):
 
 class TooMuchWaits(Exception):
     """Of this author so much waits for something earlier that no more is kept."""
-
-
-class Panicked(Exception):
-    """The CRDT library panicked over an update; the document may be damaged."""
 
 
 class Replica:
@@ -247,7 +244,8 @@ class Replica:
         known = self._known
         depths = self.nesting.depths(read.placed, known)
         if any(end > known.get(client, 0) for client, _, end in read.brings):
-            self._apply(update)
+            with applying():
+                apply_alone(self.doc, update)
             changed = True
         else:
             changed = self._deletes(update)
@@ -315,31 +313,6 @@ class Replica:
             raise Malformed("more clients than bytes")
         with applying():
             return self.doc.get_update(state)
-
-
-class _Applying:
-    """Tells the failures of the CRDT library from all others. Holds nothing: one serves for all."""
-
-    def __enter__(self) -> None:
-        pass
-
-    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        match error:
-            case None:
-                return
-            case ValueError() | RuntimeError():
-                raise Malformed(f"not a Yjs update: {error}") from error
-            case _ if type(error).__name__ == "PanicException":  # pyo3's, of BaseException
-                raise Panicked(str(error)) from error
-
-
-_APPLYING: Final = _Applying()
-
-
-def applying() -> AbstractContextManager[None]:
-    """Around a call of the CRDT library with foreign bytes, and nothing else. Raises Malformed,
-    Panicked."""
-    return _APPLYING
 
 
 class ReplicaState(msgspec.Struct, frozen=True, array_like=True):

@@ -13,8 +13,8 @@ from typing import Any, Final
 
 from pycrdt import Doc
 
+from action_assistant.editor.crdt.applying import applying
 from action_assistant.editor.crdt.messages import Malformed
-from action_assistant.editor.crdt.replica import applying
 from action_assistant.editor.crdt.update_outline import UpdateOutline
 from action_assistant.editor.crdt.update_scan import outline
 

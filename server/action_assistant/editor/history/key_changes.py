@@ -7,8 +7,9 @@ from typing import Any, Final, NamedTuple, TypeAlias, cast
 import msgspec
 from pycrdt import Map
 
+from action_assistant.editor.crdt.applying import Panicked
 from action_assistant.editor.crdt.messages import Malformed
-from action_assistant.editor.crdt.replica import Panicked, Replica, ReplicaState
+from action_assistant.editor.crdt.replica import Replica, ReplicaState
 from action_assistant.editor.documents.document import PLAIN, is_same
 from action_assistant.editor.documents.values import ROOTS, Root
 from action_assistant.journal.events import Event

@@ -9,9 +9,10 @@ import msgspec
 from pycrdt import merge_updates
 
 from action_assistant.editor.crdt import messages
+from action_assistant.editor.crdt.applying import Panicked
 from action_assistant.editor.crdt.document_quota import QuotaExceeded
 from action_assistant.editor.crdt.messages import Malformed
-from action_assistant.editor.crdt.replica import ForeignClient, Panicked, Replica, TooMuchWaits
+from action_assistant.editor.crdt.replica import ForeignClient, Replica, TooMuchWaits
 from action_assistant.editor.crdt.trial import OVERLONG, TooSlow, TriedOutline, tried
 from action_assistant.editor.crdt.update_outline import UpdateOutline
 from action_assistant.editor.crdt.update_scan import outline

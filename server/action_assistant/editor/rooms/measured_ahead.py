@@ -4,8 +4,9 @@ import asyncio
 import logging
 from typing import Final
 
+from action_assistant.editor.crdt.applying import Panicked
 from action_assistant.editor.crdt.messages import NOTHING_NEW, Malformed
-from action_assistant.editor.crdt.replica import Panicked, Replica
+from action_assistant.editor.crdt.replica import Replica
 from action_assistant.editor.crdt.trial import TooSlow, tried
 from action_assistant.editor.rooms.room_task import begin_room_task
 from action_assistant.errors import Refused

@@ -13,8 +13,9 @@ from functools import partial
 from typing import Any, Final, TypeVar
 
 from action_assistant.editor.crdt import messages
+from action_assistant.editor.crdt.applying import Panicked
 from action_assistant.editor.crdt.loading import Loaded, load
-from action_assistant.editor.crdt.replica import Panicked, Replica, UpdateEffect
+from action_assistant.editor.crdt.replica import Replica, UpdateEffect
 from action_assistant.editor.crdt.update_outline import UpdateOutline
 from action_assistant.editor.log.graph_events import DEFERRED, UPDATED, graph_of
 from action_assistant.editor.rooms.batch import (
