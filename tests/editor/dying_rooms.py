@@ -2,11 +2,12 @@
 
 `python -m editor.dying_rooms FOLDER` reads lines `STREAM POINT COUNT`, and for each forks a process that
 serves the room of STREAM on FOLDER/socket and kills itself with SIGKILL when it passes POINT for the
-COUNT-th time. It prints the number of each process, then `dead`. The product knows nothing of this.
+COUNT-th time. Every second one commits on its event loop. It prints the number of each process, then `dead`. The product knows nothing of this.
 """
 
 import asyncio
 import contextlib
+import itertools
 import os
 import signal
 import sys
@@ -20,6 +21,7 @@ from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.editor.rooms.room import Room
 from action_assistant.editor.rooms.room_news import RoomNews
 from action_assistant.journal.events import nothing
+from action_assistant.journal.health import quick_commits
 from action_assistant.journal.journal import Journal
 from action_assistant.journal.sqlite import SqliteSession
 from action_assistant.web.auth.keys import Person
@@ -113,9 +115,10 @@ class Pipe:
         self._writer.close()
 
 
-async def serve(folder: Path, stream: str, trap: Trap) -> None:
+async def serve(folder: Path, stream: str, trap: Trap, at_once: bool) -> None:
     """Until killed."""
-    journal = await Journal.open(f"sqlite:///{folder / 'editor.db'}", branch="editor", fold=nothing)
+    url = f"sqlite:///{folder / 'editor.db'}"
+    journal = await Journal.open(url, branch="editor", fold=nothing, at_once=at_once)
     rooms = Rooms(journal)
 
     async def talk(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -147,14 +150,15 @@ async def _speak(pipe: Pipe, member: Member, trap: Trap) -> None:
 
 
 def main(folder: Path) -> None:
-    for line in sys.stdin:
+    quick_commits._KNOWN = 0  # type: ignore[misc]
+    for line, at_once in zip(sys.stdin, itertools.cycle((False, True)), strict=False):
         stream, count, point = line.rstrip("\n").split(" ", 2)
         (folder / "socket").unlink(missing_ok=True)
         child = os.fork()
         if child == 0:
             trap = Trap(point, int(count))
             trap.set()
-            asyncio.run(serve(folder, stream, trap))
+            asyncio.run(serve(folder, stream, trap, at_once))
         sys.stdout.write(f"{child}\n")
         sys.stdout.flush()
         _, status = os.waitpid(child, 0)

@@ -59,7 +59,7 @@ async def open_services(
 ) -> AsyncIterator[EditorServices]:
     """The editor without its HTTP side. Raises CannotStart."""
     revoked = revoked or Revocations(settings.data)
-    journal = await Journal.open(settings.database, branch="editor", fold=h.fold)
+    journal = await Journal.open(settings.database, branch="editor", fold=h.fold, at_once=True)
     try:
         # Ours from here on; until now `move` may have taken the graphs elsewhere.
         await asyncio.to_thread(

@@ -56,6 +56,10 @@ class Database(Protocol):
         """What people may read: without a password."""
 
     @property
+    def is_near(self) -> bool:
+        """Whether a commit waits for a disk of this machine, and for nothing else."""
+
+    @property
     def patience(self) -> float:
         """Seconds to wait for the database before it is left open whether a commit has happened."""
 

@@ -30,7 +30,7 @@ from action_assistant.journal.health.commits import CommitMetrics
 from action_assistant.journal.health.probe import JournalProbe
 from action_assistant.journal.reader import JournalReader, body_of, following, seal_of
 from action_assistant.journal.removal import STREAM, StreamRemoved, delete_some, taken_out
-from action_assistant.journal.writer import Job, Outcome, Transaction, Writer
+from action_assistant.journal.writer import Job, Told, Transaction, Writer
 from action_assistant.schema.branches import BRANCHES
 from action_assistant.schema.editor_tables import editor_head, editor_snapshot
 from action_assistant.schema.log_tables import LOG
@@ -40,6 +40,7 @@ log: Final = logging.getLogger(__name__)
 T = TypeVar("T")
 
 _PAGE: Final = 500  # events that a follower reads at once
+_BRIEF: Final = 64 * 1024  # bytes of events that are written without a thread
 
 # The tables of the log are the same for both branches.
 _head, _snapshot = editor_head.c, editor_snapshot.c
@@ -54,12 +55,19 @@ class Journal(JournalReader):
     """The log of one process. The only writer of its database; readers never wait for it."""
 
     def __init__(
-        self, database: Database, session: WriterSession, branch: Branch, fold: Fold
+        self,
+        database: Database,
+        session: WriterSession,
+        branch: Branch,
+        fold: Fold,
+        *,
+        at_once: bool = False,
     ) -> None:
         self._branch: Final = branch
         self._loop = asyncio.get_running_loop()
         self._database = database
-        self._writer = Writer(database, session, fold, self._written)
+        at_once = at_once and database.is_near
+        self._writer = Writer(database, session, fold, self._written, at_once=at_once)
         self._jobs: list[Job[Any]] = []  # of this turn of the loop, for one transaction
         self._followers: set[Follower] = set()
         self._closed = False
@@ -76,19 +84,34 @@ class Journal(JournalReader):
 
     @classmethod
     async def open(
-        cls, url: str, *, branch: Branch, fold: Fold, copies: Path | None = None
+        cls,
+        url: str,
+        *,
+        branch: Branch,
+        fold: Fold,
+        copies: Path | None = None,
+        at_once: bool = False,
     ) -> "Journal":
         """Open, and bring the tables to this version. `url`: sqlite:///PATH or postgresql://…
-        `copies`: the folder where a copy goes before; without it none is made.
+        `copies`: the folder where a copy goes before; without it none is made. `at_once`: the loop may
+        wait for the disk of this machine itself, while that is quick; not for a process that must
+        always answer.
 
         Raises CannotStart: newer or foreign database, not to be reached or written, in use, or not
         set up to keep what it was told.
         """
-        return await cls.on(database_of(url), branch=branch, fold=fold, copies=copies)
+        database = database_of(url)
+        return await cls.on(database, branch=branch, fold=fold, copies=copies, at_once=at_once)
 
     @classmethod
     async def on(
-        cls, database: Database, *, branch: Branch, fold: Fold, copies: Path | None = None
+        cls,
+        database: Database,
+        *,
+        branch: Branch,
+        fold: Fold,
+        copies: Path | None = None,
+        at_once: bool = False,
     ) -> "Journal":
         """Open a journal in a database. Raises CannotStart."""
         try:
@@ -97,7 +120,7 @@ class Journal(JournalReader):
             await database.close()
             database.disown()
             raise
-        return cls(database, session, branch, fold)
+        return cls(database, session, branch, fold, at_once=at_once)
 
     async def append(
         self, stream: str, drafts: Sequence[Draft], *, expected: int | None = None
@@ -117,7 +140,8 @@ class Journal(JournalReader):
     ) -> None:
         """As `append`, for who does not wait: `done` is called on the loop after COMMIT with the newest
         seq, or with what `append` would raise. It must not raise. Raises Unavailable if closed."""
-        self._queue(Job(lambda transaction: transaction.add(addition), done))
+        is_brief = sum([len(draft.body) for draft in addition.drafts]) <= _BRIEF
+        self._queue(Job(lambda transaction: transaction.add(addition), done, is_brief=is_brief))
 
     def follow(self) -> AbstractAsyncContextManager[AsyncIterator[Event]]:
         """What is committed from now on, in order. Memory is bounded: who is slow reads later."""
@@ -269,12 +293,12 @@ class Journal(JournalReader):
     def _submit(self) -> None:
         if self._jobs:
             jobs, self._jobs = self._jobs, []
-            self._writer.submit(jobs)
+            self._tell(self._writer.submit(jobs))
 
-    def _written(self, outcomes: Sequence[tuple[Job[Any], Outcome]]) -> None:
+    def _written(self, outcomes: Told) -> None:
         self._loop.call_soon_threadsafe(self._tell, outcomes)
 
-    def _tell(self, outcomes: Sequence[tuple[Job[Any], Outcome]]) -> None:
+    def _tell(self, outcomes: Told) -> None:
         for job, (result, error, events) in outcomes:
             try:
                 job.done(result, error)

@@ -1,4 +1,4 @@
-"""The thread that writes a journal: one connection, one transaction for all who wait."""
+"""Writes a journal, on a thread or at once: one connection, one transaction for all who wait."""
 
 import logging
 import queue
@@ -25,6 +25,7 @@ Clock: TypeAlias = Callable[[], int]
 #: What became of a job: its result, or why there is none; the events it wrote.
 Outcome: TypeAlias = tuple[Any, BaseException | None, list[Event]]
 
+_AT_ONCE: Final = 50  # jobs that are committed without the thread
 _TOGETHER: Final = 1000  # jobs after which no others join a transaction
 _HEAVY: Final = 16 << 20  # bytes in one statement, beyond which no other job joins
 _KNOWN: Final = 10_000  # streams whose ends are kept in memory
@@ -38,16 +39,23 @@ def now() -> int:
 
 
 class Job(Generic[T]):
-    """Work for the writer's thread. `done` is called with its result, or with why there is none; it must
-    not raise."""
+    """Work for the writer. `done` is called with its result, or with why there is none; it must not
+    raise. `is_brief`: it appends a little to a stream, and does nothing else."""
 
     def __init__(
         self,
         work: Callable[["Transaction"], T],
         done: Callable[[T | None, BaseException | None], None],
+        *,
+        is_brief: bool = False,
     ) -> None:
         self.work: Final = work
         self.done: Final = done
+        self.is_brief: Final = is_brief
+
+
+#: Jobs of one transaction, each with its outcome.
+Told: TypeAlias = Sequence[tuple[Job[Any], Outcome]]
 
 
 class Transaction:
@@ -189,7 +197,8 @@ class Transaction:
 class Writer:
     """The only writer of a database. What waits while a commit is under way is the next one.
 
-    `tell` is called on the writer's thread after each commit or failure, once for all its jobs.
+    `tell` is called on the writer's thread after each commit or failure there, once for all its jobs.
+    `at_once`: whoever submits something brief may commit it, while commits are quick (decision 94).
     """
 
     def __init__(
@@ -197,10 +206,13 @@ class Writer:
         database: Database,
         session: WriterSession | None,
         fold: Fold,
-        tell: Callable[[Sequence[tuple[Job[Any], Outcome]]], None],
+        tell: Callable[[Told], None],
         clock: Clock = now,
+        *,
+        at_once: bool = False,
     ) -> None:
         self._database = database
+        self._at_once = at_once
         self._session = session
         self._fold = fold
         self._tell = tell
@@ -213,10 +225,25 @@ class Writer:
         )
         self._thread.start()
 
-    def submit(self, jobs: Sequence[Job[Any]]) -> None:
-        """Queue jobs, for one transaction if it can hold them; returns at once."""
+    def submit(self, jobs: Sequence[Job[Any]]) -> Told:
+        """Queue jobs, for one transaction if it can hold them, and return at once: nothing. Or commit them
+        here, and say what became of them. Only for one thread, before `close`."""
+        # Its thread counts a job as done when it needs the session no more.
+        here = self._at_once and not self.metrics.waiting and self._is_quick(jobs)
         self.metrics.submitted(len(jobs))
+        if here:
+            return self._commit(jobs)
         self._jobs.put(jobs)
+        return ()
+
+    def _is_quick(self, jobs: Sequence[Job[Any]]) -> bool:
+        return (
+            self.metrics.quick.are_quick
+            and self.metrics.failing is None
+            and self._transaction is not None  # to connect again may take long
+            and len(jobs) <= _AT_ONCE
+            and all(job.is_brief for job in jobs)
+        )
 
     @property
     def is_alive(self) -> bool:
@@ -232,7 +259,7 @@ class Writer:
         while True:
             jobs, last = self._next()
             if jobs:
-                self._commit(jobs)
+                self._tell(self._commit(jobs))
             if last:
                 self._disconnect()
                 return
@@ -251,7 +278,7 @@ class Writer:
                 return found, False
         return found, True
 
-    def _commit(self, jobs: list[Job[Any]]) -> None:
+    def _commit(self, jobs: Sequence[Job[Any]]) -> Told:
         done: list[Outcome] = []
         transaction: Transaction | None = None
         self.metrics.begins()
@@ -267,10 +294,10 @@ class Writer:
             self.metrics.failed(len(jobs), cause_of(error))
         else:
             self.metrics.over(len(jobs), [events for _, failed, events in done if failed is None])
-        self._tell(list(zip(jobs, done, strict=True)))
+        return list(zip(jobs, done, strict=True))
 
     def _together(
-        self, transaction: Transaction, jobs: list[Job[Any]], done: list[Outcome]
+        self, transaction: Transaction, jobs: Sequence[Job[Any]], done: list[Outcome]
     ) -> None:
         transaction.start()
         done.extend(transaction.attempt(job, self._database) for job in jobs)

@@ -1,4 +1,4 @@
-"""What the writer of a journal has done, as numbers. Written by its thread, read by whoever asks."""
+"""What the writer of a journal has done, as numbers. Written by whoever commits, read by whoever asks."""
 
 import time
 from collections.abc import Iterator, Sequence
@@ -9,6 +9,7 @@ from prometheus_client.core import CounterMetricFamily
 from prometheus_client.registry import Collector
 
 from action_assistant.journal.events import Event
+from action_assistant.journal.health.quick_commits import QuickCommits
 from action_assistant.journal.health.thread_histogram import ThreadHistogram
 
 _BUCKETS: Final = (
@@ -36,6 +37,7 @@ class CommitMetrics(Collector):
 
     def __init__(self) -> None:
         self.failing: str | None = None
+        self.quick: Final = QuickCommits()
         self._submitted = self._done = 0  # jobs; each is counted by one thread
         self._busy_since: float | None = None
         # Not the library's instruments: these were a fifth of the Python of a small commit.
@@ -59,7 +61,9 @@ class CommitMetrics(Collector):
         """A transaction of so many jobs is over. `stored`: the events of each that was not refused; where
         all were, nothing was written, and nothing is known of the disk."""
         if stored and self._busy_since is not None:
-            self._seconds.observe((time.monotonic() - self._busy_since,))
+            took = time.monotonic() - self._busy_since
+            self._seconds.observe((took,))
+            self.quick.took(took)
             self.failing = None
             self._last = time.time()
             self._events += sum(map(len, stored))
@@ -68,6 +72,7 @@ class CommitMetrics(Collector):
     def failed(self, jobs: int, why: str) -> None:
         """The transaction failed."""
         self.failing = why
+        self.quick.took(self.busy_s)
         self._failures += 1
         self._ended(jobs)
 

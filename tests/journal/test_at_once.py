@@ -1,0 +1,182 @@
+"""Appends that the event loop commits itself, while commits are quick: the same promises as by the thread."""
+
+import asyncio
+import sqlite3
+import threading
+import time
+from collections.abc import AsyncIterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from action_assistant.errors import Unavailable
+from action_assistant.journal.chain import link
+from action_assistant.journal.events import Addition, Draft, Event, nothing
+from action_assistant.journal.health import quick_commits
+from action_assistant.journal.journal import Journal
+from action_assistant.journal.sqlite import SqliteSession
+from support.doses import examples
+
+SMALL, LARGE = Draft("small.v1", "ada", b"x"), Draft("large.v1", "ada", bytes(100_000))
+
+
+class Watched:
+    """A journal, and on which thread each of its commits was done; `delay`: of the next ones, seconds."""
+
+    def __init__(self, journal: Journal) -> None:
+        self.journal = journal
+        self.here: list[bool] = []
+        self.delay = 0.0
+        self.broken: list[Exception] = []
+
+    def store(self, original: Any) -> Any:
+        def stored(session: SqliteSession, events: Sequence[tuple[Event, bytes]]) -> None:
+            self.here.append(threading.current_thread() is threading.main_thread())
+            time.sleep(self.delay)
+            if self.broken:
+                raise self.broken.pop()
+            original(session, events)
+
+        return stored
+
+    async def then(self, *drafts: Draft, stream: str = "a") -> int:
+        """Append as a room does."""
+        done: asyncio.Future[int] = asyncio.get_running_loop().create_future()
+
+        def told(seq: int | None, error: BaseException | None) -> None:
+            if seq is None:
+                done.set_exception(error or AssertionError())
+            else:
+                done.set_result(seq)
+
+        self.journal.append_then(Addition(stream, drafts), told)
+        return await asyncio.wait_for(done, 10)
+
+
+@pytest.fixture
+async def watched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Watched]:
+    url = f"sqlite:///{tmp_path / 'editor.db'}"
+    journal = await Journal.open(url, branch="editor", fold=nothing, at_once=True)
+    watched = Watched(journal)
+    monkeypatch.setattr(SqliteSession, "store", watched.store(SqliteSession.store))
+    monkeypatch.setattr(quick_commits, "_SLOW_S", 0.5)  # on a busy machine, too
+    monkeypatch.setattr(quick_commits, "_FAR_TOO_SLOW_S", 1.0)
+    yield watched
+    await journal.close()
+
+
+async def known(watched: Watched) -> None:
+    """Until commits count as quick."""
+    for _ in range(20):
+        await watched.then(SMALL)
+    watched.here.clear()
+
+
+async def test_the_first_ones_are_the_threads_and_then_the_loops(watched: Watched) -> None:
+    for _ in range(25):
+        await watched.then(SMALL)
+    assert watched.here == [False] * 20 + [True] * 5
+    found = await watched.journal.read("a")
+    assert [event.seq for event in found] == list(range(1, 26))
+    assert not await watched.journal.verify()
+
+
+async def test_what_is_large_or_more_than_an_append_is_the_threads(watched: Watched) -> None:
+    await known(watched)
+    await watched.then(LARGE)
+    await watched.journal.append("b", [SMALL])
+    await watched.journal.derive(lambda connection: connection.exec_driver_sql("SELECT 1"))
+    await watched.then(SMALL)
+    assert watched.here == [False, False, True]
+
+
+async def test_what_comes_while_the_thread_writes_waits_its_turn(watched: Watched) -> None:
+    await known(watched)
+    watched.delay = 0.2
+    slow = asyncio.create_task(watched.journal.append("a", [SMALL]))
+    await asyncio.sleep(0.05)
+    assert await watched.then(SMALL) == 22
+    assert await slow == 21
+    assert watched.here == [False, False]
+
+
+async def test_a_slow_disk_is_waited_for_by_the_thread(watched: Watched) -> None:
+    await known(watched)
+    watched.delay = 1.1
+    await watched.then(SMALL)
+    watched.delay = 0
+    await watched.then(SMALL)
+    assert watched.here == [True, False]
+
+
+async def test_what_could_not_be_stored_is_told_and_the_thread_begins_again(
+    watched: Watched,
+) -> None:
+    await known(watched)
+    watched.broken.append(sqlite3.OperationalError("disk I/O error"))
+    with pytest.raises(Unavailable, match="disk I/O error"):
+        await watched.then(SMALL)
+    assert [await watched.then(SMALL), await watched.then(SMALL)] == [21, 22]
+    assert watched.here == [True, False, True]
+    assert not await watched.journal.verify()
+
+
+async def test_a_journal_that_was_not_asked_to_never_holds_up_its_loop(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    url = f"sqlite:///{tmp_path / 'runner.db'}"
+    watched = Watched(await Journal.open(url, branch="runner", fold=nothing))
+    monkeypatch.setattr(SqliteSession, "store", watched.store(SqliteSession.store))
+    for _ in range(25):
+        await watched.then(SMALL)
+    await watched.journal.close()
+    assert watched.here == [False] * 25
+
+
+steps = st.lists(
+    st.tuples(st.sampled_from("ab"), st.sampled_from(["then", "large", "append"]), st.booleans()),
+    max_size=25,
+)
+
+
+@settings(max_examples=examples(25), deadline=None)
+@given(steps)
+def test_whoever_commits_all_is_stored_told_and_followed_in_order(
+    tmp_path_factory: pytest.TempPathFactory, did: list[tuple[str, str, bool]]
+) -> None:
+    url = f"sqlite:///{tmp_path_factory.mktemp('dice') / 'editor.db'}"
+    asyncio.run(mixed(url, did))
+
+
+async def mixed(url: str, did: list[tuple[str, str, bool]]) -> None:
+    """Some appends of each kind, of which some are waited for before the next one."""
+    journal = await Journal.open(url, branch="editor", fold=nothing, at_once=True)
+    for _ in range(20):
+        journal.metrics.quick.took(0.0)
+    watched, followed, waiting = Watched(journal), list[Event](), []
+    async with journal.follow() as events:
+        for stream, kind, waits in did:
+            draft = LARGE if kind == "large" else SMALL
+            if kind == "append":
+                task = asyncio.ensure_future(journal.append(stream, [draft]))
+            else:
+                task = asyncio.ensure_future(watched.then(draft, stream=stream))
+            waiting.append((stream, task))
+            if waits:
+                await task
+        told = [(stream, await task) for stream, task in waiting]
+        while len(followed) < len(did):
+            followed.append(await asyncio.wait_for(anext(events), 10))
+    stored = await journal.read_all()
+    assert followed == stored
+    assert sorted(told) == sorted((event.stream, event.seq) for event in stored)
+    assert [event.position for event in stored] == list(range(1, len(did) + 1))
+    for stream in {event.stream for event in stored}:
+        chain = bytes(16)
+        for event in stored:
+            chain = link(chain, event) if event.stream == stream else chain
+        assert (await journal.end(stream)).chain == chain
+    await journal.close()
