@@ -43,7 +43,7 @@ def tables() -> Iterator[Table]:
     head = ["load", "server", "CPU per delivered", "of Hocuspocus's", "CPU", "p50", "p99"]
     head += ["missing", "memory"]
     yield Table(head, list(_rows("fan out", OPEN, RUNS, figures)))
-    yield Table(head, list(_rows("fan out", MANY, min(RUNS, 3), figures)))
+    yield Table(head, list(_rows("fan out", MANY, RUNS, figures)))
 
 
 def in_turn(operation: str, plan: dict[str, Any], count: int) -> dict[str, list[Run]]:
