@@ -150,7 +150,7 @@ async def _speak(pipe: Pipe, member: Member, trap: Trap) -> None:
 
 
 def main(folder: Path) -> None:
-    quick_commits._KNOWN = 0  # type: ignore[misc]
+    quick_commits._KNOWN, quick_commits._SHARE = 1, 2  # type: ignore[misc]
     for line, at_once in zip(sys.stdin, itertools.cycle((False, True)), strict=False):
         stream, count, point = line.rstrip("\n").split(" ", 2)
         (folder / "socket").unlink(missing_ok=True)

@@ -64,6 +64,7 @@ async def watched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncItera
     monkeypatch.setattr(SqliteSession, "store", watched.store(SqliteSession.store))
     monkeypatch.setattr(quick_commits, "_SLOW_S", 0.5)  # on a busy machine, too
     monkeypatch.setattr(quick_commits, "_FAR_TOO_SLOW_S", 1.0)
+    monkeypatch.setattr(quick_commits, "_SHARE", 2)  # nothing but commits happens here
     yield watched
     await journal.close()
 
@@ -154,7 +155,7 @@ def test_whoever_commits_all_is_stored_told_and_followed_in_order(
 async def mixed(url: str, did: list[tuple[str, str, bool]]) -> None:
     """Some appends of each kind, of which some are waited for before the next one."""
     journal = await Journal.open(url, branch="editor", fold=nothing, at_once=True)
-    for _ in range(20):
+    for _ in range(100):
         journal.metrics.quick.took(0.0)
     watched, followed, waiting = Watched(journal), list[Event](), []
     async with journal.follow() as events:

@@ -1,32 +1,60 @@
 """When commits count as quick: by the last hundred of them."""
 
+import pytest
+
+from action_assistant.journal.health import quick_commits
 from action_assistant.journal.health.quick_commits import QuickCommits
 
 
-def after(*seconds: float) -> bool:
-    """Whether commits are quick when these were the last."""
+class Clock:
+    """Stands still until somebody moves it, seconds."""
+
+    def __init__(self) -> None:
+        self.now = 1000.0
+
+    def monotonic(self) -> float:
+        return self.now
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    clock = Clock()
+    monkeypatch.setattr(quick_commits, "time", clock)
+    return clock
+
+
+def after(clock: Clock, *seconds: float, every: float = 1.0) -> bool:
+    """Whether commits are quick when these were the last, one after the other."""
     commits = QuickCommits()
     for each in seconds:
+        clock.now += every
         commits.took(each)
     return commits.are_quick
 
 
-def test_of_the_first_twenty_nothing_is_known() -> None:
-    assert not after(*[0.001] * 19)
-    assert after(*[0.001] * 20)
+def test_of_the_first_twenty_nothing_is_known(clock: Clock) -> None:
+    assert not after(clock, *[0.001] * 19)
+    assert after(clock, *[0.001] * 20)
 
 
-def test_five_of_a_hundred_may_be_slow() -> None:
-    assert after(*[0.001] * 95, *[0.03] * 5)
-    assert not after(*[0.001] * 94, *[0.03] * 6)
-    assert not after(*[0.001] * 15, *[0.03] * 6)
+def test_five_of_a_hundred_may_be_slow(clock: Clock) -> None:
+    assert after(clock, *[0.001] * 95, *[0.03] * 5)
+    assert not after(clock, *[0.001] * 94, *[0.03] * 6)
+    assert not after(clock, *[0.001] * 15, *[0.03] * 6)
 
 
-def test_one_that_is_far_too_slow_is_remembered_until_a_hundred_more_are_over() -> None:
-    assert not after(*[0.001] * 50, 0.11, *[0.001] * 99)
-    assert after(*[0.001] * 50, 0.11, *[0.001] * 100)
+def test_one_that_is_far_too_slow_is_remembered_until_a_hundred_more_are_over(
+    clock: Clock,
+) -> None:
+    assert not after(clock, *[0.001] * 50, 0.11, *[0.001] * 99)
+    assert after(clock, *[0.001] * 50, 0.11, *[0.001] * 100)
 
 
-def test_a_disk_that_becomes_quick_is_trusted_again() -> None:
-    assert not after(*[0.03] * 100, *[0.001] * 94)
-    assert after(*[0.03] * 100, *[0.001] * 95)
+def test_a_disk_that_becomes_quick_is_trusted_again(clock: Clock) -> None:
+    assert not after(clock, *[0.03] * 100, *[0.001] * 94)
+    assert after(clock, *[0.03] * 100, *[0.001] * 95)
+
+
+def test_all_of_them_may_take_a_sixth_of_the_time(clock: Clock) -> None:
+    assert after(clock, *[0.001] * 100, every=0.007)
+    assert not after(clock, *[0.001] * 100, every=0.005)
