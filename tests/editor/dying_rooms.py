@@ -2,7 +2,8 @@
 
 `python -m editor.dying_rooms FOLDER` reads lines `STREAM POINT COUNT`, and for each forks a process that
 serves the room of STREAM on FOLDER/socket and kills itself with SIGKILL when it passes POINT for the
-COUNT-th time. Every second one commits on its event loop. It prints the number of each process, then `dead`. The product knows nothing of this.
+COUNT-th time. Every second one commits on its event loop. It prints the number of each process, then
+`dead`. The product knows nothing of this.
 """
 
 import asyncio
@@ -150,6 +151,7 @@ async def _speak(pipe: Pipe, member: Member, trap: Trap) -> None:
 
 
 def main(folder: Path) -> None:
+    # From the second commit on, and as often as there are any: constants that only a test changes.
     quick_commits._KNOWN, quick_commits._SHARE = 1, 2  # type: ignore[misc]
     for line, at_once in zip(sys.stdin, itertools.cycle((False, True)), strict=False):
         stream, count, point = line.rstrip("\n").split(" ", 2)

@@ -4,7 +4,7 @@ import asyncio
 import sqlite3
 import threading
 import time
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator, Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -69,6 +69,13 @@ async def watched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncItera
     await journal.close()
 
 
+async def until(happened: Callable[[], bool]) -> None:
+    """Wait for something."""
+    async with asyncio.timeout(10):
+        while not happened():  # noqa: ASYNC110 - nobody tells
+            await asyncio.sleep(0.01)
+
+
 async def known(watched: Watched) -> None:
     """Until commits count as quick."""
     for _ in range(20):
@@ -102,6 +109,21 @@ async def test_what_comes_while_the_thread_writes_waits_its_turn(watched: Watche
     assert await watched.then(SMALL) == 22
     assert await slow == 21
     assert watched.here == [False, False]
+
+
+async def test_what_the_thread_has_stored_is_told_before_what_the_loop_stores(
+    watched: Watched,
+) -> None:
+    await known(watched)
+    told: list[str] = []
+    journal = watched.journal
+    watched.delay = 0.1
+    journal.append_then(Addition("a", (LARGE,)), lambda *_: told.append("first"))
+    await asyncio.sleep(0.01)  # the thread has it
+    journal.append_then(Addition("a", (SMALL,)), lambda *_: told.append("second"))
+    time.sleep(0.3)  # noqa: ASYNC251 - the thread is done with it while nobody can be told
+    await until(lambda: len(told) == 2)
+    assert told == ["first", "second"]
 
 
 async def test_a_slow_disk_is_waited_for_by_the_thread(watched: Watched) -> None:

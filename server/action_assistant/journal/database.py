@@ -56,7 +56,7 @@ class Database(Protocol):
         """What people may read: without a password."""
 
     @property
-    def is_near(self) -> bool:
+    def is_local(self) -> bool:
         """Whether a commit waits for a disk of this machine, and for nothing else."""
 
     @property

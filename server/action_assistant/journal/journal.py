@@ -30,7 +30,7 @@ from action_assistant.journal.health.commits import CommitMetrics
 from action_assistant.journal.health.probe import JournalProbe
 from action_assistant.journal.reader import JournalReader, body_of, following, seal_of
 from action_assistant.journal.removal import STREAM, StreamRemoved, delete_some, taken_out
-from action_assistant.journal.writer import Job, Told, Transaction, Writer
+from action_assistant.journal.writer import Job, JobOutcomes, Transaction, Writer
 from action_assistant.schema.branches import BRANCHES
 from action_assistant.schema.editor_tables import editor_head, editor_snapshot
 from action_assistant.schema.log_tables import LOG
@@ -66,9 +66,10 @@ class Journal(JournalReader):
         self._branch: Final = branch
         self._loop = asyncio.get_running_loop()
         self._database = database
-        at_once = at_once and database.is_near
-        self._writer = Writer(database, session, fold, self._written, at_once=at_once)
+        self._at_once = at_once
+        self._writer = Writer(database, session, fold, self._written)
         self._jobs: list[Job[Any]] = []  # of this turn of the loop, for one transaction
+        self._untold = 0  # jobs that the writer's thread was given, of which nobody was told yet
         self._followers: set[Follower] = set()
         self._closed = False
         self._probe = JournalProbe(branch, self.derive, self._ask, lambda: self._writer.is_alive)
@@ -291,14 +292,24 @@ class Journal(JournalReader):
         self._jobs.append(job)
 
     def _submit(self) -> None:
-        if self._jobs:
-            jobs, self._jobs = self._jobs, []
-            self._tell(self._writer.submit(jobs))
+        if not self._jobs:
+            return
+        jobs, self._jobs = self._jobs, []
+        # Whoever follows hears events in their order, so what the thread has stored is told first.
+        if self._at_once and not self._untold and self._writer.is_quick(jobs):
+            self._tell(self._writer.commit(jobs))
+        else:
+            self._untold += len(jobs)
+            self._writer.submit(jobs)
 
-    def _written(self, outcomes: Told) -> None:
-        self._loop.call_soon_threadsafe(self._tell, outcomes)
+    def _written(self, outcomes: JobOutcomes) -> None:
+        self._loop.call_soon_threadsafe(self._tell_of_thread, outcomes)
 
-    def _tell(self, outcomes: Told) -> None:
+    def _tell_of_thread(self, outcomes: JobOutcomes) -> None:
+        self._untold -= len(outcomes)
+        self._tell(outcomes)
+
+    def _tell(self, outcomes: JobOutcomes) -> None:
         for job, (result, error, events) in outcomes:
             try:
                 job.done(result, error)

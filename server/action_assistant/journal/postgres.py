@@ -131,7 +131,7 @@ class PostgresSession:
 class Postgres:
     """A Postgres database in which this process is the only writer."""
 
-    is_near: Final = False
+    is_local: Final = False
     patience: Final = 10.0
     faults: Final[tuple[type[Exception], ...]] = (
         asyncpg.PostgresError,

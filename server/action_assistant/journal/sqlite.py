@@ -129,7 +129,7 @@ def _insert_of(rows: int) -> str:
 class Sqlite:
     """A SQLite file that this process owns."""
 
-    is_near: Final = True
+    is_local: Final = True
     patience: Final = 0.0
     faults: Final[tuple[type[Exception], ...]] = (
         sqlite3.Error,

@@ -55,7 +55,7 @@ class Job(Generic[T]):
 
 
 #: Jobs of one transaction, each with its outcome.
-Told: TypeAlias = Sequence[tuple[Job[Any], Outcome]]
+JobOutcomes: TypeAlias = Sequence[tuple[Job[Any], Outcome]]
 
 
 class Transaction:
@@ -198,7 +198,6 @@ class Writer:
     """The only writer of a database. What waits while a commit is under way is the next one.
 
     `tell` is called on the writer's thread after each commit or failure there, once for all its jobs.
-    `at_once`: whoever submits something brief may commit it, while commits are quick (decision 94).
     """
 
     def __init__(
@@ -206,13 +205,10 @@ class Writer:
         database: Database,
         session: WriterSession | None,
         fold: Fold,
-        tell: Callable[[Told], None],
+        tell: Callable[[JobOutcomes], None],
         clock: Clock = now,
-        *,
-        at_once: bool = False,
     ) -> None:
         self._database = database
-        self._at_once = at_once
         self._session = session
         self._fold = fold
         self._tell = tell
@@ -225,20 +221,22 @@ class Writer:
         )
         self._thread.start()
 
-    def submit(self, jobs: Sequence[Job[Any]]) -> Told:
-        """Queue jobs, for one transaction if it can hold them, and return at once: nothing. Or commit them
-        here, and say what became of them. Only for one thread, before `close`."""
-        # Its thread counts a job as done when it needs the session no more.
-        here = self._at_once and not self.metrics.waiting and self._is_quick(jobs)
+    def submit(self, jobs: Sequence[Job[Any]]) -> None:
+        """Queue jobs, for one transaction if it can hold them; returns at once."""
         self.metrics.submitted(len(jobs))
-        if here:
-            return self._commit(jobs)
         self._jobs.put(jobs)
-        return ()
 
-    def _is_quick(self, jobs: Sequence[Job[Any]]) -> bool:
+    def commit(self, jobs: Sequence[Job[Any]]) -> JobOutcomes:
+        """Commit jobs here and now. Only while of everything that was submitted `tell` has said what became
+        of it."""
+        self.metrics.submitted(len(jobs))
+        return self._commit(jobs)
+
+    def is_quick(self, jobs: Sequence[Job[Any]]) -> bool:
+        """Whether `commit` would not take long with these (decision 94)."""
         return (
-            self.metrics.quick.are_quick
+            self._database.is_local
+            and self.metrics.quick.are_quick
             and self.metrics.failing is None
             and self._transaction is not None  # to connect again may take long
             and len(jobs) <= _AT_ONCE
@@ -278,7 +276,7 @@ class Writer:
                 return found, False
         return found, True
 
-    def _commit(self, jobs: Sequence[Job[Any]]) -> Told:
+    def _commit(self, jobs: Sequence[Job[Any]]) -> JobOutcomes:
         done: list[Outcome] = []
         transaction: Transaction | None = None
         self.metrics.begins()

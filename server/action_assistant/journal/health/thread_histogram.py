@@ -1,4 +1,4 @@
-"""A histogram that only one thread counts in: a tenth of the price of one that any thread may."""
+"""A histogram that one thread at a time counts in: a tenth of the price of one that any may."""
 
 from bisect import bisect_left
 from collections.abc import Iterator, Sequence
