@@ -2,7 +2,7 @@
 
 import { execFileSync } from "node:child_process";
 import { expect, type Page, test } from "@playwright/test";
-import { saved, start } from "./canvas";
+import { boxOf, saved, start } from "./canvas";
 import { Product } from "./product";
 
 const product = new Product();
@@ -27,6 +27,26 @@ async function running(page: Page): Promise<void> {
   await start(page);
   await expect.poll(async () => (await states())[0]).toBe("running");
   await expect(page.getByRole("button", { name: /^Stop run/ })).toBeVisible();
+}
+
+/** At each width: what is said of the runner lies on no tool, and on STOP nothing is cut off. */
+async function nothingCovered(page: Page): Promise<void> {
+  const { width: before = 0, height = 0 } = page.viewportSize() ?? {};
+  const status = page.getByRole("status");
+  for (const width of [1280, 1100, 820]) {
+    await page.setViewportSize({ width, height });
+    await expect(async () => {
+      const said = await boxOf(status.filter({ hasText: "Runner unknown since" }));
+      const tools = await boxOf(page.getByRole("toolbar", { name: "Canvas tools" }));
+      expect(said.x >= tools.x + tools.width || said.y + said.height <= tools.y).toBe(true);
+      const stop = await boxOf(page.getByRole("button", { name: /^Stop / }).first());
+      const words = await boxOf(page.getByText("state unknown"));
+      expect(words.x).toBeGreaterThan(stop.x + 2);
+      expect(words.x + words.width).toBeLessThan(stop.x + stop.width - 2);
+      expect(words.y + words.height).toBeLessThan(stop.y + stop.height);
+    }, `at ${width} px`).toPass({ timeout: 10_000 });
+  }
+  await page.setViewportSize({ width: before, height });
 }
 
 test("while the editor is frozen, and after it has died", async ({ browser }) => {
@@ -83,6 +103,7 @@ test("while it cannot be sent the page says so, and goes on trying until it is p
     await expect(alert).toBeVisible();
     await page.waitForTimeout(3_000); // longer than one try may take
     await expect(alert).toBeVisible();
+    await nothingCovered(page);
   } finally {
     process.kill(runner, "SIGCONT");
   }
@@ -136,7 +157,7 @@ test("in sight on every width, whatever else the bar has to say", async ({ brows
       expect(box).not.toBeNull();
       expect(box?.x).toBeGreaterThanOrEqual(0);
       expect((box?.x ?? 0) + (box?.width ?? 0)).toBeLessThanOrEqual(width);
-    }, `at ${width} px`).toPass();
+    }, `at ${width} px`).toPass({ timeout: 10_000 });
   }
   await page.getByRole("button", { name: /^Stop run/ }).click();
   await expect.poll(async () => (await states())[0]).toBe("stopped");

@@ -98,10 +98,14 @@ function Emptiness({ waiting, context }: { waiting: boolean; context: EditorCont
   );
 }
 
-function Tools({ compact, hidden }: { compact: boolean; hidden: boolean }) {
+/** The tools, and what there is to say in the other corner. */
+function Foot(props: { compact: boolean; hidden: boolean; children: ReactNode }) {
   return (
-    <div className={style.tools} data-covers="bottom" data-hidden={hidden || undefined}>
-      <Toolbar compact={compact} />
+    <div className={style.foot}>
+      <div className={style.tools} data-covers="bottom" data-hidden={props.hidden || undefined}>
+        <Toolbar compact={props.compact} />
+      </div>
+      <div className={style.corner}>{props.children}</div>
     </div>
   );
 }
@@ -195,11 +199,10 @@ function Inside(props: Props) {
           <Emptiness waiting={waiting} context={context} />
           {!compact && <Robots />}
           <FollowFrame />
-          <Tools compact={compact || side !== null} hidden={phone && (dry ?? then) === true} />
-          <div className={style.corner}>
+          <Foot compact={compact || side !== null} hidden={phone && (dry ?? then) === true}>
             {lost && <FollowRun onFollow={onFollow} />}
             {!context.dryRun && corner}
-          </div>
+          </Foot>
         </div>
       </div>
       <Below context={context} record={props.record} {...{ past }} />
