@@ -48,9 +48,9 @@ function sizeOf(chunk: Chunk): number {
  */
 const BUDGETS: readonly (readonly [page: string, most: number, entries: readonly string[]])[] = [
   ["the list of graphs", 170, ["src/app/home-screen.tsx"]],
-  ["the editor", 327, ["src/app/graph-screen.tsx"]],
+  ["the editor", 328, ["src/app/graph-screen.tsx"]],
   ["administration", 170, ["src/app/administration-screen.tsx"]],
-  ["robots", 200, ["src/app/robots-screen.tsx"]],
+  ["robots", 201, ["src/app/robots-screen.tsx"]],
 ];
 
 test.each(BUDGETS)("%s needs at most %i kB of JavaScript", (_, most, entries) => {

@@ -3,7 +3,8 @@ import { Skeleton } from "@mantine/core";
 import { Link } from "wouter";
 import { authorName, type GraphSummary } from "../api/graphs";
 import { newestRun, useLive } from "../api/live/use-live";
-import { runEndText, runLabel, type Tone } from "../status/progress";
+import { runEndText, type Tone } from "../status/progress";
+import { runStatus } from "../status/run-status";
 import { toneColor } from "../status/state-label";
 import { ago, instant, stopwatch, useNow } from "../ui/times";
 import { GraphCounts } from "./graph-counts";
@@ -29,11 +30,13 @@ export function GraphRow({ graph, current }: { graph: GraphSummary; current: boo
   let tone: Tone = "idle";
   let words: string | null = null;
   if (run) {
-    tone = runLabel(run).tone;
+    const status = runStatus(run, live);
+    tone = status.tone;
     const start = instant(run.started_at) ?? now;
     const end = instant(run.ended_at) ?? now;
+    const took = live.link === "down" ? "" : ` · ${stopwatch(now - start)}`;
     words = goes
-      ? `${authorName(run.author)} · ${runLabel(run).word} · ${stopwatch(now - start)}`
+      ? `${authorName(run.author)} · ${status.word}${took}`
       : `${runEndText(run)} · ${ago(end, now)}`;
   }
   return (

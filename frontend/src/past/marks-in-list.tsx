@@ -3,7 +3,7 @@ import { Link } from "wouter";
 import type { HistoryEntry } from "../api/documents/history";
 import { authorName } from "../api/graphs";
 import type { ListedRun } from "../api/review";
-import { runEndText, runLabel } from "../status/progress";
+import { useRunStatus } from "../status/run-status";
 import { StateLabel } from "../status/state-label";
 import { hourMinute, instant } from "../ui/times";
 import style from "./history-panel.module.css";
@@ -36,7 +36,7 @@ export function VersionRow({ entry, name, chosen, onChoose }: VersionProps) {
 }
 
 export function RunRow({ run, version }: { run: ListedRun; version: string }) {
-  const { tone, word } = runLabel(run);
+  const { tone, word } = useRunStatus(run);
   const at = run.started_at ?? run.requested_at;
   return (
     <li className={style.mark} data-run={run.number}>
@@ -44,7 +44,7 @@ export function RunRow({ run, version }: { run: ListedRun; version: string }) {
         <StateLabel still tone={tone} word={`Run ${run.number}`} />
         <span>
           {version === "" ? "" : `${version} · `}
-          {run.ended_at === null ? word : runEndText(run)}
+          {word}
         </span>
         <time dateTime={at}>{timeOf(at)}</time>
       </Link>

@@ -25,7 +25,7 @@ import {
 } from "../api/review";
 import { hasEnded, type Run, runPlace } from "../api/runs";
 import { boundsText } from "../status/durations";
-import { runEndText, runLabel } from "../status/progress";
+import { useRunStatus } from "../status/run-status";
 import { StateLabel } from "../status/state-label";
 import { Empty } from "../ui/empty";
 import { clock, day, instant, stopwatch, useNow } from "../ui/times";
@@ -63,11 +63,11 @@ interface RunRowProps {
 function Row({ run, now, chosen, onChoose }: RunRowProps) {
   const [, go] = useLocation();
   const label = useVersionLabel(run);
-  const { tone, word } = runLabel(run);
+  const { tone, word } = useRunStatus(run);
   const start = instant(run.started_at);
   const end = instant(run.ended_at);
   const over = end === null ? null : (boundsText(run.took) ?? "—");
-  const took = over ?? (start === null ? "" : stopwatch(now - start));
+  const took = over ?? (start === null || tone === "unknown" ? "" : stopwatch(now - start));
   const to = `/runs/${run.id}`;
   return (
     <tr className={style.row} onClick={() => go(to)}>
@@ -81,7 +81,7 @@ function Row({ run, now, chosen, onChoose }: RunRowProps) {
         />
       </td>
       <td className={style.state}>
-        <StateLabel tone={tone} word={run.ended_at === null ? word : runEndText(run)} />
+        <StateLabel tone={tone} word={word} />
       </td>
       <td>
         <Link to={to} className={style.link} onClick={(event) => event.stopPropagation()}>

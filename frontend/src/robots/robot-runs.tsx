@@ -6,7 +6,7 @@ import { Link } from "wouter";
 import { errorText } from "../api/http";
 import { foreignGraphs, openRuns, useLive } from "../api/live/use-live";
 import { heldGraph, type Robot, stopRobot } from "../api/robots";
-import { runLabel } from "../status/progress";
+import { runStatus } from "../status/run-status";
 import { StateLabel } from "../status/state-label";
 import style from "./robot-runs.module.css";
 
@@ -74,7 +74,7 @@ export function RobotRuns({ robot, onImport }: Props) {
     <ul className={style.list} aria-label={`What runs on ${robot.name}`}>
       {own.map((run) => (
         <li key={run.id} className={style.line}>
-          <StateLabel {...runLabel(run)} />
+          <StateLabel {...runStatus(run, now)} />
           <Link to={`/runs/${run.id}`} className={style.name}>
             Run {run.number} of {run.graph_name}
           </Link>

@@ -1,8 +1,10 @@
 /** Whether what runs is what is on screen, in words; where it is not, the way to send it. */
 import { useMemo } from "react";
+import { useLive } from "../api/live/use-live";
 import type { Run } from "../api/runs";
 import { differences } from "../graph/meaning";
 import type { Graph } from "../graph/model";
+import { runStatus } from "../status/run-status";
 import { lazyPart } from "../ui/parts/lazy-part";
 import { PartBoundary } from "../ui/parts/part-boundary";
 import style from "./draft-status.module.css";
@@ -21,8 +23,15 @@ interface Props {
   obstacle: string | null;
 }
 
+/** What was sent is certain also while nobody knows whether it runs. */
+function words(differs: boolean, known: boolean): string {
+  if (differs) return known ? "Graph differs from running" : "Graph differs from sent";
+  return known ? "Running" : "Sent";
+}
+
 export function DraftStatus({ run, label, graph, seq, settle, obstacle }: Props) {
   const running = useRunningGraph(run);
+  const { now } = useLive();
   const found = useMemo(
     () => (running === null || running.seq === seq ? [] : differences(running.graph, graph)),
     [running, seq, graph],
@@ -30,7 +39,7 @@ export function DraftStatus({ run, label, graph, seq, settle, obstacle }: Props)
   if (run === null || run.ended_at !== null) return null;
   return (
     <span className={style.word} data-differs={found.length > 0 || undefined}>
-      {found.length > 0 ? "Graph differs from running" : "Running"} <i>{label}</i>
+      {words(found.length > 0, runStatus(run, now).tone !== "unknown")} <i>{label}</i>
       {found.length > 0 && (
         <PartBoundary waiting={null}>
           <ModifyRun

@@ -1,5 +1,6 @@
 /** What can be said of an action of a run, and of the run, in one word and one tone. */
 import type { ActionRun, Run, Visit } from "../api/runs";
+import { clock } from "../ui/times";
 
 export type Tone = "idle" | "run" | "true" | "false" | "error" | "stopped" | "done" | "unknown";
 
@@ -148,23 +149,24 @@ export function progressAt(found: Map<string, Progress>, at: number | null): Map
   return found;
 }
 
-function clockOf(text: string): string {
-  return new Date(text).toLocaleTimeString(undefined, { hour12: false });
+/** Nobody knows how a run goes on. `since`: ms. */
+export function unknownStatus(since: number): { tone: Tone; word: string } {
+  return { tone: "unknown", word: `unknown since ${clock(since)}` };
 }
 
-const runWords: Record<Run["state"], { tone: Tone; word: string }> = {
-  requested: { tone: "run", word: "requested" },
-  published: { tone: "run", word: "starting" },
-  running: { tone: "run", word: "running" },
-  paused: { tone: "stopped", word: "paused" },
-  stopping: { tone: "stopped", word: "stopping" },
-  unknown: { tone: "unknown", word: "unknown" },
-  finished: { tone: "true", word: "finished" },
-  halted: { tone: "stopped", word: "halted" },
-  stopped: { tone: "stopped", word: "stopped" },
-  error: { tone: "error", word: "error" },
-  refused: { tone: "error", word: "refused" },
-  lost: { tone: "unknown", word: "lost" },
+const runTones: Record<Run["state"], Tone> = {
+  requested: "run",
+  published: "run",
+  running: "run",
+  paused: "stopped",
+  stopping: "stopped",
+  unknown: "unknown",
+  finished: "true",
+  halted: "stopped",
+  stopped: "stopped",
+  error: "error",
+  refused: "error",
+  lost: "unknown",
 };
 
 /** The run's state, with the result where it has one that says more. */
@@ -174,14 +176,15 @@ export function runLabel(run: Run): { tone: Tone; word: string } {
     return { tone: "error", word: run.state === "lost" ? "lost" : "stop unconfirmed" };
   }
   if (run.state === "unknown" && run.unknown_since) {
-    return { tone: "unknown", word: `unknown since ${clockOf(run.unknown_since)}` };
+    return unknownStatus(Date.parse(run.unknown_since));
   }
   if (run.state === "finished" && run.result && run.result !== "on_true") {
     const word = run.result.replace(/^on_/, "");
     return { tone: resultTone[run.result] ?? "done", word: `finished: ${word}` };
   }
   if (run.state === "finished" && !run.result) return { tone: "done", word: "finished" };
-  return runWords[run.state] ?? { tone: "unknown", word: run.state };
+  const word = run.state === "published" ? "starting" : run.state;
+  return { tone: runTones[run.state] ?? "unknown", word };
 }
 
 /** The end in words, for history. */

@@ -8,7 +8,7 @@ import type { GraphSummary } from "../../api/graphs";
 import { newestRun, useLive } from "../../api/live/use-live";
 import { useKnownColors } from "../../api/people";
 import { type Run, useRuns } from "../../api/runs";
-import { runEndText, runLabel } from "../../status/progress";
+import { useRunStatus } from "../../status/run-status";
 import { StateLabel } from "../../status/state-label";
 import { Empty } from "../../ui/empty";
 import { colorOfName, initials } from "../../ui/name-colors";
@@ -31,11 +31,7 @@ function LastRun({ run, now }: { run: Run; now: number }) {
   const going = run.ended_at === null;
   const at = instant(run.ended_at ?? run.started_at ?? run.requested_at);
   return (
-    <StateLabel
-      tone={runLabel(run).tone}
-      word={going ? runLabel(run).word : runEndText(run)}
-      {...(at === null || going ? {} : { more: ago(at, now) })}
-    />
+    <StateLabel {...useRunStatus(run)} {...(at === null || going ? {} : { more: ago(at, now) })} />
   );
 }
 

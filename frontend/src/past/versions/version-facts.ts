@@ -1,7 +1,8 @@
 /** What is told of a version beside its name: its number, and what became of its runs. Pure. */
 import type { Version } from "../../api/graphs";
 import type { ListedRun } from "../../api/review";
-import { runLabel, type Tone } from "../../status/progress";
+import type { Tone } from "../../status/progress";
+import { type Heard, runStatus } from "../../status/run-status";
 
 export interface ListedVersion {
   readonly version: Version;
@@ -37,10 +38,10 @@ export interface ResultCount {
 }
 
 /** How often its runs ended in which way, the most frequent first. */
-export function resultCounts(runs: readonly ListedRun[]): ResultCount[] {
+export function resultCounts(runs: readonly ListedRun[], heard: Heard): ResultCount[] {
   const found = new Map<string, ResultCount>();
   for (const run of runs) {
-    const { tone, word } = runLabel(run);
+    const { tone, word } = runStatus(run, heard);
     const known = found.get(word);
     found.set(word, { tone, word, count: (known?.count ?? 0) + 1 });
   }
@@ -48,10 +49,10 @@ export function resultCounts(runs: readonly ListedRun[]): ResultCount[] {
 }
 
 /** `3 runs: 2 finished, 1 error`. */
-export function runsWords(runs: readonly ListedRun[]): string {
+export function runsWords(runs: readonly ListedRun[], heard: Heard): string {
   const [only, ...others] = runs;
   if (only === undefined) return "No run yet";
-  const counted = resultCounts(runs).map(({ word, count }) => `${count} ${word}`);
+  const counted = resultCounts(runs, heard).map(({ word, count }) => `${count} ${word}`);
   return `${others.length === 0 ? "1 run" : `${runs.length} runs`}: ${counted.join(", ")}`;
 }
 

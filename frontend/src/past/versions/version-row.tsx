@@ -3,8 +3,9 @@ import { ActionIcon, Button } from "@mantine/core";
 import { IconCopy, IconCopyPlus, IconGitCompare, IconLink, IconRestore } from "@tabler/icons-react";
 import { Link } from "wouter";
 import { authorName } from "../../api/graphs";
+import { useLive } from "../../api/live/use-live";
 import type { ListedRun } from "../../api/review";
-import { runEndText, runLabel } from "../../status/progress";
+import { useRunStatus } from "../../status/run-status";
 import { StateLabel } from "../../status/state-label";
 import { Tooltip } from "../../ui/floating/tooltip";
 import { day, hourMinute, instant } from "../../ui/times";
@@ -20,16 +21,31 @@ const timeWords = (text: string | null, now: number): string => {
   return at === null ? "" : `${day(at, now)} ${hourMinute(at)}`;
 };
 
+function NewRun({ run, now }: { run: ListedRun; now: number }) {
+  const { tone, word } = useRunStatus(run);
+  const at = run.started_at ?? run.requested_at;
+  return (
+    <li>
+      <Link to={`/runs/${run.id}`}>
+        <StateLabel still tone={tone} word={`Run ${run.number}`} />
+        <span>{word}</span>
+        <time dateTime={at}>{timeWords(at, now)}</time>
+      </Link>
+    </li>
+  );
+}
+
 function Runs({ runs, now }: { runs: readonly ListedRun[]; now: number }) {
-  if (runs.length === 0) return <p className={style.quiet}>{runsWords(runs)}</p>;
+  const { now: heard } = useLive();
+  if (runs.length === 0) return <p className={style.quiet}>{runsWords(runs, heard)}</p>;
   return (
     <>
       {runs.length > 1 && (
         <p className={style.counts}>
-          <span className="visually-hidden">{runsWords(runs)}</span>
+          <span className="visually-hidden">{runsWords(runs, heard)}</span>
           <span aria-hidden>
             {runs.length} runs:{" "}
-            {resultCounts(runs).map(({ tone, word, count }) => (
+            {resultCounts(runs, heard).map(({ tone, word, count }) => (
               <StateLabel key={word} still tone={tone} word={`${count} ${word}`} />
             ))}
           </span>
@@ -37,15 +53,7 @@ function Runs({ runs, now }: { runs: readonly ListedRun[]; now: number }) {
       )}
       <ul className={style.runs} aria-label="Newest runs">
         {runs.slice(0, NEWEST).map((run) => (
-          <li key={run.id}>
-            <Link to={`/runs/${run.id}`}>
-              <StateLabel still tone={runLabel(run).tone} word={`Run ${run.number}`} />
-              <span>{run.ended_at === null ? runLabel(run).word : runEndText(run)}</span>
-              <time dateTime={run.started_at ?? run.requested_at}>
-                {timeWords(run.started_at ?? run.requested_at, now)}
-              </time>
-            </Link>
-          </li>
+          <NewRun key={run.id} run={run} now={now} />
         ))}
       </ul>
     </>

@@ -10,7 +10,8 @@ import { useLive } from "../../api/live/use-live";
 import { type Comparison, listRuns, NO_FILTER, useComparison } from "../../api/review";
 import { getRun, type Run, useRun } from "../../api/runs";
 import { boundsText } from "../../status/durations";
-import { runEndText, runLabel } from "../../status/progress";
+import { runEndText } from "../../status/progress";
+import { useRunStatus } from "../../status/run-status";
 import { StateLabel } from "../../status/state-label";
 import { Empty } from "../../ui/empty";
 import { clock, day, instant, useNow } from "../../ui/times";
@@ -26,13 +27,12 @@ function Head({ run, title }: { run: Run; title: string }) {
   const now = useNow(60_000);
   const start = instant(run.started_at);
   const end = instant(run.ended_at);
-  const { tone, word } = runLabel(run);
   return (
     <section className={style.run} aria-label={title}>
       <Link to={`/runs/${run.id}`} className={style.link}>
         Run {run.number} · {run.graph_name}
       </Link>
-      <StateLabel pill tone={tone} word={end === null ? word : runEndText(run)} />
+      <StateLabel pill {...useRunStatus(run)} />
       <span className={style.meta}>
         {run.simulated ? "simulator" : run.engine} · {authorName(run.author)}
         {start !== null && ` · ${day(start, now)} ${clock(start)}`}

@@ -16,10 +16,11 @@ import { type Lane, lanesOf, useLanes } from "../../status/lanes/lanes";
 import { Timeline, type Track } from "../../status/lanes/timeline";
 import { INTO } from "../../status/level-words";
 import { runEndText, runLabel } from "../../status/progress";
+import { useRunStatus } from "../../status/run-status";
 import { StateLabel } from "../../status/state-label";
 import { useProgress } from "../../status/use-progress";
 import { Empty } from "../../ui/empty";
-import { clock, instant, useNow } from "../../ui/times";
+import { instant, useNow } from "../../ui/times";
 import type { Crumb } from "../../ui/top-bar";
 import { LevelBar } from "../levels/level-bar";
 import { graphsOn } from "../levels/sent-levels";
@@ -102,18 +103,13 @@ function crumbsOf(run: Run): Crumb[] {
 }
 
 /** How the run goes, or went at the moment that is shown. */
-function RunStatus({ newest, run, past, unsure }: RunStatusProps) {
-  const { now: live } = useLive();
+function RunStatus({ newest, run, past }: RunStatusProps) {
+  const now = useRunStatus(run);
   const { tone, word } = runLabel(run);
-  const since = `unknown since ${clock(live.since)}`;
-  const seen = unsure && !past;
+  const then = { tone, word: run.ended_at === null ? word : runEndText(run) };
   return (
     <>
-      <StateLabel
-        pill
-        tone={seen ? "unknown" : tone}
-        word={seen ? since : run.ended_at === null ? word : runEndText(run)}
-      />
+      <StateLabel pill {...(past ? then : now)} />
       {past && <span className={style.simulated}>as it was then</span>}
       {newest.simulated && <span className={style.simulated}>simulated</span>}
     </>
@@ -125,7 +121,6 @@ interface RunStatusProps {
   /** As it was at the moment that is shown. */
   run: Run;
   past: boolean;
-  unsure: boolean;
 }
 
 interface AboutRunProps {
@@ -278,7 +273,7 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
     <>
       {bar({
         crumbs: crumbsOf(newest),
-        status: <RunStatus newest={newest} run={run} past={past} unsure={unsure} />,
+        status: <RunStatus newest={newest} run={run} past={past} />,
         actions: (
           <>
             <PinRun runner={runner} run={newest.id} />

@@ -6,7 +6,7 @@ import { authorName } from "../../api/graphs";
 import { useLive } from "../../api/live/use-live";
 import type { Run } from "../../api/runs";
 import { boundsText } from "../../status/durations";
-import { runEndText, runLabel } from "../../status/progress";
+import { useRunStatus } from "../../status/run-status";
 import { StateLabel } from "../../status/state-label";
 import { colorOfName } from "../../ui/name-colors";
 import { clock, day, instant, stopwatch, useNow } from "../../ui/times";
@@ -95,7 +95,6 @@ export function RunHead(props: Props) {
   const { now } = useLive();
   const goes = run.ended_at === null;
   const unsure = now.link === "down" && goes;
-  const { tone, word } = runLabel(run);
   return (
     <header className={style.head}>
       <b>Run {run.number}</b>
@@ -105,12 +104,7 @@ export function RunHead(props: Props) {
         </span>
       )}
       <span className={style.version}>{versionLabel}</span>
-      <StateLabel
-        pill
-        still
-        tone={unsure ? "unknown" : tone}
-        word={unsure ? `unknown since ${clock(now.since)}` : goes ? word : runEndText(run)}
-      />
+      <StateLabel pill still {...useRunStatus(run)} />
       <Origin run={run} until={unsure ? now.since : null} />
       <span className={style.gap} />
       {told !== "" && (

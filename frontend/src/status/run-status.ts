@@ -1,0 +1,27 @@
+/** How a run stands at this moment, wherever it is listed: nobody knows while the runner is not heard. */
+import type { LiveState } from "../api/live/live-socket";
+import { useLive } from "../api/live/use-live";
+import type { Run } from "../api/runs";
+import { runEndText, runLabel, type Tone, unknownStatus } from "./progress";
+
+export interface RunStatus {
+  readonly tone: Tone;
+  readonly word: string;
+}
+
+export type Heard = Pick<LiveState, "link" | "since">;
+
+/** In a word, as it is counted. What has ended stays so, whoever is heard. Pure. */
+export function runStatus(run: Run, { link, since }: Heard): RunStatus {
+  if (run.ended_at === null && link === "down") {
+    return unknownStatus(since);
+  }
+  return runLabel(run);
+}
+
+/** The same; of an end also who or what brought it. */
+export function useRunStatus(run: Run): RunStatus {
+  const { now } = useLive();
+  const { tone, word } = runStatus(run, now);
+  return { tone, word: run.ended_at === null ? word : runEndText(run) };
+}
