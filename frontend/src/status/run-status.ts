@@ -4,15 +4,10 @@ import { useLive } from "../api/live/use-live";
 import type { Run } from "../api/runs";
 import { runEndText, runLabel, type Tone, unknownStatus } from "./progress";
 
-export interface RunStatus {
-  readonly tone: Tone;
-  readonly word: string;
-}
-
 export type Heard = Pick<LiveState, "link" | "since">;
 
 /** In a word, as it is counted. What has ended stays so, whoever is heard. Pure. */
-export function runStatus(run: Run, { link, since }: Heard): RunStatus {
+export function runStatus(run: Run, { link, since }: Heard): { tone: Tone; word: string } {
   if (run.ended_at === null && link === "down") {
     return unknownStatus(since);
   }
@@ -20,7 +15,7 @@ export function runStatus(run: Run, { link, since }: Heard): RunStatus {
 }
 
 /** The same; of an end also who or what brought it. */
-export function useRunStatus(run: Run): RunStatus {
+export function useRunStatus(run: Run): { tone: Tone; word: string } {
   const { now } = useLive();
   const { tone, word } = runStatus(run, now);
   return { tone, word: run.ended_at === null ? word : runEndText(run) };

@@ -21,7 +21,7 @@ const timeWords = (text: string | null, now: number): string => {
   return at === null ? "" : `${day(at, now)} ${hourMinute(at)}`;
 };
 
-function NewRun({ run, now }: { run: ListedRun; now: number }) {
+function RunItem({ run, now }: { run: ListedRun; now: number }) {
   const { tone, word } = useRunStatus(run);
   const at = run.started_at ?? run.requested_at;
   return (
@@ -53,7 +53,7 @@ function Runs({ runs, now }: { runs: readonly ListedRun[]; now: number }) {
       )}
       <ul className={style.runs} aria-label="Newest runs">
         {runs.slice(0, NEWEST).map((run) => (
-          <NewRun key={run.id} run={run} now={now} />
+          <RunItem key={run.id} run={run} now={now} />
         ))}
       </ul>
     </>
