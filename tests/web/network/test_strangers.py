@@ -1,11 +1,8 @@
 """Who says nothing, or not who they are, takes no room from those who are signed in."""
 
 import contextlib
-import os
 import resource
 import socket
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -14,9 +11,9 @@ from pathlib import Path
 import httpx
 import pytest
 
-from support.product import TOKEN, free_ports
+from support.product import TOKEN
+from web.process import BEARER, UPGRADE, started
 
-BEARER = {"authorization": f"Bearer {TOKEN}"}
 #: Descriptors that the process may have.
 FEW = 256
 
@@ -24,37 +21,8 @@ FEW = 256
 @contextmanager
 def process(name: str, folder: Path, *flags: str) -> Iterator[int]:
     """An editor or a runner that may have few descriptors."""
-    port = free_ports()
-    scheme = "https" if "--tls" in flags else "http"
-
-    def few() -> None:
-        resource.setrlimit(resource.RLIMIT_NOFILE, (FEW, FEW))
-
-    with (folder / "log").open("ab") as log:
-        running = subprocess.Popen(
-            [
-                *(sys.executable, "-m", "action_assistant", name),
-                *("--data", str(folder / "data"), "--port", str(port), *flags),
-            ],
-            env={**os.environ, "ACTION_ASSISTANT_TOKEN": TOKEN},
-            preexec_fn=few,
-            stdout=log,
-            stderr=log,
-        )
-    try:
-        deadline = time.monotonic() + 40
-        while True:
-            try:
-                url = f"{scheme}://127.0.0.1:{port}/readyz"
-                if httpx.get(url, trust_env=False, verify=False).status_code == 200:
-                    break
-            except httpx.TransportError:
-                assert time.monotonic() < deadline, (folder / "log").read_text()
-                time.sleep(0.05)
+    with started(name, folder, *flags, descriptors=FEW) as (port, _):
         yield port
-    finally:
-        running.terminate()
-        running.wait()
 
 
 @pytest.fixture(autouse=True)
@@ -136,11 +104,6 @@ def test_a_body_in_crumbs_is_refused(tmp_path: Path) -> None:
 CUT_OFF = (
     b"POST /api/session HTTP/1.1\r\nhost: localhost\r\norigin: http://localhost:%d\r\n"
     b"content-type: application/json\r\ncontent-length: 50\r\n\r\n{"
-)
-UPGRADE = (
-    b"GET /api/graphs/%b/room HTTP/1.1\r\nhost: localhost\r\nauthorization: Bearer %b\r\n"
-    b"connection: Upgrade\r\nupgrade: websocket\r\nsec-websocket-version: 13\r\n"
-    b"sec-websocket-key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
 )
 UNFINISHED = (
     b"%b HTTP/1.1\r\nhost: localhost\r\nauthorization: Bearer %b\r\naccept: %b\r\n"

@@ -14,8 +14,9 @@ from collections.abc import Mapping, MutableMapping
 from typing import Any, Final, Protocol
 
 from uvicorn._types import ASGIReceiveEvent, ASGISendEvent
-from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.http11 import Request
+
+from action_assistant.web.server.websocket import WebSocketProtocol
 
 try:
     from websockets.speedups import apply_mask
@@ -63,7 +64,7 @@ class Nobody:
         """Nothing."""
 
 
-class DirectSocket(WebSocketsSansIOProtocol):
+class DirectSocket(WebSocketProtocol):
     """One socket. `taker` hears its messages, once there is one."""
 
     def __init__(self, *args: Any, **more: Any) -> None:
@@ -74,6 +75,7 @@ class DirectSocket(WebSocketsSansIOProtocol):
         self._in_pieces: int | None = None
         self._pieces = 0  # of that message
         self._is_held = False  # its taker wants to hear nothing now
+        self._held_until = 0.0  # in the time of the loop
         self._waits = False  # until others had their turn
         self._late_ping: bytes | None = None  # the newest, of who reads nothing
         self._limit: Final = self.config.ws_max_size
@@ -125,6 +127,7 @@ class DirectSocket(WebSocketsSansIOProtocol):
     def resume_hearing(self) -> None:
         """Go on, beginning with what has come already."""
         self._is_held = False
+        self._held_until = self.loop.time()
         self._read_on()
         self._go_on()
 
@@ -204,6 +207,12 @@ class DirectSocket(WebSocketsSansIOProtocol):
         super().shutdown()
         if self._taker is not None:
             self._taker.gone()
+
+    def may_be_unread(self) -> bool:
+        """Whether the answer to the last ping may have come without having been read."""
+        # What came while nobody listened takes its time also after that.
+        was_held = self._is_held or self._held_until >= self.ping_sent_at
+        return was_held or self._waits or super().may_be_unread()
 
     # --- frames -------------------------------------------------------------------------------
 

@@ -26,6 +26,7 @@ from action_assistant.web.network.connections import Connections
 from action_assistant.web.server.direct import DirectSocket
 from action_assistant.web.server.proxy import ASKED, Forwarded
 from action_assistant.web.server.sockets import bound
+from action_assistant.web.server.websocket import WebSocketProtocol, end_connection
 
 if TYPE_CHECKING:  # slow to load, and most servers do without
     from action_assistant.web.network.certificate import Certificate
@@ -96,7 +97,7 @@ def _configured(app: ASGIApp, identity: "TlsIdentity | None", *, direct: bool) -
         access_log=False,
         proxy_headers=False,
         server_header=False,
-        ws=DirectSocket if direct else "websockets-sansio",
+        ws=DirectSocket if direct else WebSocketProtocol,
         ws_max_size=WEBSOCKET_LIMIT,
         ws_per_message_deflate=False,
         ws_ping_interval=10,
@@ -265,6 +266,14 @@ class _Http(H11Protocol):
             return
         self.transport.write(_LENGTH_REQUIRED)
         self.transport.close()
+
+    def shutdown(self) -> None:
+        """The process ends."""
+        if not self.transport.is_closing():
+            end_connection(self.transport, super().shutdown)
+            return
+        # All is said, and goes out as far as the peer reads it. A refusal is none that h11 knows of.
+        self._unset_keepalive_if_required()
 
 
 class _Strict(h11.Connection):

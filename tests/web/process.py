@@ -1,0 +1,56 @@
+"""An editor or a runner as a process of its own, and what clients say to it by hand."""
+
+import os
+import resource
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import httpx
+
+from support.product import COMMAND, TOKEN, free_ports
+
+BEARER = {"authorization": f"Bearer {TOKEN}"}
+UPGRADE = (
+    b"GET /api/graphs/%b/room HTTP/1.1\r\nhost: localhost\r\nauthorization: Bearer %b\r\n"
+    b"connection: Upgrade\r\nupgrade: websocket\r\nsec-websocket-version: 13\r\n"
+    b"sec-websocket-key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+)
+
+
+@contextmanager
+def started(
+    name: str, folder: Path, *flags: str, descriptors: int | None = None
+) -> Iterator[tuple[int, "subprocess.Popen[bytes]"]]:
+    """Its port, and the process, which may have so many descriptors. Its log is the file `log`."""
+    port = free_ports()
+    scheme = "https" if "--tls" in flags else "http"
+
+    def limit() -> None:
+        if descriptors is not None:
+            resource.setrlimit(resource.RLIMIT_NOFILE, (descriptors, descriptors))
+
+    with (folder / "log").open("ab") as log:
+        running = subprocess.Popen(
+            [*COMMAND, name, "--data", str(folder / "data"), "--port", str(port), *flags],
+            env={**os.environ, "ACTION_ASSISTANT_TOKEN": TOKEN},
+            preexec_fn=limit,
+            stdout=log,
+            stderr=log,
+        )
+    try:
+        deadline = time.monotonic() + 40
+        while True:
+            try:
+                url = f"{scheme}://127.0.0.1:{port}/readyz"
+                if httpx.get(url, trust_env=False, verify=False).status_code == 200:
+                    break
+            except httpx.TransportError:
+                assert time.monotonic() < deadline, (folder / "log").read_text()
+                time.sleep(0.05)
+        yield port, running
+    finally:
+        running.terminate()
+        running.wait()
