@@ -103,7 +103,7 @@ class EditorState:
 
     @property
     def services(self) -> EditorServices:
-        """The house. Only requests ask for it, and there are none before it is open."""
+        """What serves requests, of which there are none before it is open."""
         if self._services is None:
             raise RuntimeError("the editor is not open yet")
         return self._services

@@ -98,3 +98,11 @@ def test_kinds_that_we_do_not_know_are_passed_over() -> None:
 def test_a_count_that_the_bytes_cannot_hold_costs_nothing() -> None:
     with pytest.raises(Malformed):
         wire.parse(b"\x01\x06" + b"\xff" * 5 + b"\x0f")
+
+
+def test_more_entries_than_a_room_has_sockets_are_not_looked_at() -> None:
+    entry = PresenceEntry(1, 1, b"{}")
+    most = wire.presence([entry] * wire.MOST_ENTRIES)
+    assert wire.parse(most) == Presence((entry,) * wire.MOST_ENTRIES)
+    with pytest.raises(Malformed, match="entries"):
+        wire.parse(wire.presence([entry] * (wire.MOST_ENTRIES + 1)))

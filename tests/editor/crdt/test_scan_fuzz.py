@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from pycrdt import Array, Doc, Map, Text, merge_updates
 
 from action_assistant.editor.crdt.messages import Malformed, number
-from action_assistant.editor.crdt.update_scan import outline
+from action_assistant.editor.crdt.updates.update_scan import outline
 from editor import forged_updates
 from editor.crdt.test_scan import made, values
 from support.doses import examples

@@ -11,9 +11,9 @@ from pycrdt import Doc, Map, Text
 
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.crdt.messages import ByteReader, Edit, Malformed
-from action_assistant.editor.crdt.small_update import small_outline
-from action_assistant.editor.crdt.update_outline import UpdateOutline
-from action_assistant.editor.crdt.update_scan import outline, scanned
+from action_assistant.editor.crdt.updates.small_update import small_outline
+from action_assistant.editor.crdt.updates.update_outline import UpdateOutline
+from action_assistant.editor.crdt.updates.update_scan import outline, scanned
 from editor.crdt.test_scan import made, values
 from editor.crdt.test_scan_fuzz import base, mutated
 from support.doses import examples

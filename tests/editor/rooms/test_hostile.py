@@ -12,7 +12,7 @@ from action_assistant.editor.crdt.loading import load
 from action_assistant.editor.crdt.messages import Malformed
 from action_assistant.editor.crdt.nesting import DEEPEST_TYPES
 from action_assistant.editor.crdt.replica import WAITING_UPDATES, ForeignClient, Replica
-from action_assistant.editor.crdt.update_scan import outline
+from action_assistant.editor.crdt.updates.update_scan import outline
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import TooMany
 from action_assistant.journal.journal import Journal

@@ -1,10 +1,12 @@
 """Rooms are opened once, stay open while somebody is there, and close for all."""
 
 import asyncio
+from typing import Any
 
 import pytest
 
 from action_assistant.editor.crdt import messages
+from action_assistant.editor.crdt.loading import Loaded, load
 from action_assistant.editor.rooms.batch import Taken
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.editor.rooms.room import Room
@@ -165,3 +167,33 @@ async def test_a_room_that_fails_closes_alone(
 
 class Panic(BaseException):
     """As the library's: no Exception."""
+
+
+async def test_a_room_whose_only_visitor_gave_up_while_it_was_loaded_is_let_go(
+    journal: Journal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    loading, go_on = asyncio.Event(), asyncio.Event()
+
+    async def slowly(*args: Any, **more: Any) -> Loaded:
+        loading.set()
+        await go_on.wait()
+        return await load(*args, **more)
+
+    monkeypatch.setattr("action_assistant.editor.rooms.open_rooms.load", slowly)
+    rooms = Rooms(journal, linger=0.05, window=0)
+
+    async def visit() -> None:
+        async with rooms.enter(STREAM):
+            pass
+
+    visitor = asyncio.create_task(visit())
+    await loading.wait()
+    visitor.cancel()
+    await asyncio.wait([visitor])
+    go_on.set()
+    async with asyncio.timeout(2):
+        while rooms.open_room(STREAM) is None:  # noqa: ASYNC110 - nobody tells when it is loaded
+            await asyncio.sleep(0.005)
+        while rooms.open_room(STREAM) is not None:  # noqa: ASYNC110 - nor when it is gone
+            await asyncio.sleep(0.005)
+    await rooms.close()

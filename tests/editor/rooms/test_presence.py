@@ -3,13 +3,19 @@
 import json
 from typing import Any
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.crdt.messages import PresenceEntry
 from action_assistant.editor.rooms.open_rooms import Rooms
-from action_assistant.editor.rooms.presence import STATE_LIMIT, RoomPresence, Seat
+from action_assistant.editor.rooms.presence import (
+    MOST_NUMBER,
+    STATE_LIMIT,
+    PresenceOwner,
+    RoomPresence,
+)
 from action_assistant.web.auth.keys import Person
 from editor.client import Client, settle
 
@@ -22,12 +28,12 @@ def said(entries: list[PresenceEntry]) -> dict[int, Any]:
     return {each.client: json.loads(each.state) for each in entries}
 
 
-def seat(name: str) -> Seat:
-    return Seat(Person(name, name.title()))
+def owner(name: str) -> PresenceOwner:
+    return PresenceOwner(Person(name, name.title()))
 
 
 def test_the_server_says_who_it_is() -> None:
-    room, ada = RoomPresence(), Seat(Person("ada", "Ada"), "#d110bc")
+    room, ada = RoomPresence(), PresenceOwner(Person("ada", "Ada"), "#d110bc")
     told = room.hear(ada, (entry(7, cursor=[1, 2], user={"id": "bob", "name": "Bob"}),))
     user = {"id": "ada", "name": "Ada", "color": "#d110bc"}
     assert said(told) == {7: {"cursor": [1, 2], "user": user}}
@@ -36,7 +42,7 @@ def test_the_server_says_who_it_is() -> None:
 def test_names_of_any_script_arrive_whole() -> None:
     room = RoomPresence()
     person = Person("x", "Ülle 🤖 اسم 名前")
-    told = room.hear(Seat(person), (entry(1, editing="ключ"),))
+    told = room.hear(PresenceOwner(person), (entry(1, editing="ключ"),))
     frame = messages.presence(told)
     parsed = messages.parse(frame)
     assert isinstance(parsed, messages.Presence)
@@ -45,7 +51,7 @@ def test_names_of_any_script_arrive_whole() -> None:
 
 
 def test_nobody_speaks_for_others() -> None:
-    room, ada, eve = RoomPresence(), seat("ada"), seat("eve")
+    room, ada, eve = RoomPresence(), owner("ada"), owner("eve")
     room.hear(ada, (entry(1, cursor=[0, 0]),))
     assert room.hear(eve, (entry(1, 9, cursor=[6, 6]),)) == []
     assert room.hear(eve, (PresenceEntry(1, 9, b"null"),)) == []
@@ -56,7 +62,7 @@ def test_nobody_speaks_for_others() -> None:
 
 
 def test_who_reconnects_takes_over_from_the_socket_before() -> None:
-    room, old, new = RoomPresence(), seat("ada"), seat("ada")
+    room, old, new = RoomPresence(), owner("ada"), owner("ada")
     room.hear(old, (entry(1, 5),))
     assert len(room.hear(new, (entry(1, 6, cursor=[1, 1]),))) == 1
     assert room.leave(old) == []
@@ -66,7 +72,7 @@ def test_who_reconnects_takes_over_from_the_socket_before() -> None:
 
 
 def test_another_window_of_the_same_person_is_left_alone_by_an_echo() -> None:
-    room, one, two = RoomPresence(), seat("ada"), seat("ada")
+    room, one, two = RoomPresence(), owner("ada"), owner("ada")
     room.hear(one, (entry(1),))
     room.hear(two, (entry(2),))
     assert room.hear(two, (entry(1, 7),)) == []
@@ -75,7 +81,7 @@ def test_another_window_of_the_same_person_is_left_alone_by_an_echo() -> None:
 
 
 def test_who_takes_itself_away_is_gone_and_may_come_back() -> None:
-    room, ada = RoomPresence(), seat("ada")
+    room, ada = RoomPresence(), owner("ada")
     room.hear(ada, (entry(1, 1),))
     assert room.hear(ada, (PresenceEntry(1, 2, b"null"),)) == [PresenceEntry(1, 2, b"null")]
     assert room.everyone() == ()
@@ -87,7 +93,7 @@ def test_what_is_no_state_is_not_passed_on() -> None:
     wrong = [b"", b"5", b"[]", b"{", b'{"a": ' + b"[" * 5000, b"\xff", b'"x"']
     wrong.append(json.dumps({"a": "x" * STATE_LIMIT}).encode())
     for state in wrong:
-        assert room.hear(seat("eve"), (PresenceEntry(1, 1, state),)) == []
+        assert room.hear(owner("eve"), (PresenceEntry(1, 1, state),)) == []
     assert room.everyone() == ()
 
 
@@ -96,18 +102,18 @@ def test_whatever_is_said_entries_belong_to_seats_that_said_them(
     words: list[tuple[int, int, bool]],
 ) -> None:
     room = RoomPresence()
-    seats = [seat(f"p{n}") for n in range(4)]
+    owners = [owner(f"p{n}") for n in range(4)]
     for who, client, gone in words:
         state = b"null" if gone else b"{}"
-        for told in room.hear(seats[who], (PresenceEntry(client, 1, state),)):
+        for told in room.hear(owners[who], (PresenceEntry(client, 1, state),)):
             assert told.client == client
             if not gone:
                 assert json.loads(told.state)["user"]["id"] == f"p{who}"
     for each in room.everyone():
         holder = json.loads(each.state)["user"]["id"]
-        assert seats[int(holder[1:])].client == each.client
-    for each_seat in seats:
-        room.leave(each_seat)
+        assert owners[int(holder[1:])].client == each.client
+    for each_owner in owners:
+        room.leave(each_owner)
     assert room.everyone() == ()
 
 
@@ -161,3 +167,45 @@ async def test_of_several_who_speak_at_once_each_hears_all_and_one_alone_hears_n
         bob.deliver(messages.presence([entry(2)]))
         await settle(ada, bob, eve)
         assert [set(c.others) for c in (ada, bob, eve)] == [{1, 2}] * 3
+
+
+def test_numbers_that_a_page_cannot_read_are_not_passed_on() -> None:
+    room = RoomPresence()
+    for client, clock in ((2**53 - 1, 1), (1, 2**53 - 1), (2**53, 1), (1, 2**64 - 1)):
+        for state in (b"{}", b"null"):
+            assert room.hear(owner("eve"), (PresenceEntry(client, clock, state),)) == []
+    assert room.everyone() == ()
+    eve = owner("eve")
+    largest = PresenceEntry(MOST_NUMBER, MOST_NUMBER, b"{}")
+    assert len(room.hear(eve, (largest,))) == 1  # the clock after it can be read as well
+    assert room.hear(eve, (PresenceEntry(MOST_NUMBER, 2**60, b"null"),)) == []
+    assert room.leave(eve) == [PresenceEntry(MOST_NUMBER, MOST_NUMBER, b"null")]
+
+
+@pytest.mark.parametrize(
+    "state",
+    [
+        b'{"a":"\xff"}',
+        b'{"a":{"\xff":1}}',
+        b'{"a":["\xed\xa0\x80"]}',
+        b'{"a":NaN}',
+        b'{"a":[-Infinity]}',
+        b'{"a":{"b":01}}',
+        b'{"a":"\x01"}',
+        b'{"a":[1,]}',
+        b'\xef\xbb\xbf{"a":1}',
+        b'{"a":' + b"[" * 10_000 + b"]" * 10_000 + b"}",
+    ],
+)
+def test_what_a_page_could_not_read_as_json_is_not_passed_on(state: bytes) -> None:
+    room = RoomPresence()
+    assert room.hear(owner("eve"), (PresenceEntry(1, 1, state),)) == []
+    assert room.everyone() == ()
+
+
+def test_of_a_key_that_comes_twice_the_last_is_passed_on_and_the_stamp_stays() -> None:
+    state = b'{"a":1,"user":{"id":"bob"},"a":2,"\\u0075ser":{"id":"cyd"}}'
+    (told,) = RoomPresence().hear(owner("eve"), (PresenceEntry(1, 1, state),))
+    assert told.state.count(b'"a"') == told.state.count(b'"user"') == 1
+    assert json.loads(told.state)["a"] == 2
+    assert json.loads(told.state)["user"]["id"] == "eve"

@@ -50,6 +50,10 @@ class Conversation:
         spend = limits.spend if isinstance(message, messages.Edit) else limits.speak
         return spend(member.person.id, len(data))
 
+    def debt(self) -> float:
+        """For how many seconds its person is not to be read, for what came by other sockets."""
+        return self._rate_limits.spend(self.member.person.id, 0)
+
     async def pause(self, seconds: float) -> None:
         """Wait until more may be read."""
         await self.member.until_heard()
@@ -86,6 +90,8 @@ class _Directly:
         talk.member.on_news = self._soon
         talk.member.write_now = self._write_now
         self._soon()  # something may wait already
+        if (debt := talk.debt()) > 0:
+            self._hold(debt)
 
     def heard(self, message: bytes | None) -> None:
         """A message has come; None for text."""
@@ -99,8 +105,11 @@ class _Directly:
             member.close(NORMAL)
             return
         if wait > 0 or member.far_ahead or member.owes:
-            self._socket.pause_hearing()
-            self._pause = self._loop.create_task(self._hear_later(wait))
+            self._hold(wait)
+
+    def _hold(self, seconds: float) -> None:
+        self._socket.pause_hearing()
+        self._pause = self._loop.create_task(self._hear_later(seconds))
 
     async def _hear_later(self, seconds: float) -> None:
         await self._talk.pause(seconds)
@@ -175,6 +184,8 @@ async def converse(talk: Conversation, receive: Receive, send: Send) -> int:
 
 async def _listen(receive: Receive, talk: Conversation) -> None:
     """What the client says. Ends the member when the client goes."""
+    if (debt := talk.debt()) > 0:
+        await talk.pause(debt)
     while True:
         event = await receive()
         if event["type"] == "websocket.disconnect":

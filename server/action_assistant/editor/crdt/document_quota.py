@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from pycrdt import Doc, Map
 
-from action_assistant.editor.crdt.update_outline import UpdateOutline
+from action_assistant.editor.crdt.updates.update_outline import UpdateOutline
 from action_assistant.editor.documents.values import ROOTS
 from action_assistant.errors import TooLarge
 from action_assistant.umrf.model import ENTRY, EXIT, Graph

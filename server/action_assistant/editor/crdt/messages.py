@@ -50,6 +50,9 @@ REASONS: Final = {
 OTHER_CLIENT: Final = "client id of another person"
 
 UPDATE_LIMIT: Final = 1 << 20  # bytes
+MOST_ENTRIES: Final = (
+    2_000  # of an awareness message: one is the sender's own, the others are echoes
+)
 NOTHING_NEW: Final = b"\x00\x00"  # an update without structs and deletions
 
 
@@ -144,6 +147,18 @@ class ByteReader:
         while self.byte() & 0x80:
             pass
 
+    def magnitude(self) -> int:
+        """A varInt of at most 62 bit, without its sign."""
+        byte = self.byte()
+        number, shift = byte & 0x3F, 6
+        while byte & 0x80:
+            if shift > 61:
+                raise Malformed("a number has no end")
+            byte = self.byte()
+            number |= (byte & 0x7F) << shift
+            shift += 7
+        return number
+
     @property
     def left(self) -> int:
         """Bytes that were not read."""
@@ -213,7 +228,10 @@ def _short(data: bytes, at: int) -> tuple[int, int]:
 
 def _entries(data: bytes) -> Iterable[PresenceEntry]:
     reader = ByteReader(data)
-    for _ in range(reader.number()):
+    count = reader.number()
+    if count > MOST_ENTRIES:
+        raise Malformed("too many entries")
+    for _ in range(count):
         yield PresenceEntry(reader.number(), reader.number(), reader.text())
 
 

@@ -10,7 +10,7 @@ import math
 from typing import Final
 
 from action_assistant.editor.crdt.document_quota import QuotaExceeded
-from action_assistant.editor.crdt.update_outline import UpdateOutline
+from action_assistant.editor.crdt.updates.update_outline import UpdateOutline
 
 #: Seconds of a processor that opening a document may take, beside what its size needs: an honest
 #: graph takes 0.07 s per MiB.

@@ -8,7 +8,7 @@ from enum import Enum
 from typing import Any, Final, Literal
 
 import msgspec
-from pycrdt import Doc, get_update
+from pycrdt import Doc
 
 from action_assistant.editor.crdt.applying import Panicked, apply_alone, applying
 from action_assistant.editor.crdt.document_quota import DocumentQuota
@@ -17,8 +17,19 @@ from action_assistant.editor.crdt.messages import NOTHING_NEW, ByteReader, Malfo
 from action_assistant.editor.crdt.nesting import Nesting
 from action_assistant.editor.crdt.opening_time import OpeningTime
 from action_assistant.editor.crdt.sound_updates import Clients, check_nothing_waits, lies_deep
-from action_assistant.editor.crdt.update_outline import UpdateOutline
-from action_assistant.editor.crdt.update_scan import outline
+from action_assistant.editor.crdt.updates.applied_updates import (
+    check_cut_items,
+    check_unchanged,
+    check_whole,
+    clocks,
+)
+from action_assistant.editor.crdt.updates.paired_texts import (
+    PairedTexts,
+    has_paired_texts,
+    paired_texts_in,
+)
+from action_assistant.editor.crdt.updates.update_outline import PairedText, UpdateOutline
+from action_assistant.editor.crdt.updates.update_scan import outline, stored_outline
 from action_assistant.editor.log.document_events import DEFERRED, UPDATED
 from action_assistant.journal.events import Event
 
@@ -56,6 +67,7 @@ class Replica:
         self.doc: Final[Doc[Any]] = Doc()
         self.owners: dict[int, str] = {}
         self.nesting = Nesting()
+        self.paired = PairedTexts()
         self.opening = OpeningTime()
         self._quota = DocumentQuota(self.doc)
         self._known: dict[int, int] = {}
@@ -72,7 +84,8 @@ class Replica:
         """Apply an update. `holder` may know whose a client is that has written nothing yet; `read`
         is its outline, where that is known.
 
-        Raises Malformed, Foreign, Full, TooMuchWaits, Panicked; the document is then as before.
+        Raises Malformed, ForeignClient, QuotaExceeded, TooMuchWaits; the document is then as before. Raises
+        Panicked; then it is not to be gone on with.
         """
         if self._waiting and update in self._waiting:
             return UpdateEffect.NOTHING
@@ -85,7 +98,10 @@ class Replica:
         if new:  # what is known is echoed by stock clients, and adds nothing
             self._quota.check(update, read)
         if read.ready(known):
+            self.paired.check(update, read, known)
+            check_cut_items(self.doc, update, read, known)
             brought = self._grew(update, read)
+            check_whole(self.doc, read)
         else:
             self._check_patience(update, author)
             self._waiting[update] = read, author
@@ -129,7 +145,7 @@ class Replica:
 
     def _replay_together(self, events: EventColumns) -> None:
         """Updates that wait for nothing, in a document in which nothing waits."""
-        if self.nesting.spans or lies_deep(events.bodies):
+        if self.nesting.spans or lies_deep(events.bodies) or has_paired_texts(events.bodies):
             self._replay_one_by_one(events)
             return
         clients = Clients(events.bodies, events.authors)
@@ -158,13 +174,18 @@ class Replica:
         self.opening.opened(time.thread_time() - begun, len(kept.state))
         self._quota.took(len(kept.state))
         self.owners, self.nesting = kept.owners, Nesting(kept.spans)
+        self.paired = PairedTexts(
+            paired_texts_in(kept.state) if kept.paired is None else kept.paired
+        )
         self._known = clocks(self.doc.get_state())
-        self._waiting = {update: (outline(update), author) for update, author in kept.waiting}
+        self._waiting = {
+            update: (stored_outline(update), author) for update, author in kept.waiting
+        }
 
     def _replay_one_by_one(self, events: Iterable[Told]) -> None:
         together: list[bytes] = []
         for kind, author, body in events:
-            read = outline(body)
+            read = stored_outline(body)
             for client, _, _ in read.brings:
                 self.owners.setdefault(client, author)
             if kind == DEFERRED or self._waiting or not read.ready(self._known):
@@ -193,7 +214,12 @@ class Replica:
 
     def _grew(self, update: bytes, read: UpdateOutline) -> UpdateEffect:
         """Apply what is ready, and what waited for it."""
-        if not self._applied(update, read):
+        try:
+            changed = self._applied(update, read)
+        except Malformed as error:
+            check_unchanged(self.doc, self._known, error)
+            raise
+        if not changed:
             return UpdateEffect.NOTHING
         while self._waiting and self._release():
             pass
@@ -273,6 +299,7 @@ class Replica:
 
     def _count(self, read: UpdateOutline, size: int) -> None:
         self._quota.took(size, read.actions, read.fields)
+        self.paired.learn(read, self._known)
         for client, _, end in read.brings:
             self._known[client] = max(end, self._known.get(client, 0))
 
@@ -282,6 +309,8 @@ class Replica:
         for update in ready:
             read, _ = self._waiting.pop(update)
             try:
+                self.paired.check(update, read, self._known)
+                check_cut_items(self.doc, update, read, self._known)
                 if self._applied(update, read):
                     self._released.append(update)
             except Malformed as error:
@@ -298,14 +327,6 @@ class Replica:
             with self.doc.transaction():
                 for update in updates:
                     self.doc.apply_update(update)
-
-    def adds_nothing(self, update: bytes) -> bool:
-        """Whether an update that was not applied would leave the document as it is."""
-        if update == NOTHING_NEW:
-            return True
-        outline(update)
-        with applying():
-            return bool(get_update(update, self.doc.get_state()) == NOTHING_NEW)
 
     def lacking(self, state: bytes) -> bytes:
         """What somebody with this state vector lacks. Raises Malformed, Panicked."""
@@ -327,13 +348,17 @@ class ReplicaState(msgspec.Struct, frozen=True, array_like=True):
     spans: dict[int, list[tuple[int, int, int]]]
     state: bytes
     waiting: list[tuple[bytes, str]] = []
+    paired: list[PairedText] | None = (
+        None  # those of a snapshot from before they were kept are sought
+    )
 
     @classmethod
     def of(cls, replica: Replica) -> bytes:
         """As bytes."""
         state = replica.doc.get_update()
         spans, waiting = replica.nesting.spans, replica.held_back()
-        return msgspec.msgpack.encode(cls("with what waits", replica.owners, spans, state, waiting))
+        kept = cls("with what waits", replica.owners, spans, state, waiting, replica.paired.all())
+        return msgspec.msgpack.encode(kept)
 
     @classmethod
     def replica(cls, kept: bytes) -> Replica | None:
@@ -365,9 +390,3 @@ class ReplicaState(msgspec.Struct, frozen=True, array_like=True):
             return msgspec.msgpack.decode(kept, type=cls)
         except (msgspec.DecodeError, UnicodeDecodeError):
             return None
-
-
-def clocks(state: bytes) -> dict[int, int]:
-    """A state vector as numbers: what is known of each client."""
-    reader = ByteReader(state)
-    return {reader.number(): reader.number() for _ in range(reader.number())}

@@ -14,7 +14,7 @@ from typing import Any, Final
 from pycrdt import Doc, get_update
 
 from action_assistant.editor.crdt.messages import ByteReader
-from action_assistant.editor.crdt.update_scan import outline
+from action_assistant.editor.crdt.updates.update_scan import stored_outline
 
 #: The beginning of an update with structs of one client: how many, whose.
 _ONE_CLIENT: Final = re.compile(rb"\x01[\x01-\x7f]([\x80-\xff]*[\x00-\x7f])")
@@ -54,7 +54,7 @@ class Clients:
             self._add(body, "")
 
     def _add(self, body: bytes, author: str) -> None:
-        for client, _, end in outline(body).brings:
+        for client, _, end in stored_outline(body).brings:
             self.authors.setdefault(client, author)
             self.ends[client] = max(end, self.ends.get(client, 0))
 
@@ -62,7 +62,7 @@ class Clients:
 def lies_deep(bodies: Sequence[bytes]) -> bool:
     """Whether anything in these updates does not lie in a root. Raises Malformed."""
     return any(
-        any(each.inside for each in outline(body).placed)
+        any(each.inside for each in stored_outline(body).placed)
         for body in map(bodies.__getitem__, _doubtful(bodies))
         if _MAY_LIE_INSIDE.search(body, 0, len(body) - 1)  # the last 0 says: nothing was deleted
     )

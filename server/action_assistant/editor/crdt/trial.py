@@ -1,4 +1,5 @@
-"""Applies large updates to a copy in another process before the room takes them.
+"""Applies large updates to a copy in another process before the room takes them, and reads there those
+of who may only look.
 
 How long the CRDT library works on an update follows from what the update says: 80,000 values for one
 key, all written at once, are 640 kB and half a minute. And some updates end the process.
@@ -11,12 +12,12 @@ import time
 from collections.abc import Iterator, Sequence
 from typing import Any, Final
 
-from pycrdt import Doc
+from pycrdt import Doc, get_update
 
 from action_assistant.editor.crdt.applying import applying
-from action_assistant.editor.crdt.messages import Malformed
-from action_assistant.editor.crdt.update_outline import UpdateOutline
-from action_assistant.editor.crdt.update_scan import outline
+from action_assistant.editor.crdt.messages import NOTHING_NEW, Malformed
+from action_assistant.editor.crdt.updates.update_outline import UpdateOutline
+from action_assistant.editor.crdt.updates.update_scan import outline
 
 SECONDS: Final = 0.25  # of a processor that one update may take
 _ENDS: Final = 8 * SECONDS  # of a processor, after which the process that tries it ends
@@ -54,8 +55,25 @@ def tried(state: bytes, update: bytes, released: Sequence[bytes]) -> TriedOutlin
     if spent > SECONDS:
         raise TooSlow(OVERLONG)
     return TriedOutline(
-        read.brings, read.needs, placed, read.actions, read.fields, read.structs, opening
+        read.brings,
+        read.needs,
+        placed,
+        read.actions,
+        read.fields,
+        read.structs,
+        read.paired,
+        opening,
     )
+
+
+def adds_nothing(state: bytes, update: bytes) -> bool:
+    """Whether an update would leave a document with this state vector as it is. Raises Malformed,
+    Panicked."""
+    if update == NOTHING_NEW:
+        return True
+    outline(update)
+    with applying():
+        return bool(get_update(update, state) == NOTHING_NEW)
 
 
 @contextlib.contextmanager

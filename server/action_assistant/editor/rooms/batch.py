@@ -3,7 +3,7 @@
 import asyncio
 import time
 from collections.abc import Callable, Sequence
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, TypeAlias, TypeVar
 
 import msgspec
 from pycrdt import merge_updates
@@ -13,13 +13,15 @@ from action_assistant.editor.crdt.applying import Panicked
 from action_assistant.editor.crdt.document_quota import QuotaExceeded
 from action_assistant.editor.crdt.messages import Malformed
 from action_assistant.editor.crdt.replica import ForeignClient, Replica, TooMuchWaits
-from action_assistant.editor.crdt.trial import OVERLONG, TooSlow, TriedOutline, tried
-from action_assistant.editor.crdt.update_outline import UpdateOutline
-from action_assistant.editor.crdt.update_scan import outline
+from action_assistant.editor.crdt.trial import OVERLONG, TooSlow, TriedOutline, adds_nothing, tried
+from action_assistant.editor.crdt.updates.update_outline import UpdateOutline
+from action_assistant.editor.crdt.updates.update_scan import outline
 from action_assistant.editor.rooms.member import Member
 from action_assistant.errors import BadInput, Refused, TooLarge
 from action_assistant.web.auth.caller import acting_for
 from action_assistant.web.workers.lanes import Crashed, OutOfTime, RunInWorker
+
+T = TypeVar("T")
 
 LARGE: Final = 8 * 1024  # bytes of an update that is tried on a copy first, and by itself
 _BATCH: Final = 200  # items of one commit
@@ -182,11 +184,22 @@ async def tried_for(
 
     Raises Malformed, Panicked, TooSlow; NotNow for what does not lie in the update.
     """
+    return await _done_for(person, run_in_worker, tried, state, update, released)
+
+
+async def adds_nothing_aside(offer: Offer, state: bytes, run_in_worker: RunInWorker) -> bool:
+    """As `adds_nothing`: reading a large update takes long. Raises as `tried_for`."""
+    return await _done_for(offer.author, run_in_worker, adds_nothing, state, offer.update)
+
+
+async def _done_for(
+    person: str, run_in_worker: RunInWorker, work: Callable[..., T], *arguments: object
+) -> T:
     died = 0
     while True:
         try:
             with acting_for(person):
-                return await run_in_worker(tried, state, update, released)
+                return await run_in_worker(work, *arguments)
         except OutOfTime as error:
             raise TooSlow(OVERLONG) from error
         except Crashed as error:

@@ -8,7 +8,7 @@ from typing import Final
 
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.rooms.colours import NOBODYS
-from action_assistant.editor.rooms.presence import PresenceNews, Seat
+from action_assistant.editor.rooms.presence import PresenceNews, PresenceOwner
 from action_assistant.web.auth.keys import PersonRef
 from action_assistant.web.server.direct import framed
 
@@ -40,7 +40,7 @@ class Member:
         colour: str = NOBODYS,
     ) -> None:
         self.person: Final = person
-        self.seat: Final = Seat(person, colour)
+        self.presence_owner: Final = PresenceOwner(person, colour)
         self.edits = edits
         self.acks: Final = acks
         self.synced = False  # has been sent the document

@@ -49,7 +49,7 @@ class Rooms:
         self._closed = False
         self._divergences = 0
         self.metrics: Final = RoomMetrics()
-        self._heart = asyncio.create_task(self._beat(), name="heart")
+        self._heartbeat = asyncio.create_task(self._beat(), name="heartbeat")
 
     @asynccontextmanager
     async def enter(self, stream: str) -> AsyncIterator[Room]:
@@ -64,9 +64,7 @@ class Rooms:
             self._holders[stream] -= 1
             if self._holders[stream] == 0:
                 del self._holders[stream]
-                if stream in self._rooms and not self._closed:
-                    loop = asyncio.get_running_loop()
-                    self._timers[stream] = loop.call_later(self._linger, self._unload, stream)
+                self._let_go_later(stream)
 
     def open_room(self, stream: str) -> Room | None:
         """The room if it is open, without opening it."""
@@ -112,7 +110,7 @@ class Rooms:
     async def close(self) -> None:
         """Finish and let go of every room."""
         self._closed = True
-        self._heart.cancel()
+        self._heartbeat.cancel()
         for timer in self._timers.values():
             timer.cancel()
         await asyncio.gather(*self._loading.values(), return_exceptions=True)
@@ -154,9 +152,17 @@ class Rooms:
                 self.metrics,
             )
             self.metrics.opened += 1
+            if stream not in self._holders:  # whoever came was gone before it was loaded
+                self._let_go_later(stream)
             return room
         finally:
             del self._loading[stream]
+
+    def _let_go_later(self, stream: str) -> None:
+        """Nobody is in the room any more."""
+        if stream in self._rooms and not self._closed:
+            loop = asyncio.get_running_loop()
+            self._timers[stream] = loop.call_later(self._linger, self._unload, stream)
 
     def _forget(self, room: Room) -> None:
         if self._rooms.get(room.stream) is room:

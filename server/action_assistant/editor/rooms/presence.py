@@ -13,6 +13,7 @@ from action_assistant.web.auth.keys import PersonRef
 from action_assistant.web.server.direct import framed
 
 STATE_LIMIT: Final = 32_768  # bytes of one client's entry
+MOST_NUMBER: Final = 2**53 - 2  # of a client or a clock: pages read it, and the one after it
 _GONE: Final = b"null"
 _decode: Final = msgspec.json.Decoder(dict[str, msgspec.Raw])
 
@@ -30,7 +31,7 @@ def stamp_of(person: PersonRef, colour: str) -> bytes:
     return msgspec.json.encode(PersonStamp(person.id, person.name, colour))
 
 
-class Seat:
+class PresenceOwner:
     """The one client id that a socket speaks for."""
 
     def __init__(self, person: PersonRef, colour: str = NOBODYS) -> None:
@@ -40,11 +41,14 @@ class Seat:
 
     def stamped(self, entry: PresenceEntry) -> PresenceEntry | None:
         """The entry under the person's own name; None when it is none that can be shown."""
+        if max(entry.client, entry.clock) > MOST_NUMBER:
+            return None
         if entry.state == _GONE:
             return entry
         if len(entry.state) > STATE_LIMIT:
             return None
         try:
+            entry.state.decode()  # raw parts of it are passed on as they are
             state = _decode.decode(entry.state)
         except (msgspec.DecodeError, RecursionError, UnicodeDecodeError):
             return None
@@ -74,48 +78,48 @@ class PresenceNews:
 
 
 class RoomPresence:
-    """The entries of a room. Each belongs to a seat and vanishes with it."""
+    """The entries of a room. Each belongs to an owner and vanishes with it."""
 
     def __init__(self) -> None:
         self._entries: dict[int, PresenceEntry] = {}
-        self._seats: dict[int, Seat] = {}
+        self._owners: dict[int, PresenceOwner] = {}
 
-    def hear(self, seat: Seat, entries: tuple[PresenceEntry, ...]) -> list[PresenceEntry]:
-        """What the others are to be told; entries that are not this seat's are dropped."""
+    def hear(self, owner: PresenceOwner, entries: tuple[PresenceEntry, ...]) -> list[PresenceEntry]:
+        """What the others are to be told; entries that are not this owner's are dropped."""
         told: list[PresenceEntry] = []
         for entry in entries:
-            if not self._is_own(seat, entry):
+            if not self._is_own(owner, entry):
                 continue
-            stamped = seat.stamped(entry)
+            stamped = owner.stamped(entry)
             if stamped is None:
                 continue
             if stamped.state == _GONE:
-                told += self.leave(seat, entry.clock)
+                told += self.leave(owner, entry.clock)
                 continue
-            seat.client = entry.client
-            self._seats[entry.client] = seat
+            owner.client = entry.client
+            self._owners[entry.client] = owner
             self._entries[entry.client] = stamped
             told.append(stamped)
         return told
 
-    def leave(self, seat: Seat, clock: int | None = None) -> list[PresenceEntry]:
-        """Take a seat's entry away; what the others are to be told."""
-        client, seat.client = seat.client, None
-        if client is None or self._seats.get(client) is not seat:
+    def leave(self, owner: PresenceOwner, clock: int | None = None) -> list[PresenceEntry]:
+        """Take an owner's entry away; what the others are to be told."""
+        client, owner.client = owner.client, None
+        if client is None or self._owners.get(client) is not owner:
             return []
-        del self._seats[client]
+        del self._owners[client]
         last = self._entries.pop(client)
         # The same clock, so that the client's next word, should it come back, is newer.
         return [PresenceEntry(client, last.clock if clock is None else clock, _GONE)]
 
     def holder(self, client: int) -> str | None:
         """The person whose socket speaks for a client."""
-        seat = self._seats.get(client)
-        return None if seat is None else seat.person.id
+        owner = self._owners.get(client)
+        return None if owner is None else owner.person.id
 
     def people(self) -> tuple[PersonRef, ...]:
         """Who is there now, each once, by name."""
-        there = {seat.person.id: seat.person for seat in self._seats.values()}
+        there = {owner.person.id: owner.person for owner in self._owners.values()}
         return tuple(
             PersonRef(person.id, person.name)
             for person in sorted(there.values(), key=lambda person: (person.name, person.id))
@@ -125,15 +129,15 @@ class RoomPresence:
         """Who is there now."""
         return tuple(self._entries.values())
 
-    def _is_own(self, seat: Seat, entry: PresenceEntry) -> bool:
+    def _is_own(self, owner: PresenceOwner, entry: PresenceEntry) -> bool:
         """Stock clients echo what they hear of others; those entries are not theirs to say.
 
         A socket speaks for the first client id it names. If another socket of the same person
         speaks for that one, it is what is left of the connection before this one.
         """
-        if seat.client is not None:
-            return seat.client == entry.client
+        if owner.client is not None:
+            return owner.client == entry.client
         if entry.state == _GONE:
             return False
-        holder = self._seats.get(entry.client)
-        return holder is None or holder.person.id == seat.person.id
+        holder = self._owners.get(entry.client)
+        return holder is None or holder.person.id == owner.person.id

@@ -16,9 +16,11 @@ from action_assistant.editor.crdt import messages
 from action_assistant.editor.crdt.applying import Panicked
 from action_assistant.editor.crdt.loading import Loaded, load
 from action_assistant.editor.crdt.replica import Replica, UpdateEffect
-from action_assistant.editor.crdt.update_outline import UpdateOutline
+from action_assistant.editor.crdt.trial import adds_nothing
+from action_assistant.editor.crdt.updates.update_outline import UpdateOutline
 from action_assistant.editor.log.graph_events import DEFERRED, UPDATED, graph_of
 from action_assistant.editor.rooms.batch import (
+    LARGE,
     OBJECTIONS,
     Ask,
     Compare,
@@ -28,6 +30,7 @@ from action_assistant.editor.rooms.batch import (
     Objection,
     Offer,
     Taken,
+    adds_nothing_aside,
     fail,
     next_batch,
     refuse,
@@ -117,7 +120,7 @@ class Room:
     def leave(self, member: Member) -> None:
         """A socket is gone, and what it said about itself with it."""
         self.members.discard(member)
-        self._spread.tell(self.attendance.leave(member.seat), member)
+        self._spread.tell(self.attendance.leave(member.presence_owner), member)
 
     def hear(self, member: Member, message: messages.Message) -> None:
         """Something that a socket says. Never blocks; the answer comes through the member."""
@@ -130,7 +133,7 @@ class Room:
                     return
                 self._enter(Offer(update, member.person.id, member))
             case messages.Presence(entries):
-                self._spread.tell(self.attendance.hear(member.seat, entries), member)
+                self._spread.tell(self.attendance.hear(member.presence_owner, entries), member)
             case messages.Question(state):
                 if member.asks():
                     self._enter(Ask(member, state))
@@ -236,7 +239,6 @@ class Room:
             self._fail(failure)
 
     def _committed(self, taken: Taken) -> None:
-        self._in_hand = []
         self._spoken.tell(taken, self.seq)
         if taken.panicked:
             self._do_aside(self._loaded_anew(taken))
@@ -253,6 +255,7 @@ class Room:
         if taken.news:
             self._measured.look(self._replica)
             self._snapshots.look(self.seq, self._replica)
+        self._in_hand = []
         if self._waiting:
             self._window.when_open(self._act)
         else:
@@ -308,14 +311,25 @@ class Room:
         taken = Taken()
         member = offer.member
         try:
-            read = None
-            if member is None or (member.edits and not member.refused):
-                read = await tried_first(offer, self._replica, self._tried)
+            if member is not None and not member.edits and len(offer.update) > LARGE:
+                await self._look_at_large(offer, member, taken)
+            else:
+                read = None
+                if member is None or (member.edits and not member.refused):
+                    read = await tried_first(offer, self._replica, self._tried)
+                self._take_in(offer, taken, read)
         except OBJECTIONS as error:
             self._refuse(offer, error)
-        else:
-            self._take_in(offer, taken, read)
         self._store(taken)
+
+    async def _look_at_large(self, offer: Offer, member: Member, taken: Taken) -> None:
+        """Ignore one edit of somebody who may only look, or refuse it."""
+        if member.refused:
+            return
+        state = self._replica.doc.get_state()
+        if not await adds_nothing_aside(offer, state, self._tried):
+            raise NotAllowed
+        taken.handled.append(offer)
 
     def _take_in(self, offer: Offer, taken: Taken, read: UpdateOutline | None = None) -> None:
         """Apply one edit, or refuse it."""
@@ -352,7 +366,7 @@ class Room:
         if member is not None and member.refused:
             return None
         if member is not None and not member.edits:
-            if not self._replica.adds_nothing(offer.update):
+            if not adds_nothing(self._replica.doc.get_state(), offer.update):
                 raise NotAllowed
             return UpdateEffect.NOTHING
         return self._replica.take(offer.update, offer.author, self.attendance.holder, read)

@@ -42,7 +42,7 @@ from support.doses import examples
 DOCK, CHARGE = "Dock" * 3, "Char" * 3
 
 
-class House:
+class Editor:
     """Everything that drafts need, and one graph."""
 
     def __init__(self, journal: Journal, rooms: Rooms, people: People) -> None:
@@ -120,23 +120,23 @@ _STREAMS = (h.graph_stream, h.about_stream)
 
 
 @pytest.fixture(params=["SQLite", pytest.param("Postgres", marks=pytest.mark.long)])
-async def house(request: pytest.FixtureRequest, tmp_path: Path) -> AsyncIterator[House]:
+async def editor(request: pytest.FixtureRequest, tmp_path: Path) -> AsyncIterator[Editor]:
     """On each kind of database that there is."""
     url = f"sqlite:///{tmp_path / 'editor.db'}"
     if request.param == "Postgres":
         url = request.getfixturevalue("postgres").new_database()
     journal = await Journal.open(url, branch="editor", fold=h.fold)
     rooms = Rooms(journal, linger=60, window=0)
-    house = House(journal, rooms, await People.known(journal))
-    made, _ = await house.catalogue.create(b'{"name": "valve"}', "ada")
-    house.origin = made.id
-    yield house
+    editor = Editor(journal, rooms, await People.known(journal))
+    made, _ = await editor.catalogue.create(b'{"name": "valve"}', "ada")
+    editor.origin = made.id
+    yield editor
     await rooms.close()
     await journal.close()
 
 
-async def _draft(house: House, name: str = "gentler grip") -> DraftView:
-    return await house.drafts.make(house.origin, "ben", NewDraft(name))
+async def _draft(editor: Editor, name: str = "gentler grip") -> DraftView:
+    return await editor.drafts.make(editor.origin, "ben", NewDraft(name))
 
 
 def _silent(maps: Maps) -> bytes:
@@ -147,67 +147,67 @@ def _loose(maps: Maps) -> set[str]:
     return loose({(root, k): v for root, fields in maps.items() for k, v in fields.items()})  # type: ignore[misc]
 
 
-async def test_a_draft_begins_as_its_origin_was_and_is_listed_under_it(house: House) -> None:
+async def test_a_draft_begins_as_its_origin_was_and_is_listed_under_it(editor: Editor) -> None:
     dice = random.Random(1)
-    await house.edit(house.origin, "ada", dice, 12)
-    then = await house.now(house.origin)
-    made = await _draft(house)
-    assert _silent(await house.now(made.id)) == _silent(then)
+    await editor.edit(editor.origin, "ada", dice, 12)
+    then = await editor.now(editor.origin)
+    made = await _draft(editor)
+    assert _silent(await editor.now(made.id)) == _silent(then)
     assert (made.name, made.origin, made.ahead, made.behind) == (
         "gentler grip",
-        house.origin,
+        editor.origin,
         0,
         0,
     )
-    assert [view.id for view in await house.catalogue.all()] == [house.origin]
-    assert [view.id for view in await house.drafts.of(house.origin)] == [made.id]
-    assert (await house.catalogue.get(house.origin)).drafts == 1
-    await house.catalogue.delete(made.id, "ben")
-    assert await house.drafts.of(house.origin) == []
-    assert (await house.catalogue.get(house.origin)).drafts == 0
-    assert [view.id for view in await house.catalogue.all(deleted=True)] == [made.id]
+    assert [view.id for view in await editor.catalogue.all()] == [editor.origin]
+    assert [view.id for view in await editor.drafts.of(editor.origin)] == [made.id]
+    assert (await editor.catalogue.get(editor.origin)).drafts == 1
+    await editor.catalogue.delete(made.id, "ben")
+    assert await editor.drafts.of(editor.origin) == []
+    assert (await editor.catalogue.get(editor.origin)).drafts == 0
+    assert [view.id for view in await editor.catalogue.all(deleted=True)] == [made.id]
 
 
-async def test_what_was_done_is_rebuilt_from_the_log(house: House) -> None:
+async def test_what_was_done_is_rebuilt_from_the_log(editor: Editor) -> None:
     dice = random.Random(2)
-    await house.edit(house.origin, "ada", dice, 6)
-    made = await _draft(house)
-    await house.edit(made.id, "ben", dice, 6)
-    await house.merge(made.id, "ada", dice)
-    before = await house.drafts.get(made.id)
-    await house.journal.rebuild()
-    assert await house.drafts.get(made.id) == before
+    await editor.edit(editor.origin, "ada", dice, 6)
+    made = await _draft(editor)
+    await editor.edit(made.id, "ben", dice, 6)
+    await editor.merge(made.id, "ada", dice)
+    before = await editor.drafts.get(made.id)
+    await editor.journal.rebuild()
+    assert await editor.drafts.get(made.id) == before
 
 
 @pytest.mark.parametrize("seed", range(examples(10)))
 async def test_blame_names_who_did_it_however_often_and_whichever_way_it_was_merged(
-    house: House, seed: int
+    editor: Editor, seed: int
 ) -> None:
     dice = random.Random(seed)
-    await house.edit(house.origin, "ada", dice, 8)
-    drafts = [(await _draft(house)).id, (await _draft(house)).id]
+    await editor.edit(editor.origin, "ada", dice, 8)
+    drafts = [(await _draft(editor)).id, (await _draft(editor)).id]
     for _ in range(6):
         draft = dice.choice(drafts)
-        await house.edit(dice.choice([draft, draft, house.origin]), dice.choice(_PEOPLE), dice, 2)
+        await editor.edit(dice.choice([draft, draft, editor.origin]), dice.choice(_PEOPLE), dice, 2)
         if dice.random() < 0.6:
-            before = await house.now(house.origin)
-            await house.merge(draft, "zoe", dice, dice.choice(("origin", "draft")))
-            assert _loose(await house.now(house.origin)) <= _loose(before)
-    for graph in [*drafts, house.origin]:
-        await _blamed(house, graph)
+            before = await editor.now(editor.origin)
+            await editor.merge(draft, "zoe", dice, dice.choice(("origin", "draft")))
+            assert _loose(await editor.now(editor.origin)) <= _loose(before)
+    for graph in [*drafts, editor.origin]:
+        await _blamed(editor, graph)
 
 
 _PEOPLE = ("ada", "ben", "mari")
 
 
-async def _blamed(house: House, graph: str) -> None:
-    maps = await house.now(graph)
+async def _blamed(editor: Editor, graph: str) -> None:
+    maps = await editor.now(graph)
     owners = {owner_of(root, k) for root, fields in maps.items() for k in fields}  # type: ignore[arg-type]
     for owner in owners - {"entry", "exit"}:
-        for each in await house.blame.of(graph, owner, None):
+        for each in await editor.blame.of(graph, owner, None):
             value = msgspec.msgpack.encode(each.value)
             keys = keys_of(owner, each.field)
-            authors = {who for place in keys for who in house.wrote.get((*place, value), ())}
+            authors = {who for place in keys for who in editor.wrote.get((*place, value), ())}
             if authors:  # else it is what the graph began with
                 assert each.author.id in authors, (owner, each)
                 assert each.merged is None or each.merged.by.id == "zoe"
@@ -215,36 +215,36 @@ async def _blamed(house: House, graph: str) -> None:
 
 @pytest.mark.parametrize("seed", range(examples(10)))
 async def test_a_merge_that_is_taken_back_leaves_the_origin_as_it_was(
-    house: House, seed: int
+    editor: Editor, seed: int
 ) -> None:
     dice = random.Random(seed)
-    await house.edit(house.origin, "ada", dice, 10)
-    made = await _draft(house)
-    await house.edit(made.id, "ben", dice, 8)
-    await house.edit(house.origin, "mari", dice, 4)
-    before = await house.now(house.origin)
-    merged = await house.merge(made.id, "zoe", dice)
+    await editor.edit(editor.origin, "ada", dice, 10)
+    made = await _draft(editor)
+    await editor.edit(made.id, "ben", dice, 8)
+    await editor.edit(editor.origin, "mari", dice, 4)
+    before = await editor.now(editor.origin)
+    merged = await editor.merge(made.id, "zoe", dice)
     if merged.changed:
-        gone = await house.going_back.revert(
-            house.origin, "ada", EditsOfOne("zoe", merged.seq, merged.seq)
+        gone = await editor.going_back.revert(
+            editor.origin, "ada", EditsOfOne("zoe", merged.seq, merged.seq)
         )
         assert gone.left == ()
-    assert plain(await house.now(house.origin)) == plain(before)
+    assert plain(await editor.now(editor.origin)) == plain(before)
 
 
 @pytest.mark.parametrize("seed", range(examples(10)))
-async def test_what_is_merged_either_way_is_the_same(house: House, seed: int) -> None:
+async def test_what_is_merged_either_way_is_the_same(editor: Editor, seed: int) -> None:
     dice = random.Random(seed)
-    await house.edit(house.origin, "ada", dice, 10)
-    made = await _draft(house)
-    await house.edit(made.id, "ben", dice, 5)
-    await house.edit(house.origin, "mari", dice, 5)
-    await house.merge(made.id, "zoe", dice)
-    assert (await house.drafts.get(made.id)).ahead == 0
-    await house.merge(made.id, "zoe", dice, "draft")
-    assert _things(await house.now(made.id)) == _things(await house.now(house.origin))
-    view = await house.drafts.get(made.id)
-    found = await house.merges.preview(made.id, AskedMerge())
+    await editor.edit(editor.origin, "ada", dice, 10)
+    made = await _draft(editor)
+    await editor.edit(made.id, "ben", dice, 5)
+    await editor.edit(editor.origin, "mari", dice, 5)
+    await editor.merge(made.id, "zoe", dice)
+    assert (await editor.drafts.get(made.id)).ahead == 0
+    await editor.merge(made.id, "zoe", dice, "draft")
+    assert _things(await editor.now(made.id)) == _things(await editor.now(editor.origin))
+    view = await editor.drafts.get(made.id)
+    found = await editor.merges.preview(made.id, AskedMerge())
     assert (view.behind, found.conflicts) == (0, ())
 
 
@@ -253,27 +253,27 @@ def _things(maps: Maps) -> set[str]:
     return exist(places) - loose(places)  # type: ignore[arg-type]
 
 
-async def test_where_nothing_was_done_in_a_draft_nothing_is_stored(house: House) -> None:
+async def test_where_nothing_was_done_in_a_draft_nothing_is_stored(editor: Editor) -> None:
     dice = random.Random(3)
-    await house.edit(house.origin, "ada", dice, 5)
-    made = await _draft(house)
-    await house.edit(house.origin, "ada", dice, 5)
-    before = await house.log(house.origin), await house.log(made.id)
-    assert (await house.merge(made.id, "zoe", dice)).changed is False
-    assert (await house.log(house.origin), await house.log(made.id)) == before
+    await editor.edit(editor.origin, "ada", dice, 5)
+    made = await _draft(editor)
+    await editor.edit(editor.origin, "ada", dice, 5)
+    before = await editor.log(editor.origin), await editor.log(made.id)
+    assert (await editor.merge(made.id, "zoe", dice)).changed is False
+    assert (await editor.log(editor.origin), await editor.log(made.id)) == before
 
 
-async def _conflicting(house: House) -> DraftView:
-    await house.set(house.origin, "ada", "actions", **{DOCK: "Dock", f"{DOCK}__in/speed": "1"})
-    made = await _draft(house)
-    await house.set(made.id, "ben", "actions", **{f"{DOCK}__in/speed": "2", CHARGE: "Charge"})
-    await house.set(house.origin, "ada", "actions", **{f"{DOCK}__in/speed": "3"})
+async def _conflicting(editor: Editor) -> DraftView:
+    await editor.set(editor.origin, "ada", "actions", **{DOCK: "Dock", f"{DOCK}__in/speed": "1"})
+    made = await _draft(editor)
+    await editor.set(made.id, "ben", "actions", **{f"{DOCK}__in/speed": "2", CHARGE: "Charge"})
+    await editor.set(editor.origin, "ada", "actions", **{f"{DOCK}__in/speed": "3"})
     return made
 
 
-async def test_a_conflict_is_refused_until_it_has_a_choice(house: House) -> None:
-    made = await _conflicting(house)
-    found = await house.merges.preview(made.id, AskedMerge())
+async def test_a_conflict_is_refused_until_it_has_a_choice(editor: Editor) -> None:
+    made = await _conflicting(editor)
+    found = await editor.merges.preview(made.id, AskedMerge())
     (conflict,) = found.conflicts
     assert (conflict.place, conflict.what) == (
         f"actions/{DOCK}|in/speed",
@@ -283,95 +283,95 @@ async def test_a_conflict_is_refused_until_it_has_a_choice(house: House) -> None
     assert [(f.field, f.before, f.after) for f in theirs.fields] == [("in/speed", "1", "2")]
     wanted = WantedMerge(found.seq, found.draft_seq)
     with pytest.raises(Conflict, match=r"input speed of Dock_0") as refused:
-        await house.merges.merge(made.id, "zoe", wanted)
+        await editor.merges.merge(made.id, "zoe", wanted)
     assert refused.value.where == {"places": [conflict.place]}
     choices: dict[str, DraftSide] = {conflict.place: "draft"}
     chosen = msgspec.structs.replace(wanted, choices=choices)
-    merged = await house.merges.merge(made.id, "zoe", chosen)
-    actions = (await house.now(house.origin))["actions"]
+    merged = await editor.merges.merge(made.id, "zoe", chosen)
+    actions = (await editor.now(editor.origin))["actions"]
     assert (actions[f"{DOCK}|in/speed"], actions[CHARGE]) == ("2", "Charge")
     speed = next(
-        each for each in await house.blame.of(house.origin, DOCK, None) if each.field == "in/speed"
+        each for each in await editor.blame.of(editor.origin, DOCK, None) if each.field == "in/speed"
     )
     assert (speed.author.id, speed.seq) == ("ben", merged.seq)
     assert speed.merged is not None
     assert (speed.merged.graph, speed.merged.by.id, speed.merged.seq) == (made.id, "zoe", 2)
-    entry = (await house.history.of(house.origin, limit=5, before=None))[0]
+    entry = (await editor.history.of(editor.origin, limit=5, before=None))[0]
     assert entry.kind == "merged"
     assert entry.merged is not None
     assert [each.id for each in entry.merged.authors] == ["ben"]
 
 
-async def test_a_conflict_in_which_nothing_changes_is_settled_too(house: House) -> None:
-    await house.set(house.origin, "ada", "actions", **{DOCK: "Dock"})
-    made = await _draft(house)
-    await house.set(made.id, "ben", "actions", **{DOCK: "Berth"})
-    seq = await house.set(house.origin, "ada", "actions", **{DOCK: "Port"})
+async def test_a_conflict_in_which_nothing_changes_is_settled_too(editor: Editor) -> None:
+    await editor.set(editor.origin, "ada", "actions", **{DOCK: "Dock"})
+    made = await _draft(editor)
+    await editor.set(made.id, "ben", "actions", **{DOCK: "Berth"})
+    seq = await editor.set(editor.origin, "ada", "actions", **{DOCK: "Port"})
     choices: dict[str, DraftSide] = {f"actions/{DOCK}": "origin"}
     wanted = WantedMerge(seq, 2, choices=choices)
-    assert await house.merges.merge(made.id, "zoe", wanted) == MergedDraft(
-        house.origin, seq, changed=False
+    assert await editor.merges.merge(made.id, "zoe", wanted) == MergedDraft(
+        editor.origin, seq, changed=False
     )
-    assert (await house.merges.preview(made.id, AskedMerge())).conflicts == ()
-    assert (await house.drafts.get(made.id)).state == "merged"
-    entry = (await house.history.of(house.origin, limit=5, before=None))[0]
+    assert (await editor.merges.preview(made.id, AskedMerge())).conflicts == ()
+    assert (await editor.drafts.get(made.id)).state == "merged"
+    entry = (await editor.history.of(editor.origin, limit=5, before=None))[0]
     assert entry.kind == "edited"
-    (name,) = await house.blame.of(house.origin, DOCK, None)
+    (name,) = await editor.blame.of(editor.origin, DOCK, None)
     assert (name.author.id, name.merged) == ("ada", None)
 
 
-async def test_a_merge_of_what_nobody_looked_at_is_refused(house: House) -> None:
-    made = await _conflicting(house)
-    found = await house.merges.preview(made.id, AskedMerge())
+async def test_a_merge_of_what_nobody_looked_at_is_refused(editor: Editor) -> None:
+    made = await _conflicting(editor)
+    found = await editor.merges.preview(made.id, AskedMerge())
     choices: dict[str, DraftSide] = {each.place: "draft" for each in found.conflicts}
     wanted = WantedMerge(found.seq, found.draft_seq, choices=choices)
-    await house.set(made.id, "ben", "actions", **{CHARGE: "Load"})
+    await editor.set(made.id, "ben", "actions", **{CHARGE: "Load"})
     with pytest.raises(Conflict, match="draft was changed") as refused:
-        await house.merges.merge(made.id, "zoe", wanted)
+        await editor.merges.merge(made.id, "zoe", wanted)
     assert refused.value.where == {"side": "draft"}
     newer = msgspec.structs.replace(wanted, draft_seq=found.draft_seq + 1)
-    await house.set(house.origin, "ada", "meta", name="valves")
+    await editor.set(editor.origin, "ada", "meta", name="valves")
     with pytest.raises(Conflict, match="graph was changed"):
-        await house.merges.merge(made.id, "zoe", newer)
+        await editor.merges.merge(made.id, "zoe", newer)
 
 
-async def test_problems_that_would_come_with_a_merge_are_told(house: House) -> None:
-    await house.set(house.origin, "ada", "actions", **{DOCK: "Dock", f"{DOCK}__type": "sync"})
-    made = await _draft(house)
-    await house.set(made.id, "ben", "actions", **{CHARGE: "not a name"})
-    found = await house.merges.preview(made.id, AskedMerge())
+async def test_problems_that_would_come_with_a_merge_are_told(editor: Editor) -> None:
+    await editor.set(editor.origin, "ada", "actions", **{DOCK: "Dock", f"{DOCK}__type": "sync"})
+    made = await _draft(editor)
+    await editor.set(made.id, "ben", "actions", **{CHARGE: "not a name"})
+    found = await editor.merges.preview(made.id, AskedMerge())
     assert any("not a name" in problem.message for problem in found.problems)
     assert not any("Dock" in problem.message for problem in found.problems)
 
 
-async def test_a_proposal_is_answered_and_ends_with_the_merge(house: House) -> None:
-    made = await _conflicting(house)
+async def test_a_proposal_is_answered_and_ends_with_the_merge(editor: Editor) -> None:
+    made = await _conflicting(editor)
     with pytest.raises(Conflict, match="not proposed"):
-        await house.drafts.answer(made.id, "ada", h.DraftAnswered(yes=True, note="", seq=2))
-    proposed = await house.drafts.propose(made.id, "ben", "softer")
+        await editor.drafts.answer(made.id, "ada", h.DraftAnswered(yes=True, note="", seq=2))
+    proposed = await editor.drafts.propose(made.id, "ben", "softer")
     assert proposed.state == "proposed"
     for yes in (False, True):
-        answered = await house.drafts.answer(made.id, "ada", h.DraftAnswered(yes, "", 2))
+        answered = await editor.drafts.answer(made.id, "ada", h.DraftAnswered(yes, "", 2))
     assert answered.proposal is not None
     assert [(each.author.id, each.yes) for each in answered.proposal.answers] == [("ada", True)]
-    await house.merge(made.id, "ada", random.Random(0))
-    merged = await house.drafts.get(made.id)
+    await editor.merge(made.id, "ada", random.Random(0))
+    merged = await editor.drafts.get(made.id)
     assert (merged.state, merged.proposal) == ("merged", None)
-    await house.set(made.id, "ben", "actions", **{CHARGE: "Load"})
-    again = await house.drafts.get(made.id)
+    await editor.set(made.id, "ben", "actions", **{CHARGE: "Load"})
+    again = await editor.drafts.get(made.id)
     assert (again.state, again.ahead) == ("open", 1)
-    await house.drafts.propose(made.id, "ben", "")
-    assert (await house.drafts.withdraw(made.id, "ben")).state == "open"
+    await editor.drafts.propose(made.id, "ben", "")
+    assert (await editor.drafts.withdraw(made.id, "ben")).state == "open"
 
 
-async def test_what_is_no_draft_is_not_found(house: House) -> None:
+async def test_what_is_no_draft_is_not_found(editor: Editor) -> None:
     with pytest.raises(NotFound, match="no draft"):
-        await house.drafts.get(house.origin)
+        await editor.drafts.get(editor.origin)
     with pytest.raises(BadInput, match="200 characters"):
-        await _draft(house, "x" * 201)
-    made = await _draft(house, "")
+        await _draft(editor, "x" * 201)
+    made = await _draft(editor, "")
     assert made.name == "Draft 1"
-    await house.catalogue.delete(house.origin, "ada")
+    await editor.catalogue.delete(editor.origin, "ada")
     with pytest.raises(NotFound):
-        await house.merges.preview(made.id, AskedMerge())
-    assert (await house.drafts.get(made.id)).ahead is None
+        await editor.merges.preview(made.id, AskedMerge())
+    assert (await editor.drafts.get(made.id)).ahead is None

@@ -12,11 +12,30 @@ MOST_CLIENT: Final = 2**53 - 1  # beyond that a page cannot read the number, and
 MOST_CLOCK: Final = 2**31 - 1
 
 
+class PairedText(msgspec.Struct, frozen=True, array_like=True):
+    """A text that begins at this clock of a client, with characters that take two clocks: as UTF-16."""
+
+    client: int
+    start: int
+    units: bytes
+
+    @property
+    def end(self) -> int:
+        """The clock after it."""
+        return self.start + len(self.units) // 2
+
+    def is_within(self, clock: int) -> bool:
+        """Whether this clock is the second of a character."""
+        return (
+            self.start < clock < self.end and self.units[2 * (clock - self.start) + 1] >> 2 == 0x37
+        )
+
+
 class UpdateOutline(msgspec.Struct, frozen=True):
     """What an update brings, `(client, from clock, to clock)`, and what must be there before it:
     of each client so many clocks. `placed`: what need not lie in a root. `fields`: how many keys that
     may be new are among it, `actions`: how many of them are new actions; `structs`: how many there are
-    in all."""
+    in all; `paired`: texts that cannot be parted anywhere."""
 
     brings: tuple[tuple[int, int, int], ...]
     needs: dict[int, int]
@@ -24,6 +43,7 @@ class UpdateOutline(msgspec.Struct, frozen=True):
     actions: int = 0
     fields: int = 0
     structs: int = 0
+    paired: tuple[PairedText, ...] = ()
 
     def ready(self, known: dict[int, int]) -> bool:
         """Whether everything that it builds on is known, or comes with it."""

@@ -9,12 +9,17 @@ after it; whoever skips beyond the end does not end at the end, which is looked 
 from typing import Final
 
 from action_assistant.editor.crdt.nesting import Placed
-from action_assistant.editor.crdt.update_outline import MOST_CLIENT, MOST_CLOCK, UpdateOutline
+from action_assistant.editor.crdt.updates.update_outline import (
+    MOST_CLIENT,
+    MOST_CLOCK,
+    UpdateOutline,
+)
 
 _LARGEST: Final = 4096  # bytes of an update that is read here
 _STRING, _ANY = 4, 8
 _FIXED: Final = {127: 0, 126: 0, 124: 4, 123: 8, 122: 8, 121: 0, 120: 0}  # bytes of plain values
 _SIGNED, _BYTES, _ARRAY, _OBJECT, _TEXT = 125, 116, 117, 118, 119
+_SIGNED_BYTES: Final = 6  # of a whole number before its last one: all of these are read by pages
 _DEEPEST: Final = 8  # of arrays and objects in one value
 
 
@@ -51,6 +56,8 @@ def _outline(update: bytes) -> UpdateOutline:
             beside = None
             if info & 0xC0:
                 beside, at = _beside(update, at + 1, info, needs)
+                if needs.get(client, 0) > start:  # as the scanner refuses it
+                    raise _NotSmall
             else:
                 is_action, at = _root(update, at + 1, info)
                 fields += 1
@@ -143,8 +150,11 @@ def _value(update: bytes, at: int, deepest: int) -> int:
     if kind in _FIXED:
         return at + _FIXED[kind]
     if kind == _SIGNED:
+        first = at
         while update[at] > 127:
             at += 1
+        if at - first > _SIGNED_BYTES:
+            raise _NotSmall
         return at + 1
     if kind not in {_ARRAY, _OBJECT} or not deepest:
         raise _NotSmall
@@ -170,7 +180,7 @@ def _deletions(update: bytes, at: int, needs: dict[int, int]) -> int:
         for _ in range(ranges):
             start, at = _number(update, at)
             length, at = _number(update, at)
-            if start + length > MOST_CLOCK:
+            if not length or start + length > MOST_CLOCK:
                 raise _NotSmall
             needs[client] = max(start + length, needs.get(client, 0))
     return at

@@ -1,0 +1,55 @@
+"""What an update does to a document beyond what its bytes say, where a page and the library differ."""
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+from pycrdt import Doc
+
+from action_assistant.editor.crdt.applying import Panicked
+from action_assistant.editor.crdt.messages import ByteReader, Malformed, number
+from action_assistant.editor.crdt.updates.update_outline import UpdateOutline
+from action_assistant.editor.crdt.updates.update_scan import cut_items
+
+_KIND: Final = 31  # the bits of a struct that say what it is; none of them: it was collected
+
+
+def check_cut_items(
+    doc: "Doc[Any]", update: bytes, read: UpdateOutline, known: Mapping[int, int]
+) -> None:
+    """Raise Malformed where an item goes on from a struct of which nothing but its length is left: Yjs
+    fails at that. An item of which nothing is known goes on from nothing."""
+    if not any(start < known.get(client, 0) < end for client, start, end in read.brings):
+        return
+    for client in cut_items(update, known):
+        clock = known[client] - 1
+        reader = ByteReader(doc.get_update(_state({**known, client: clock})))
+        found = [reader.number() for _ in range(4)]  # clients, structs, client, clock
+        if found == [1, 1, client, clock] and not reader.byte() & _KIND:
+            raise Malformed("an item that goes on from what was collected")
+
+
+def check_whole(doc: "Doc[Any]", read: UpdateOutline) -> None:
+    """Raise Panicked where the library has not applied all of an update, since parts of it wait for each
+    other. Within one client that is seen beforehand."""
+    if len(read.brings) > 1:
+        reached = clocks(doc.get_state())
+        if any(reached.get(client, 0) < end for client, _, end in read.brings):
+            raise Panicked("structs that wait for each other")
+
+
+def check_unchanged(doc: "Doc[Any]", known: Mapping[int, int], error: Malformed) -> None:
+    """Raise Panicked where the library has refused an update after applying some of it."""
+    if clocks(doc.get_state()) != {client: clock for client, clock in known.items() if clock}:
+        raise Panicked(f"partly applied: {error}") from error
+
+
+def clocks(state: bytes) -> dict[int, int]:
+    """A state vector as numbers: what is known of each client."""
+    reader = ByteReader(state)
+    return {reader.number(): reader.number() for _ in range(reader.number())}
+
+
+def _state(known: Mapping[int, int]) -> bytes:
+    """A state vector."""
+    pairs = [number(client) + number(clock) for client, clock in known.items()]
+    return number(len(pairs)) + b"".join(pairs)

@@ -1,0 +1,97 @@
+"""Texts with characters of two clocks, between which nothing may come.
+
+Yjs counts text in UTF-16 units, and such a character has two. Where a deletion or a struct parts the two, the
+CRDT library counts one of its own texts otherwise than it says, and gives out a document at which every page
+fails. Documents of graphs hold no text but in values; other clients may write some.
+"""
+
+import re
+from bisect import bisect_right
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
+from typing import Final
+
+from action_assistant.editor.crdt.messages import Malformed
+from action_assistant.editor.crdt.updates.update_outline import PairedText, UpdateOutline
+from action_assistant.editor.crdt.updates.update_scan import places_parted, scanned, stored_outline
+
+MOST_BYTES: Final = 4 << 20  # of memory for all such texts of a document
+_EACH: Final = 200  # bytes of memory for one, beside its units
+_MOST_SOUGHT: Final = 1 << 20  # bytes of a document in which they are sought on the loop
+_OF_TWO: Final = re.compile(rb"[\xf0-\xf4][\x80-\xbf]{3}")  # such a character in UTF-8
+
+
+class PairedTexts:
+    """Those of one document."""
+
+    def __init__(self, kept: Iterable[PairedText] = ()) -> None:
+        self._by_client: Final[dict[int, list[PairedText]]] = {}
+        self._bytes = 0
+        self._add(kept)
+
+    def all(self) -> list[PairedText]:
+        """Those of each client in their order."""
+        return [each for found in self._by_client.values() for each in found]
+
+    def check(self, update: bytes, read: UpdateOutline, known: Mapping[int, int]) -> None:
+        """Raise Malformed for an update that would part a character, in a document that has so many
+        clocks of each client, or that brings more of them than can be kept."""
+        if not self._by_client and not read.paired:
+            return
+        news = _new(read, known)
+        if news and self._bytes + _size(news) > MOST_BYTES:
+            raise Malformed("more text outside of values than is kept")
+        known_ends = [
+            (client, known[client])
+            for client, start, end in read.brings
+            if start < known.get(client, 0) < end
+        ]
+        fresh = PairedTexts(read.paired)
+        for client, clock in [*places_parted(update), *known_ends]:
+            if self._is_within(client, clock) or fresh._is_within(client, clock):
+                raise Malformed("a change within one character")
+
+    def learn(self, read: UpdateOutline, known: Mapping[int, int]) -> None:
+        """The update is applied to a document that had so many clocks of each client."""
+        if read.paired:
+            self._add(_new(read, known))
+
+    def _add(self, texts: Iterable[PairedText]) -> None:
+        added = list(texts)
+        for each in added:
+            self._by_client.setdefault(each.client, []).append(each)
+        for client in {each.client for each in added}:
+            self._by_client[client].sort(key=_start)
+        self._bytes += _size(added)
+
+    def _is_within(self, client: int, clock: int) -> bool:
+        texts = self._by_client.get(client, [])
+        at = bisect_right(texts, clock, key=_start) - 1
+        return at >= 0 and texts[at].is_within(clock)
+
+
+def has_paired_texts(bodies: Sequence[bytes]) -> bool:
+    """Whether any of these stored updates brings such a text. Raises Malformed."""
+    if not _OF_TWO.search(b"\x00".join(bodies)):  # nearly always
+        return False
+    return any(bool(stored_outline(body).paired) for body in bodies if _OF_TWO.search(body))
+
+
+def paired_texts_in(state: bytes) -> list[PairedText]:
+    """Those in a document whose snapshot does not tell them; none where looking for them takes long."""
+    if len(state) <= _MOST_SOUGHT and _OF_TWO.search(state):
+        with suppress(Malformed):
+            return list(scanned(state, stored=True).paired)
+    return []
+
+
+def _start(text: PairedText) -> int:
+    return text.start
+
+
+def _size(texts: Iterable[PairedText]) -> int:
+    return sum(len(each.units) + _EACH for each in texts)
+
+
+def _new(read: UpdateOutline, known: Mapping[int, int]) -> list[PairedText]:
+    return [each for each in read.paired if each.end > known.get(each.client, 0)]

@@ -1,0 +1,209 @@
+"""Reads what an update consists of, without the CRDT library and within bounds (rule R4).
+
+The library allocates by declared counts, recurses by nesting, and loses edits when it is given
+several updates that wait for an earlier one. So nothing reaches it that was not read here first. It
+also takes what Yjs in a page fails at; that is refused here. Yjs update format, version 1.
+"""
+
+from collections.abc import Mapping
+from typing import Final, Literal, TypeAlias
+
+from action_assistant.editor.crdt.messages import ByteReader, Malformed
+from action_assistant.editor.crdt.nesting import Placed
+from action_assistant.editor.crdt.updates.small_update import small_outline
+from action_assistant.editor.crdt.updates.update_content import ContentReader, length
+from action_assistant.editor.crdt.updates.update_outline import (
+    MOST_CLIENT,
+    MOST_CLIENTS,
+    MOST_CLOCK,
+    MOST_STRUCTS,
+    PairedText,
+    UpdateOutline,
+)
+
+_GC, _DELETED, _STRING, _SKIP = 0, 1, 4, 10
+
+
+def outline(update: bytes) -> UpdateOutline:
+    """Read an update. Raises Malformed for what is none, is beyond the bounds, or fails in a page."""
+    return small_outline(update) or scanned(update)
+
+
+def stored_outline(update: bytes) -> UpdateOutline:
+    """Read an update that a room took, also one that it would not take today: the graph can be opened
+    all the same. Raises Malformed."""
+    return small_outline(update) or scanned(update, stored=True)
+
+
+def scanned(update: bytes, *, stored: bool = False) -> UpdateOutline:
+    """Read an update of any kind: `outline` without its short cut, or `stored_outline`. Raises
+    Malformed."""
+    scan = _Scan(ByteReader(update), stored=stored)
+    scan.whole()
+    return scan.outline()
+
+
+def places_parted(update: bytes) -> list[tuple[int, int]]:
+    """The clocks of clients before which applying an update parts a text, if there is one. Raises
+    Malformed."""
+    scan = _Scan(ByteReader(update), stored=True)
+    scan.whole()
+    return scan.parted
+
+
+def cut_items(update: bytes, known: Mapping[int, int]) -> list[int]:
+    """The clients of which the first part of an item is known, where there are so many clocks of each.
+    Raises Malformed."""
+    scan = _Scan(ByteReader(update), stored=True)
+    scan.whole()
+    return [c for c, start, end in scan.items if start < known.get(c, 0) < end]
+
+
+#: A struct that tells where this one lies, and whether inside it.
+_Reference: TypeAlias = tuple[int, int, bool]
+#: What kind of key in a root a struct may add.
+_Fresh: TypeAlias = Literal["none", "field", "action"]
+_NONE: Final = "none"
+_FIELD: Final = "field"
+_ACTION: Final = "action"
+
+
+class _Scan:
+    """What was read so far."""
+
+    def __init__(self, reader: ByteReader, *, stored: bool) -> None:
+        self.parted: Final[list[tuple[int, int]]] = []
+        self.items: Final[list[tuple[int, int, int]]] = []  # of more than one clock
+        self._needs: dict[int, int] = {}
+        self._reader = reader
+        self._contents = ContentReader(reader, stored=stored)
+        self._stored = stored
+        self._brings: list[tuple[int, int, int]] = []
+        self._placed: list[Placed] = []
+        self._paired: list[PairedText] = []
+        self._seen: set[int] = set()
+        self._structs = self._actions = self._fields = 0
+
+    def whole(self) -> None:
+        """All of an update. Raises Malformed."""
+        reader = self._reader
+        clients = reader.number()
+        if clients > MOST_CLIENTS or clients * 3 > reader.left:
+            raise Malformed("too many clients")
+        for _ in range(clients):
+            self._client_structs()
+        self._deletions()
+        if reader.left:
+            raise Malformed("something follows the update")
+
+    def outline(self) -> UpdateOutline:
+        """What that says."""
+        return UpdateOutline(
+            tuple(self._brings),
+            self._needs,
+            tuple(self._placed),
+            self._actions,
+            self._fields,
+            self._structs,
+            tuple(self._paired),
+        )
+
+    def _client_structs(self) -> None:
+        """All that is there of the next client."""
+        reader = self._reader
+        count, client, clock = reader.number(), _client(reader), reader.number()
+        if client in self._seen:
+            raise Malformed("a client comes twice")
+        self._seen.add(client)
+        self._structs += count
+        if self._structs > MOST_STRUCTS or count > reader.left:
+            raise Malformed("too many structs")
+        needs: dict[int, int] = {}
+        for _ in range(count):
+            info = reader.byte()
+            if info & 31 == _SKIP:
+                clock += reader.number()
+                continue
+            clock = self._one(client, clock, info, needs)
+        if clock > MOST_CLOCK:
+            raise Malformed("a clock that no client reaches")
+        for other, end in needs.items():
+            self._needs[other] = max(end, self._needs.get(other, 0))
+
+    def _one(self, client: int, start: int, info: int, needs: dict[int, int]) -> int:
+        """One struct; the clock after it."""
+        size, reference, fresh = self._struct(info, needs)
+        if needs.get(client, 0) > start and not self._stored:
+            raise Malformed("a struct that stands on itself or on a later one")
+        clock = start + size
+        if size > 1 and info & 31 != _GC:
+            self.items.append((client, start, clock))
+        self._fields += fresh is not _NONE
+        self._actions += fresh is _ACTION
+        if reference is not None:
+            self._placed.append(Placed((client, start, clock), *reference))
+        if info & 31 == _STRING and self._contents.paired:
+            self._paired.append(PairedText(client, start, self._contents.paired))
+        brings = self._brings
+        if brings and brings[-1][0] == client and brings[-1][2] == start:
+            brings[-1] = (client, brings[-1][1], clock)
+        else:
+            brings.append((client, start, clock))
+        return clock
+
+    def _struct(self, info: int, needs: dict[int, int]) -> tuple[int, _Reference | None, _Fresh]:
+        """How many clocks it takes, where it lies, and which key may be new with it."""
+        reader, kind = self._reader, info & 31
+        if kind == _GC:
+            return length(reader), None, _NONE
+        reference: _Reference | None = None
+        fresh: _Fresh = _NONE
+        if info & 0x80:
+            client, clock = _need(reader, needs)
+            reference = client, clock, False
+            self.parted.append((client, clock + 1))
+        if info & 0x40:
+            right = _need(reader, needs)
+            reference = reference or (*right, False)
+            self.parted.append(right)
+        if not info & 0xC0:
+            parent = reader.number()
+            if parent == 1:
+                fresh = _ACTION if reader.text() == b"actions" else _FIELD
+                fresh = _NONE if kind == _DELETED else fresh
+            elif parent == 0:
+                reference = *_need(reader, needs), True
+            else:
+                raise Malformed("a struct without a parent")
+            if info & 0x20:
+                fresh = _FIELD if b"|" in reader.text() and fresh is _ACTION else fresh
+        return self._contents.content(kind), reference, fresh
+
+    def _deletions(self) -> None:
+        reader, needs = self._reader, self._needs
+        for _ in range(reader.number()):
+            client = _client(reader)
+            for _ in range(reader.number()):
+                start = reader.number()
+                end = start + reader.number()
+                if start == end and not self._stored:
+                    raise Malformed("a deletion of nothing")
+                if end > MOST_CLOCK:
+                    raise Malformed("a clock that no client reaches")
+                needs[client] = max(end, needs.get(client, 0))
+                self.parted.extend(((client, start), (client, end)))
+
+
+def _need(reader: ByteReader, needs: dict[int, int]) -> tuple[int, int]:
+    client, clock = _client(reader), reader.number()
+    if clock > MOST_CLOCK:
+        raise Malformed("a clock that no client reaches")
+    needs[client] = max(clock + 1, needs.get(client, 0))
+    return client, clock
+
+
+def _client(reader: ByteReader) -> int:
+    client = reader.number()
+    if client > MOST_CLIENT:
+        raise Malformed("a client that cannot be")
+    return client
