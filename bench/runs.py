@@ -304,7 +304,7 @@ def _measured(actions: int, took: float) -> list[str]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         place, sent = run_in_virtual_time(lambda: _lived(folder, actions, took))
-        (events,) = (v for k, v in place.harness.ledger.streams.items() if k.startswith("run/"))
+        (events,) = (v for k, v in place.harness.journal.streams.items() if k.startswith("run/"))
         journal = asyncio.run(_stored(folder, events))
         raw = sum(path.stat().st_size for path in folder.glob("recordings/*/*"))
         archived = (folder / "one.jsonl.gz").stat().st_size

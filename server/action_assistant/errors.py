@@ -116,6 +116,12 @@ class Unavailable(Refused):
     status = 503
 
 
+class OutcomeUnknown(Refused):
+    """Nobody knows whether it was done"""
+
+    status = 504
+
+
 class CannotStart(Exception):
     """The process cannot begin its work; the message says why in one sentence."""
 

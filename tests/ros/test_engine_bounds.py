@@ -34,7 +34,7 @@ from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.visits import Visit
 from action_assistant.umrf.model import Action, Graph, Parameter
 from runner.bounds import GRAPHS, Real, fits
-from runner.harness import ANN, BEN, MemoryLedger, at_once, order
+from runner.harness import ANN, BEN, MemoryJournal, at_once, order
 
 RUNS = int(os.environ.get("TEST_BOUNDS_RUNS", "6"))
 DOMAIN = int(os.environ.get("TEST_BOUNDS_DOMAIN", "150"))
@@ -103,9 +103,9 @@ class Driven:
             [*command, "--truth", str(self.truth)], stdout=self.log, stderr=self.log
         )
         try:
-            self.ledger = MemoryLedger()  # SQLite stays on the thread that it was made on
+            self.journal = MemoryJournal()  # SQLite stays on the thread that it was made on
             asyncio.run(self._drive(runs))
-            self.runs = [self.ledger.history(each) for each in self.ids]
+            self.runs = [self.journal.history(each) for each in self.ids]
         finally:
             engine.kill()
             engine.wait()
@@ -117,7 +117,7 @@ class Driven:
         robots = Robots(reach=reach)
         try:
             async with ExecutionService.opened(
-                self.ledger, robots, clock_us=clock_us, run_in_worker=at_once
+                self.journal, robots, clock_us=clock_us, run_in_worker=at_once
             ) as control:
                 await robots.register(Registration(name="David", domain=self.domain), ANN)
                 for n in range(runs):

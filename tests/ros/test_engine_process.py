@@ -18,7 +18,7 @@ from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import Ended
 from ros.robots import RobotProcess, robot
 from ros.test_false_confirmations import clock_us
-from runner.harness import ANN, BEN, MemoryLedger, at_once, order, sequence
+from runner.harness import ANN, BEN, MemoryJournal, at_once, order, sequence
 
 STUBBORN: dict[str, Any] = {"*": [{"never": True, "ignores_stop": True}]}
 
@@ -34,14 +34,14 @@ def test_a_run_that_did_not_obey_ends_with_the_process_of_its_engine(
     domain: int, tmp_path: Path
 ) -> None:
     david = RobotProcess(domain, tmp_path, STUBBORN)
-    ledger = MemoryLedger()
+    journal = MemoryJournal()
 
     async def live() -> None:
         reach = ros2_reach(clock_us, {"ROS_DOMAIN_ID": str(domain)})
         assert not isinstance(reach, str), reach
         robots = Robots(reach=reach)
         async with ExecutionService.opened(
-            ledger, robots, clock_us=clock_us, run_in_worker=at_once
+            journal, robots, clock_us=clock_us, run_in_worker=at_once
         ) as control:
             await _answering(robots, domain)
             run = (await control.start(order(sequence(), engine="David"), ANN)).run.id
@@ -59,7 +59,7 @@ def test_a_run_that_did_not_obey_ends_with_the_process_of_its_engine(
             with anyio.fail_after(20):
                 while run in control.open:  # noqa: ASYNC110
                     await anyio.sleep(0.05)
-            told = ledger.told(run)[-1]
+            told = journal.told(run)[-1]
             assert isinstance(told, Ended)
             assert told.at_rest is not None
             assert (told.state, told.at_rest.by) == ("error", None)
@@ -79,7 +79,7 @@ def test_an_engine_that_was_not_started_by_its_name_is_of_no_known_process(domai
         assert not isinstance(reach, str), reach
         robots = Robots(reach=reach)
         async with ExecutionService.opened(
-            MemoryLedger(), robots, clock_us=clock_us, run_in_worker=at_once
+            MemoryJournal(), robots, clock_us=clock_us, run_in_worker=at_once
         ):
             await _answering(robots, domain)
             engine = robots.link("David")

@@ -42,7 +42,7 @@ from action_assistant.umrf.files import codec
 from action_assistant.umrf.semantics import Execution
 from ros.robots import robot
 from runner.fake_network import run_of
-from runner.harness import ANN, BEN, MemoryLedger, at_once, order, sequence, two_ends
+from runner.harness import ANN, BEN, MemoryJournal, at_once, order, sequence, two_ends
 
 HISTORIES = int(os.environ.get("TEST_ROS_HISTORIES", "2"))
 FIRST = int(os.environ.get("TEST_ROS_HISTORIES_FROM", "0"))
@@ -111,7 +111,7 @@ class Story:
         self.false: list[str] = []
         self.judged: set[str] = set()
         self.still: set[str] = set()
-        self.ledger = MemoryLedger()
+        self.journal = MemoryJournal()
         self.runs: dict[Execution, str] = {}
 
     def robot(self) -> None:
@@ -131,7 +131,7 @@ class Story:
         try:
             robots = Robots(reach=reach)
             async with ExecutionService.opened(
-                self.ledger, robots, clock_us=clock_us, run_in_worker=at_once
+                self.journal, robots, clock_us=clock_us, run_in_worker=at_once
             ) as control:
                 control.watch(self.judge)
                 await robots.register(Registration(name="David", domain=self.domain), ANN)
@@ -172,7 +172,7 @@ class Story:
                 self.chance.choice([stranger.start, stranger.stop])(name)
             case "made up":
                 for opened in tuple(control.open.values())[:1]:
-                    requested = self.ledger.told(opened.run.id)[0]
+                    requested = self.journal.told(opened.run.id)[0]
                     stranger.make_up(getattr(requested, "umrf", "{}"))
             case "look":
                 for run, opened in tuple(control.open.items()):

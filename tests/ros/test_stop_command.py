@@ -1,7 +1,13 @@
 """Stop on the command line with a robot that does not obey: over rclpy, with the real product."""
 
 import json
+import os
+import signal
+import subprocess
+import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +20,7 @@ pytest.importorskip(
 from ros.robots import RobotProcess
 from support.product import Product, running
 
+FOREIGN_START = Path(__file__).parents[2] / "frontend" / "e2e" / "foreign_start.py"
 STUBBORN: dict[str, Any] = {"*": [{"never": True, "ignores_stop": True}]}
 GRAPH = {
     "graph_name": "pair",
@@ -63,5 +70,82 @@ def test_stop_says_unconfirmed_and_exits_1_until_somebody_has_looked(
             looked = product.cli("runs", "at-rest", run, "--how", "I stand beside it.")
             assert (looked.returncode, looked.stdout) == (0, "run 1 of pair is over: error\n")
             assert product.cli("stop", "--all").returncode == 0
+    finally:
+        david.end()
+
+
+@contextmanager
+def _started_by_others(domain: int) -> Iterator[None]:
+    """Somebody else on that domain starts the graph on David; the runner and David listen."""
+    environment = {**os.environ, "ROS_DOMAIN_ID": str(domain)}
+    other = subprocess.Popen(
+        [sys.executable, str(FOREIGN_START), "David", "2"],
+        stdin=subprocess.PIPE,
+        env=environment,
+        text=True,
+    )
+    assert other.stdin is not None
+    other.stdin.write(json.dumps(GRAPH))
+    other.stdin.close()
+    try:
+        yield
+    finally:
+        other.terminate()
+        other.wait(10)
+
+
+def _moving(product: Product) -> None:
+    """Wait until the runner shows that the graph of others moves."""
+    with product.runner() as runner:
+        deadline = time.monotonic() + 30
+        while time.monotonic() < deadline:
+            robots = runner.get("/api/robots").json()
+            if any(held["active"] for robot in robots for held in robot["holds"]):
+                return
+            time.sleep(0.1)
+    raise AssertionError("nothing moves")
+
+
+@pytest.mark.timeout(240)
+@pytest.mark.parametrize(
+    ("script", "code", "said"),
+    [
+        ({"*": [{"never": True}]}, 0, "stopped\n"),
+        (STUBBORN, 1, "STOP UNCONFIRMED for pair on David: "),
+    ],
+)
+def test_stop_all_waits_for_proof_of_what_others_started_too(
+    domain: int, tmp_path: Path, script: dict[str, Any], code: int, said: str
+) -> None:
+    david = RobotProcess(domain, tmp_path, script)
+    try:
+        with running(tmp_path / "data") as product:
+            with product.runner() as runner:
+                runner.post("/api/robots", json={"name": "David", "domain": domain})
+            _answering(product)
+            with _started_by_others(domain):
+                _moving(product)
+                told = product.cli("stop", "--all", "--wait", "10")
+                assert told.returncode == code, told
+                assert said in told.stdout + told.stderr
+    finally:
+        david.end()
+
+
+@pytest.mark.timeout(240)
+def test_a_robot_that_does_not_answer_proves_nothing(domain: int, tmp_path: Path) -> None:
+    david = RobotProcess(domain, tmp_path, {})
+    try:
+        with running(tmp_path / "data") as product:
+            with product.runner() as runner:
+                runner.post("/api/robots", json={"name": "David", "domain": domain})
+            _answering(product)
+            assert product.cli("stop", "--all").stdout == "nothing was running\n"
+            david.signal(signal.SIGSTOP)
+            deadline = time.monotonic() + 30
+            while (told := product.cli("stop", "--all")).returncode == 0:
+                assert time.monotonic() < deadline, told
+            assert "NOT KNOWN what David runs: " in told.stderr
+            david.signal(signal.SIGCONT)
     finally:
         david.end()

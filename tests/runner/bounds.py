@@ -104,7 +104,7 @@ async def _lived(
                     await anyio.sleep(stop)
                     await place.control.stop(run, BEN)
                 await all_over(place.control)
-            history = place.harness.ledger.history(run)
+            history = place.harness.journal.history(run)
     return Lived(history, place, {name: _real(name, traces, script) for name in history.actions})
 
 

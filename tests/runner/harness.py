@@ -115,7 +115,7 @@ async def at_once(work: Callable[..., Any], *args: Any) -> Any:
     return work(*args)
 
 
-class MemoryLedger:
+class MemoryJournal:
     """A journal in memory, with the real tables. `down` makes it fail, `slow` makes it late;
     `forgetful` makes it commit and then say that it failed."""
 
@@ -313,7 +313,7 @@ class Harness:
     """One place with a journal and robots, in which runners come and go."""
 
     def __init__(self, robots: dict[str, Link] | None = None) -> None:
-        self.ledger = MemoryLedger()
+        self.journal = MemoryJournal()
         self.links = robots or {}
         self.shown: list[tuple[float, Run]] = []
 
@@ -321,7 +321,7 @@ class Harness:
     async def runner(self) -> AsyncIterator[ExecutionService]:
         """A runner, up to its end."""
         async with ExecutionService.opened(
-            self.ledger, Robots(self.links), clock_us=clock_us, run_in_worker=at_once
+            self.journal, Robots(self.links), clock_us=clock_us, run_in_worker=at_once
         ) as control:
             control.watch(self._saw)
             yield control

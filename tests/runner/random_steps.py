@@ -102,6 +102,6 @@ async def live_through(
                 if step == "crash":
                     break
                 await do(control, people, step, value)
-            harness.ledger.down = True  # a crash writes nothing any more
+            harness.journal.down = True  # a crash writes nothing any more
             people.cancel_scope.cancel()
-        harness.ledger.down = False
+        harness.journal.down = False

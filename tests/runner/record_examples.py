@@ -202,8 +202,8 @@ async def played(story: Story, begins: int) -> bytes:
         async with stage.harness.runner() as stage.control:
             await anyio.sleep(1.5)
             await story(stage)
-    (run,) = [each for each in stage.harness.ledger.streams if each.startswith("run/")]
-    events = stage.harness.ledger.streams[run]
+    (run,) = [each for each in stage.harness.journal.streams if each.startswith("run/")]
+    events = stage.harness.journal.streams[run]
     assert run == stream_of(run.removeprefix("run/"))
     return recorded_runs.written(events)
 

@@ -203,7 +203,7 @@ async def told(story: Story) -> list[list[Event]]:
             await anyio.sleep(3)
             async with place.harness.runner() as place.control:
                 await all_over(place.control)
-    streams = place.harness.ledger.streams
+    streams = place.harness.journal.streams
     return [streams[name] for name in sorted(streams) if name.startswith("run/")]
 
 

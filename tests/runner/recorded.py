@@ -33,7 +33,7 @@ from action_assistant.runner.runs.events import Requested
 from action_assistant.runner.runs.fold import begin
 from action_assistant.runner.runs.run import Run
 from action_assistant.umrf.files import codec
-from runner.harness import ANN, BEN, EPOCH, MemoryLedger, at_once, clock_us, run_in_virtual_time
+from runner.harness import ANN, BEN, EPOCH, MemoryJournal, at_once, clock_us, run_in_virtual_time
 
 LETTERS = {
     "U": "UNINITIALIZED", "I": "INITIALIZED", "R": "RUNNING", "Q": "PAUSE_REQUESTED", "P": "PAUSED",
@@ -249,7 +249,7 @@ def history(file: Path) -> Run:
             begin(asked),
             link=link,
             owns_link=False,
-            store=MemoryLedger(),
+            store=MemoryJournal(),
             seq=0,
             clock_us=clock_us,
             run_in_worker=at_once,

@@ -121,7 +121,7 @@ async def fleet(harness: Harness, **robots: Open) -> AsyncIterator[ExecutionServ
     """A runner that knows these robots, after they have answered for the first time."""
     reach = Robots(reach=RegisteredRobots(**robots))
     async with ExecutionService.opened(
-        harness.ledger, reach, clock_us=clock_us, run_in_worker=at_once
+        harness.journal, reach, clock_us=clock_us, run_in_worker=at_once
     ) as control:
         for name in robots:
             await control.register(Registration(name=name), ANN)

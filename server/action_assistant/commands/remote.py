@@ -26,6 +26,7 @@ from action_assistant.safe_text import one_line
 _ENDED: Final = frozenset({"finished", "halted", "stopped", "error", "refused", "lost"})
 _POLL: Final = 0.2  # seconds
 _INSIST_S: Final = 5.0
+_LOOK: Final = "Look at the robot; use its hardware stop."
 
 Run: TypeAlias = dict[str, Any]
 
@@ -265,24 +266,44 @@ def _stop(options: argparse.Namespace) -> int:
     with running(options) as server:
         try:
             path = "/api/stop" if options.all else f"/api/runs/{options.run}/stop"
-            stopping: list[str] = insisting(server, "POST", path)["runs"]
+            asked = insisting(server, "POST", path)
+            others = asked.get("graphs", {})
             deadline = time.monotonic() + options.wait
             while True:
-                runs = [insisting(server, "GET", f"/api/runs/{run}") for run in stopping]
-                unproven = [run for run in runs if not _is_at_rest(run)]
-                if all(_is_at_rest(run) or run["unconfirmed"] for run in runs):
-                    break
-                if time.monotonic() > deadline:
+                runs = [insisting(server, "GET", f"/api/runs/{run}") for run in asked["runs"]]
+                graphs = _unproven(others, insisting(server, "GET", "/api/robots"))
+                settled = all(_is_at_rest(run) or run["unconfirmed"] for run in runs)
+                if (settled and not graphs) or time.monotonic() > deadline:
                     break
                 time.sleep(_POLL)
         except No as error:
             return refused(error)
-    for run in unproven:
-        said = (
-            f"STOP UNCONFIRMED for run {run['number']} of {run['graph_name']}: it is "
-            f"{run['state']}. {_why(run)}Look at the robot; use its hardware stop."
-        )
+    doubts = [_unconfirmed(run) for run in runs if not _is_at_rest(run)]
+    doubts += [f"STOP UNCONFIRMED for {each}. {_LOOK}" for each in graphs]
+    doubts += [f"NOT KNOWN what {each} runs: {why}" for each, why in asked.get("unknown", {}).items()]
+    for said in doubts:
         print(one_line(said), file=sys.stderr)
-    if not unproven:
-        print("stopped" if stopping else "nothing was running")
-    return 1 if unproven else 0
+    if not doubts:
+        print("stopped" if runs or others else "nothing was running")
+    return 1 if doubts else 0
+
+
+def _unconfirmed(run: Run) -> str:
+    said = f"STOP UNCONFIRMED for run {run['number']} of {run['graph_name']}: it is {run['state']}."
+    return f"{said} {_why(run)}{_LOOK}"
+
+
+def _unproven(stopped: dict[str, list[str]], robots: list[dict[str, Any]]) -> list[str]:
+    """Of graphs that others started, by robot: which are not proven to be at rest, and why not."""
+    known = {robot["name"]: robot for robot in robots}
+    found: list[str] = []
+    for name, graphs in stopped.items():
+        robot = known.get(name)
+        holds = {} if robot is None else {each["graph"]: each for each in robot["holds"]}
+        silent = robot is None or robot["state"] not in {"answering", "restarted"}
+        for graph in graphs:
+            held = holds.get(graph)
+            if silent or (held is not None and (held["active"] or held["stopping"] is not None)):
+                why = (held or {}).get("stopping") or (robot or {}).get("why") or "no proof has come"
+                found.append(f"{graph} on {name}: {why.rstrip('.')}")
+    return found

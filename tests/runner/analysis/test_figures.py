@@ -57,20 +57,20 @@ def durations(told: Lived) -> dict[str, int]:
 
 def figures(told: Lived) -> statistics.Statistics:
     """Statistics of such a run, from what is kept of it."""
-    ledger = told.place.harness.ledger
+    journal = told.place.harness.journal
 
     async def found() -> statistics.Statistics:
         draft = annotations.draft(annotations.sum_of(told.run, None, 0))
-        await ledger.append(annotations.stream_about(told.run.id), [draft])
-        rows = await ledger.query(statistics.runs_of(told.run.graph_name, None, 10))
-        sums = await ledger.query(statistics.sums_of([row.id for row in rows]))
+        await journal.append(annotations.stream_about(told.run.id), [draft])
+        rows = await journal.query(statistics.runs_of(told.run.graph_name, None, 10))
+        sums = await journal.query(statistics.sums_of([row.id for row in rows]))
         return statistics.statistics(rows, sums, graph_of(told))
 
     return anyio.run(found)
 
 
 def graph_of(told: Lived) -> Graph:
-    (requested, *_) = told.place.harness.ledger.told(told.run.id)
+    (requested, *_) = told.place.harness.journal.told(told.run.id)
     return codec.read(getattr(requested, "umrf", "").encode()).graph
 
 
@@ -165,7 +165,7 @@ def test_what_ended_unseen_and_what_was_seen_to_go_on_are_not_the_same() -> None
     done = lived("line", {"*": [{"after_s": 1.0}]}, NetworkFaults(), None)
     other = lived("line", {"*": [{"never": True, "ignores_stop": True}]}, NetworkFaults(), None)
     texts = [
-        getattr(each.place.harness.ledger.told(each.run.id)[0], "umrf", "")
+        getattr(each.place.harness.journal.told(each.run.id)[0], "umrf", "")
         for each in (done, other)
     ]
     found = comparison.compare(done.run, other.run, *map(comparison.SentTree, texts))
@@ -185,7 +185,7 @@ def test_a_script_says_between_which_bounds_it_had_to_choose() -> None:
 
 def test_visits_stand_in_mcap_between_their_bounds() -> None:
     told = lived("line", {"*": [{"after_s": 3.0}]}, NetworkFaults(), None)
-    events = told.place.harness.ledger.streams[stream_of(told.run.id)]
+    events = told.place.harness.journal.streams[stream_of(told.run.id)]
     read = make_reader(io.BytesIO(exports.mcap(events)))
     visits = {
         channel.topic: msgspec.json.decode(message.data)
@@ -218,7 +218,7 @@ def test_a_percentile_of_ranges_holds_that_of_what_was_true(
 
 def test_runs_that_an_older_version_has_summed_up_are_summed_up_again(tmp_path: Path) -> None:
     told = lived("line", {"*": [{"after_s": 2.0}]}, NetworkFaults(), None)
-    ledger = told.place.harness.ledger
+    journal = told.place.harness.journal
     old = {
         "Work_0": annotations.ActionSum(visits=1, took=(0,)),
         "Work_1": annotations.ActionSum(visits=1),
@@ -226,19 +226,19 @@ def test_runs_that_an_older_version_has_summed_up_are_summed_up_again(tmp_path: 
 
     async def again_() -> list[Any]:
         stream = annotations.stream_about(told.run.id)
-        ledger.streams.pop(stream, None)
-        await ledger.append(stream, [annotations.draft(annotations.SummedUp(1, old))])
-        before = await ledger.query(statistics.sums_of([told.run.id]))
+        journal.streams.pop(stream, None)
+        await journal.append(stream, [annotations.draft(annotations.SummedUp(1, old))])
+        before = await journal.query(statistics.sums_of([told.run.id]))
         assert [row.took for row in before if row.took] == [[[0, None]]]  # at least: it is no value
         async with told.place.harness.runner() as control, anyio.create_task_group() as tasks:
             review_service = ReviewService(
-                control, ArchiveStore(ledger, tmp_path, at_once), at_once, clock_us
+                control, ArchiveStore(journal, tmp_path, at_once), at_once, clock_us
             )
             tasks.start_soon(review_service.run)
             await anyio.sleep(5)
             tasks.cancel_scope.cancel()
-        assert len(ledger.streams[stream]) == 2  # once, and no more
-        return await ledger.query(statistics.sums_of([told.run.id]))
+        assert len(journal.streams[stream]) == 2  # once, and no more
+        return await journal.query(statistics.sums_of([told.run.id]))
 
     rows = run_in_virtual_time(again_)
     assert {row.action for row in rows} == {f"Work_{i}" for i in range(4)}

@@ -22,7 +22,7 @@ from action_assistant.runner.runs.events import (
     encode,
 )
 from action_assistant.runner.runs.fold import replay
-from runner.harness import MemoryLedger, at_once, virtual
+from runner.harness import MemoryJournal, at_once, virtual
 from runner.runs.test_runs import STARTED
 from support.doses import examples
 
@@ -62,11 +62,11 @@ def told(drawn: Sequence[Sequence[Any]]) -> list[RunEvent]:
     return [*events, StopRequested(end, Author("b", "Ben")), Ended(end + 1, "stopped", None, "so")]
 
 
-async def stored(events: Sequence[RunEvent]) -> MemoryLedger:
-    ledger = MemoryLedger()
+async def stored(events: Sequence[RunEvent]) -> MemoryJournal:
+    journal = MemoryJournal()
     drafts = [Draft(each.kind, "x", encode(each)) for each in events]
-    await ledger.append("run/r1", drafts)
-    return ledger
+    await journal.append("run/r1", drafts)
+    return journal
 
 
 def played(run_replay: RunReplay, upto: int) -> dict[str, Any]:
@@ -147,33 +147,33 @@ async def test_the_pages_of_a_long_film_join_without_a_gap() -> None:
 @virtual
 async def test_keyframes_are_a_cache_that_may_vanish_or_be_of_another_fold() -> None:
     events = long_run(APART + 700)
-    ledger = await stored(events)
-    whole = await KeyframeStore(ledger, at_once).keyframes("r1")
+    journal = await stored(events)
+    whole = await KeyframeStore(journal, at_once).keyframes("r1")
     assert whole.keys[-1].run == replay(events)
-    assert ledger.snapshots
-    again = await KeyframeStore(ledger, at_once).keyframes("r1")  # from the cache
+    assert journal.snapshots
+    again = await KeyframeStore(journal, at_once).keyframes("r1")  # from the cache
     assert again == whole
     other = msgspec.structs.replace(whole, fold=-1)
-    await ledger.keep_snapshot("run/r1", whole.keys[-1].seq, msgspec.msgpack.encode(other))
-    assert await KeyframeStore(ledger, at_once).keyframes("r1") == whole
-    await ledger.keep_snapshot("run/r1", whole.keys[-1].seq, b"nonsense")
-    assert await KeyframeStore(ledger, at_once).keyframes("r1") == whole
+    await journal.keep_snapshot("run/r1", whole.keys[-1].seq, msgspec.msgpack.encode(other))
+    assert await KeyframeStore(journal, at_once).keyframes("r1") == whole
+    await journal.keep_snapshot("run/r1", whole.keys[-1].seq, b"nonsense")
+    assert await KeyframeStore(journal, at_once).keyframes("r1") == whole
 
 
 @virtual
 async def test_of_a_run_that_goes_on_each_whole_multiple_is_kept_and_gone_on_from() -> None:
     events = long_run(3 * APART)
-    ledger = await stored(events[: APART - 1])
-    followed = KeyframeStore(ledger, at_once)
+    journal = await stored(events[: APART - 1])
+    followed = KeyframeStore(journal, at_once)
     await followed.keyframes("r1")
-    assert not ledger.snapshots  # nothing worth it yet
+    assert not journal.snapshots  # nothing worth it yet
     for upto, kept in ((APART + 5, APART + 5), (2 * APART - 1, APART + 5), (2 * APART, 2 * APART)):
-        there = await ledger.newest("run/r1")
+        there = await journal.newest("run/r1")
         rest = [Draft(each.kind, "x", encode(each)) for each in events[there:upto]]
-        await ledger.append("run/r1", rest)
+        await journal.append("run/r1", rest)
         await followed.keyframes("r1")
-        assert ledger.snapshots["run/r1"].seq == kept
-        again = await KeyframeStore(ledger, at_once).keyframes("r1")  # by who begins there
+        assert journal.snapshots["run/r1"].seq == kept
+        again = await KeyframeStore(journal, at_once).keyframes("r1")  # by who begins there
         whole = KeyframeStore(await stored(events[:upto]), at_once)
         assert again == await whole.keyframes("r1")
 
@@ -181,11 +181,11 @@ async def test_of_a_run_that_goes_on_each_whole_multiple_is_kept_and_gone_on_fro
 @virtual
 async def test_keyframes_stand_at_whole_multiples_however_many_events_are_read_at_once() -> None:
     events = long_run(6 * APART)
-    ledger = await stored(events[:700])
-    keyframe_store = KeyframeStore(ledger, at_once)
+    journal = await stored(events[:700])
+    keyframe_store = KeyframeStore(journal, at_once)
     await keyframe_store.keyframes("r1")
     rest = [Draft(each.kind, "x", encode(each)) for each in events[700:]]
-    await ledger.append("run/r1", rest)
+    await journal.append("run/r1", rest)
     keys = (await keyframe_store.keyframes("r1")).keys
     assert [key.seq for key in keys] == [*range(APART, len(events), APART), len(events)]
     for key in keys:
@@ -195,12 +195,12 @@ async def test_keyframes_stand_at_whole_multiples_however_many_events_are_read_a
 @virtual
 async def test_keyframes_that_were_made_early_go_on_with_the_run() -> None:
     events = long_run(APART + 50)
-    ledger = await stored(events[: APART // 2])
-    keyframe_store = KeyframeStore(ledger, at_once)
+    journal = await stored(events[: APART // 2])
+    keyframe_store = KeyframeStore(journal, at_once)
     early = await keyframe_store.keyframes("r1")
     assert early.keys[-1].seq == APART // 2
     rest = [Draft(each.kind, "x", encode(each)) for each in events[APART // 2 :]]
-    await ledger.append("run/r1", rest)
+    await journal.append("run/r1", rest)
     late = await keyframe_store.keyframes("r1")
     assert late.keys[-1].run == replay(events)
     run = replay(events[:1234])

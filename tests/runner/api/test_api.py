@@ -230,7 +230,8 @@ def test_stop_is_answered_at_once_and_proven_soon(process: RunnerProcess) -> Non
         run = started(client, order(sequence(), script=ENDLESS))
         answer = client.post(f"/api/runs/{run['id']}/stop", json={"stop_id": "s"})
         assert answer.status_code == 202
-        assert answer.json() == {"type": "stopping", "stop_id": "s", "runs": [run["id"]]}
+        told = answer.json()
+        assert (told["type"], told["stop_id"], told["runs"]) == ("stopping", "s", [run["id"]])
         done = over(client, run["id"])
         assert (done["state"], done["stopped_by"]["id"]) == ("stopped", "local")
         assert done["proof_at"] is not None
@@ -293,6 +294,15 @@ def test_a_robot_can_be_registered_and_says_that_it_has_no_link(process: RunnerP
         problem(client.post("/api/robots", json={"name": "simulator"}), 409)
         problem(client.post("/api/robots", json={"name": "a b"}), 400)
         problem(client.post("/api/robots", json={"name": "Eve", "domain": 999}), 400)
+
+
+def test_stopping_everything_tells_of_which_robots_nothing_is_known(process: RunnerProcess) -> None:
+    with process.client() as client:
+        assert client.post("/api/robots", json={"name": "Farah", "domain": 8}).status_code == 201
+        answer = client.post("/api/stop", json={"stop_id": "s9"}).json()
+        assert client.delete("/api/robots/Farah").status_code == 204
+    assert (answer["stop_id"], answer["graphs"]) == ("s9", {})
+    assert answer["unknown"]["Farah"].startswith("No link: ")
 
 
 def events(client: httpx.Client, run: str, last: int | None = None) -> list[dict[str, Any]]:

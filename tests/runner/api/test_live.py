@@ -61,7 +61,13 @@ def test_stop_by_the_socket_is_answered_and_done(process: RunnerProcess) -> None
         run = started(client, order(sequence(), script=ENDLESS))
         socket.send(json.dumps({"type": "stop", "run": run["id"], "stop_id": "s1"}))
         answer = next(each for each in messages(socket) if each["type"] == "stopping")
-        assert answer == {"type": "stopping", "stop_id": "s1", "runs": [run["id"]]}
+        assert answer == {
+            "type": "stopping",
+            "stop_id": "s1",
+            "runs": [run["id"]],
+            "graphs": {},
+            "unknown": {},
+        }
         assert over(client, run["id"])["state"] == "stopped"
 
 

@@ -193,7 +193,7 @@ def test_a_recording_that_cannot_be_looked_at_does_not_end_what_puts_old_ones_aw
 
     async def live() -> None:
         retention = Retention(
-            Harness().ledger,  # type: ignore[arg-type] - nothing of it is asked
+            Harness().journal,  # type: ignore[arg-type] - nothing of it is asked
             Recordings(tmp_path / "recordings", at_once),
             Keep(folder=tmp_path, raw=1),
             is_open=lambda _: False,
@@ -213,7 +213,7 @@ def test_a_recording_that_cannot_be_looked_at_does_not_end_what_puts_old_ones_aw
 async def test_a_run_that_cannot_be_summed_up_is_left_out_and_the_next_one_is_not() -> None:
     harness = Harness()
     async with harness.runner() as control, anyio.create_task_group() as tasks:
-        archive_store = ArchiveStore(harness.ledger, Path("nowhere"), at_once)  # type: ignore[arg-type]
+        archive_store = ArchiveStore(harness.journal, Path("nowhere"), at_once)  # type: ignore[arg-type]
         review_service = ReviewService(control, archive_store, at_once, clock_us)
         keyframes, failed = review_service.keyframe_store.keyframes, []
 
@@ -228,5 +228,7 @@ async def test_a_run_that_cannot_be_summed_up_is_left_out_and_the_next_one_is_no
         for _ in range(2):
             run = (await control.start(order(sequence(actions=1)), ANN)).run
             await until(lambda run=run: run.id not in control.open)
-        await until(lambda: len([each for each in harness.ledger.streams if "about/" in each]) == 2)
+        await until(
+            lambda: len([each for each in harness.journal.streams if "about/" in each]) == 2
+        )
         tasks.cancel_scope.cancel()

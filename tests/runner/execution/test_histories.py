@@ -122,9 +122,9 @@ class Story:
             case "silent":
                 self.robot.silent = value
             case "journal":
-                self.harness.ledger.down = value
+                self.harness.journal.down = value
             case "slow journal":
-                self.harness.ledger.slow = value
+                self.harness.journal.slow = value
             case "well":
                 self.make_well()
             case "engine restarts":
@@ -138,8 +138,8 @@ class Story:
     def make_well(self) -> None:
         """Nothing is lost any more."""
         self.robot.start_delay, self.robot.old = 0.0, 0.01
-        self.robot.loss = self.robot.start_loss = self.harness.ledger.slow = 0.0
-        self.robot.silent = self.harness.ledger.down = False
+        self.robot.loss = self.robot.start_loss = self.harness.journal.slow = 0.0
+        self.robot.silent = self.harness.journal.down = False
 
     async def start(self, control: ExecutionService, name: str, where: str) -> None:
         """A start, which may be refused."""
@@ -200,13 +200,13 @@ class Story:
         runs = [each.run for each in self.robot.starts]
         assert len(runs) == len(set(runs))
         last = {run.id: run for _, run in self.harness.shown}
-        for stream in self.harness.ledger.streams:
+        for stream in self.harness.journal.streams:
             if not stream.startswith("run/"):
                 continue
-            told = self.harness.ledger.history(stream.removeprefix("run/"))
+            told = self.harness.journal.history(stream.removeprefix("run/"))
             assert told.state in ENDED or told.id in self.defiant
             assert told == last[told.id]
-            stops = [e for e in self.harness.ledger.told(told.id) if isinstance(e, StopRequested)]
+            stops = [e for e in self.harness.journal.told(told.id) if isinstance(e, StopRequested)]
             assert (told.desired == "stopped") == bool(stops)
 
 

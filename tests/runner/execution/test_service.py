@@ -48,7 +48,7 @@ async def test_what_was_shown_last_is_what_the_history_tells() -> None:
         await anyio.sleep(5)
         control.stop_all(BEN)
         await ended(control, started.run.id)
-    assert harness.shown[-1][1] == harness.ledger.history(started.run.id)
+    assert harness.shown[-1][1] == harness.journal.history(started.run.id)
     assert harness.shown[-1][1].state == "stopped"
 
 
@@ -57,24 +57,24 @@ async def test_the_run_is_stored_before_anything_is_sent() -> None:
     robot = Robot(engine())
     harness = Harness({"David": robot})
     async with harness.runner() as control:
-        harness.ledger.down = True
+        harness.journal.down = True
         with pytest.raises(Unavailable, match="could not be recorded"):
             await control.start(order(sequence(), engine="David"), ANN)
         assert robot.starts == []
-        harness.ledger.down = False
+        harness.journal.down = False
         run = (await control.start(order(sequence(), engine="David"), ANN)).run
-        assert [type(each) for each in harness.ledger.told(run.id)][:1] == [Requested]
+        assert [type(each) for each in harness.journal.told(run.id)][:1] == [Requested]
 
 
 @virtual
 async def test_a_run_whose_record_was_in_doubt_is_told_as_refused() -> None:
     harness = Harness()
     async with harness.runner() as control:
-        harness.ledger.forgetful = True
+        harness.journal.forgetful = True
         with pytest.raises(Unavailable):
             await control.start(order(sequence()), ANN)
-        (stream,) = harness.ledger.streams
-        harness.ledger.forgetful = False
+        (stream,) = harness.journal.streams
+        harness.journal.forgetful = False
         await anyio.sleep(3)
         assert (await control.find(stream.removeprefix("run/"))).state == "refused"
 
@@ -84,7 +84,7 @@ async def test_a_run_whose_record_was_in_doubt_is_told_as_refused() -> None:
 async def test_equal_requests_at_once_make_exactly_one_start(askers: int) -> None:
     robot = Robot(engine())
     harness = Harness({"David": robot})
-    harness.ledger.slow = 0.05
+    harness.journal.slow = 0.05
     asked = order(sequence(), engine="David")
     answers = []
     async with harness.runner() as control:
@@ -163,7 +163,7 @@ async def test_an_engine_that_does_not_answer_is_not_started() -> None:
         with pytest.raises(Unavailable, match="does not answer"):
             await control.start(order(sequence(), engine="David"), ANN)
     assert robot.starts == []
-    assert not any(stream.startswith("run/") for stream in harness.ledger.streams)
+    assert not any(stream.startswith("run/") for stream in harness.journal.streams)
 
 
 @virtual
@@ -216,7 +216,7 @@ async def test_a_simulated_run_pauses_and_goes_on() -> None:
         assert control.open[run.id].run.state == "paused"
         await control.resume(run.id, ANN)
         assert await ended(control, run.id) == "finished"
-    found = harness.ledger.history(run.id)
+    found = harness.journal.history(run.id)
     assert found.ended_at is not None
     assert found.started_at is not None
     assert (found.ended_at - found.started_at) / 1e6 > 20
@@ -328,7 +328,7 @@ async def test_numbers_go_on_after_a_restart() -> None:
             run = (await control.start(order(sequence(actions=1)), ANN)).run
             assert run.number == number
             assert await ended(control, run.id) in ENDED
-            assert Published in [type(each) for each in harness.ledger.told(run.id)]
+            assert Published in [type(each) for each in harness.journal.told(run.id)]
 
 
 @virtual
@@ -341,7 +341,7 @@ async def test_a_simulated_run_that_is_paused_can_be_stopped() -> None:
         await until(lambda: control.open[run].run.state == "paused")
         await control.stop(run, BEN)
         assert await ended(control, run) == "stopped"
-    assert harness.ledger.history(run).alarms == ()
+    assert harness.journal.history(run).alarms == ()
 
 
 @virtual

@@ -71,9 +71,9 @@ async def played(scene: RobotsInNetwork, graph: Graph) -> str:
 @virtual
 async def test_a_sub_graph_of_an_earlier_run_is_no_part_of_one_that_has_only_its_name() -> None:
     scene = WithSub(1, script=SCRIPT)
-    first = scene.harness.ledger.history(await played(scene, named("Sub")))
+    first = scene.harness.journal.history(await played(scene, named("Sub")))
     assert set(first.actions) == {"Sub_0", "patrol__Sub__0/Work_0"}
-    second = scene.harness.ledger.history(await played(scene, named("Work")))
+    second = scene.harness.journal.history(await played(scene, named("Work")))
     assert set(second.actions) == {"Work_0"}
     assert second.parts == {}
 
@@ -82,7 +82,7 @@ async def test_a_sub_graph_of_an_earlier_run_is_no_part_of_one_that_has_only_its
 async def test_until_its_own_begins_a_run_does_not_show_the_one_from_before() -> None:
     scene = WithSub(2, script=SCRIPT)
     await played(scene, named("Sub"))
-    run = scene.harness.ledger.history(await played(scene, named("Work", "Sub")))
+    run = scene.harness.journal.history(await played(scene, named("Work", "Sub")))
     (outer,) = run.actions["Work_0"].visits
     (inner,) = run.actions["patrol__Sub__0/Work_0"].visits
     assert outer.until is not None

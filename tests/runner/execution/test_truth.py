@@ -106,9 +106,9 @@ def test_nothing_is_shown_that_was_not_seen_and_live_is_as_it_is_told_later(
     calls: list[dict[str, Any]], loss: float, seed: int, stop: float | None
 ) -> None:
     witness: Witness = run_in_virtual_time(lambda: lived(calls, loss, seed, stop))
-    ledger = witness.place.harness.ledger
-    (stream,) = [each for each in ledger.streams if each.startswith("run/")]
-    events = ledger.told(stream.removeprefix("run/"))
+    journal = witness.place.harness.journal
+    (stream,) = [each for each in journal.streams if each.startswith("run/")]
+    events = journal.told(stream.removeprefix("run/"))
     run = replay(events)
     assert run is not None
     if run.state not in ENDED:  # an action failed when the stop came: its code may go on

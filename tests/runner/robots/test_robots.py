@@ -84,7 +84,7 @@ async def test_an_engine_that_came_back_is_called_restarted() -> None:
 async def test_a_changed_profile_makes_another_link_and_a_removed_robot_is_unknown() -> None:
     reach = RegisteredRobots(David=Open())
     async with ExecutionService.opened(
-        Harness().ledger, Robots(reach=reach), clock_us=clock_us, run_in_worker=at_once
+        Harness().journal, Robots(reach=reach), clock_us=clock_us, run_in_worker=at_once
     ) as control:
         await control.register(Registration(name="David"), ANN)
         await control.register(Registration(name="David", profile={"pauses_safely": True}), ANN)
@@ -132,7 +132,7 @@ async def test_registered_robots_are_known_after_a_restart_and_removed_ones_are_
         await control.remove("Eve", ANN)
     again = Robots(reach=RegisteredRobots(David=Open()))
     async with ExecutionService.opened(
-        harness.ledger, again, clock_us=clock_us, run_in_worker=at_once
+        harness.journal, again, clock_us=clock_us, run_in_worker=at_once
     ) as control:
         assert [robot.name for robot in control.robots.all()] == ["simulator", "David"]
 
@@ -144,7 +144,7 @@ async def test_candidates_are_those_that_nobody_registered() -> None:
     other = Candidate(domain=3, rmw="x", get_service="/eve/umrf_graph_get", actor="Eve")
     reach.sight = (seen, other)
     async with ExecutionService.opened(
-        Harness().ledger, Robots(reach=reach), clock_us=clock_us, run_in_worker=at_once
+        Harness().journal, Robots(reach=reach), clock_us=clock_us, run_in_worker=at_once
     ) as control:
         assert await control.robots.candidates() == (seen, other)
         await control.register(Registration(name="David"), ANN)
@@ -182,7 +182,7 @@ async def test_the_log_of_the_engine_is_kept_with_the_run_and_proves_nothing() -
         assert control.open[run.id].run.state == "running"
         control.stop_all(ANN)
         await until(lambda: not control.open)
-    said = [each.text for each in harness.ledger.told(run.id) if isinstance(each, EngineSaid)]
+    said = [each.text for each in harness.journal.told(run.id) if isinstance(each, EngineSaid)]
     assert said == ["UMRF graph 'sequence' stopped."]
 
 
@@ -215,4 +215,4 @@ async def test_with_two_engines_on_one_path_nothing_is_called_stopped() -> None:
         assert any("2 engines" in alarm.text for alarm in now.alarms)
         david.servers = 1
         await until(lambda: not control.open)
-    assert harness.ledger.history(run.id).state == "stopped"
+    assert harness.journal.history(run.id).state == "stopped"

@@ -93,7 +93,7 @@ def test_what_outlasts_a_stop_has_no_end() -> None:
 
 def test_no_bound_is_lost_when_it_is_stored(tmp_path: Any) -> None:
     told = lived("join", {"*": [{"after_s": 0.7}]}, NetworkFaults(loss=0.3), None)
-    events = told.place.harness.ledger.told(told.run.id)
+    events = told.place.harness.journal.told(told.run.id)
     seen = [item for event in events for item in getattr(event, "seen", ())]
     assert any(item.source == "feedback" and item.since_asked is not None for item in seen)
     assert any(item.source == "get" and item.since_asked is not None for item in seen)

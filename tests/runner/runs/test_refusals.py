@@ -67,7 +67,7 @@ async def told(scene: RobotsInNetwork, control: ExecutionService, request: Any) 
     run = (await control.start(request, ANN)).run
     assert await ended(control, run.id) == "refused", control.open.get(run.id)
     assert not any(node.robot.moving for node in scene.nodes.values())
-    return scene.harness.ledger.history(run.id)
+    return scene.harness.journal.history(run.id)
 
 
 @virtual
@@ -145,9 +145,9 @@ async def test_words_about_the_start_of_somebody_else_refuse_nothing_of_ours() -
         text = codec.write(PATROL)
         scene.network.carry(Start(graph_name="patrol", targets=("David",), graph_json=text), "cli")
         await ended(control, run.id)
-    codes = [each.code for each in scene.harness.ledger.history(run.id).alarms]
+    codes = [each.code for each in scene.harness.journal.history(run.id).alarms]
     assert codes == ["foreign_start"]
-    assert scene.harness.ledger.history(run.id).end == "stopped"
+    assert scene.harness.journal.history(run.id).end == "stopped"
 
 
 @virtual
@@ -173,7 +173,7 @@ async def test_the_words_of_a_refusal_outlive_the_runner() -> None:
     scene.network.loss = {}
     async with scene.played() as control:
         assert await ended(control, run.id) == "refused"
-    assert "Could not resolve" in scene.harness.ledger.history(run.id).detail
+    assert "Could not resolve" in scene.harness.journal.history(run.id).detail
 
 
 @virtual

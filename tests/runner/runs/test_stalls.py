@@ -87,7 +87,7 @@ async def test_what_a_run_in_which_nothing_moves_waits_for_is_said_once_and_is_i
         assert waits in alarm.text
         await control.stop(run, BEN)
         assert await ended(control, run) == "stopped"
-    found = scene.harness.ledger.history(run)
+    found = scene.harness.journal.history(run)
     named = causes(found, graph)
     assert [each.action for each in named] == ["Work_1"], named
     assert named[0].at == found.alarms[0].at
@@ -109,7 +109,7 @@ async def test_a_run_in_which_something_moves_raises_no_such_alarm() -> None:
     async with scene.played() as control:
         run = await stalled(control, sequence("patrol", 2), 75)
         assert run not in control.open or not control.open[run].run.alarms
-    assert scene.harness.ledger.history(run).alarms == ()
+    assert scene.harness.journal.history(run).alarms == ()
 
 
 @virtual
@@ -120,7 +120,7 @@ async def test_a_pause_between_two_actions_is_no_standstill() -> None:
     async with scene.played() as control:
         run = (await control.start(asked(sequence("patrol", 3)), ANN)).run.id
         assert await ended(control, run) == "finished"
-    assert scene.harness.ledger.history(run).alarms == ()
+    assert scene.harness.journal.history(run).alarms == ()
 
 
 @virtual
@@ -161,7 +161,7 @@ async def test_a_sub_graph_in_which_nothing_moves_is_named_and_stays_the_cause_a
         assert f"{told}: it is HALTED." in alarm.text
         await control.stop(run, BEN)
         assert await ended(control, run) == "stopped"
-    found = scene.harness.ledger.history(run)
+    found = scene.harness.journal.history(run)
     first, *_ = causes(found, graph)
     assert (first.action, words(first, found)) == ("Sub_0", f"{told}.")
 

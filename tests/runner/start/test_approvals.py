@@ -126,9 +126,9 @@ async def test_a_yes_is_kept_once_and_after_a_restart() -> None:
         await control.approvals.give(yes(digest), CARL)
         with pytest.raises(BadInput, match="no digest"):
             await control.approvals.give(yes("x" * 64), BEN)
-    events = await harness.ledger.read(STREAM)
+    events = await harness.journal.read(STREAM)
     assert [event.kind for event in events] == [ApprovalGiven.kind] * 2
-    again = Approvals(harness.ledger, clock_us)
+    again = Approvals(harness.journal, clock_us)
     assert [each.author for each in await again.of(digest)] == [BEN, CARL]
 
 

@@ -25,7 +25,7 @@ async def test_a_group_starts_together_and_is_stopped_together() -> None:
         assert sorted(stopped) == sorted(run.id for run in started.runs)
         await until(lambda: not control.open)
     for run in started.runs:
-        told = harness.ledger.history(run.id)
+        told = harness.journal.history(run.id)
         assert (told.state, told.group) == ("stopped", started.group)
 
 
@@ -34,7 +34,7 @@ async def test_a_start_that_is_under_way_says_so_until_its_runs_are_there() -> N
     harness = Harness()
     async with fleet(harness, David=Open(NEVER), Eve=Open(NEVER)) as control:
         asked = group(sequence(), "David", "Eve")
-        harness.ledger.slow = 1.0
+        harness.journal.slow = 1.0
 
         async def found() -> list[str]:
             rows = await control.history.rows(queries.of_start(asked.request_id))
@@ -67,7 +67,7 @@ async def test_a_group_that_starts_in_part_says_which_robot_was_left_out() -> No
     class Breaks(Open):
         async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
             """The disk is full right after it."""
-            harness.ledger.down = True
+            harness.journal.down = True
             await super().start(order, leaves)
 
     david = Breaks(NEVER)
@@ -76,6 +76,6 @@ async def test_a_group_that_starts_in_part_says_which_robot_was_left_out() -> No
         assert [run.engine for run in started.runs] == ["David"]
         assert "could not be recorded" in started.failed["Eve"]
         assert eve.starts == []
-        harness.ledger.down = False
+        harness.journal.down = False
         control.stop_all(ANN)
         await until(lambda: not control.open)

@@ -32,7 +32,7 @@ async def runner(
     """A runner that knows these robots, and may write for David."""
     folders = {"David": folder}
     async with ExecutionService.opened(
-        harness.ledger,
+        harness.journal,
         Robots(reach=RegisteredRobots(**robots)),
         clock_us=clock_us,
         run_in_worker=at_once,
@@ -86,13 +86,13 @@ async def test_the_look_says_what_can_be_written_and_afterwards_the_start_goes(
 
 
 @virtual
-async def test_the_deed_is_recorded_with_its_author_before_and_after(tmp_path: Path) -> None:
+async def test_a_write_is_recorded_with_its_author_before_and_after(tmp_path: Path) -> None:
     harness = Harness()
     add(tmp_path, "mine.graph.json", sequence("round", 3))
     async with runner(harness, tmp_path, David=Open()) as (control, writer):
         answer = await writer.write("David", wish(LEG, sequence("leg"), replace=["round"]), ANN)
         assert [each.path for each in answer.replaced] == ["mine.graph.json"]
-        await until(lambda: harness.ledger.streams["robot/David"][-1].kind.endswith("written.v1"))
+        await until(lambda: harness.journal.streams["robot/David"][-1].kind.endswith("written.v1"))
         told = [event for _, event in await control.robots.robot_log.newest("David", 9)]
         asked, done = told[-2:]
         assert isinstance(asked, IndexWriteAsked)
@@ -115,11 +115,11 @@ async def test_the_deed_is_recorded_with_its_author_before_and_after(tmp_path: P
 async def test_what_cannot_be_recorded_is_not_written(tmp_path: Path) -> None:
     harness = Harness()
     async with runner(harness, tmp_path, David=Open()) as (_, writer):
-        harness.ledger.down = True
+        harness.journal.down = True
         with pytest.raises(Unavailable, match=r"journal .* Nothing was written"):
             await writer.write("David", wish(LEG), ANN)
         assert held(tmp_path) == {}
-        harness.ledger.down = False
+        harness.journal.down = False
 
 
 @virtual
@@ -150,7 +150,7 @@ async def test_what_stands_in_the_way_is_told_before_anybody_tries(tmp_path: Pat
 async def test_what_fails_half_way_is_told_and_recorded_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Somebody else's file comes under the name between the look and the deed."""
+    """Somebody else's file comes under the name between the look and the write."""
     harness = Harness()
     mine = add(tmp_path, "z.graph.json", sequence("round", 3))
 
@@ -164,7 +164,7 @@ async def test_what_fails_half_way_is_told_and_recorded_so(
             Unavailable, match=r"z\.graph\.json was changed .* Written before .*leg"
         ):
             await writer.write("David", wish(sequence("leg"), LEG, replace=["round"]), ANN)
-        await until(lambda: harness.ledger.streams["robot/David"][-1].kind.endswith("written.v1"))
+        await until(lambda: harness.journal.streams["robot/David"][-1].kind.endswith("written.v1"))
         ((_, done),) = await control.robots.robot_log.newest("David", 1)
         assert isinstance(done, IndexWritten)
         assert ([each.graph for each in done.files], "changed" in done.why) == (["leg"], True)

@@ -105,11 +105,11 @@ async def test_the_simulator_runs_what_is_inside_and_the_run_keeps_it() -> None:
         asked = start(sent(sequence("round", 2)), script=FAST)
         run = (await control.start(asked, ANN)).run
         assert await ended(control, run.id) == "finished"
-        done = harness.ledger.history(run.id)
+        done = harness.journal.history(run.id)
         inner = [name for name in done.actions if name.startswith("tour__round__0/")]
         assert sorted(inner) == ["tour__round__0/Work_0", "tour__round__0/Work_1"]
         assert [len(done.actions[name].visits) for name in inner] == [1, 1]
-        first = harness.ledger.told(run.id)[0]
+        first = harness.journal.told(run.id)[0]
         assert isinstance(first, Requested)
         assert [each.name for each in first.subgraphs] == ["round"]
         assert first.tree_digest == asked.tree_digest

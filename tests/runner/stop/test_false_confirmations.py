@@ -152,7 +152,7 @@ class Story:
             case "made up":
                 self.make_up(value)
             case "journal":
-                self.harness.ledger.down = value
+                self.harness.journal.down = value
             case "well":
                 self.make_well()
 
@@ -207,7 +207,7 @@ class Story:
         """Nothing is lost any more."""
         self.network.loss.clear()
         self.network.late_s = self.network.old_s = 0.0
-        self.harness.ledger.down = False
+        self.harness.journal.down = False
 
     async def start(self, control: ExecutionService, name: str) -> None:
         """A start, which may be refused; some people override what can be."""

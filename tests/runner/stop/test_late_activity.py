@@ -9,13 +9,18 @@ from typing import Any
 
 import anyio
 
+from action_assistant.errors import Unavailable
 from action_assistant.runner.emulator.messages import EngineTraits
 from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.links.port import Order
+from action_assistant.runner.robots.robot_events import stream_of_robot
 from action_assistant.runner.runs import queries
 from action_assistant.runner.runs.events import Ended, MovesAgain, Proof, StopSent
+from runner.fake_link import FakeLink
 from runner.fake_network import now_ms
-from runner.harness import ANN, BEN, until, virtual
-from runner.robots_in_network import RobotsInNetwork, asked, shown
+from runner.harness import ANN, BEN, Harness, order, sequence, until, virtual
+from runner.registered_robots import NEVER, Open, fleet
+from runner.robots_in_network import OTHER, PATHS, PATROL, RobotsInNetwork, asked, shown
 
 SLOW = EngineTraits(loading_ms=3_000.0)
 TWO_SECONDS = {"*": [{"after_s": 2.0}]}
@@ -48,7 +53,7 @@ async def test_it_is_called_stopped_no_more_until_that_is_proven_anew() -> None:
         assert (told.state, told.proof_at, told.ended_at) == ("stopping", None, None)
         assert told.moves_again_at is not None
         assert any("MOVES AGAIN: David shows Work_0" in each.text for each in told.alarms)
-        assert [row.id for row in await here.harness.ledger.query(queries.open_runs())] == [run]
+        assert [row.id for row in await here.harness.journal.query(queries.open_runs())] == [run]
         await until(lambda: run not in control.open)
         assert here.nodes["David"].robot.moving == ()
         told = await control.find(run)
@@ -56,13 +61,13 @@ async def test_it_is_called_stopped_no_more_until_that_is_proven_anew() -> None:
         assert told.proof_at is not None
         assert first is not None
         assert told.proof_at > first
-    kinds = [type(each) for each in here.harness.ledger.told(run)]
+    kinds = [type(each) for each in here.harness.journal.told(run)]
     again = kinds.index(MovesAgain)
     assert kinds[again - 1] is Ended
     assert [kinds.count(each) for each in (MovesAgain, Proof, Ended)] == [1, 2, 2]
     assert StopSent in kinds[again:]
-    assert here.harness.ledger.history(run) == told
-    (row,) = await here.harness.ledger.query(queries.listed(queries.Filter(), 5))
+    assert here.harness.journal.history(run) == told
+    (row,) = await here.harness.journal.query(queries.listed(queries.Filter(), 5))
     assert (row.state, row.summary["proof_at"]) == ("stopped", told.proof_at)
     assert [each["code"] for each in row.summary["alarms"]].count("moves_again") == 1
 
@@ -81,14 +86,14 @@ async def test_it_is_said_also_while_nothing_can_be_recorded() -> None:
     here = scene()
     async with here.played() as control:
         run = await proven_stopped(control)
-        here.harness.ledger.down = True
+        here.harness.journal.down = True
         await until(lambda: run in control.open)
         await until(lambda: not control.open[run].recorder.recorded)
         assert shown(control, run).moves_again_at is not None
         await until(lambda: shown(control, run).state == "stopped")
-        here.harness.ledger.down = False
+        here.harness.journal.down = False
         await until(lambda: run not in control.open)
-        assert here.harness.ledger.history(run) == await control.find(run)
+        assert here.harness.journal.history(run) == await control.find(run)
 
 
 @virtual
@@ -97,14 +102,14 @@ async def test_it_is_said_also_where_the_first_end_is_not_recorded_yet() -> None
     async with here.played() as control:
         run = (await control.start(asked(), ANN)).run.id
         await anyio.sleep(0.3)
-        here.harness.ledger.down = True
+        here.harness.journal.down = True
         await control.stop(run, BEN)
         await until(lambda: shown(control, run).state == "stopped")
         await until(lambda: shown(control, run).moves_again_at is not None)
-        here.harness.ledger.down = False
+        here.harness.journal.down = False
         await until(lambda: run not in control.open)
-        assert here.harness.ledger.history(run).state == "stopped"
-    kinds = [type(each) for each in here.harness.ledger.told(run)]
+        assert here.harness.journal.history(run).state == "stopped"
+    kinds = [type(each) for each in here.harness.journal.told(run)]
     assert [kinds.count(each) for each in (MovesAgain, Ended)] == [1, 2]
 
 
@@ -127,7 +132,7 @@ async def test_a_run_that_its_robot_shows_before_it_is_taken_up_again_is_still_o
     None
 ):
     here = scene()
-    read = here.harness.ledger.read
+    read = here.harness.journal.read
 
     async def slowly(*given: Any, **more: Any) -> Any:
         """A journal on a busy disk."""
@@ -139,7 +144,7 @@ async def test_a_run_that_its_robot_shows_before_it_is_taken_up_again_is_still_o
             await anyio.sleep(0.5)
             run = (await control.start(asked(), ANN)).run.id
             await until(lambda: "Work_0" in control.open[run].run.active)
-        here.harness.ledger.read = slowly  # type: ignore[method-assign]
+        here.harness.journal.read = slowly  # type: ignore[method-assign]
         async with here.harness.runner() as control:
             await until(lambda: run in control.open)
             await until(lambda: not control.open[run].run.active)  # the next one is being loaded
@@ -186,6 +191,86 @@ async def test_a_start_of_ours_that_somebody_plays_again_is_theirs() -> None:
         await anyio.sleep(5)
         assert run not in control.open
         assert here.nodes["David"].robot.moving == ("patrol",)  # a Stop of it is asked for by name
+
+
+@virtual
+async def test_a_start_that_it_overtakes_while_that_is_being_stored_is_refused_and_never_sent() -> (
+    None
+):
+    here = scene()
+    async with here.played() as control:
+        began = now_ms()
+        first = await proven_stopped(control)
+        await anyio.sleep((began + 2_500 - now_ms()) / 1000)  # half a second before it moves
+        assert here.nodes["David"].robot.moving == ()
+        here.harness.journal.slow = 2.0
+        asked_for = order(OTHER, engine="David")
+        refused = (await control.start(asked_for, ANN)).run
+        assert shown(control, first).moves_again_at is not None
+        assert refused.state == "refused"
+        here.harness.journal.slow = 0.0
+        await until(lambda: not control.open)
+        await anyio.sleep(5)
+    assert [each.graph_name for each in here.starts()] == ["patrol"]
+    assert here.harness.journal.history(refused.id).state == "refused"
+
+
+@virtual
+async def test_a_second_name_of_its_robot_hides_nothing_of_it() -> None:
+    here = scene(quirks=EngineTraits(loading_ms=3_000.0, loss=1.0))
+    here.harness.links["Twin"] = FakeLink(here.network, "Twin", PATHS["David"])
+    async with here.played() as control:
+        run = await proven_stopped(control)
+        twin = control.robots.link("Twin")
+        assert twin is not None
+        await until(lambda: here.nodes["David"].robot.moving == ("patrol",))
+        await twin.get()  # it is seen under that name first
+        await until(lambda: run in control.open, patience=3)
+        assert shown(control, run).moves_again_at is not None
+        await until(lambda: run not in control.open)
+        assert (await control.find(run)).state == "stopped"
+
+
+@virtual
+async def test_a_second_name_of_which_nothing_can_be_read_holds_nothing_up() -> None:
+    here = scene(quirks=EngineTraits(loading_ms=3_000.0, loss=1.0))
+    here.harness.links["Twin"] = FakeLink(here.network, "Twin", PATHS["David"])
+    newest = here.harness.journal.newest
+
+    async def failing(stream: str) -> int:
+        if stream == stream_of_robot("Twin"):
+            raise Unavailable("a disk fails")
+        return await newest(stream)
+
+    async with here.network.running():
+        async with here.harness.runner() as control:
+            await anyio.sleep(0.5)
+            run = await proven_stopped(control)
+        here.harness.journal.newest = failing  # type: ignore[method-assign]
+        async with here.harness.runner() as control:
+            twin = control.robots.link("Twin")
+            assert twin is not None
+            await until(lambda: here.nodes["David"].robot.moving == ("patrol",))
+            await twin.get()
+            await until(lambda: run in control.open, patience=3)
+            await until(lambda: run not in control.open)
+
+
+@virtual
+async def test_what_another_robot_shows_takes_no_end_back_that_is_not_recorded_yet() -> None:
+    david, eve = Open(NEVER), Open(NEVER)
+    harness = Harness()
+    async with fleet(harness, David=david, Eve=eve) as control:
+        run = (await control.start(order(PATROL, engine="David"), ANN)).run.id
+        await until(lambda: shown(control, run).state == "running")
+        harness.journal.down = True
+        await control.stop(run, BEN)
+        await until(lambda: shown(control, run).state == "stopped")
+        await eve.engine.start(Order(run=run, graph=sequence("cleaning"), umrf=""))
+        await anyio.sleep(15)
+        assert shown(control, run).state == "stopped"
+        harness.journal.down = False
+        await until(lambda: not control.open)
 
 
 def _made_up(here: RobotsInNetwork) -> None:

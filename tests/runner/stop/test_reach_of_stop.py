@@ -1,6 +1,8 @@
 """Stop reaches everything that moves or is about to: graphs that carry a run's mark where no run of
 ours is, starts under way, robots that are registered anew meanwhile. In virtual time."""
 
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from typing import Any
 
 import anyio
@@ -11,6 +13,7 @@ from action_assistant.runner.emulator.messages import Start
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import Leaves, Link, NotSent, Order, Registration, unwatched
 from action_assistant.runner.robots.registry import Robots
+from action_assistant.runner.robots.robot_events import StopUnproven
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.files import codec
 from runner.harness import ANN, BEN, Harness, at_once, clock_us, order, sequence, until, virtual
@@ -49,7 +52,7 @@ async def test_a_graph_with_the_mark_of_a_run_that_has_ended_is_stopped_before_t
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run.id
         await until(lambda: shown(control, run).state == "running")
-        scene.harness.ledger.down = True
+        scene.harness.journal.down = True
         await control.stop(run, BEN)
         await until(lambda: shown(control, run).state == "stopped")
         scene.network.carry(scene.starts()[0], "bag")  # somebody plays our start again
@@ -58,7 +61,7 @@ async def test_a_graph_with_the_mark_of_a_run_that_has_ended_is_stopped_before_t
         assert shown(control, run).state == "stopped"
         control.stop_all(BEN)
         await until(lambda: scene.nodes["David"].robot.moving == ())
-        scene.harness.ledger.down = False
+        scene.harness.journal.down = False
 
 
 # --- graphs that were begun just now ----------------------------------------------------------
@@ -146,13 +149,13 @@ async def test_a_start_that_comes_while_its_robot_is_registered_anew_can_be_stop
     robots = Robots(reach=Leases(David=david))
     async with (
         ExecutionService.opened(
-            harness.ledger, robots, clock_us=clock_us, run_in_worker=at_once
+            harness.journal, robots, clock_us=clock_us, run_in_worker=at_once
         ) as control,
         anyio.create_task_group() as tasks,
     ):
         await control.register(Registration(name="David"), ANN)
         await until(lambda: control.robots.robot("David").heard_at is not None)
-        harness.ledger.slow = 1.0
+        harness.journal.slow = 1.0
         tasks.start_soon(control.register, Registration(name="David", domain=3), BEN)
         await anyio.sleep(0.5)
         run = (await control.start(order(sequence(), engine="David"), ANN)).run.id
@@ -180,6 +183,49 @@ async def test_a_robot_is_neither_changed_nor_forgotten_while_something_is_stopp
         await control.remove("David", BEN)
 
 
+@asynccontextmanager
+async def _leased(harness: Harness, david: Open) -> AsyncIterator[ExecutionService]:
+    """A runner in which somebody else's graph moves on David, which hears nothing more."""
+    robots = Robots(reach=Leases(David=david))
+    async with ExecutionService.opened(
+        harness.journal, robots, clock_us=clock_us, run_in_worker=at_once
+    ) as control:
+        await control.register(Registration(name="David"), ANN)
+        await _cleaning(david, "theirs")
+        await anyio.sleep(15)
+        david.loss = 1.0
+        harness.journal.slow = 1.0
+        yield control
+
+
+@virtual
+async def test_a_stop_that_is_pressed_while_its_robot_is_registered_anew_goes_the_new_way() -> None:
+    harness, david = Harness(), Open(NEVER)
+    async with _leased(harness, david) as control, anyio.create_task_group() as tasks:
+        tasks.start_soon(control.register, Registration(name="David", domain=3), BEN)
+        await anyio.sleep(0.5)
+        control.stop_robot("David", BEN)
+        await until(lambda: control.robots.robot("David").domain == 3)
+        david.loss = 0.0
+        await until(lambda: not control.robots.foreign_stops.going("David"), patience=10)
+        assert not await david.moving("cleaning")
+
+
+@virtual
+async def test_a_stop_that_is_pressed_while_its_robot_is_removed_ends_and_says_so() -> None:
+    harness, david = Harness(), Open(NEVER)
+    async with _leased(harness, david) as control, anyio.create_task_group() as tasks:
+        tasks.start_soon(control.remove, "David", BEN)
+        await anyio.sleep(0.5)
+        control.stop_robot("David", BEN)
+        await until(lambda: not control.robots.names)
+        await until(lambda: not control.robots.foreign_stops.going("David"), patience=10)
+        await until(lambda: not control.robots.robot_log.waiting)
+        told = [event for _, event in await control.robots.robot_log.newest("David", 20)]
+        (given_up,) = [event for event in told if isinstance(event, StopUnproven)]
+        assert "taken out of the registry" in given_up.why
+
+
 # --- starts under way -------------------------------------------------------------------------
 
 
@@ -198,7 +244,7 @@ async def test_stopping_a_robot_catches_a_start_there_that_is_being_stored_and_n
     david, eve = Open(NEVER), Open(NEVER)
     harness = Harness()
     async with fleet(harness, David=david, Eve=eve) as control, anyio.create_task_group() as tasks:
-        harness.ledger.slow = 1.0
+        harness.journal.slow = 1.0
         for name in ("David", "Eve"):
             tasks.start_soon(control.start, order(sequence(), engine=name), ANN)
         await anyio.sleep(0.5)

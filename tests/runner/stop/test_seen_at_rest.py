@@ -106,7 +106,7 @@ async def test_a_run_of_which_an_event_cannot_be_read_still_holds_its_robot() ->
         await control.stop(run, BEN)
         await until(lambda: bool(shown(control, run).unconfirmed))
         await until(lambda: control.open[run].recorder.idle)
-    stored = scene.harness.ledger.streams[f"run/{run}"]
+    stored = scene.harness.journal.streams[f"run/{run}"]
     body = b'{"at":1,"seen":[{"kind":"of a later version"}]}'
     stored.append(msgspec.structs.replace(stored[-1], seq=len(stored) + 1, body=body,
                                           kind="run.observed.v1"))  # fmt: skip
@@ -159,14 +159,14 @@ async def test_a_mark_of_a_run_that_is_not_here_is_asked_for_once() -> None:
         action["gui_attributes"] = {"action_assistant": {"run": "AAAAAAAAAAAA"}}
     text = msgspec.json.encode(graph).decode()
     async with scene.network.running():
-        ledger, robots = scene.harness.ledger, Robots(scene.harness.links)
+        journal, robots = scene.harness.journal, Robots(scene.harness.links)
         await anyio.sleep(0.5)
         scene.network.carry(
             Start(graph_name="theirs", targets=("David",), graph_json=text), "other"
         )
         await anyio.sleep(1)
         async with ExecutionService.opened(
-            ledger, robots, clock_us=clock_us, run_in_worker=at_once, past=past
+            journal, robots, clock_us=clock_us, run_in_worker=at_once, past=past
         ):
             await anyio.sleep(60)
     assert asked_for == ["AAAAAAAAAAAA"]

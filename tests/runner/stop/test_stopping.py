@@ -32,9 +32,9 @@ async def test_stop_is_proven_by_a_get_that_was_asked_after_it() -> None:
         await anyio.sleep(1)
         assert await control.stop(run.id, BEN, "s1") == [run.id]
         assert await ended(control, run.id) == "stopped"
-    found = harness.ledger.history(run.id)
+    found = harness.journal.history(run.id)
     assert (found.stopped_by, found.desired, found.result) == (BEN, "stopped", "on_stopped")
-    kinds = [type(each) for each in harness.ledger.told(run.id)]
+    kinds = [type(each) for each in harness.journal.told(run.id)]
     assert kinds.index(StopSent) < kinds.index(Proof)
     assert found.proof_at is not None
     assert found.actions["Work_0"].visits[-1].result == "stopped"
@@ -47,16 +47,16 @@ async def test_stop_does_not_wait_for_the_journal() -> None:
     async with harness.runner() as control:
         run = (await control.start(order(sequence(), engine="David"), ANN)).run
         await anyio.sleep(1)
-        harness.ledger.down = True
+        harness.journal.down = True
         began = anyio.current_time()
         await control.stop(run.id, ANN)
         await until(lambda: bool(robot.stops))
         assert robot.stops[0][0] - began < 0.02
         await until(lambda: control.open[run.id].run.state == "stopped")
         assert not control.open[run.id].recorder.recorded
-        harness.ledger.down = False
+        harness.journal.down = False
         assert await ended(control, run.id) == "stopped"
-    assert harness.ledger.history(run.id).state == "stopped"
+    assert harness.journal.history(run.id).state == "stopped"
 
 
 @virtual
@@ -123,14 +123,14 @@ async def test_a_start_that_got_lost_is_unknown_is_not_repeated_and_is_given_up_
         await control.stop(run.id, ANN)
         await until(lambda: control.open[run.id].run.state == "lost")
     assert len(robot.starts) == 1
-    assert harness.ledger.history(run.id).proof_at is None
+    assert harness.journal.history(run.id).proof_at is None
 
 
 @virtual
 async def test_stopping_everything_catches_a_start_that_is_being_stored() -> None:
     robot = Robot(engine())
     harness = Harness({"David": robot})
-    harness.ledger.slow = 1.0
+    harness.journal.slow = 1.0
     async with harness.runner() as control, anyio.create_task_group() as tasks:
         answers = []
 
@@ -139,7 +139,7 @@ async def test_stopping_everything_catches_a_start_that_is_being_stored() -> Non
 
         tasks.start_soon(ask)
         await anyio.sleep(0.5)
-        assert control.stop_all(BEN) == []
+        assert control.stop_all(BEN).runs == []
         await until(lambda: bool(answers))
         assert robot.starts == []
         assert answers[0].run.state == "stopped"
@@ -156,7 +156,7 @@ async def test_one_press_that_comes_by_two_ways_is_recorded_once() -> None:
         await control.stop(run.id, BEN, "")
         await control.stop(run.id, BEN, "press")
         await ended(control, run.id)
-    kinds = [each.kind for each in harness.ledger.told(run.id)]
+    kinds = [each.kind for each in harness.journal.told(run.id)]
     assert kinds.count("run.stop_requested.v1") == 1
 
 
@@ -169,7 +169,7 @@ async def test_stop_of_a_run_that_is_over_does_nothing_and_of_no_run_is_an_error
         assert await control.stop(run.id, ANN) == []
         with pytest.raises(NotFound):
             await control.stop("nothing", ANN)
-    assert harness.ledger.history(run.id).state == "finished"
+    assert harness.journal.history(run.id).state == "finished"
 
 
 @virtual
@@ -181,7 +181,7 @@ async def test_an_action_that_ignores_stop_ends_in_error_not_in_stopped() -> Non
         await anyio.sleep(1)
         await control.stop(run.id, ANN)
         state = await ended(control, run.id)
-    found = harness.ledger.history(run.id)
+    found = harness.journal.history(run.id)
     assert state == "error"
     assert any(each.code == "stop_unconfirmed" for each in found.alarms)
 
@@ -214,7 +214,7 @@ async def test_a_simulated_engine_that_does_not_obey_is_switched_off_and_its_run
         await anyio.sleep(5)
         await control.stop(run.id, ANN)
         assert await ended(control, run.id) == "lost"
-    assert "switched off" in harness.ledger.history(run.id).detail
+    assert "switched off" in harness.journal.history(run.id).detail
 
 
 @virtual

@@ -119,7 +119,7 @@ class Packer:
     def _take(self, name: str, path: Path) -> BackupPart:
         entry = zipfile.ZipInfo(name) if path.suffix == ".gz" else name  # the former: as it is
         with path.open("rb") as there, self._zip.open(entry, "w", force_zip64=True) as here:
-            size, digest = _poured(there, here, f"packing {name}", self._progress)
+            size, digest = _copied(there, here, f"packing {name}", self._progress)
         return BackupPart(size, digest)
 
 
@@ -146,7 +146,7 @@ class Package:
         self._check_total()
         for name in self.parts:
             with Path(os.devnull).open("wb") as nowhere:
-                self._pour(name, nowhere, f"reading back {name}", progress)
+                self._copy(name, nowhere, f"reading back {name}", progress)
 
     def unpack(self, folder: Path, progress: Progress) -> None:
         """All its parts into a folder, each proven. Raises CannotStart."""
@@ -161,7 +161,7 @@ class Package:
             path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
             descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, _MODE)
             with os.fdopen(descriptor, "wb") as here:
-                self._pour(name, here, f"unpacking {name}", progress)
+                self._copy(name, here, f"unpacking {name}", progress)
 
     def _check_total(self) -> int:
         """The size of all parts. Raises CannotStart."""
@@ -170,12 +170,12 @@ class Package:
             raise self._damaged("its parts lie over each other")
         return total
 
-    def _pour(self, name: str, here: IO[bytes], text: str, progress: Progress) -> None:
+    def _copy(self, name: str, here: IO[bytes], text: str, progress: Progress) -> None:
         """One part, proven. Raises CannotStart."""
         entry, sha256 = self.parts[name]
         try:
             with self._zip.open(entry) as there:
-                _, digest = _poured(there, here, text, progress)
+                _, digest = _copied(there, here, text, progress)
         except (zipfile.BadZipFile, zlib.error, EOFError) as error:
             raise self._damaged(f"{name} cannot be read ({error})") from error
         if digest != sha256:
@@ -271,7 +271,7 @@ def _is_place(name: str) -> bool:
     return plain and len(parts) > 1 and parts[0] in {FILES, ARCHIVE} and "\\" not in name
 
 
-def _poured(there: IO[bytes], here: IO[bytes], text: str, progress: Progress) -> tuple[int, str]:
+def _copied(there: IO[bytes], here: IO[bytes], text: str, progress: Progress) -> tuple[int, str]:
     """Copy all that comes; its size in bytes and its SHA-256."""
     size, digest = 0, hashlib.sha256()
     while block := there.read(_CHUNK):

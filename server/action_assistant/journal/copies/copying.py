@@ -44,7 +44,7 @@ def copy(
 
     def pour(here: Connection) -> int:
         recognize(here)
-        return target.migrate(lambda there: _pour(here, there, branch, fold, tell, over_older))
+        return target.migrate(lambda there: _copy(here, there, branch, fold, tell, over_older))
 
     try:
         session = target.open(branch)
@@ -74,7 +74,7 @@ async def _read(source: Database, question: Callable[[Connection], int]) -> int:
         await source.close()
 
 
-def _pour(
+def _copy(
     here: Connection,
     there: Connection,
     branch: Branch,

@@ -33,7 +33,7 @@ from action_assistant.runner.runs.events import (
     decode_all,
 )
 from action_assistant.runner.runs.fold import begin, follow, replay
-from action_assistant.runner.runs.history import Ledger
+from action_assistant.runner.runs.history import RunnerJournal
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.runner.runs.run import Run
 from action_assistant.web.workers.lanes import RunInWorker
@@ -90,8 +90,8 @@ class RunKeyframes(msgspec.Struct, frozen=True):
         return self.keys[place - 1] if place else None
 
 
-class SnapshotJournal(Ledger, Protocol):
-    """A ledger that also keeps what a stream adds up to."""
+class SnapshotJournal(RunnerJournal, Protocol):
+    """A journal that also keeps what a stream adds up to."""
 
     async def bare(self, stream: str, usual: str, *, after: int, upto: int) -> list[BareEvent]:
         """Events with `after < seq <= upto`, in order; fewer when some are missing."""
@@ -109,9 +109,9 @@ class SnapshotJournal(Ledger, Protocol):
 class KeyframeStore:
     """The keyframes of all runs."""
 
-    def __init__(self, ledger: SnapshotJournal, run_in_worker: RunInWorker) -> None:
+    def __init__(self, journal: SnapshotJournal, run_in_worker: RunInWorker) -> None:
         self.run_in_worker = run_in_worker
-        self._ledger = ledger
+        self._journal = journal
         self._known: OrderedDict[str, RunKeyframes] = OrderedDict()
         self._asking: dict[str, asyncio.Lock] = {}
 
@@ -130,7 +130,7 @@ class KeyframeStore:
         key = (await self.keyframes(run)).before(seq)
         if key is not None and key.seq == seq:
             return key.run
-        events = await self._ledger.read(stream_of(run), after=key.seq if key else 0, upto=seq)
+        events = await self._journal.read(stream_of(run), after=key.seq if key else 0, upto=seq)
         return (await self.run_in_worker(lambda: _next(key, _whole(events)))).run
 
     async def seq_at(self, run: str, at: int) -> int:
@@ -148,11 +148,11 @@ class KeyframeStore:
 
     async def page(self, run: str, after: int) -> Sequence[Event]:
         """Events of one page, those with `seq > after`."""
-        return await self._ledger.read(stream_of(run), after=after, limit=APART)
+        return await self._journal.read(stream_of(run), after=after, limit=APART)
 
     async def _up_to_date(self, run: str) -> RunKeyframes:
         stream = stream_of(run)
-        newest = await self._ledger.newest(stream)
+        newest = await self._journal.newest(stream)
         if not newest:
             raise NotFound("There is no such run.")
         keyframes = self._known.get(run) or await self._kept(stream)
@@ -181,13 +181,13 @@ class KeyframeStore:
         return found
 
     async def _part(self, stream: str, after: int, upto: int) -> "_Part":
-        events = await self._ledger.bare(stream, Observed.kind, after=after, upto=upto)
+        events = await self._journal.bare(stream, Observed.kind, after=after, upto=upto)
         if len(events) == upto - after:
             return _Part(range(after + 1, upto + 1), events)
-        return _whole(await self._ledger.read(stream, after=after, upto=upto))
+        return _whole(await self._journal.read(stream, after=after, upto=upto))
 
     async def _kept(self, stream: str) -> RunKeyframes | None:
-        kept = await self._ledger.snapshot(stream)
+        kept = await self._journal.snapshot(stream)
         if kept is None:
             return None
         try:
@@ -201,7 +201,7 @@ class KeyframeStore:
     async def _keep(self, stream: str, keyframes: RunKeyframes) -> None:
         state = await self.run_in_worker(lambda: msgspec.msgpack.encode(keyframes))
         try:
-            await self._ledger.keep_snapshot(stream, keyframes.keys[-1].seq, state)
+            await self._journal.keep_snapshot(stream, keyframes.keys[-1].seq, state)
         except Refused:
             return  # a cache: it is made again when the journal can be written
 

@@ -27,6 +27,7 @@ from action_assistant.runner.robots.registration import Robot
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.run import Run
+from action_assistant.runner.stop.stopped_all import StoppedAll
 from action_assistant.web.auth.access import session_of
 
 log: Final = logging.getLogger(__name__)
@@ -37,7 +38,7 @@ _BEAT_S: Final = 1.0
 _SEND_S: Final = 15.0
 _AT_ONCE: Final = 250  # actions that are put together without letting go
 _ENGINES_GAP_S: Final = 0.25  # between two lists of engines
-_LETTERS: Final = 64
+_MOST_ANSWERS: Final = 64
 _TOO_SLOW: Final = 1013
 _LONGEST: Final = 10_000  # characters of a message from the page
 
@@ -50,10 +51,18 @@ class StopMessage(msgspec.Struct, frozen=True, tag="stop", tag_field="type"):
 
 
 class Stopping(msgspec.Struct, frozen=True, tag="stopping", tag_field="type"):
-    """The runs that a Stop concerns."""
+    """What a Stop concerns: runs, and when everything is stopped `graphs` of others by robot.
+    `unknown`: why nothing is known of what a robot runs, by robot."""
 
     stop_id: str
     runs: list[str]
+    graphs: dict[str, list[str]] = {}
+    unknown: dict[str, str] = {}
+
+    @classmethod
+    def everything(cls, stop_id: str, stopped: StoppedAll) -> "Stopping":
+        """The answer to a stop of everything."""
+        return cls(stop_id, stopped.runs, stopped.graphs, stopped.unknown)
 
 
 class RefusedMessage(msgspec.Struct, frozen=True, tag="refused", tag_field="type"):
@@ -189,9 +198,8 @@ class Hub:
             message = msgspec.json.decode(text, type=StopMessage)
             stop_id = message.stop_id
             if message.run == "all":
-                runs = self.control.stop_all(author, stop_id)
-            else:
-                runs = await self.control.stop(message.run, author, stop_id)
+                return _text(Stopping.everything(stop_id, self.control.stop_all(author, stop_id)))
+            runs = await self.control.stop(message.run, author, stop_id)
         except msgspec.DecodeError as wrong:
             return _text(RefusedMessage(stop_id, f"Not understood: {wrong}"))
         except Refused as refused:
@@ -211,7 +219,7 @@ class Outbox:
     def __init__(self, hub: Hub, is_allowed: Callable[[], bool]) -> None:
         self._hub = hub
         self._is_allowed = is_allowed
-        self._letters: deque[str] = deque()
+        self._answers: deque[str] = deque()
         self._changed: dict[str, OpenRun] = {}
         self._next: dict[str, float] = {}  # run -> when it may be sent again
         self._engines_at = math.inf  # when the engines are to be sent
@@ -232,9 +240,9 @@ class Outbox:
 
     def post(self, text: str) -> bool:
         """An answer; false when the page has left too many unread."""
-        self._letters.append(text)
+        self._answers.append(text)
         self._news.set()
-        return len(self._letters) <= _LETTERS
+        return len(self._answers) <= _MOST_ANSWERS
 
     async def deliver(self, send: Callable[[str], Awaitable[None]]) -> None:
         """Send until cancelled. `TimeoutError` when the page does not read."""
@@ -257,8 +265,8 @@ class Outbox:
     def _pick(self, beat: float) -> str | None:
         """The next thing to send: answers, then a beat, then runs whose turn has come."""
         now = anyio.current_time()
-        if self._letters:
-            return self._letters.popleft()
+        if self._answers:
+            return self._answers.popleft()
         if now >= beat:
             return self._hub.beat()
         if not self._is_allowed():

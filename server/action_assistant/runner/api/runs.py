@@ -108,7 +108,8 @@ def _moves(services: RunnerServices) -> list[ControllerRouterHandler]:
     )
     async def stop_all(request: _Asking) -> Stopping:
         stop_id = await _stop_id(request)
-        return Stopping(stop_id, services.control.stop_all(author_of(request), stop_id))
+        stopped = services.control.stop_all(author_of(request), stop_id)
+        return Stopping.everything(stop_id, stopped)
 
     @post(
         "/api/runs/{run:str}/stop",

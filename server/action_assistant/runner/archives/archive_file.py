@@ -59,7 +59,7 @@ class _ArchiveLine(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True
     base64: str | None = None  # a body that is no line of JSON
 
 
-class _Foot(msgspec.Struct, frozen=True):
+class _Footer(msgspec.Struct, frozen=True):
     sha256: str
 
 
@@ -97,7 +97,7 @@ class ArchiveFile:
         try:
             if self._seen != self._end:
                 raise Damaged("The journal does not hold what its chain says; `verify` tells more.")
-            self._write(_Foot(self._hash.hexdigest()))
+            self._write(_Footer(self._hash.hexdigest()))
             self._file.close()
             self._raw.flush()
             os.fsync(self._raw.fileno())
@@ -132,9 +132,9 @@ def read(path: Path) -> Iterator[Event]:
             digest.update(file.readline(_LONGEST))
             for number, text in enumerate(iter(lambda: file.readline(_LONGEST), b""), 1):
                 if number > title.events:
-                    foot = msgspec.json.decode(text, type=_Foot)
+                    footer = msgspec.json.decode(text, type=_Footer)
                     _check(seen == title.end, path, "its chain does not end as it says")
-                    _check(foot.sha256 == digest.hexdigest(), path, "its sum is another one")
+                    _check(footer.sha256 == digest.hexdigest(), path, "its sum is another one")
                     _check(not file.read(1), path, "something follows its end")
                     return
                 digest.update(text)

@@ -72,7 +72,7 @@ async def modify(
     run_in_worker: RunInWorker,
 ) -> Run:
     """Give a running graph another structure; `body` is a ModifyRequest, `engine` None that of a
-    simulated run. Raises BadInput, Conflict, Unavailable."""
+    simulated run. Raises BadInput, Conflict, Unavailable, OutcomeUnknown."""
     run = opened.run
     _require_moving(run)
     if not opened.pauses:

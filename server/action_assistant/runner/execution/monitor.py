@@ -101,6 +101,7 @@ class Monitor:
         self._disturbed = 0
         self._begun = 0  # when feedback was the first to show it
         self._sent: str | None = None  # until it was compared with what the engine shows
+        self._sent_order = 0
         self._start = refusals.StartLog(it.run)
         self._absent: float | None = None  # since when answers lack a start that was refused
         self._standstill = stall.Standstill()
@@ -126,8 +127,10 @@ class Monitor:
         self.sends(umrf)
 
     def sends(self, umrf: str) -> None:
-        """This graph is handed over: what the engine shows is compared with it, once."""
+        """This graph is handed over: what the engine is asked for from now on is compared with it,
+        once."""
         self._sent = self.umrf = umrf
+        self._sent_order = next(self._order)
 
     def hear(self, line: str) -> None:
         """A line of the engine's own log, about whatever."""
@@ -181,7 +184,7 @@ class Monitor:
                 self._hear_nothing(str(nothing))
             else:
                 self._take(answer, order, began)
-                self._compare(answer)
+                self._compare(answer, order)
             process = self._it.run.process
             if process is not None and has_ended(process):
                 self._it.engine_ended()
@@ -229,10 +232,12 @@ class Monitor:
         else:
             self.trouble = _SEVERAL.format(servers=servers or "no")
 
-    def _compare(self, answer: Answer) -> None:
+    def _compare(self, answer: Answer, order: int) -> None:
         """Once: whether the engine has what was sent. It is never stopped for that by itself."""
         sent, text = self._sent, answer.texts.get(self._it.run.graph_name)
         if sent is None or text is None or self._it.run.graph_state is None:
+            return
+        if order < self._sent_order:  # asked before that was handed over
             return
         self._sent = None
 

@@ -13,6 +13,7 @@ import msgspec
 
 from action_assistant.errors import Refused
 from action_assistant.runner.clock import ClockUs
+from action_assistant.runner.execution.graph_change import send_change
 from action_assistant.runner.execution.monitor import Monitor
 from action_assistant.runner.links.observations import Hazard, Seen
 from action_assistant.runner.links.port import (
@@ -37,7 +38,6 @@ from action_assistant.runner.runs.events import (
     End,
     Ended,
     EngineSaid,
-    ModifyRefused,
     ModifyRequested,
     MovesAgain,
     Observed,
@@ -138,7 +138,8 @@ class OpenRun:
     async def modify(
         self, author: Author, order: Order, version: str, digest: str, continue_from: str
     ) -> None:
-        """Want the run to go on with another graph. Raises NotSent, EngineRefused."""
+        """Want the run to go on with another graph. Raises NotSent, EngineRefused, and OutcomeUnknown
+        when nobody knows whether it does."""
         asked = ModifyRequested(
             at=self._clock_us(),
             author=author,
@@ -148,24 +149,8 @@ class OpenRun:
             umrf=order.umrf,
             continue_from=continue_from,
         )
-        before = self.run
         self._doubts.reach()
-        self.tell(asked, author.id)
-        try:
-            await self._link.modify(order, continue_from)
-        except (NotSent, EngineRefused) as why:
-            self.tell(
-                ModifyRefused(
-                    at=self._clock_us(),
-                    version=before.version,
-                    digest=before.digest,
-                    actions={name: action.aid for name, action in before.actions.items()},
-                    why=str(why),
-                )
-            )
-            raise
-        self.watch.sends(order.umrf)
-        self.watch.look()
+        await send_change(self, self._link, order, asked, self._clock_us)
 
     @property
     def pauses(self) -> bool:
@@ -209,21 +194,16 @@ class OpenRun:
             outer.start_soon(self.recorder.run)
             if order is None:
                 outer.start_soon(self._recall)
-            try:
+            with self._link.listen(self._hear):
+                if order is not None:
+                    await self._publish(order, incarnation)
+                self._let_early_ones_in()
+                await self._live()
+            if self._owns_link:
+                await self._link.aclose()
+            while await self._opens_again():
                 with self._link.listen(self._hear):
-                    if order is not None:
-                        await self._publish(order, incarnation)
-                    self._let_early_ones_in()
                     await self._live()
-                if self._owns_link:
-                    await self._link.aclose()
-                while await self._opens_again():
-                    with self._link.listen(self._hear):
-                        await self._live()
-            except anyio.get_cancelled_exc_class():
-                with anyio.move_on_after(1, shield=True):
-                    await self.recorder.flushed()
-                raise
             outer.cancel_scope.cancel()
 
     async def _recall(self) -> None:
@@ -296,6 +276,8 @@ class OpenRun:
 
     async def _publish(self, order: Order, incarnation: str) -> None:
         """Send the one start message. Whatever happens, it is never sent again."""
+        if self.run.end is not None:  # refused since it was written down
+            return
         at = self._clock_us()
         self.watch.starts(order.umrf)
         if self.run.desired == "stopped":

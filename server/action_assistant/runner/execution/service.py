@@ -22,12 +22,12 @@ from action_assistant.runner.links.port import SIMULATOR, ForeignCommand, Link, 
 from action_assistant.runner.links.simulator import Simulator, in_this_process
 from action_assistant.runner.links.unreachable import UnreachableLink
 from action_assistant.runner.robots.engine import KnownEngine
-from action_assistant.runner.robots.registration import Robot
+from action_assistant.runner.robots.registration import Robot, registration_of
 from action_assistant.runner.robots.registry import RegistryContext, Robots
 from action_assistant.runner.robots.robot_events import Commanded
 from action_assistant.runner.runs import queries
 from action_assistant.runner.runs.events import Author, Ended, MovesAgain
-from action_assistant.runner.runs.history import Ledger, Past, RunHistory
+from action_assistant.runner.runs.history import Past, RunHistory, RunnerJournal
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start.admission import StartRequest
 from action_assistant.runner.start.approvals import Approvals
@@ -44,6 +44,7 @@ from action_assistant.runner.start.start_checks import (
 )
 from action_assistant.runner.stop.foreign_stop import ForeignStopLoop
 from action_assistant.runner.stop.late_activity import LateActivity
+from action_assistant.runner.stop.stopped_all import StoppedAll
 from action_assistant.web.auth.caller import done_for_nobody
 from action_assistant.web.workers.lanes import RunInWorker
 
@@ -60,7 +61,7 @@ class ExecutionService:
 
     def __init__(
         self,
-        ledger: Ledger,
+        journal: RunnerJournal,
         robots: Robots,
         *,
         clock_us: ClockUs,
@@ -71,16 +72,16 @@ class ExecutionService:
         sources: StartSources = NO_SOURCES,
     ) -> None:
         self.robots = robots
-        self.history = RunHistory(ledger, past)
+        self.history = RunHistory(journal, past)
         self.open: dict[str, OpenRun] = {}
-        self._ledger, self._clock_us = ledger, clock_us
+        self._journal, self._clock_us = journal, clock_us
         self._tasks, self._run_in_worker = tasks, run_in_worker
         self._watchers: list[Callable[[OpenRun], None]] = []
         self._news = anyio.Event()
         self._places: dict[str, anyio.Lock] = {}
-        self._book = IdempotentStarts(ledger, tasks, clock_us)
-        self.under_way: Final = self._book.under_way
-        self.approvals: Final = Approvals(ledger, clock_us)
+        self._idempotent_starts = IdempotentStarts(journal, tasks, clock_us)
+        self.under_way: Final = self._idempotent_starts.under_way
+        self.approvals: Final = Approvals(journal, clock_us)
         self._starting = StartChecks(
             robots,
             approvals=self.approvals,
@@ -103,7 +104,7 @@ class ExecutionService:
     @asynccontextmanager
     async def opened(
         cls,
-        ledger: Ledger,
+        journal: RunnerJournal,
         robots: Robots,
         *,
         clock_us: ClockUs,
@@ -117,7 +118,7 @@ class ExecutionService:
         looked at with, besides."""
         async with anyio.create_task_group() as tasks:
             control = cls(
-                ledger,
+                journal,
                 robots,
                 clock_us=clock_us,
                 tasks=tasks,
@@ -150,7 +151,7 @@ class ExecutionService:
         """Carry out a start, at most once per request. Raises Refused of many kinds; then nothing
         was sent. Returns after the one message has left."""
         stops = self._stops.count
-        async with self._book.once(asked.request_id):
+        async with self._idempotent_starts.once(asked.request_id):
             known = await self._known(asked)
             if known is not None:
                 return Started(known, fresh=False)
@@ -169,7 +170,7 @@ class ExecutionService:
         if not asked.request_id or SIMULATOR in asked.engines:
             where = "/engines" if asked.request_id else "/request_id"
             raise BadInput("A group has a request_id, and robots only.", where={"path": where})
-        async with self._book.once(asked.request_id):
+        async with self._idempotent_starts.once(asked.request_id):
             found = [await self._known(each) for each in starts]
             if known := [run for run in found if run is not None]:
                 missing = [each.engine for each, run in zip(starts, found, strict=True) if not run]
@@ -208,7 +209,7 @@ class ExecutionService:
         return self._places.setdefault(engine, anyio.Lock())
 
     async def _known(self, asked: StartRequest) -> Run | None:
-        run = await self._book.run_of(asked)
+        run = await self._idempotent_starts.run_of(asked)
         return None if run is None else await self.find(run)
 
     def _taken(self, engine: str) -> Run | None:
@@ -219,7 +220,7 @@ class ExecutionService:
         """What somebody has seen at rest there since this process began. A start that others have
         played again is theirs, and was not seen."""
         found = [each for each in self._settled.values() if each.engine == engine]
-        return [each for each in found if not self._late_activity.is_of_others(each.run)]
+        return [each for each in found if not self._late_activity.is_of_others(engine, each.run)]
 
     def _going(self, engine: str) -> dict[str, OpenRun]:
         """The runs that go on there. Whatever else carries the mark of one was sent by others."""
@@ -239,7 +240,7 @@ class ExecutionService:
         if not cleared.own:  # a run that was over may have moved again since it was looked at
             check_items([of_taken(asked.engine, self._taken(asked.engine))], ())
         with anyio.CancelScope(shield=True):
-            run = await self._book.store(requested)
+            run = await self._idempotent_starts.store(requested)
             other = None if cleared.own else self._taken(asked.engine)
             opened = self._opened(run, cleared.link, own=cleared.own, seq=1)
             if other is not None:
@@ -260,7 +261,7 @@ class ExecutionService:
             run,
             link=link,
             owns_link=own,
-            store=self._ledger,
+            store=self._journal,
             seq=seq,
             clock_us=self._clock_us,
             run_in_worker=self._run_in_worker,
@@ -295,12 +296,12 @@ class ExecutionService:
 
     # --- stop, pause, resume ------------------------------------------------------------------
 
-    def stop_all(self, author: Author, stop_id: str = "") -> list[str]:
-        """Want everything stopped; the runs that this concerns. Never waits."""
+    def stop_all(self, author: Author, stop_id: str = "") -> StoppedAll:
+        """Want everything stopped; what this concerns. Never waits."""
         self._stops.note("", author, stop_id)
         runs = [run for run in tuple(self.open) if self._stop(run, author, stop_id)]
         self.robots.silence(author, self._going)
-        return runs
+        return StoppedAll(runs, self.robots.foreign_stops.graphs(), self.robots.unheard())
 
     def stop_robot(self, name: str, author: Author) -> tuple[list[str], list[str]]:
         """Want whatever a robot runs stopped: runs of ours, graphs of others. Raises NotFound."""
@@ -337,7 +338,7 @@ class ExecutionService:
 
     async def modify(self, run: str, body: bytes, author: Author) -> Run:
         """Give a run another version of its graph. Raises NotFound, BadInput, Conflict,
-        Unavailable."""
+        Unavailable, OutcomeUnknown."""
         opened = await self._movable(run)
         engine = self.robots.link(opened.run.engine)
         return await interventions.modify(
@@ -382,7 +383,7 @@ class ExecutionService:
 
     async def _over(self, run: str) -> Row[Any]:
         """What the table tells of a run: that takes no time. Raises NotFound, Unavailable."""
-        rows = await self._ledger.query(queries.of_run(run))
+        rows = await self._journal.query(queries.of_run(run))
         if not rows:
             raise NotFound("There is no such run.")
         return rows[0]
@@ -433,9 +434,9 @@ class ExecutionService:
 
     async def _take_up(self) -> None:
         """Adopt what an earlier process left: pending stops first of all; nothing is started."""
-        self._number = (await self._ledger.query(queries.last_number()))[0][0]
+        self._number = (await self._journal.query(queries.last_number()))[0][0]
         ground = RegistryContext(
-            self._ledger,
+            self._journal,
             self._tasks,
             self._clock_us,
             self._run_in_worker,
@@ -446,22 +447,15 @@ class ExecutionService:
         )
         self._tasks.start_soon(self._late_activity.run)
         self.robots.open(ground)
-        for row in await self._ledger.query(queries.all_robots()):
-            self.robots.add(
-                Registration(
-                    name=row.name,
-                    domain=row.domain,
-                    rmw=row.rmw,
-                    get_service=row.get_service,
-                    profile=row.profile,
-                )
-            )
-        for row in await self._ledger.query(queries.open_runs()):
+        for row in await self._journal.query(queries.all_robots()):
+            self.robots.add(registration_of(row))
+        for row in await self._journal.query(queries.open_runs()):
             run, seq, is_whole = await self.history.left(row.id)
             if run is None or run.end is not None:
                 log.error("run %s: table and events differ; `rebuild` mends the table", row.id)
                 continue
             self._adopt(run, seq, is_whole=is_whole)
+        await self.robots.take_up_stops()
 
     def _reopen(self, run: Run, seq: int, event: MovesAgain) -> None:
         """A run that was over and stored moves again."""

@@ -92,18 +92,18 @@ class ReviewService:
     def __init__(
         self,
         control: OngoingRuns,
-        ledger: ArchiveStore,
+        journal: ArchiveStore,
         run_in_worker: RunInWorker,
         clock_us: ClockUs,
         asked: ReviewQueries | None = None,
     ) -> None:
-        self.keyframe_store = KeyframeStore(ledger, run_in_worker)
+        self.keyframe_store = KeyframeStore(journal, run_in_worker)
         self._asked = asked
         self._control = control
-        self._ledger = ledger
+        self._journal = journal
         self._run_in_worker = run_in_worker
         self._clock_us = clock_us
-        self._sums = SumUpLoop(ledger, control, clock_us, self._summed)
+        self._sums = SumUpLoop(journal, control, clock_us, self._summed)
         self._keyframes = KeyframeLoop(control, self._make_keyframes)
 
     async def run(self) -> None:
@@ -183,7 +183,7 @@ class ReviewService:
 
     async def rows(self, statement: Select[Any]) -> list[Row[Any]]:
         """Rows of the tables. Raises Unavailable."""
-        return await self._ledger.query(statement)
+        return await self._journal.query(statement)
 
     async def events(self, run_id: str, after: int, limit: int) -> Sequence[Event]:
         """Stored events of a run. Raises Unavailable."""
@@ -195,7 +195,7 @@ class ReviewService:
 
     async def place(self, run_id: str) -> Row[Any] | None:
         """Where the events of a run are, when they are in an archive."""
-        return await self._ledger.place(stream_of(run_id))
+        return await self._journal.place(stream_of(run_id))
 
     async def raw(self, run_id: str, recordings: Sequence[Recording], now: int) -> RawMessages:
         """The raw messages of its robot from its time; `recordings` are all of it that are here.
@@ -208,7 +208,7 @@ class ReviewService:
             for each in recordings
             if not run_.simulated and first <= each.name[: len(first)] <= last
         ]
-        told = await self._ledger.read(stream_of_raw(run_.engine))
+        told = await self._journal.read(stream_of_raw(run_.engine))
         gone = (msgspec.json.decode(event.body, type=RawPut) for event in told)
         return raw_of(run_, here, gone, until)
 
@@ -224,13 +224,13 @@ class ReviewService:
         """Pin, note or label a run. Raises NotFound."""
         await self.known(run_id)
         marked = annotations.Marked(self._clock_us(), author, marks)
-        await self._ledger.append(annotations.stream_about(run_id), [annotations.draft(marked)])
+        await self._journal.append(annotations.stream_about(run_id), [annotations.draft(marked)])
         return await self.marks(run_id)
 
     async def marks(self, run_id: str) -> RunMarks:
         """What people noted about it."""
-        rows = await self._ledger.query(select(review).where(review.c.run == run_id))
-        labels = await self._ledger.query(
+        rows = await self._journal.query(select(review).where(review.c.run == run_id))
+        labels = await self._journal.query(
             select(run_label.c.label).where(run_label.c.run == run_id).order_by(run_label.c.label)
         )
         pinned, note = (rows[0].pinned, rows[0].note) if rows else (False, "")
@@ -251,7 +251,7 @@ class ReviewService:
         found = await self.known(run_id)
         if form == "csv":
             return await self._run_in_worker(lambda: exports.intervals(found))
-        events = await self._ledger.read(stream_of(run_id))
+        events = await self._journal.read(stream_of(run_id))
         if form == "mcap":
             return await self._run_in_worker(lambda: exports.mcap(events))
         return await self._run_in_worker(lambda: b"".join(exports.lines(run_id, events)))
@@ -259,7 +259,7 @@ class ReviewService:
     async def lines(self, run_id: str, after: int) -> tuple[int, bytes]:
         """A page of JSON lines, and the seq of its last event; the run may be longer than memory
         should hold. Raises NotFound when there is nothing at all."""
-        events = await self._ledger.read(stream_of(run_id), after=after, limit=_PAGE)
+        events = await self._journal.read(stream_of(run_id), after=after, limit=_PAGE)
         if not events and not after:
             raise NotFound("There is no such run.")
         return events[-1].seq if events else after, b"".join(exports.lines(run_id, events))
@@ -282,11 +282,11 @@ class ReviewService:
 
     async def statistics(self, graph: str, engine: str | None, last: int) -> statistics.Statistics:
         """The newest runs of a graph together."""
-        rows = await self._ledger.query(statistics.runs_of(graph, engine, min(last, _LAST)))
+        rows = await self._journal.query(statistics.runs_of(graph, engine, min(last, _LAST)))
         ids = [row.id for row in rows]
         sums: list[Row[Any]] = []
         for i in range(0, len(ids), _ROWS):
-            sums += await self._ledger.query(statistics.sums_of(ids[i : i + _ROWS]))
+            sums += await self._journal.query(statistics.sums_of(ids[i : i + _ROWS]))
         newest = await self._graph(ids[0]) if ids else None
         return await self._run_in_worker(lambda: statistics.statistics(rows, sums, newest))
 
@@ -303,14 +303,14 @@ class ReviewService:
         for text in texts:
             first, rest = examples.read(text)
             stream = stream_of(first.run)
-            if not await self._ledger.newest(stream):
+            if not await self._journal.newest(stream):
                 label = annotations.Marks(labels=(examples.LABEL,))
                 marked = annotations.Marked(self._clock_us(), author, label)
-                await self._ledger.append(
+                await self._journal.append(
                     annotations.stream_about(first.run), [annotations.draft(marked)]
                 )
                 begin = examples.numbered(first, self._control.next_number())
-                await self._ledger.append(stream, [begin, *rest], expected=0)
+                await self._journal.append(stream, [begin, *rest], expected=0)
             taken.append(first.run)
         self._sums.begin_again()  # they ended long ago
         return taken
@@ -334,7 +334,7 @@ class ReviewService:
         else:
             saved = await self._asked.value(ReviewService.expected, wanted, name, author, now)
         draft = Draft(saved.kind, author.id, msgspec.json.encode(saved))
-        await self._ledger.append(expected_runs.STREAM, [draft])
+        await self._journal.append(expected_runs.STREAM, [draft])
         return expected_runs.shown(saved)
 
     async def expected(
@@ -366,16 +366,16 @@ class ReviewService:
 
     async def _all_saved(self, *where: ColumnElement[bool]) -> list[expected_runs.Expected]:
         asked = select(expectation).where(*where).order_by(expectation.c.name)
-        return [await self._saved(row.seq) for row in await self._ledger.query(asked)]
+        return [await self._saved(row.seq) for row in await self._journal.query(asked)]
 
     async def _saved(self, seq: int) -> expected_runs.Expected:
-        (event,) = await self._ledger.read(expected_runs.STREAM, after=seq - 1, upto=seq)
+        (event,) = await self._journal.read(expected_runs.STREAM, after=seq - 1, upto=seq)
         return msgspec.json.decode(event.body, type=expected_runs.Expected)
 
     async def retire(self, name: str, author: Author) -> None:
         """Expect it no more. Raises NotFound."""
-        if not await self._ledger.query(select(expectation).where(expectation.c.name == name)):
+        if not await self._journal.query(select(expectation).where(expectation.c.name == name)):
             raise NotFound(f"Nothing is expected under the name {name!r}.")
         retired = expected_runs.Retired(self._clock_us(), name, author)
         draft = Draft(retired.kind, author.id, msgspec.json.encode(retired))
-        await self._ledger.append(expected_runs.STREAM, [draft])
+        await self._journal.append(expected_runs.STREAM, [draft])

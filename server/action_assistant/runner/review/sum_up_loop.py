@@ -28,12 +28,12 @@ class SumUpLoop:
 
     def __init__(
         self,
-        ledger: ArchiveStore,
+        journal: ArchiveStore,
         ongoing: OngoingRuns,
         clock_us: ClockUs,
         summed: Callable[[str], Awaitable[annotations.SummedUp]],
     ) -> None:
-        self._ledger = ledger
+        self._journal = journal
         self._clock_us = clock_us
         self._summed = summed
         self._ended = anyio.Event()
@@ -82,7 +82,7 @@ class SumUpLoop:
             .order_by(run.c.number.desc())
             .limit(_AT_ONCE)
         )
-        rows = await self._ledger.query(query)
+        rows = await self._journal.query(query)
         for row in rows:
             await self._one(row.id)
         if not rows:
@@ -101,4 +101,4 @@ class SumUpLoop:
         except Exception:  # whatever a run of long ago holds, those that go on are not ended by it
             log.exception("run %s cannot be read; it is left out of sums", run_id)
             summed = annotations.SummedUp(self._clock_us(), {}, figures=annotations.FIGURES)
-        await self._ledger.append(annotations.stream_about(run_id), [annotations.draft(summed)])
+        await self._journal.append(annotations.stream_about(run_id), [annotations.draft(summed)])

@@ -21,7 +21,7 @@ from action_assistant.runner.analysis.keyframes import SnapshotJournal
 from action_assistant.runner.archives.archive_store import ArchiveStore
 from action_assistant.runner.review.ongoing_runs import OngoingRun, settled
 from action_assistant.runner.review.service import ReviewService
-from action_assistant.runner.runs.history import Ledger, RunHistory
+from action_assistant.runner.runs.history import RunnerJournal, RunHistory
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.runner.runs.run import Run
 from action_assistant.web.auth.caller import done_for_nobody
@@ -48,13 +48,13 @@ class WorkerQueries:
         self,
         run_in_worker: RunInWorker,
         place: StoragePaths,
-        ledger: SnapshotJournal,
+        journal: SnapshotJournal,
         tasks: TaskGroup,
     ) -> None:
         self.opened: Mapping[str, OngoingRun] = {}
         self._run_in_worker = run_in_worker
         self._place = place
-        self._ledger = ledger
+        self._journal = journal
         self._tasks = tasks
 
     async def value(
@@ -90,7 +90,7 @@ class WorkerQueries:
     async def newest(self, run: str) -> int:
         """The seq of the last stored event of a run; 0 when there is none. Raises Unavailable."""
         await self._settled([run])
-        return await self._ledger.newest(stream_of(run))
+        return await self._journal.newest(stream_of(run))
 
     async def past(self, run: str, robots_too: bool) -> tuple[Run, int]:
         """As `history.Past`."""
@@ -111,7 +111,7 @@ class WorkerQueries:
         done_for_nobody()
         for each in kept:
             try:
-                await self._ledger.keep_snapshot(each.stream, each.seq, each.state)
+                await self._journal.keep_snapshot(each.stream, each.seq, each.state)
             except Refused as why:
                 log.info("what %s adds up to is not kept: %s", each.stream, why.detail)
             except Exception:
@@ -182,9 +182,9 @@ class _ReadOnlyJournal(FileJournalReader):
 class _NoOngoingRuns:
     """Where nothing goes on: all that is known is stored."""
 
-    def __init__(self, ledger: Ledger) -> None:
+    def __init__(self, journal: RunnerJournal) -> None:
         self.open: Mapping[str, OngoingRun] = {}
-        self.history = RunHistory(ledger)
+        self.history = RunHistory(journal)
 
     def next_number(self) -> int:
         """Nothing begins here."""

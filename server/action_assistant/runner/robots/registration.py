@@ -3,10 +3,11 @@
 import re
 from collections.abc import Callable
 from datetime import datetime
-from typing import ClassVar, Final, Literal, TypeAlias
+from typing import Any, ClassVar, Final, Literal, TypeAlias
 
 import msgspec
 from msgspec.structs import replace
+from sqlalchemy import Row
 
 from action_assistant.errors import BadInput, Conflict
 from action_assistant.runner.links.port import SIMULATOR, EngineState, Generation, Registration
@@ -87,6 +88,17 @@ class Robot(msgspec.Struct, frozen=True, kw_only=True):
     holds: tuple[HeldGraph, ...] = ()
     actions: int | None = None
     graphs: int | None = None
+
+
+def registration_of(row: Row[Any]) -> Registration:
+    """A registration as the table has it."""
+    return Registration(
+        name=row.name,
+        domain=row.domain,
+        rmw=row.rmw,
+        get_service=row.get_service,
+        profile=row.profile,
+    )
 
 
 def check_registration(asked: Registration) -> None:

@@ -37,15 +37,20 @@ from action_assistant.runner.robots.robot_events import (
     EngineBecame,
     RobotEvent,
     RobotLog,
+    StopAsked,
+    left_unproven,
 )
 from action_assistant.runner.runs.events import Author
-from action_assistant.runner.runs.history import Ledger
+from action_assistant.runner.runs.history import RunnerJournal
 from action_assistant.umrf.facts import PINNED, BadProfile, EngineFacts, facts_of
 from action_assistant.web.workers.lanes import RunInWorker
 
 log: Final = logging.getLogger(__name__)
 
 _NO_LINK: Final = "Nothing can be started or stopped there from here."
+_NOT_YET: Final = "It has not answered yet."
+_ANSWERS: Final = frozenset({"answering", "restarted"})
+_TOLD: Final = 500  # newest entries of a flight record
 
 
 class ForeignStops(Protocol):
@@ -59,6 +64,10 @@ class ForeignStops(Protocol):
         """Whether something is being stopped there."""
         ...
 
+    def graphs(self) -> dict[str, list[str]]:
+        """The graphs that are being stopped, by robot."""
+        ...
+
     def all_going(self) -> Iterator[tuple[str, str]]:
         """The robot of each graph that is being stopped, and why that is not proven yet."""
         ...
@@ -67,26 +76,31 @@ class ForeignStops(Protocol):
         """Want a graph stopped. Never waits."""
         ...
 
+    def take_up(self, robot: str, asked: StopAsked) -> None:
+        """Go on with a stop that an earlier process has left without a proof. Never waits."""
+        ...
+
     def hear_of(self, robot: str, command: ForeignCommand) -> None:
         """Somebody else may just have set it going."""
         ...
 
 
 Note: TypeAlias = Callable[[str, RobotEvent, str], None]
+Present: TypeAlias = Callable[[str], KnownEngine | None]
 
 
 class RegistryContext(msgspec.Struct, frozen=True):
     """What the registry stands on. `foreign` hears of each command of somebody else,
     `shows` of all graphs that an engine shows; `stops` makes what stops foreign graphs."""
 
-    ledger: Ledger
+    journal: RunnerJournal
     tasks: TaskGroup
     clock_us: ClockUs
     run_in_worker: RunInWorker
     changed: Callable[[], None]
     foreign: Callable[[KnownEngine, ForeignCommand], Commanded]
     shows: Callable[[KnownEngine, tuple[Snapshot, ...]], None]
-    stops: Callable[[TaskGroup, ClockUs, Note, Callable[[], None]], ForeignStops]
+    stops: Callable[[TaskGroup, ClockUs, Note, Callable[[], None], Present], ForeignStops]
 
 
 class Robots:
@@ -112,14 +126,30 @@ class Robots:
     def open(self, ground: RegistryContext) -> None:
         """Watch what was given, and from now on whatever is added."""
         self._ground = ground
-        self._robot_log = RobotLog(ground.ledger, ground.tasks)
+        self._robot_log = RobotLog(ground.journal, ground.tasks)
         self._foreign_stops = ground.stops(
-            ground.tasks, ground.clock_us, self._robot_log.note, lambda: ground.changed()
+            ground.tasks,
+            ground.clock_us,
+            self._robot_log.note,
+            lambda: ground.changed(),
+            self.present,
         )
         if self.recordings is not None:
             ground.tasks.start_soon(self.recordings.run)
         for name in self._given:
             self.add(Registration(name=name))
+
+    async def take_up_stops(self) -> None:
+        """Go on with the stops of graphs of others that an earlier process left without a proof. Waits
+        for no engine; a log that cannot be read keeps nothing else from being taken up."""
+        for name in self.names:
+            try:
+                told = await self.robot_log.newest(name, _TOLD)
+            except Exception:
+                log.exception("whether something was being stopped on %s cannot be read", name)
+                continue
+            for asked in left_unproven(event for _, event in told):
+                self.foreign_stops.take_up(name, asked)
 
     # --- the registry -------------------------------------------------------------------------
 
@@ -129,7 +159,7 @@ class Robots:
         ground = self._standing()
         body = RobotRegistered(at=ground.clock_us(), **msgspec.structs.asdict(asked))
         draft = Draft(body.kind, author.id, msgspec.json.encode(body))
-        await ground.ledger.append(STREAM, [draft])
+        await ground.journal.append(STREAM, [draft])
         self.add(asked)
         ground.changed()
         return self.robot(asked.name)
@@ -140,7 +170,7 @@ class Robots:
         ground = self._standing()
         body = RobotRemoved(at=ground.clock_us(), name=name)
         draft = Draft(body.kind, author.id, msgspec.json.encode(body))
-        await ground.ledger.append(STREAM, [draft])
+        await ground.journal.append(STREAM, [draft])
         self._let_go(name)
         del self._registered[name]
         ground.changed()
@@ -251,6 +281,17 @@ class Robots:
             return plain
         return seen(plain, engine, self.foreign_stops.trouble)
 
+    def unheard(self) -> dict[str, str]:
+        """Why nothing is known of what a robot runs now, for each of which that is so."""
+        found: dict[str, str] = {}
+        for name in self.names:
+            engine = self._engines.get(name)
+            if engine is None:
+                found[name] = f"No link: {self._reach} {_NO_LINK}"
+            elif engine.answer is None or engine.state not in _ANSWERS:
+                found[name] = engine.why or _NOT_YET
+        return found
+
     @property
     def names(self) -> list[str]:
         """Of all that are registered."""
@@ -279,6 +320,11 @@ class Robots:
         if name in self._registered:
             raise Conflict(f"{name}: No link: {self._reach} {_NO_LINK}", where={"path": "/engine"})
         raise BadInput(f"No robot is called {name!r}.", where={"path": "/engine"})
+
+    def present(self, name: str) -> KnownEngine | None:
+        """The engine of a robot as it is reached now, None without a link. Raises NotFound."""
+        self.registration(name)
+        return self._engines.get(name)
 
     def link(self, name: str) -> KnownEngine | None:
         """The engine of a robot, if there is a link."""

@@ -4,7 +4,7 @@ One stream per robot, `robot/NAME`. Bodies are msgspec JSON; fields are only eve
 default. What our own runs sent stands in their streams.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import ClassVar, Final, TypeAlias
 
 import anyio
@@ -15,7 +15,7 @@ from action_assistant.errors import NotFound, Unavailable
 from action_assistant.journal.events import Draft, Event
 from action_assistant.runner.links.port import Command, EngineState, ForeignCommand
 from action_assistant.runner.runs.events import Author
-from action_assistant.runner.runs.history import Ledger
+from action_assistant.runner.runs.history import RunnerJournal
 from action_assistant.runner.runs.recorder import StreamAppender
 
 _PATIENCE_S: Final = 5.0  # until something that has to be stored is given up
@@ -56,13 +56,15 @@ class EngineBecame(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True
 
 
 class StopAsked(msgspec.Struct, frozen=True, kw_only=True):
-    """Somebody here wants a graph stopped that was not started from here."""
+    """Somebody here wants a graph stopped that was not started from here. `life`: the incarnation of
+    the engine that ran it, "" where that was not known."""
 
     kind: ClassVar[str] = "robot.stop_asked.v1"
 
     at: int
     graph: str
     author: Author
+    life: str = ""
 
 
 class StopWasProven(msgspec.Struct, frozen=True, kw_only=True):
@@ -183,11 +185,26 @@ def event_of(stored: Event) -> RobotEvent | None:
     return None if known is None else msgspec.json.decode(stored.body, type=known)
 
 
+def left_unproven(told: Iterable[RobotEvent]) -> list[StopAsked]:
+    """The stops of which neither a proof nor that they were given up stands behind them, in events of
+    one robot, oldest first."""
+    left: dict[str, StopAsked] = {}
+    for event in told:
+        match event:
+            case StopAsked(graph=graph):
+                left[graph] = event
+            case StopWasProven(graph=graph) | StopUnproven(graph=graph):
+                left.pop(graph, None)
+            case _:
+                pass
+    return list(left.values())
+
+
 class RobotLog:
     """Writes and reads the streams of robots."""
 
-    def __init__(self, ledger: Ledger, tasks: TaskGroup) -> None:
-        self._ledger = ledger
+    def __init__(self, journal: RunnerJournal, tasks: TaskGroup) -> None:
+        self._journal = journal
         self._tasks = tasks
         self._pens: dict[str, StreamAppender] = {}
 
@@ -207,13 +224,9 @@ class RobotLog:
     def _appender(self, robot: str) -> StreamAppender:
         appender = self._pens.get(robot)
         if appender is None:
-            appender = self._pens[robot] = StreamAppender(self._ledger, stream_of_robot(robot), -1)
-            self._tasks.start_soon(self._write, appender)
+            appender = self._pens[robot] = StreamAppender(self._journal, stream_of_robot(robot), -1)
+            self._tasks.start_soon(appender.run)
         return appender
-
-    async def _write(self, appender: StreamAppender) -> None:
-        await appender.find_end()
-        await appender.run()
 
     @property
     def waiting(self) -> int:
@@ -223,14 +236,14 @@ class RobotLog:
     async def newest(self, robot: str, most: int) -> list[tuple[int, RobotEvent]]:
         """The newest events of a robot, oldest first, with their seqs. Raises Unavailable."""
         stream = stream_of_robot(robot)
-        end = await self._ledger.newest(stream)
-        stored = await self._ledger.read(stream, after=max(0, end - most))
+        end = await self._journal.newest(stream)
+        stored = await self._journal.read(stream, after=max(0, end - most))
         read = [(each.seq, event_of(each)) for each in stored]
         return [(seq, event) for seq, event in read if event is not None]
 
     async def graph(self, robot: str, seq: int) -> str:
         """The graph of a recorded command. Raises NotFound, Unavailable."""
-        stored = await self._ledger.read(stream_of_robot(robot), after=seq - 1, limit=1)
+        stored = await self._journal.read(stream_of_robot(robot), after=seq - 1, limit=1)
         event = event_of(stored[0]) if stored and stored[0].seq == seq else None
         if not isinstance(event, Commanded) or not event.umrf:
             raise NotFound("No graph was recorded with this.")

@@ -14,7 +14,7 @@ from action_assistant.runner.runs.recorder import Store, stream_of
 from action_assistant.runner.runs.run import Run
 
 
-class Ledger(Store, Protocol):
+class RunnerJournal(Store, Protocol):
     """What the runner asks of its journal."""
 
     async def query(self, statement: Select[Any]) -> list[Row[Any]]:
@@ -31,8 +31,8 @@ class RunHistory:
     """Reads runs. Raises Unavailable while the journal cannot be read. `past` reads those that are
     over; without it they are folded here."""
 
-    def __init__(self, ledger: Ledger, past: Past | None = None) -> None:
-        self._ledger = ledger
+    def __init__(self, journal: RunnerJournal, past: Past | None = None) -> None:
+        self._journal = journal
         self._past = past
 
     async def followed(self, run: str) -> tuple[Run | None, int]:
@@ -43,14 +43,14 @@ class RunHistory:
 
     async def replayed(self, run: str) -> tuple[Run | None, int]:
         """The same, folded here and now: for the time before anybody can ask for anything."""
-        events = await self._ledger.read(stream_of(run))
+        events = await self._journal.read(stream_of(run))
         found = replay(decode(each.kind, each.body) for each in events)
         return found, events[-1].seq if events else 0
 
     async def left(self, run: str) -> tuple[Run | None, int, bool]:
         """A run that an earlier process left, the seq of its last event, and whether all of them could
         be read; those that cannot are passed over."""
-        events = await self._ledger.read(stream_of(run))
+        events = await self._journal.read(stream_of(run))
         read = [_decoded(each) for each in events]
         told = [event for event in read if event is not None]
         return replay(told), events[-1].seq if events else 0, len(told) == len(read)
@@ -70,7 +70,7 @@ class RunHistory:
 
     async def requested(self, run: str) -> Requested:
         """The start, as it was asked for. Raises NotFound."""
-        first = await self._ledger.read(stream_of(run), limit=1)
+        first = await self._journal.read(stream_of(run), limit=1)
         event = decode(first[0].kind, first[0].body) if first else None
         if not isinstance(event, Requested):
             raise NotFound("There is no such run.")
@@ -78,11 +78,11 @@ class RunHistory:
 
     async def events(self, run: str, after: int, limit: int) -> Sequence[Event]:
         """Stored events of a run with `seq > after`."""
-        return await self._ledger.read(stream_of(run), after=after, limit=limit)
+        return await self._journal.read(stream_of(run), after=after, limit=limit)
 
     async def rows(self, statement: Select[Any]) -> list[Row[Any]]:
         """Rows of the tables."""
-        return await self._ledger.query(statement)
+        return await self._journal.query(statement)
 
 
 def _decoded(event: Event) -> RunEvent | None:

@@ -19,6 +19,7 @@ log: Final = logging.getLogger(__name__)
 
 _PAUSES: Final = (0.05, 0.2, 0.5, 1.0, 2.0)  # seconds between attempts
 _BATCH: Final = 500  # events in one transaction
+_AT_THE_END_S: Final = 1.0  # for what is left when writing is cancelled
 
 
 class Store(Protocol):
@@ -47,8 +48,8 @@ def stream_of(run: str) -> str:
 
 
 class StreamAppender:
-    """Appends to a stream that ends at `seq`. `changed` is called when `seq` or `recorded` have
-    changed."""
+    """Appends to a stream that ends at `seq`, negative while that is not known. `changed` is called
+    when `seq` or `recorded` have changed."""
 
     def __init__(
         self, store: Store, stream: str, seq: int, changed: Callable[[], None] = lambda: None
@@ -96,17 +97,31 @@ class StreamAppender:
                 return
 
     async def run(self) -> None:
-        """Write until cancelled."""
-        while True:
-            await self._more.wait()
-            self._more = anyio.Event()
-            failures = 0
-            while self._waiting:
-                if await self._write():
-                    failures = 0
-                else:
-                    await anyio.sleep(_PAUSES[min(failures, len(_PAUSES) - 1)])
-                    failures += 1
+        """Write until cancelled, and then, for a second at most, what is left."""
+        try:
+            while True:
+                await self._more.wait()
+                self._more = anyio.Event()
+                await self._write_all()
+        except anyio.get_cancelled_exc_class():
+            if self._waiting:
+                with anyio.move_on_after(_AT_THE_END_S, shield=True):
+                    await self._write_all()
+            if self._waiting:
+                log.error("%s lacks its last %d events", self._stream, len(self._waiting))
+            raise
+
+    async def _write_all(self) -> None:
+        """However long that takes."""
+        if self.seq < 0:
+            await self.find_end()
+        failures = 0
+        while self._waiting:
+            if await self._write():
+                failures = 0
+            else:
+                await anyio.sleep(_PAUSES[min(failures, len(_PAUSES) - 1)])
+                failures += 1
 
     async def _write(self) -> bool:
         """One transaction. `expected` keeps a commit whose answer got lost from being repeated."""

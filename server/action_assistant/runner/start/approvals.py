@@ -15,7 +15,7 @@ from action_assistant.journal.events import Draft
 from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.runs.events import Author
-from action_assistant.runner.runs.history import Ledger
+from action_assistant.runner.runs.history import RunnerJournal
 from action_assistant.runner.start.preflight import Item
 from action_assistant.umrf.facts import SECOND_PERSON
 
@@ -50,8 +50,8 @@ class ApprovalRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
 class Approvals:
     """All of them. Raises Unavailable while the journal cannot be read."""
 
-    def __init__(self, ledger: Ledger, clock_us: ClockUs) -> None:
-        self._ledger = ledger
+    def __init__(self, journal: RunnerJournal, clock_us: ClockUs) -> None:
+        self._journal = journal
         self._clock_us = clock_us
         self._seq = 0
         self._by_digest: defaultdict[str, list[ApprovalGiven]] = defaultdict(list)
@@ -73,13 +73,13 @@ class Approvals:
             note=asked.note.strip(),
         )
         draft = Draft(given.kind, author.id, msgspec.json.encode(given))
-        await self._ledger.append(STREAM, [draft])
+        await self._journal.append(STREAM, [draft])
         return given
 
     async def of(self, digest: str) -> tuple[ApprovalGiven, ...]:
         """Who said yes to a graph, in order of time."""
         async with self._reading:
-            while events := await self._ledger.read(STREAM, after=self._seq, limit=500):
+            while events := await self._journal.read(STREAM, after=self._seq, limit=500):
                 for event in events:
                     if event.kind == ApprovalGiven.kind:
                         given = msgspec.json.decode(event.body, type=ApprovalGiven)

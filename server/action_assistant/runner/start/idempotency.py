@@ -14,7 +14,7 @@ from action_assistant.runner.links.port import GraphOutline, Order
 from action_assistant.runner.runs import queries
 from action_assistant.runner.runs.events import Author, Ended, Requested, encode
 from action_assistant.runner.runs.fold import begin
-from action_assistant.runner.runs.history import Ledger
+from action_assistant.runner.runs.history import RunnerJournal
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start.admission import StartRequest
@@ -86,8 +86,8 @@ class StopOrder:
 class IdempotentStarts:
     """Where starts are written down."""
 
-    def __init__(self, ledger: Ledger, tasks: TaskGroup, clock_us: ClockUs) -> None:
-        self._ledger = ledger
+    def __init__(self, journal: RunnerJournal, tasks: TaskGroup, clock_us: ClockUs) -> None:
+        self._journal = journal
         self._tasks = tasks
         self._clock_us = clock_us
         self._asking: WeakValueDictionary[str, anyio.Lock] = WeakValueDictionary()
@@ -107,7 +107,7 @@ class IdempotentStarts:
 
     async def run_of(self, asked: StartRequest) -> str | None:
         """The run that a request has become. Raises Conflict when it was another start."""
-        rows = await self._ledger.query(queries.by_request(asked.request_id))
+        rows = await self._journal.query(queries.by_request(asked.request_id))
         if not rows:
             return None
         row = rows[0]
@@ -124,7 +124,7 @@ class IdempotentStarts:
         stream = stream_of(requested.run)
         draft = Draft(requested.kind, requested.author.id, encode(requested))
         try:
-            await self._ledger.append(stream, [draft], expected=0)
+            await self._journal.append(stream, [draft], expected=0)
         except Refused as refused:
             self._tasks.start_soon(self._disown, requested.run)
             raise Unavailable(
@@ -138,9 +138,9 @@ class IdempotentStarts:
         end = Ended(self._clock_us(), "refused", None, "It could not be recorded in time.")
         while True:
             try:
-                seq = await self._ledger.newest(stream)
+                seq = await self._journal.newest(stream)
                 if seq:
-                    await self._ledger.append(stream, [Draft(end.kind, "", encode(end))])
+                    await self._journal.append(stream, [Draft(end.kind, "", encode(end))])
                 return
             except Refused:
                 await anyio.sleep(1)

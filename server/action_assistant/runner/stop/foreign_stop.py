@@ -2,15 +2,16 @@
 
 It ends by itself with the life of the engine, and when a minute since it was last asked for has
 brought no proof; no start from here leaves before: a late stop would hit a run that only has the same
-name.
+name. What an earlier process left is gone on with once the engine has shown that it is still the same.
 """
 
 from collections.abc import Callable, Iterator
-from typing import Final
+from typing import Final, TypeAlias
 
 import anyio
 from anyio.abc import TaskGroup
 
+from action_assistant.errors import NotFound
 from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import Answer, ForeignCommand, NoAnswer
@@ -31,9 +32,34 @@ _GET_S: Final = 1.0
 _PATIENCE_S: Final = 60.0
 _LOUD_S: Final = 2.0
 
+_TAKEN_UP: Final = "the runner was started anew, and it is not proven yet"
+_RESTARTED: Final = "the engine was restarted: look at the robot"
+_UNKNOWN_LIFE: Final = "nobody knows whether this is the engine that ran it: look at the robot"
+_NO_LINK: Final = "there is no link to this robot"
+_REMOVED: Final = "the robot was taken out of the registry meanwhile: look at it"
+
+Present: TypeAlias = Callable[[str], KnownEngine | None]
+
+
+class _ForeignStop:
+    """One stop that goes on. `life`: of the engine that was to stop the graph; `why`: that is not
+    proven yet, "" at first."""
+
+    def __init__(self, robot: str, graph: str, life: str, why: str) -> None:
+        self.robot = robot
+        self.graph = graph
+        self.life = life
+        self.why = why
+        self.patience = anyio.CancelScope(deadline=anyio.current_time() + _PATIENCE_S)
+        self.disturbed = False  # since the last answer
+        self.rest = RestProof(exact=False)
+        self.doubts = DoubtfulErrors(reached=True)
+
 
 class ForeignStopLoop:
-    """All such stops that go on. `note` records; `changed` is told when people see something else."""
+    """All such stops that go on. `note` records; `changed` is told when people see something else;
+    `present` gives the engine of a robot as it is reached now, None without a link, and raises
+    NotFound for a robot that is registered no more."""
 
     def __init__(
         self,
@@ -41,92 +67,135 @@ class ForeignStopLoop:
         clock_us: ClockUs,
         note: Callable[[str, RobotEvent, str], None],
         changed: Callable[[], None],
+        present: Present,
     ) -> None:
         self._tasks = tasks
         self._clock_us = clock_us
         self._note = note
         self._changed = changed
-        self._going: dict[tuple[str, str], str] = {}
-        self._patience: dict[tuple[str, str], anyio.CancelScope] = {}
-        self._disturbed: set[tuple[str, str]] = set()  # since the last answer
+        self._present = present
+        self._going: dict[tuple[str, str], _ForeignStop] = {}
 
     def trouble(self, robot: str, graph: str) -> str | None:
         """None when the graph is not being stopped; else why that is not proven yet, "" at first."""
-        return self._going.get((robot, graph))
+        found = self._going.get((robot, graph))
+        return None if found is None else found.why
 
     def going(self, robot: str) -> bool:
         """Whether something is being stopped there."""
         return any(name == robot for name, _ in self._going)
 
+    def graphs(self) -> dict[str, list[str]]:
+        """The graphs that are being stopped, by robot."""
+        found: dict[str, list[str]] = {}
+        for robot, graph in sorted(self._going):
+            found.setdefault(robot, []).append(graph)
+        return found
+
     def all_going(self) -> Iterator[tuple[str, str]]:
         """The robot of each graph that is being stopped, and why that is not proven yet."""
-        return ((robot, why) for (robot, _), why in self._going.items())
+        return ((each.robot, each.why) for each in self._going.values())
 
     def stop(self, engine: KnownEngine, graph: str, author: Author) -> None:
         """Want a graph stopped. Never waits."""
         robot = engine.registration.name
-        until = anyio.current_time() + _PATIENCE_S
-        if (robot, graph) in self._going:
-            self._patience[robot, graph].deadline = until
+        known = self._going.get((robot, graph))
+        if known is not None:
+            known.patience.deadline = anyio.current_time() + _PATIENCE_S
             return
-        self._patience[robot, graph] = anyio.CancelScope(deadline=until)
-        self._going[robot, graph] = ""
-        asked = StopAsked(at=self._clock_us(), graph=graph, author=author)
+        life = engine.answer.incarnation if engine.answer is not None else ""
+        asked = StopAsked(at=self._clock_us(), graph=graph, author=author, life=life)
         self._note(robot, asked, author.id)
-        self._tasks.start_soon(self._stop, engine, graph, robot)
-        self._changed()
+        self._begin(_ForeignStop(robot, graph, life, ""), engine)
+
+    def take_up(self, robot: str, asked: StopAsked) -> None:
+        """Go on with a stop that an earlier process has left without a proof. Never waits."""
+        if (robot, asked.graph) not in self._going:
+            self._begin(_ForeignStop(robot, asked.graph, asked.life, _TAKEN_UP), None)
 
     def hear_of(self, robot: str, command: ForeignCommand) -> None:
         """Somebody else may just have set it going: what was asked before proves nothing any more."""
-        if command.command in SET_GOING and (robot, command.graph) in self._going:
-            self._disturbed.add((robot, command.graph))
+        found = self._going.get((robot, command.graph))
+        if command.command in SET_GOING and found is not None:
+            found.disturbed = True
 
-    async def _stop(self, engine: KnownEngine, graph: str, robot: str) -> None:
+    def _begin(self, it: _ForeignStop, engine: KnownEngine | None) -> None:
+        self._going[it.robot, it.graph] = it
+        self._tasks.start_soon(self._stop, it, engine)
+        self._changed()
+
+    async def _stop(self, it: _ForeignStop, engine: KnownEngine | None) -> None:
         try:
-            with self._patience[robot, graph]:
-                told = await self._until_proven(engine, graph, robot)
-                self._note(robot, told, "")
+            with it.patience:
+                try:
+                    told = await self._until_proven(it, engine)
+                except NotFound:
+                    told = self._unproven(it, _REMOVED)
+                self._note(it.robot, told, "")
                 return
-            why = self._going[robot, graph] or "no proof has come"
-            self._note(robot, StopUnproven(at=self._clock_us(), graph=graph, why=why), "")
+            self._note(it.robot, self._unproven(it, it.why or "no proof has come"), "")
         finally:
-            self._going.pop((robot, graph), None)
-            self._patience.pop((robot, graph), None)
-            self._disturbed.discard((robot, graph))
+            self._going.pop((it.robot, it.graph), None)
             self._changed()
 
-    async def _until_proven(self, engine: KnownEngine, graph: str, robot: str) -> RobotEvent:
+    async def _until_proven(self, it: _ForeignStop, known: KnownEngine | None) -> RobotEvent:
+        """`known`: the engine as it is reached, once it is the one that was to stop it. By another
+        link, or after a restart of the runner, it has to show that first."""
         began, gap = anyio.current_time(), _GAP_S
-        life = engine.answer.incarnation if engine.answer is not None else ""
-        rest, doubts = RestProof(exact=False), DoubtfulErrors(reached=True)
         while True:
-            why = await send_stop(engine, graph)
-            asked = anyio.current_time()
-            answer = await _ask(engine)
-            disturbed = (robot, graph) in self._disturbed
-            self._disturbed.discard((robot, graph))
-            if disturbed:
-                rest.forget()
-            if answer is None:
-                why = why or engine.why or "the engine does not answer"
-            elif len({life, answer.incarnation} - {""}) > 1:
-                why = "the engine was restarted: look at the robot"
-                return StopUnproven(at=self._clock_us(), graph=graph, why=why)
-            elif engine.standing.servers != 1:
-                why = f"{engine.standing.servers} engines are seen on the path of its answers"
-            elif disturbed:
-                why = "somebody has just set it going again"
-            elif doubt := doubts.look(_shown(answer, graph)):
-                why = doubt
-            elif _at_rest(answer, graph, rest, asked) and not why:
-                return StopWasProven(at=answer.at, graph=graph, asked_at=answer.asked_at)
+            engine = self._present(it.robot)
+            if engine is None:
+                told: RobotEvent | str = _NO_LINK
+            elif engine is known:
+                told = await self._once(it, engine)
             else:
-                why = why or f"{graph} has not stopped yet"
-            if anyio.current_time() - began >= _LOUD_S and self._going[robot, graph] != why:
-                self._going[robot, graph] = why
+                it.rest.forget()
+                told = await self._recognise(it, engine)
+                if not told:
+                    known = engine
+                    continue
+            if not isinstance(told, str):
+                return told
+            if anyio.current_time() - began >= _LOUD_S and it.why != told:
+                it.why = told
                 self._changed()
             await anyio.sleep(gap)
             gap = min(1.5 * gap, _SLOWEST_S)
+
+    async def _recognise(self, it: _ForeignStop, engine: KnownEngine) -> StopUnproven | str:
+        """Send nothing: "" when it is the engine that was to stop the graph, why that is not known
+        yet, or that it is another one."""
+        answer = await _ask(engine)
+        if answer is None:
+            return engine.why or "the engine does not answer"
+        if not it.life or not answer.incarnation:
+            return self._unproven(it, _UNKNOWN_LIFE)
+        return "" if answer.incarnation == it.life else self._unproven(it, _RESTARTED)
+
+    async def _once(self, it: _ForeignStop, engine: KnownEngine) -> RobotEvent | str:
+        """One message and one look: how it ends, or why it is not proven yet."""
+        why = await send_stop(engine, it.graph)
+        asked = anyio.current_time()
+        answer = await _ask(engine)
+        disturbed, it.disturbed = it.disturbed, False
+        if disturbed:
+            it.rest.forget()
+        if answer is None:
+            return why or engine.why or "the engine does not answer"
+        if len({it.life, answer.incarnation} - {""}) > 1:
+            return self._unproven(it, _RESTARTED)
+        if engine.standing.servers != 1:
+            return f"{engine.standing.servers} engines are seen on the path of its answers"
+        if disturbed:
+            return "somebody has just set it going again"
+        if doubt := it.doubts.look(_shown(answer, it.graph)):
+            return doubt
+        if _at_rest(answer, it.graph, it.rest, asked) and not why:
+            return StopWasProven(at=answer.at, graph=it.graph, asked_at=answer.asked_at)
+        return why or f"{it.graph} has not stopped yet"
+
+    def _unproven(self, it: _ForeignStop, why: str) -> StopUnproven:
+        return StopUnproven(at=self._clock_us(), graph=it.graph, why=why)
 
 
 async def _ask(engine: KnownEngine) -> Answer | None:

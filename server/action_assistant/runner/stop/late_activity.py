@@ -32,6 +32,7 @@ _AGAIN_S: Final = 0.5
 _KEPT: Final = 200
 _TOLD: Final = 500  # newest entries of a flight record
 
+K = TypeVar("K")
 T = TypeVar("T")
 Reopen: TypeAlias = Callable[[Run, int, MovesAgain], None]
 
@@ -75,11 +76,13 @@ class LateActivity:
         self._tasks = tasks
         self._clock_us = clock_us
         self._reopen = reopen
-        self._looking: set[str] = set()
+        self._looking: set[tuple[str, str]] = set()  # robots and runs
         self._waiting: deque[tuple[KnownEngine, Snapshot, str]] = deque()
         self._news = anyio.Event()
         self._ended: OrderedDict[str, tuple[Run, int]] = OrderedDict()
         self._others: OrderedDict[str, None] = OrderedDict()
+        #: What a robot shows that is none of its runs. One engine may be registered under two names.
+        self._elsewhere: OrderedDict[tuple[str, str], None] = OrderedDict()
 
     def ended(self, run: Run, seq: int) -> None:
         """A run is over and stored; its end is known without the journal then."""
@@ -91,16 +94,19 @@ class LateActivity:
         if run is not None:
             _put(self._others, run, None)
 
-    def is_of_others(self, run: str) -> bool:
-        """Whether somebody else has played the start of this run again."""
-        return run in self._others
+    def is_of_others(self, robot: str, run: str) -> bool:
+        """Whether what a robot shows as this run was started by somebody else."""
+        return run in self._others or (robot, run) in self._elsewhere
 
     def shows(self, engine: KnownEngine, snapshots: tuple[Snapshot, ...]) -> None:
         """An engine shows these graphs, in an answer or by feedback. Never waits; feedback comes
         outside of any task, so that none can be started here."""
+        robot = engine.registration.name
         for each in snapshots:
-            if each.run is not None and each.active and self._is_over(each.run):
-                self._looking.add(each.run)
+            if each.run is None or not each.active or (robot, each.run) in self._looking:
+                continue
+            if self._is_over(robot, each.run):
+                self._looking.add((robot, each.run))
                 self._waiting.append((engine, each, each.run))
                 self._news.set()
 
@@ -112,45 +118,48 @@ class LateActivity:
             while self._waiting:
                 self._tasks.start_soon(self._look_into, *self._waiting.popleft())
 
-    def _is_over(self, run: str) -> bool:
-        if run in self._looking or run in self._others:
+    def _is_over(self, robot: str, run: str) -> bool:
+        if self.is_of_others(robot, run):
             return False
         opened = self._open.get(run)
         return opened is None or opened.run.end is not None
 
     async def _look_into(self, engine: KnownEngine, shown: Snapshot, run: str) -> None:
+        robot = engine.registration.name
         try:
             moving = shown if shown.source == "get" else await _asked(engine, shown, run)
-            if moving is not None and self._is_over_still(run):
+            if moving is not None and self._is_over(robot, run):
                 await self._take_back(engine, moving, run)
         except (
             Exception
         ):  # one look must not end the others; the next snapshot is looked into again
             log.exception("whether run %s moves again cannot be told", run)
         finally:
-            self._looking.discard(run)
-
-    def _is_over_still(self, run: str) -> bool:
-        opened = self._open.get(run)
-        return run not in self._others and (opened is None or opened.run.end is not None)
+            self._looking.discard((robot, run))
 
     async def _take_back(self, engine: KnownEngine, shown: Snapshot, run: str) -> None:
-        opened = self._open.get(run)
+        opened, robot = self._open.get(run), engine.registration.name
+        if opened is not None and opened.run.engine != robot:
+            _put(self._elsewhere, (robot, run), None)
+            return
         if opened is not None and opened.moves_again(self._told(opened.run, shown)):
             return
         while run in self._open:  # noqa: ASYNC110 - it is just being left
             await anyio.sleep(0.01)
-        found = await self._known(run, engine.registration.name)
+        found = await self._known(run, robot)
         if found is None or not _is_of(found[0], engine):
-            _put(self._others, run, None)
+            _put(self._elsewhere, (robot, run), None)
         elif found[0].end is not None:  # else it is being taken up after a restart
             self._reopen(*found, self._told(found[0], shown))
 
     async def _known(self, run: str, robot: str) -> tuple[Run, int] | None:
         """A run that is not open, and its last seq; None when there is no such run here, or when an
         earlier process has recorded that somebody else played its start again."""
-        if run in self._ended:
-            return self._ended.pop(run)
+        ended = self._ended.get(run)
+        if ended is not None:
+            if ended[0].engine == robot:
+                del self._ended[run]
+            return ended
         while True:
             try:
                 told = await self._robots.robot_log.newest(robot, _TOLD)
@@ -199,7 +208,7 @@ def _is_of(run: Run, engine: KnownEngine) -> bool:
     return run.engine == engine.registration.name and len(lives) <= 1
 
 
-def _put(kept: OrderedDict[str, T], key: str, value: T) -> None:
+def _put(kept: OrderedDict[K, T], key: K, value: T) -> None:
     kept[key] = value
     while len(kept) > _KEPT:
         kept.popitem(last=False)

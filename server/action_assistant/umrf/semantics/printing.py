@@ -42,7 +42,7 @@ class Sheet:
         entry = [_child(edge.label, _renamed(edge, conditioned)) for edge in running.entry.children]
         exits = [_parent(name, link, conditioned) for name, link in running.exit.links.items()]
         description = running.graph.description if described else ""
-        self._foot = (
+        self._end = (
             f',\n    "graph_description": {json.dumps(description, ensure_ascii=False)}'
             f',\n    "graph_entry": {_text(entry, _MARGIN[:5])}'
             f',\n    "graph_exit": {_text(exits, _MARGIN[:5])}'
@@ -64,7 +64,7 @@ class Sheet:
         )
         body = f"[{actions}\n    ]" if self._nodes else "[]"
         shown = "INITIALIZED" if graph_state == "UNINITIALIZED" else graph_state
-        return f'{{\n    "actions": {body}{self._foot},\n    "graph_state": "{shown}"\n}}'
+        return f'{{\n    "actions": {body}{self._end},\n    "graph_state": "{shown}"\n}}'
 
     def _action(self, node: Node, state: str, messages: Sequence[tuple[int, str]]) -> str:
         values = [slot.value for slot in node.inputs.values()]

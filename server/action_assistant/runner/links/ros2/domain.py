@@ -10,7 +10,6 @@ import logging
 import secrets
 import threading
 import time
-from collections import deque
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from typing import Final, TypeAlias, TypeVar
@@ -35,6 +34,7 @@ from temoto_msgs.srv import UmrfGraphGet
 from action_assistant.runner.links.engine_text import NotAGraph, name_of, snapshot
 from action_assistant.runner.links.listeners import Listeners
 from action_assistant.runner.links.port import Command, Feedback
+from action_assistant.runner.links.ros2.message_queue import MessageQueue
 from action_assistant.runner.links.ros2.outlets import Message, Outlet, Outlets, Topics, qos
 from action_assistant.runner.links.ros2.ros_values import (
     Endpoint,
@@ -49,7 +49,6 @@ log: Final = logging.getLogger(__name__)
 #: Seconds until who has joined a domain sees everybody there: Fast DDS announces itself every three,
 #: and of two engines the second was seen up to two seconds after the first (measured, loaded machine).
 DISCOVERY_S: Final = 3.5
-_KEPT: Final = 512  # sounds that may wait for the event loop; then the oldest goes
 _PROCESS: Final = 12  # bytes of a gid that all endpoints of one process share
 _KIND: Final = "temoto_msgs/srv/UmrfGraphGet"
 _ACTORS: Final = 64
@@ -76,9 +75,7 @@ class Domain:
         self._loop = loop
         self._clock_us = clock_us
         self._subscribers = Listeners[RosValue]()
-        self._waiting: deque[RosValue] = deque(maxlen=_KEPT)
-        self._called = False
-        self._dropped = 0
+        self._waiting = MessageQueue()
         self._leaving = False
         self._clients: dict[str, Client] = {}
         self._context = Context()
@@ -243,22 +240,23 @@ class Domain:
         self._tell(LogLine(message.name, message.msg))
 
     def _tell(self, sound: RosValue) -> None:
-        if len(self._waiting) == _KEPT:
-            self._dropped += 1
-        self._waiting.append(sound)
-        if not self._called:
-            self._called = True
+        """On the thread of this domain."""
+        if self._waiting.add(sound):
             self._to_loop(self._hand_over)
 
     def _hand_over(self) -> None:
         """On the event loop, in order."""
-        self._called = False
-        if self._dropped:
-            log.warning("domain %d: %d messages came too fast", self.number, self._dropped)
-            self._dropped = 0
-        while self._waiting:
-            sound = self._waiting.popleft()
-            self._subscribers.tell(sound)
+        taken = self._waiting.take()
+        if taken.dropped:
+            log.warning("domain %d: %d messages came too fast", self.number, taken.dropped)
+        if taken.dropped_commands:
+            count = taken.dropped_commands
+            log.error("domain %d: %d commands of others came too fast", self.number, count)
+        for sound in taken.sounds:
+            try:
+                self._subscribers.tell(sound)
+            except Exception:  # whoever fails at one must not miss the others
+                log.exception("domain %d: a message could not be told", self.number)
 
     def _to_loop(self, work: Callable[[], None]) -> None:
         try:

@@ -1,0 +1,62 @@
+"""What came on a domain's thread and waits for the event loop: bounded, commands apart from the rest.
+
+Nodes may log faster than anybody listens. What they push out is other lines and feedback, of which some
+is always missing; a command of somebody else is said once.
+"""
+
+import threading
+from collections import deque
+from heapq import merge
+from operator import itemgetter
+from typing import Final, NamedTuple, TypeAlias
+
+from action_assistant.runner.links.ros2.ros_values import OverheardCommand, RosValue
+
+_KEPT: Final = 512  # of each; then the oldest goes
+
+_Numbered: TypeAlias = tuple[int, RosValue]
+
+
+class QueuedMessages(NamedTuple):
+    """What has waited, oldest first, and how much of it was pushed out."""
+
+    sounds: list[RosValue]
+    dropped: int
+    dropped_commands: int
+
+
+class MessageQueue:
+    """Added to by one thread, taken from by another."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._number = 0
+        self._begin()
+
+    def _begin(self) -> None:
+        self._commands: deque[_Numbered] = deque(maxlen=_KEPT)
+        self._others: deque[_Numbered] = deque(maxlen=_KEPT)
+        self._dropped = self._dropped_commands = 0
+        self._is_empty = True
+
+    def add(self, sound: RosValue) -> bool:
+        """Keep it, and whether it is the first to wait: then somebody has to take it."""
+        with self._lock:
+            self._number += 1
+            if isinstance(sound, OverheardCommand):
+                self._dropped_commands += len(self._commands) == _KEPT
+                self._commands.append((self._number, sound))
+            else:
+                self._dropped += len(self._others) == _KEPT
+                self._others.append((self._number, sound))
+            is_first, self._is_empty = self._is_empty, False
+            return is_first
+
+    def take(self) -> QueuedMessages:
+        """All that waits."""
+        with self._lock:
+            commands, others = self._commands, self._others
+            dropped, dropped_commands = self._dropped, self._dropped_commands
+            self._begin()
+        in_order = merge(commands, others, key=itemgetter(0))
+        return QueuedMessages([sound for _, sound in in_order], dropped, dropped_commands)

@@ -1,0 +1,44 @@
+"""Commands of others are heard although nodes flood the log, over real rclpy."""
+
+import time
+
+import pytest
+
+pytest.importorskip(
+    "rclpy", reason="rclpy is not here; `make ros-test` brings it", exc_type=ImportError
+)
+
+from action_assistant.runner.links.port import EngineLog, ForeignCommand, Report
+from ros.echo_engine import EchoEngine
+from ros.test_ros2_link import answering, engine, eventually, robot
+
+
+def flood(node: EchoEngine, other: EchoEngine) -> None:
+    """Two commands with many lines between them, while the event loop takes nothing in."""
+    other.publish("stop", umrf_graph_name="first", targets=["robot"])
+    time.sleep(0.3)
+    for number in range(1_500):
+        node.log(f"The line {number}.")
+        time.sleep(0.0005)
+    time.sleep(0.3)
+    other.publish("stop", umrf_graph_name="last", targets=["robot"])
+    time.sleep(0.3)
+
+
+async def test_a_flood_of_log_lines_hides_no_command_of_others(domain: int) -> None:
+    heard: list[Report] = []
+    with engine(domain) as node, engine(domain, namespace="laptop") as other:
+        async with robot(domain, get_service="/umrf_graph_get") as link:
+            with link.listen(heard.append):
+                await answering(link)
+                other.speak()
+                await eventually(lambda: link.standing.others == 1)
+                flood(node, other)
+                foreign = lambda: [each for each in heard if isinstance(each, ForeignCommand)]  # noqa: E731
+                await eventually(lambda: len(foreign()) == 2, 5)
+            assert [each.graph for each in foreign()] == ["first", "last"]
+            lines = [at for at, each in enumerate(heard) if isinstance(each, EngineLog)]
+            first, last = [at for at, each in enumerate(heard) if isinstance(each, ForeignCommand)]
+            between = [at for at in lines if first < at < last]
+            assert len(lines) < 1_500  # of these the oldest went
+            assert len(between) > 200

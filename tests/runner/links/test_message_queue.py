@@ -1,0 +1,34 @@
+"""What waits for the event loop: in order, bounded, and commands are not pushed out by anything else."""
+
+from action_assistant.runner.links.ros2.message_queue import MessageQueue
+from action_assistant.runner.links.ros2.ros_values import LogLine, OverheardCommand, RosValue
+
+
+def command(graph: str) -> OverheardCommand:
+    return OverheardCommand(command="stop", graph=graph, umrf="", targets=("David",), sender="")
+
+
+def test_what_comes_is_taken_in_order_and_only_the_first_needs_somebody_to_take_it() -> None:
+    queue = MessageQueue()
+    sounds: list[RosValue] = [LogLine("a", "1"), command("x"), LogLine("a", "2"), command("y")]
+    assert [queue.add(each) for each in sounds] == [True, False, False, False]
+    assert queue.take() == (sounds, 0, 0)
+    assert queue.add(command("z"))
+    assert queue.take() == ([command("z")], 0, 0)
+    assert queue.take() == ([], 0, 0)
+
+
+def test_a_flood_of_lines_pushes_out_no_command_and_both_are_bounded_and_counted() -> None:
+    queue = MessageQueue()
+    queue.add(command("first"))
+    for number in range(2_000):
+        queue.add(LogLine("a", str(number)))
+    taken = queue.take()
+    assert taken.sounds[0] == command("first")
+    assert taken.sounds[-1] == LogLine("a", "1999")
+    assert (len(taken.sounds), taken.dropped, taken.dropped_commands) == (513, 1_488, 0)
+    for number in range(600):
+        queue.add(command(str(number)))
+    taken = queue.take()
+    assert taken.sounds[0] == command("88")
+    assert (len(taken.sounds), taken.dropped, taken.dropped_commands) == (512, 0, 88)

@@ -1,0 +1,75 @@
+"""What is answered to a stop of everything: what it concerns, and of which robots nothing is known. In
+virtual time."""
+
+import json
+
+import anyio
+
+from action_assistant.runner.api.live import Hub
+from action_assistant.runner.links.port import Order
+from action_assistant.runner.stop.stopped_all import StoppedAll
+from runner.harness import ANN, BEN, Harness, clock_us, engine, order, sequence, until, virtual
+from runner.registered_robots import NEVER, Open, fleet
+
+_SILENT = "It is there, but does not answer a get within a second."
+
+
+async def _cleaning(robot: Open) -> None:
+    """Somebody else starts a graph there."""
+    await robot.engine.start(Order(run="theirs", graph=sequence("cleaning"), umrf=""))
+    await anyio.sleep(15)
+
+
+@virtual
+async def test_graphs_of_others_and_robots_of_which_nothing_is_known_are_named() -> None:
+    david, eve, farah = Open(NEVER), Open(NEVER), Open(NEVER)
+    async with fleet(Harness(), David=david, Eve=eve, Farah=farah) as control:
+        run = (await control.start(order(sequence(), engine="Farah"), ANN)).run.id
+        eve.silent = True
+        await _cleaning(david)
+        told = control.stop_all(BEN)
+        assert told == StoppedAll([run], {"David": ["cleaning"]}, {"Eve": _SILENT})
+        await until(lambda: not control.robots.foreign_stops.going("David"))
+        assert not await david.moving("cleaning")
+        assert control.stop_all(BEN).graphs == {}
+
+
+@virtual
+async def test_the_last_graphs_of_a_robot_that_has_fallen_silent_are_stopped_and_it_is_named() -> (
+    None
+):
+    david = Open(NEVER)
+    async with fleet(Harness(), David=david) as control:
+        await _cleaning(david)
+        david.silent = True
+        await anyio.sleep(15)
+        assert control.stop_all(BEN) == StoppedAll([], {"David": ["cleaning"]}, {"David": _SILENT})
+
+
+@virtual
+async def test_a_robot_that_has_not_answered_yet_is_not_known_and_one_that_came_back_is() -> None:
+    david = Open(NEVER)
+    david.silent = True
+    async with Harness({"David": david}).runner() as control:
+        assert control.stop_all(BEN).unknown == {"David": "It has not answered yet."}
+        david.silent = False
+        await until(lambda: control.robots.robot("David").heard_at is not None)
+        david.engine = engine(NEVER)
+        await until(lambda: control.robots.robot("David").state == "restarted")
+        assert control.stop_all(BEN).unknown == {}
+
+
+@virtual
+async def test_the_live_socket_tells_the_same() -> None:
+    david, eve = Open(NEVER), Open(NEVER)
+    async with fleet(Harness(), David=david, Eve=eve) as control:
+        eve.silent = True
+        await _cleaning(david)
+        text = await Hub(control, clock_us).follow('{"type":"stop","run":"all","stop_id":"s"}', BEN)
+        assert json.loads(text) == {
+            "type": "stopping",
+            "stop_id": "s",
+            "runs": [],
+            "graphs": {"David": ["cleaning"]},
+            "unknown": {"Eve": _SILENT},
+        }
