@@ -89,7 +89,12 @@ test("persons, graphs and epochs are apart", async ({ page }) => {
   expect(await call(page, "read", { ...ADA, graph: "h" })).toEqual([]);
   expect(await call(page, "others", ADA)).toEqual([]);
   expect(await call(page, "others", MARI)).toEqual([{ id: "a", name: "Ada", waiting: 3 }]);
-  await call(page, "forget", ADA, "0");
+  await call(page, "forget", ADA, "0", ["1"]);
+  expect(await call(page, "read", ADA)).toMatchObject([
+    { epoch: "0", waiting: [{ id: "2" }] },
+    { epoch: "1" },
+  ]);
+  await call(page, "forget", ADA, "0", ["2"]);
   expect(await call(page, "read", ADA)).toMatchObject([{ epoch: "1", waiting: [{ id: "3" }] }]);
 });
 

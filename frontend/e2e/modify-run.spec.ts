@@ -1,7 +1,7 @@
 /** A running graph is changed from the page, where that is safe: the simulator says that it is. */
 
 import { expect, test } from "@playwright/test";
-import { give, saved, start } from "./canvas";
+import { add, give, saved, start } from "./canvas";
 import { Product } from "./product";
 
 const product = new Product();
@@ -36,11 +36,25 @@ test("what is on screen is sent to the running robot, after what becomes differe
   await expect(changes.getByRole("listitem")).toHaveCount(1);
   await expect(changes).toContainText('Action Wait_0 changeddelay: "0.5" → "0.9"');
   await page.screenshot({ path: test.info().outputPath("send-change.png") });
+  // What somebody else changes meanwhile is neither sent nor listed.
+  const other = await product.person(browser, "Mari");
+  await other.page.goto(page.url());
+  await saved(other.page);
+  await add(other.page, "Theirs");
+  await saved(other.page);
+  await page.waitForTimeout(1_000); // in which the page follows
+  await expect(changes.getByRole("listitem")).toHaveCount(1);
+  await expect(changes).toContainText('delay: "0.5" → "0.9"');
+  await other.context.close();
   await dialog.getByRole("button", { name: /^Send v2 to run 1/ }).focus();
   await page.keyboard.down("Enter");
   await expect(dialog).toBeHidden();
   await page.keyboard.up("Enter");
   await expect.poll(async () => (await newest())?.version).not.toBe(before);
+  const version = (await newest())?.version ?? "";
+  const sent = await product.ask<{ umrf: unknown }>(`/api/versions/${version}`);
+  expect(JSON.stringify(sent.umrf)).toContain('"0.9"');
+  expect(JSON.stringify(sent.umrf)).not.toContain("Theirs");
   await page.keyboard.press("Control+.");
   await expect.poll(async () => (await newest())?.state).toBe("stopped");
   expect(failures).toEqual([]);

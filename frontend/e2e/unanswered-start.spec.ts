@@ -125,3 +125,32 @@ test("what the runner refuses was not started, and that is certain", async () =>
   await expect(notice(page)).toHaveCount(0);
   await page.unrouteAll();
 });
+
+test("what was asked for without a network is not sent when there is one again", async () => {
+  const { page, context } = ada;
+  await open(page);
+  const before = (await runs()).length;
+  const sent: string[] = [];
+  page.on("request", (request) => {
+    if (request.method() === "POST") sent.push(request.url());
+  });
+  await context.setOffline(true);
+  await start(page);
+  await expect(page.getByText(/Not started|NOT KNOWN/).first()).toBeVisible();
+  const tried = sent.length;
+  await context.setOffline(false);
+  await saved(page);
+  await page.waitForTimeout(1_500); // in which what was queued would go
+  expect(sent.slice(tried)).toEqual([]);
+  expect(await runs()).toHaveLength(before);
+});
+
+test("a browser that believes to be without a network holds nothing back", async () => {
+  const { page } = ada;
+  await open(page);
+  await page.evaluate(() => window.dispatchEvent(new Event("offline")));
+  await start(page);
+  await expect.poll(async () => (await runs())[0]?.state).toBe("running");
+  await page.evaluate(() => window.dispatchEvent(new Event("online")));
+  await stopAll(page);
+});

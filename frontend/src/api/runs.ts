@@ -48,7 +48,13 @@ export function hasEnded(run: Run): boolean {
   return run.ended_at !== null;
 }
 
-const MOVES: ReadonlySet<string> = new Set(["RUNNING", "STOPPING", "PAUSE_REQUESTED", "PAUSED"]);
+/** States of an action whose code was seen to go on. */
+export const MOVES: ReadonlySet<string> = new Set([
+  "RUNNING",
+  "STOPPING",
+  "PAUSE_REQUESTED",
+  "PAUSED",
+]);
 
 /** Whether a person's word can end the run, since no answer of its engine can. */
 export function needsRestConfirmation(run: Run): boolean {

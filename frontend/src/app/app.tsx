@@ -34,12 +34,18 @@ import {
 } from "./lazy-screens";
 import { NotFound } from "./not-found";
 
+/** What a browser says of its network says nothing of a server on this computer or in this room, and what
+ * a person asks for happens now or not at all: nothing waits for a network and is sent by itself later. */
+const NOW = "always";
 const client = new QueryClient({
   defaultOptions: {
     queries: {
+      networkMode: NOW,
       retry: (count, error) => !(error instanceof Refusal) && count < 3,
+      refetchOnReconnect: true,
       refetchOnWindowFocus: true,
     },
+    mutations: { networkMode: NOW },
   },
 });
 

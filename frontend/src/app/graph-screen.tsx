@@ -3,7 +3,8 @@ import { memo, type ReactNode, useEffect, useMemo, useRef, useState } from "reac
 import { Redirect, useSearch } from "wouter";
 import { type GraphAsAction, useGraphsAsActions } from "../api/documents/library";
 import { useVersions, versionName } from "../api/graphs";
-import { newestRun, openRuns, useLive } from "../api/live/use-live";
+import { newestRun, openRuns } from "../api/live/open-runs";
+import { useLive } from "../api/live/use-live";
 import { type Run, useLastRun } from "../api/runs";
 import { useMay, usePerson } from "../api/use-person";
 import { levelsOf } from "../canvas/levels/level-path";

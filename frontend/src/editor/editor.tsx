@@ -31,7 +31,7 @@ import { CanvasPane } from "./canvas-pane";
 import { crumbsOf } from "./menus/crumbs";
 import { DryRunButton } from "./menus/dry-run-button";
 import { Overlays } from "./menus/overlays";
-import { DeskLayout, PhoneLayout } from "./panels/layouts";
+import { DesktopLayout, PhoneLayout } from "./panels/layouts";
 import { QuietParts } from "./panels/quiet-parts";
 import { usePanels } from "./panels/use-panels";
 import { blockWords, ProblemCount, useToldProblems } from "./problem-count";
@@ -345,7 +345,7 @@ export function Editor(props: Props) {
       {phone ? (
         <PhoneLayout {...parts} onCanvas={aside} start={() => props.start(shown)} />
       ) : (
-        <DeskLayout {...parts} wide={!compact} told={told} list={() => props.list(place)} />
+        <DesktopLayout {...parts} wide={!compact} told={told} list={() => props.list(place)} />
       )}
       <RoomNotices />
       <QuietParts />

@@ -2,7 +2,8 @@
 import { Skeleton } from "@mantine/core";
 import { Link } from "wouter";
 import { authorName, type GraphSummary } from "../api/graphs";
-import { newestRun, useLive } from "../api/live/use-live";
+import { newestRun } from "../api/live/open-runs";
+import { useLive } from "../api/live/use-live";
 import { runEndText, type Tone } from "../status/progress";
 import { runStatus } from "../status/run-status";
 import { toneColor } from "../status/state-label";

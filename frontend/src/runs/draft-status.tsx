@@ -40,13 +40,13 @@ export function DraftStatus({ run, label, graph, seq, settle, obstacle }: Props)
   return (
     <span className={style.word} data-differs={found.length > 0 || undefined}>
       {words(found.length > 0, runStatus(run, now).tone !== "unknown")} <i>{label}</i>
-      {found.length > 0 && (
+      {running !== null && found.length > 0 && (
         <PartBoundary waiting={null}>
           <ModifyRun
+            key={run.id}
             run={run}
             label={label}
-            found={found}
-            seq={seq}
+            running={running.graph}
             settle={settle}
             obstacle={obstacle}
           />

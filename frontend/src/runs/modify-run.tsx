@@ -3,13 +3,17 @@ import { Button, Modal, Text } from "@mantine/core";
 import { IconArrowRight, IconMinus, IconPencil, IconPlus, IconSend } from "@tabler/icons-react";
 import { useMutation, useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
+import { fetchDocument } from "../api/documents/history";
 import { queryKeys, useVersions } from "../api/graphs";
-import { errorText } from "../api/http";
+import { errorText, isOutcomeUnknown } from "../api/http";
 import { useLive } from "../api/live/use-live";
 import type { Robot } from "../api/robots";
 import { abilitiesOf, modifyRun, type Run } from "../api/runs";
 import { useMay } from "../api/use-person";
-import type { MeaningDifference } from "../graph/meaning";
+import { mapsFrom } from "../graph/document-keys";
+import { differences, type MeaningDifference } from "../graph/meaning";
+import type { Graph } from "../graph/model";
+import { readGraph } from "../graph/read";
 import { HoldButton } from "../ui/floating/hold-button";
 import style from "./modify-run.module.css";
 import { nextLabel, notifyFailure, publishedVersion } from "./start/use-start";
@@ -18,14 +22,23 @@ interface Props {
   run: Run;
   /** The version that runs. */
   label: string;
-  found: readonly MeaningDifference[];
-  seq: number;
+  running: Graph;
   settle: () => Promise<number>;
   obstacle: string | null;
 }
 
+/** What somebody looks at before it is sent: exactly that goes, whatever others do meanwhile. */
+interface LookedAt {
+  readonly seq: number;
+  /** Of the run, then: from which the differences are. */
+  readonly version: string | null;
+  readonly label: string;
+  readonly found: readonly MeaningDifference[];
+}
+
 const SIGNS = { added: IconPlus, removed: IconMinus, changed: IconPencil } as const;
 const MOST = 40; // differences that are listed
+const PATIENCE = 10_000; // ms for the graph as it was at the moment that is sent
 
 /** Why a running graph cannot be changed; null when it can. */
 function modifyObstacle(run: Run, engine: Robot | undefined, obstacle: string | null) {
@@ -65,73 +78,121 @@ function List({ found }: { found: readonly MeaningDifference[] }) {
   );
 }
 
-export function ModifyRun({ run, label, found, seq, settle, obstacle }: Props) {
-  const { runner, now } = useLive();
+/** The moment that is on screen, as the server has it, beside what runs. */
+async function looked({ run, label, running, settle }: Props): Promise<LookedAt> {
+  const seq = await settle();
+  const document = await fetchDocument(run.graph ?? "", seq, AbortSignal.timeout(PATIENCE));
+  const found = differences(running, readGraph(mapsFrom(document)));
+  if (found.length === 0) throw new Error("What runs is what is on screen.");
+  return { seq, version: run.version, label, found };
+}
+
+/** The runner may have taken it all the same. */
+class Unanswered extends Error {}
+
+/** Publishes that moment and sends it, once. */
+async function sent(runner: string, run: Run, seq: number, onVersion: () => void): Promise<Run> {
+  const { version, umrf } = await publishedVersion(run.graph ?? "", seq);
+  onVersion();
+  try {
+    return await modifyRun(runner, run.id, { id: version.id, digest: version.digest, umrf });
+  } catch (error) {
+    throw isOutcomeUnknown(error) ? new Unanswered(errorText(error)) : error;
+  }
+}
+
+interface DialogProps {
+  run: Run;
+  asking: LookedAt;
+  /** Why it cannot be sent now; null when it can. */
+  obstacle: string | null;
+  onClose: () => void;
+}
+
+function SendDialog({ run, asking, obstacle, onClose }: DialogProps) {
+  const { runner } = useLive();
   const client = useQueryClient();
-  const [asking, setAsking] = useState<number | null>(null);
+  const graph = run.graph ?? "";
+  const next = nextLabel(useVersions(graph).data ?? [], asking.seq);
+  const where = run.simulated ? "the simulator" : run.engine;
+  const told = () => void client.invalidateQueries({ queryKey: queryKeys.versions(graph) });
+  const send = useMutation({
+    mutationFn: () => sent(runner ?? "", run, asking.seq, told),
+    onSuccess: onClose,
+    onError: (error) => {
+      if (!(error instanceof Unanswered)) return notifyFailure("Not sent", errorText(error));
+      notifyFailure(
+        "NOT KNOWN whether it was sent",
+        `${error.message} It may go on by the new graph.`,
+      );
+      onClose();
+    },
+  });
+  const other = run.version !== asking.version;
+  const why = other ? "Something else was sent meanwhile: look again" : obstacle;
+  return (
+    <Modal
+      opened
+      onClose={onClose}
+      title={`Change run ${run.number} while it goes`}
+      closeButtonProps={{ "aria-label": "Close" }}
+    >
+      <p className={style.what}>
+        <b>{asking.label}</b> <IconArrowRight size={15} aria-label="becomes" /> <b>{next}</b> on{" "}
+        {where}
+      </p>
+      <List found={asking.found} />
+      <Text size="sm" c="dimmed">
+        The engine pauses the graph, takes this one in its place and goes on. Actions that run now
+        are paused meanwhile. Stop works all the while.
+      </Text>
+      <footer className={style.foot}>
+        <Button onClick={onClose}>Cancel</Button>
+        <HoldButton
+          icon={<IconSend size={13} aria-hidden />}
+          label={why ?? (send.isPending ? "Sending …" : "Hold to send")}
+          name={why === null ? `Send ${next} to run ${run.number} on ${where}` : why}
+          question={`Change run ${run.number} on ${where} to exactly ${next}?`}
+          disabled={why !== null || send.isPending}
+          onHeld={() => send.mutate()}
+        />
+      </footer>
+    </Modal>
+  );
+}
+
+export function ModifyRun(props: Props) {
+  const { run, obstacle } = props;
+  const { now } = useLive();
   const may = useMay(run.simulated ? "simulate" : "operate");
-  const versions = useVersions(run.graph ?? "").data ?? [];
+  const [asking, setAsking] = useState<LookedAt | null>(null);
+  const look = useMutation({
+    mutationFn: () => looked(props),
+    onSuccess: setAsking,
+    onError: (error) => notifyFailure("Not sent", errorText(error)),
+  });
   const why = modifyObstacle(
     run,
     now.engines.find((each) => each.name === abilitiesOf(run)),
     now.link === "down" ? "The runner does not answer" : obstacle,
   );
-  const where = run.simulated ? "the simulator" : run.engine;
-  const send = useMutation({
-    mutationFn: async (at: number) => {
-      const graph = run.graph ?? "";
-      const { version, umrf } = await publishedVersion(graph, at);
-      void client.invalidateQueries({ queryKey: queryKeys.versions(graph) });
-      return modifyRun(runner ?? "", run.id, { id: version.id, digest: version.digest, umrf });
-    },
-    onSuccess: () => setAsking(null),
-    onError: (error) => notifyFailure("Not sent", errorText(error)),
-  });
   if (!may) return null;
-  const ask = () =>
-    void settle().then(setAsking, (error) => notifyFailure("Not sent", errorText(error)));
-  const next = nextLabel(versions, asking ?? seq);
   return (
     <>
       <Button
         size="compact-xs"
         variant="subtle"
         leftSection={<IconSend size={13} aria-hidden />}
+        loading={look.isPending}
         disabled={why !== null}
         title={why ?? `Send what is on screen to run ${run.number}, as it runs`}
         aria-label={why === null ? "Send to the running robot …" : `Send: ${why}`}
-        onClick={ask}
+        onClick={() => look.mutate()}
       >
         Send …
       </Button>
       {asking !== null && (
-        <Modal
-          opened
-          onClose={() => setAsking(null)}
-          title={`Change run ${run.number} while it goes`}
-          closeButtonProps={{ "aria-label": "Close" }}
-        >
-          <p className={style.what}>
-            <b>{label}</b> <IconArrowRight size={15} aria-label="becomes" /> <b>{next}</b> on{" "}
-            {where}
-          </p>
-          <List found={found} />
-          <Text size="sm" c="dimmed">
-            The engine pauses the graph, takes this one in its place and goes on. Actions that run
-            now are paused meanwhile. Stop works all the while.
-          </Text>
-          <footer className={style.foot}>
-            <Button onClick={() => setAsking(null)}>Cancel</Button>
-            <HoldButton
-              icon={<IconSend size={13} aria-hidden />}
-              label={why ?? (send.isPending ? "Sending …" : "Hold to send")}
-              name={why === null ? `Send ${next} to run ${run.number} on ${where}` : why}
-              question={`Change run ${run.number} on ${where} to exactly ${next}?`}
-              disabled={why !== null || send.isPending}
-              onHeld={() => send.mutate(asking)}
-            />
-          </footer>
-        </Modal>
+        <SendDialog run={run} asking={asking} obstacle={why} onClose={() => setAsking(null)} />
       )}
     </>
   );

@@ -1,6 +1,6 @@
 /** What moves now, on which robot: only what an engine has shown; the rest is said to be not known. Pure. */
 import type { LiveState } from "../api/live/live-socket";
-import { foreignGraphs, openRuns } from "../api/live/use-live";
+import { foreignGraphs, openRuns } from "../api/live/open-runs";
 import type { Run } from "../api/runs";
 import { instant } from "../ui/times";
 

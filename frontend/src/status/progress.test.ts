@@ -42,6 +42,20 @@ const visit = {
   inputs: null,
 } as const;
 
+test.each(["RUNNING", "PAUSE_REQUESTED", "PAUSED", "STOPPING"])(
+  "an action that was %s is unknown while nothing is heard, and its end was not seen when all is over",
+  (state) => {
+    const action: ActionRun = { ...going, state };
+    expect(progressOf(action, run, false).tone).not.toBe("unknown");
+    expect(progressOf(action, run, true)).toMatchObject({ tone: "unknown", word: "unknown" });
+    const over = { ...run, ended_at: "2026-01-01T00:00:09Z" };
+    expect(progressOf(action, over, false)).toMatchObject({
+      tone: "unknown",
+      word: "end not seen",
+    });
+  },
+);
+
 const going: ActionRun = { aid: "a", state: "RUNNING", visits: [visit], older: 0, messages: [] };
 
 test("an action that runs says since when", () => {

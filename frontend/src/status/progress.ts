@@ -1,5 +1,5 @@
 /** What can be said of an action of a run, and of the run, in one word and one tone. */
-import type { ActionRun, Run, Visit } from "../api/runs";
+import { type ActionRun, MOVES, type Run, type Visit } from "../api/runs";
 import { clock } from "../ui/times";
 
 export type Tone = "idle" | "run" | "true" | "false" | "error" | "stopped" | "done" | "unknown";
@@ -54,10 +54,13 @@ function finished(visit: Visit | undefined): { tone: Tone; word: string } {
 
 function stateOf(action: ActionRun, over: boolean, unsure: boolean): { tone: Tone; word: string } {
   const last = action.visits.at(-1);
+  if (MOVES.has(action.state)) {
+    if (over) return { tone: "unknown", word: "end not seen" };
+    if (unsure) return { tone: "unknown", word: "unknown" };
+  }
   switch (action.state) {
     case "RUNNING":
-      if (over) return { tone: "unknown", word: "end not seen" };
-      return unsure ? { tone: "unknown", word: "unknown" } : { tone: "run", word: "running" };
+      return { tone: "run", word: "running" };
     case "PAUSE_REQUESTED":
       return { tone: "run", word: "pausing" };
     case "PAUSED":

@@ -4,7 +4,7 @@ import { addAction, rename } from "../graph/edit";
 import { graphNow } from "../graph/edit/document-writes";
 import { FakeEditStore } from "../testing/fake-device";
 import { FakeServer } from "../testing/fake-server";
-import { GraphConnection } from "./graph-connection";
+import { GraphConnection, wouldLose } from "./graph-connection";
 
 const ADA = { id: "a", name: "Ada" };
 
@@ -239,6 +239,61 @@ test("who shares a client id with somebody else takes another, and loses nothing
   expect(names(server.doc)).toEqual(["Peek"]);
   expect(connection.now()).toMatchObject({ stranded: [], notice: null });
   expect(device.waiting).toBe(0);
+});
+
+test("what another page left on the same history is shown, not erased, once this one has decided", async () => {
+  const first = await come();
+  await arrive();
+  const second = await come();
+  await arrive();
+  const then = backup("two");
+  for (const socket of server.sockets) socket.end(1006);
+  addAction(docOf(first), { name: "Mine" });
+  addAction(docOf(second), { name: "Theirs" });
+  await settle();
+  second.leave();
+  await settle();
+  expect(device.waiting).toBe(2);
+  server = then;
+  await vi.advanceTimersByTimeAsync(2_000);
+  await arrive();
+  await arrive();
+  const [mine] = first.now().stranded;
+  expect(mine?.edits).toBe(1);
+  if (mine) await first.drop(mine);
+  const [theirs, ...more] = first.now().stranded;
+  expect(more).toEqual([]);
+  expect([...(theirs?.difference.actions.values() ?? [])]).toContain("Theirs");
+  if (theirs) await first.drop(theirs);
+  expect(first.now().stranded).toEqual([]);
+  expect(device.waiting).toBe(0);
+});
+
+test("where no device keeps edits, leaving the graph keeps its room until they are stored", async () => {
+  vi.spyOn(console, "warn").mockImplementation(() => undefined);
+  device.refuses = true;
+  const connection = await come();
+  await arrive();
+  server.last.end(1006);
+  addAction(docOf(connection), { name: "Look" });
+  await settle();
+  connection.leave();
+  expect(wouldLose(undefined)).toBe(true);
+  await vi.advanceTimersByTimeAsync(2_000);
+  await arrive();
+  expect(names(server.doc)).toEqual(["Look"]);
+  expect(wouldLose(undefined)).toBe(false);
+  expect(server.last.readyState).toBe(3);
+});
+
+test("closing the page is asked about while what was laid aside is kept nowhere else", async () => {
+  vi.spyOn(console, "warn").mockImplementation(() => undefined);
+  device.refuses = true;
+  const connection = await come();
+  await strand(connection);
+  expect(wouldLose(connection)).toBe(true);
+  for (const stranded of connection.now().stranded) await connection.drop(stranded);
+  expect(wouldLose(connection)).toBe(false);
 });
 
 test("a device that keeps nothing loses no choice while the page is open", async () => {

@@ -8,7 +8,14 @@
  */
 
 import { admissionCheck } from "./admission";
-import { browserStore, type EditStore, epochName, newEpoch, type StoredCopy } from "./indexed-db";
+import {
+  browserStore,
+  type EditStore,
+  epochName,
+  idOf,
+  newEpoch,
+  type StoredCopy,
+} from "./indexed-db";
 import { type ClosableRoom, type OpenRoom, openRoom } from "./open-room";
 import {
   applyDifference,
@@ -38,12 +45,22 @@ export interface GraphConnectionOptions {
 interface StrandedEpoch {
   readonly epoch: string;
   readonly stranded: StrandedEdits;
-  /** Lets go of what is kept of it on the device. */
+  /** Whether the device has them, so that they outlive this page. */
+  isKept(): boolean;
+  /** Lets go of them on the device. */
   forget(): Promise<void>;
 }
 
 /** A document that differs so often has a fault that opening anew does not mend. */
 const MOST_DIFFERENCES = 3;
+
+/** Left, with edits that no server and no device has yet. */
+const lingering = new Set<GraphConnection>();
+
+/** Whether edits would be lost if the page were closed now, in this graph or in one that was left. */
+export function wouldLose(connection: GraphConnection | undefined): boolean {
+  return lingering.size > 0 || connection?.wouldLose() === true;
+}
 
 export class GraphConnection {
   private readonly options: GraphConnectionOptions;
@@ -91,6 +108,7 @@ export class GraphConnection {
     await aside?.forget();
     this.asides = this.asides.filter((each) => each !== aside);
     this.say();
+    await this.lookAside(); // another page may have left some on the same history
   }
 
   /** The notice was read. */
@@ -99,12 +117,31 @@ export class GraphConnection {
     this.say();
   }
 
+  /** Whether closing the page now would lose edits. */
+  wouldLose(): boolean {
+    return isAtRisk(this.opened.room) || this.asides.some((aside) => !aside.isKept());
+  }
+
+  /** Where nothing else has the edits that wait, the room stays open until they are stored. */
   leave(): void {
     if (this.left) return;
     this.left = true;
     this.unfollow();
-    this.opened.leave();
     this.listeners.clear();
+    const { opened } = this;
+    const { room } = opened;
+    if (!mayBeStored(room)) {
+      opened.leave();
+      return;
+    }
+    lingering.add(this);
+    room.awareness.setLocalState(null); // nobody looks at it any more
+    const stop = room.onLink(() => {
+      if (mayBeStored(room)) return;
+      stop();
+      lingering.delete(this);
+      opened.leave();
+    });
   }
 
   private enter(keep: PersistenceOptions | undefined): ClosableRoom {
@@ -129,24 +166,25 @@ export class GraphConnection {
     const { room } = this.opened;
     const stranded = room.stranded();
     const epoch = room.histories().here;
-    const forget = () => room.forget();
+    const isKept = () => room.link().kept === true;
+    const aside = stranded && { epoch, stranded, isKept, forget: () => room.forget() };
     switch (why) {
       case "other-epoch":
-        if (stranded !== null) this.asides = [...this.asides, { epoch, stranded, forget }];
+        if (aside !== null) this.asides = [...this.asides, aside];
         else this.notice = "went-back";
         this.follower(otherEpoch(room));
         break;
       case "other-client":
         this.follower(newEpoch(room.histories().theirs));
-        if (stranded === null) void forget();
-        else void this.again({ epoch, stranded, forget });
+        if (aside === null) void room.forget();
+        else void this.again(aside);
         break;
       case "differs":
         this.differences += 1;
         if (this.differences > MOST_DIFFERENCES) return;
         this.notice = "differed";
         this.follower(newEpoch(room.histories().theirs));
-        void forget();
+        void room.forget();
         break;
       default:
         return; // the person can do something about it, and this room goes on then
@@ -195,8 +233,24 @@ export class GraphConnection {
 }
 
 function asideOf(device: EditStore, keep: PersistenceOptions, kept: StoredCopy): StrandedEpoch {
-  const { epoch } = kept;
-  return { epoch, stranded: strandedEditsOf(kept), forget: () => device.forget(keep, epoch) };
+  const { epoch, waiting } = kept;
+  return {
+    epoch,
+    stranded: strandedEditsOf(kept),
+    isKept: () => true,
+    forget: () => device.forget(keep, epoch, waiting.map(idOf)),
+  };
+}
+
+/** Whether it has edits that neither the server nor this device has. */
+function isAtRisk(room: Room): boolean {
+  const { unsaved, kept } = room.link();
+  return unsaved > 0 && kept !== true;
+}
+
+/** Whether they may still be stored without anybody looking at the room. */
+function mayBeStored(room: Room): boolean {
+  return isAtRisk(room) && room.link().state !== "refused";
 }
 
 /** Where to keep what the server has now: under its name, unless that is the name of what was. */

@@ -33,6 +33,8 @@ export const madeNow = (update: Uint8Array, before: ReplacedEntries): UnsavedEdi
   before,
 });
 
+export const idOf = ({ id }: UnsavedEdit): string => id;
+
 export interface StoredCopy {
   /** One history of the graph, see `epochName`. */
   readonly epoch: string;
@@ -74,8 +76,8 @@ export interface EditStore {
   /** What is kept, of all histories, the last used one at the end. */
   read(owner: CopyOwner): Promise<readonly StoredCopy[]>;
   write(owner: CopyOwner, epoch: string, batch: StoreWrite): Promise<void>;
-  /** Lets go of everything kept of one epoch, edits that wait included. */
-  forget(owner: CopyOwner, epoch: string): Promise<void>;
+  /** Lets go of these edits (by id), and of the copy unless others wait on it: another page's, say. */
+  forget(owner: CopyOwner, epoch: string, edits: readonly string[]): Promise<void>;
   /** The graphs of which this person has a copy here, the last used first. */
   graphs(person: string): Promise<readonly KeptGraph[]>;
   /** Lets go of this person's copies in which nothing waits. */
@@ -152,10 +154,14 @@ export function indexedDbStore(factory: IDBFactory | undefined = globalThis.inde
       }
       if (batch.copy !== null) await prune(store, owner, MOST_COPIES);
     },
-    async forget(owner, epoch) {
+    async forget(owner, epoch, edits) {
       const work = (await database()).transaction(["copies", "known", "waiting"], "readwrite");
-      remove(work, [owner.graph, owner.person.id, epoch]);
-      await finished(work);
+      const done = finished(work);
+      const place: CopyKey = [owner.graph, owner.person.id, epoch];
+      const waiting = work.objectStore("waiting");
+      for (const id of edits) waiting.delete([...place, id]);
+      if ((await answer(waiting.count(within(...place)))) === 0) remove(work, place);
+      await done;
     },
     async graphs(person) {
       const work = (await database()).transaction(["copies", "waiting"]);

@@ -8,6 +8,7 @@
 import {
   type CopyOwner,
   type EditStore,
+  idOf,
   type StoredCopy,
   type StoreWrite,
   UNNAMED_EPOCH,
@@ -63,11 +64,12 @@ export class Persistence {
     while (this.writing !== null) await this.writing;
     this.epoch = epoch;
     this.waits = [...waiting()];
+    const moved = this.waits.map(idOf);
     this.tail = TAIL + 1; // the copy is written whole
     this.flush();
     while (this.writing !== null) await this.writing;
     try {
-      if (this.opened && !this.failed) await this.device.forget(this.owner, UNNAMED_EPOCH);
+      if (this.opened && !this.failed) await this.device.forget(this.owner, UNNAMED_EPOCH, moved);
     } catch (error) {
       this.fail(error);
     }
@@ -134,15 +136,16 @@ export class Persistence {
     this.soon();
   }
 
-  /** Forgets everything that is kept of this epoch. */
-  async forget(): Promise<void> {
+  /** Forgets these edits, those that are durable, and the copy unless another page's edits wait on it. */
+  async forget(edits: readonly UnsavedEdit[]): Promise<void> {
     clearTimeout(this.timer);
     this.waits = [];
     while (this.writing !== null) await this.writing;
+    const gone = [...edits, ...this.durable].map(idOf);
     this.waits = [];
     this.known = [];
     this.durable = [];
-    if (this.opened) await this.device.forget(this.owner, this.epoch);
+    if (this.opened) await this.device.forget(this.owner, this.epoch, gone);
     this.opened = false;
   }
 

@@ -149,7 +149,7 @@ class Connection implements Room, SocketHandler {
   }
 
   async forget(): Promise<void> {
-    await this.persistence?.forget();
+    await this.persistence?.forget(this.outbox.edits);
     this.outbox.clear();
     this.say({ unsaved: 0 });
   }

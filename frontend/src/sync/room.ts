@@ -49,7 +49,7 @@ export interface Room {
   histories(): { readonly here: string; readonly theirs: string };
   /** The edits that are not durable, as values; null when there are none. */
   stranded(): StrandedEdits | null;
-  /** Forgets everything kept here of this history, edits that wait included. */
+  /** Forgets the edits that wait, and what is kept here of this history unless another page's wait too. */
   forget(): Promise<void>;
   /** Leaves the room. Edits that were not stored stay in `doc`, and on the device if there is one. */
   close(): void;

@@ -19,8 +19,9 @@ import {
   type ConnectionNotice,
   GraphConnection,
   type GraphConnectionState,
+  wouldLose,
 } from "./graph-connection";
-import { browserStore, type OtherPerson } from "./indexed-db";
+import { browserStore, idOf, type OtherPerson } from "./indexed-db";
 import type { OpenRoom } from "./open-room";
 import type { Participant } from "./presence/presence";
 import { type StrandedEdits, strandedEditsOf } from "./replaced-history";
@@ -84,15 +85,14 @@ export function RoomProvider({
 
 /** Asks before the page is closed, when something would be lost by that. */
 function useBeforeLeaving(roomContext: RoomContextValue | null): void {
-  const open = roomContext?.connectionState.open;
+  const connection = roomContext?.connection;
   useEffect(() => {
     const onLeave = (event: BeforeUnloadEvent) => {
-      const link = open?.room.link();
-      if (link && link.unsaved > 0 && !link.kept) event.preventDefault();
+      if (wouldLose(connection)) event.preventDefault();
     };
     window.addEventListener("beforeunload", onLeave);
     return () => window.removeEventListener("beforeunload", onLeave);
-  }, [open]);
+  }, [connection]);
 }
 
 /** The same object as long as graph and person are the same; the name in it is the newest. */
@@ -324,7 +324,9 @@ export function useOthersWaiting(): OthersWaiting {
       forget: async (id) => {
         if (keep === undefined || device === undefined) return;
         const owner = { graph: keep.graph, person: { id, name: "" } };
-        for (const { epoch } of await waiting(id)) await device.forget(owner, epoch);
+        for (const kept of await waiting(id)) {
+          await device.forget(owner, kept.epoch, kept.waiting.map(idOf));
+        }
         setOthers((now) => now.filter((other) => other.id !== id));
       },
     };

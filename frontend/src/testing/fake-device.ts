@@ -46,11 +46,14 @@ export class FakeEditStore implements EditStore {
     entry.seq = batch.seq;
   }
 
-  async forget({ graph, person }: CopyOwner, epoch: string): Promise<void> {
+  async forget(owner: CopyOwner, epoch: string, edits: readonly string[]): Promise<void> {
     this.check();
-    const keep = this.entries.filter(
-      (e) => e.graph !== graph || e.person.id !== person.id || e.epoch !== epoch,
-    );
+    const { graph, person } = owner;
+    const isMeant = (e: StoredGraph) =>
+      e.graph === graph && e.person.id === person.id && e.epoch === epoch;
+    for (const { waiting } of this.entries.filter(isMeant))
+      for (const id of edits) waiting.delete(id);
+    const keep = this.entries.filter((e) => !isMeant(e) || e.waiting.size > 0);
     this.entries.splice(0, this.entries.length, ...keep);
   }
 

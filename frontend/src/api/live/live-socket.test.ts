@@ -131,6 +131,104 @@ test("a Stop that nobody hears is sent again until somebody does", async () => {
   live.close();
 });
 
+test("what was unknown when all was to be stopped is stopped, however late it is heard", async () => {
+  answering({});
+  const live = new LiveSocket("http://h:1"); // nothing was heard of any run yet
+  live.open();
+  live.stop("all");
+  await vi.advanceTimersByTimeAsync(20_000);
+  expect(live.state.stops.at(-1)?.state).toBe("unheard");
+  posted.mockReset();
+  answering({ "/api/stop": 202 });
+  await vi.advanceTimersByTimeAsync(1_500);
+  expect(posted).toHaveBeenCalledWith("POST", "http://h:1/api/stop");
+  expect(live.state.stops.at(-1)?.state).toBe("heard");
+  live.close();
+});
+
+test("a graph that others started keeps a late Stop of everything one of everything", async () => {
+  const live = new LiveSocket("http://h:1");
+  live.open();
+  const holds = [{ graph: "theirs", state: "RUNNING", active: true, run: null, stopping: null }];
+  const engines = [{ name: "David", holds }];
+  newest().say({ type: "hello", engines, runs: [run("running")] });
+  answering({});
+  live.stop("all");
+  await vi.advanceTimersByTimeAsync(10_000);
+  expect(posted).toHaveBeenLastCalledWith("POST", "http://h:1/api/stop");
+  live.close();
+});
+
+test("a Stop that nobody has heard is not crowded out by others", async () => {
+  const live = new LiveSocket("http://h:1");
+  live.open();
+  answering({});
+  live.stop("r");
+  for (let n = 0; n < 9; n += 1) live.stop(`other${n}`);
+  for (let n = 0; n < 9; n += 1) live.stop("all"); // a key that is held down
+  await vi.advanceTimersByTimeAsync(3_000);
+  expect(live.state.stops.map((stop) => stop.run)).toHaveLength(11);
+  posted.mockReset();
+  answering({ "/stop": 202 });
+  await vi.advanceTimersByTimeAsync(2_000);
+  expect(posted).toHaveBeenCalledWith("POST", "http://h:1/api/runs/r/stop");
+  expect(posted.mock.calls.filter(([, url]) => url === "http://h:1/api/stop")).toHaveLength(1);
+  expect(live.state.stops.every((stop) => stop.state === "heard")).toBe(true);
+  live.close();
+});
+
+test("one run that cannot be stopped now keeps no other from being stopped", async () => {
+  const live = new LiveSocket("http://h:1");
+  live.open();
+  const other = { ...run("running"), id: "q" };
+  newest().say({ type: "hello", engines: [], runs: [run("running"), other] });
+  newest().close();
+  answering({});
+  live.stop("all");
+  await vi.advanceTimersByTimeAsync(6_000);
+  posted.mockReset();
+  answering({ "/runs/r/stop": 503, "/runs/q/stop": 202 });
+  await vi.advanceTimersByTimeAsync(1_500);
+  expect(posted).toHaveBeenCalledWith("POST", "http://h:1/api/runs/q/stop");
+  expect(live.state.stops.at(-1)?.state).toBe("unheard");
+  live.close();
+});
+
+test("a Stop of everything is about the runs that went on then, and those that the runner stops since", async () => {
+  const live = new LiveSocket("http://h:1");
+  live.open();
+  newest().say({ type: "hello", engines: [], runs: [run("running")] });
+  live.stop("all");
+  await vi.advanceTimersByTimeAsync(10);
+  const said = (id: string, desired: string) =>
+    newest().say({ type: "run", run: { ...run("running"), id, desired } });
+  said("unseen", "stopped");
+  said("calm", "running");
+  expect(live.state.stops.at(-1)?.runs).toEqual(["r", "unseen"]);
+  newest().say({ type: "beat", at: "" });
+  await vi.advanceTimersByTimeAsync(3_000);
+  newest().say({ type: "beat", at: "" });
+  await vi.advanceTimersByTimeAsync(3_400);
+  said("later", "stopped");
+  expect(live.state.stops.at(-1)?.runs).toEqual(["r", "unseen"]);
+  live.close();
+});
+
+test("how old a proof is does not follow from whose clock is right", () => {
+  const live = new LiveSocket("http://h:1");
+  live.open();
+  newest().say({ type: "hello", engines: [], runs: [] });
+  const theirs = Date.now() - 600_000; // the runner's clock is ten minutes behind
+  const moment = (ms: number) => new Date(ms).toISOString();
+  const beat = { type: "beat", at: moment(theirs), heard: {}, seen: { r: moment(theirs - 400) } };
+  newest().say(beat);
+  expect(live.runSeenAt.get("r")).toBe(Date.now() - 400);
+  vi.advanceTimersByTime(2_000);
+  newest().say(beat); // the same, two seconds under way
+  expect(live.runSeenAt.get("r")).toBe(Date.now() - 2_400);
+  live.close();
+});
+
 test("when the runner has nothing to stop it with, a Stop is refused and not repeated", async () => {
   const live = new LiveSocket("http://h:1");
   live.open();
@@ -201,7 +299,8 @@ test("a beat says when each robot last answered, without another render of every
   const seers = vi.fn();
   live.subscribe(all);
   live.subscribeSeen(seers);
-  newest().say({ type: "beat", at: "", seen: {}, heard: { David: "1970-01-01T00:00:02Z" } });
+  const at = new Date().toISOString();
+  newest().say({ type: "beat", at, seen: {}, heard: { David: "1970-01-01T00:00:02Z" } });
   expect(live.robotAnsweredAt.get("David")).toBe(2000);
   expect(seers).toHaveBeenCalledOnce();
   expect(all).not.toHaveBeenCalled();

@@ -6,6 +6,7 @@ import { getRun, postStop, type Run } from "../runs";
 import type { RunnerApi } from "../schema/runner";
 import { sessionEnd } from "../session-end";
 import { isUrgentChange, withKeptParts } from "./kept-run";
+import { foreignGraphs } from "./open-runs";
 import {
   blockedByBrowser,
   findUnreachableReason,
@@ -19,12 +20,17 @@ export interface StopRequest {
   id: string;
   run: string | "all";
   at: number;
+  /** Which runs "all" is about: those that went on when it was asked, as far as this page knew, and those
+   * that the runner stops since. */
+  runs: readonly string[];
   /**
    * `asked`: nobody has answered yet; `unheard`: it could not be sent, and is sent again;
    * `heard`: the runner is stopping; `refused`: it will not.
    */
   state: "asked" | "heard" | "refused" | "unheard";
   detail: string;
+  /** Of a clock that nobody sets, ms. */
+  heardAt?: number;
 }
 
 export interface LiveState {
@@ -43,7 +49,8 @@ type PageMessage = RunnerApi["PageMessage"];
 
 const SESSION_ENDED = 4401;
 const SILENCE = 3_500; // ms; the runner beats each second
-const STOPS_KEPT = 5;
+const STOPS_KEPT = 5; // that somebody has answered
+const JOINS = 6_000; // ms after "all" is heard in which a run that is being stopped is one of its
 const AGAIN = 1_000; // ms between two tries to send a Stop
 const SOON = 5_000; // ms; the longest wait for another try to reach the runner
 const SELDOM = 60_000; // ms; the same where trying soon has proven to be of no use
@@ -74,6 +81,7 @@ export class LiveSocket {
   /** News of runs that listeners are told of soon. */
   #untold: ReturnType<typeof setTimeout> | undefined;
   #toldAt = 0; // of a clock that nobody sets
+  #ahead = 0; // ms that this page's clock is before the runner's, at most
   /** What was found out about the last socket that did not open. */
   #unreached: UnreachableReason | null = null;
 
@@ -121,23 +129,36 @@ export class LiveSocket {
    * hears it, it is sent again for as long as the page is open.
    */
   stop(run: string | "all"): void {
-    const id = newAid();
-    const at = Date.now();
     const open = [...this.state.runs.values()].filter((each) => each.ended_at === null);
-    const meant = open.map((each) => each.id);
-    this.#putStop({ id, run, at, state: "asked", detail: "" });
-    void this.#keepStopping(id, run, at, meant);
+    const runs = run === "all" ? open.map((each) => each.id) : [];
+    const stop: StopRequest = {
+      id: newAid(),
+      run,
+      at: Date.now(),
+      runs,
+      state: "asked",
+      detail: "",
+    };
+    this.#putStop(stop);
+    void this.#keepStopping(stop, this.#isWhole(runs));
   }
 
-  async #keepStopping(id: string, run: string, at: number, meant: string[]): Promise<void> {
+  /** Whether these are all that could be seen to move when somebody asked to stop all. */
+  #isWhole(runs: readonly string[]): boolean {
+    return runs.length > 0 && foreignGraphs(this.state).length === 0;
+  }
+
+  /** `whole`: its runs are all that it is about, so that it can be narrowed to them. */
+  async #keepStopping({ id, run, at, runs }: StopRequest, whole: boolean): Promise<void> {
     for (;;) {
-      const late = run === "all" && Date.now() - at > ALL_HOLDS;
-      try {
-        for (const each of late ? meant : [run]) await this.#sendStop(each, id);
-        this.#answerStop(id, "heard", "");
-      } catch (error) {
-        this.#answerStop(id, isFinal(error) ? "refused" : "unheard", errorText(error));
-      }
+      const late = run === "all" && whole && Date.now() - at > ALL_HOLDS;
+      const sent = (late ? runs : [run]).map((each) => this.#sendStop(each, id));
+      const errors = (await Promise.allSettled(sent)).flatMap((each) =>
+        each.status === "rejected" ? [each.reason as unknown] : [],
+      );
+      const [error] = [...errors.filter((each) => !isFinal(each)), ...errors];
+      if (error === undefined) this.#answerStop(id, "heard", "");
+      else this.#answerStop(id, isFinal(error) ? "refused" : "unheard", errorText(error));
       const now = this.state.stops.find((stop) => stop.id === id);
       if (this.#closed || now?.state !== "unheard") return;
       await new Promise((done) => setTimeout(done, AGAIN));
@@ -169,6 +190,7 @@ export class LiveSocket {
     const socket = new WebSocket(`${this.#runner.replace(/^http/, "ws")}/api/live`);
     let opened = false;
     this.#socket = socket;
+    this.#ahead = Number.POSITIVE_INFINITY;
     this.#expect(socket);
     socket.onopen = () => {
       opened = true;
@@ -240,6 +262,7 @@ export class LiveSocket {
           );
         }
         for (const run of message.runs) runs.set(run.id, withKeptParts(runs.get(run.id), run));
+        this.#joinStops(message.runs);
         this.#set({
           link: "live",
           unreached: null,
@@ -262,8 +285,10 @@ export class LiveSocket {
         this.#set({ engines: message.engines });
         break;
       case "beat": {
-        const seen = times(message.seen);
-        const heard = times(message.heard);
+        // By the message that was least under way, so that neither a clock nor delay makes old proof new.
+        this.#ahead = Math.min(this.#ahead, Date.now() - Date.parse(message.at));
+        const seen = times(message.seen, this.#ahead);
+        const heard = times(message.heard, this.#ahead);
         if (seen.size + heard.size + this.runSeenAt.size + this.robotAnsweredAt.size === 0) break;
         this.runSeenAt = seen;
         this.robotAnsweredAt = heard;
@@ -278,21 +303,41 @@ export class LiveSocket {
     const before = this.state.runs.get(run.id);
     const now = withKeptParts(before, run);
     if (now === before) return; // the runner tells of each change of what it knows, also of the unseen
+    this.#joinStops([run]);
     this.state = { ...this.state, runs: new Map(this.state.runs).set(run.id, now) };
     const wait = this.#toldAt + TOGETHER - performance.now();
     if (wait <= 0 || isUrgentChange(before, now)) this.#tell();
     else this.#untold ??= setTimeout(() => this.#tell(), wait);
   }
 
+  /** One that nobody has answered stays, and is sent on, until it is asked for anew. */
   #putStop(stop: StopRequest): void {
-    this.#set({ stops: [...this.state.stops.slice(1 - STOPS_KEPT), stop] });
+    const waits = (each: StopRequest) => each.state === "asked" || each.state === "unheard";
+    const others = this.state.stops.filter((each) => !(waits(each) && each.run === stop.run));
+    const answered = others.filter((each) => !waits(each)).slice(1 - STOPS_KEPT);
+    const kept = others.filter((each) => waits(each) || answered.includes(each));
+    this.#set({ stops: [...kept, stop] });
   }
 
   #answerStop(id: string, state: StopRequest["state"], detail: string): void {
+    const heard = state === "heard" && { heardAt: performance.now() };
     const stops = this.state.stops.map((stop) =>
-      stop.id === id && stop.state !== "heard" ? { ...stop, state, detail } : stop,
+      stop.id === id && stop.state !== "heard" ? { ...stop, state, detail, ...heard } : stop,
     );
     this.#set({ stops });
+  }
+
+  /** What the runner stops, and this page had not known when it asked to stop all. */
+  #joinStops(told: readonly Run[]): void {
+    const stopping = told.filter((run) => run.ended_at === null && run.desired === "stopped");
+    if (stopping.length === 0) return;
+    const stops = this.state.stops.map((stop) => {
+      const { heardAt = Number.POSITIVE_INFINITY } = stop;
+      if (stop.run !== "all" || performance.now() - heardAt > JOINS) return stop;
+      const more = stopping.map(({ id }) => id).filter((id) => !stop.runs.includes(id));
+      return more.length === 0 ? stop : { ...stop, runs: [...stop.runs, ...more] };
+    });
+    this.state = { ...this.state, stops };
   }
 
   #set(part: Partial<LiveState>): void {
@@ -308,6 +353,7 @@ export class LiveSocket {
   }
 }
 
-function times(told: Record<string, string> | undefined): Map<string, number> {
-  return new Map(Object.entries(told ?? {}).map(([name, at]) => [name, Date.parse(at)]));
+/** Moments of the runner's clock by name, as ms of this page's, which is `ahead` of it. */
+function times(told: Record<string, string> | undefined, ahead: number): Map<string, number> {
+  return new Map(Object.entries(told ?? {}).map(([name, at]) => [name, Date.parse(at) + ahead]));
 }

@@ -11,8 +11,6 @@ import {
 } from "react";
 import { useConfig } from "../graphs";
 import { errorText } from "../http";
-import type { HeldGraph, Robot } from "../robots";
-import type { Run } from "../runs";
 import { LiveSocket, type LiveState } from "./live-socket";
 
 interface LiveContext {
@@ -84,40 +82,4 @@ export function useRunSeenAt(run: string): number | undefined {
 export function useRobotAnsweredAt(robot: string): number | undefined {
   const { live } = use(Context);
   return useSyncExternalStore(live?.subscribeSeen ?? never, () => live?.robotAnsweredAt.get(robot));
-}
-
-/** The runs that go on, newest first, as far as this page knows. */
-export function openRuns(now: LiveState): Run[] {
-  return [...now.runs.values()]
-    .filter((run) => run.ended_at === null)
-    .sort((a, b) => b.number - a.number);
-}
-
-/** The newest run of a graph that this page has heard of live. */
-export function newestRun(now: LiveState, graph: string): Run | null {
-  let newest: Run | null = null;
-  for (const run of now.runs.values()) {
-    if (run.graph === graph && (newest === null || run.number > newest.number)) newest = run;
-  }
-  return newest;
-}
-
-/** What robots run that nobody started from here, as `robot: graph`. Sub-graphs belong to theirs. */
-export function foreignGraphs(now: LiveState): { robot: Robot; held: HeldGraph }[] {
-  return now.engines.flatMap((robot) => {
-    const moving = robot.holds.filter((held) => held.active);
-    const tops = moving.filter((held) => !moving.some((top) => isPart(held.graph, top.graph)));
-    return tops.filter((held) => !isOurs(now, robot, held)).map((held) => ({ robot, held }));
-  });
-}
-
-function isPart(graph: string, top: string): boolean {
-  return graph !== top && graph.startsWith(`${top}__`);
-}
-
-function isOurs(now: LiveState, robot: Robot, held: HeldGraph): boolean {
-  return openRuns(now).some(
-    (run) =>
-      run.engine === robot.name && (run.id === held.run || isPart(held.graph, run.graph_name)),
-  );
 }

@@ -146,7 +146,7 @@ function FoldButton({ fold }: { fold: Panels["fold"] }) {
   );
 }
 
-interface DeskParts extends Parts {
+interface DesktopParts extends Parts {
   wide: boolean;
   told: readonly ToldProblem[];
   list: () => ReactNode;
@@ -174,7 +174,7 @@ function SideTabs({ panels: { side, setSide } }: { panels: Panels }) {
 }
 
 /** The lists: beside the canvas, or over it where there is no room or a rail in their place. */
-function ListSide({ wide, panels, told, outline, history, list }: DeskParts) {
+function ListSide({ wide, panels, told, outline, history, list }: DesktopParts) {
   const { left, side, folded, fold } = panels;
   const carrying = useSyncExternalStore(actionDrag.subscribe, actionDrag.now) !== null;
   const beside = wide && !folded;
@@ -242,7 +242,7 @@ function useDetails(wide: boolean, { folded, right, setRight }: Panels) {
   return { open: rail ? chosen || right : wide || right, asked: rail ? !chosen : !wide };
 }
 
-export function DeskLayout(props: DeskParts) {
+export function DesktopLayout(props: DesktopParts) {
   const { wide, panels, stage, find, details, strip, status } = props;
   const { open, asked } = useDetails(wide, panels);
   useSelectedInView(wide && panels.folded && open);

@@ -2,7 +2,8 @@
 import { NativeSelect } from "@mantine/core";
 import { useMemo } from "react";
 import { versionName } from "../../api/graphs";
-import { openRuns, useLive } from "../../api/live/use-live";
+import { openRuns } from "../../api/live/open-runs";
+import { useLive } from "../../api/live/use-live";
 import { type PastPlace, useEditorContext } from "../../edit-actions/editor-context";
 import { useNow } from "../../ui/times";
 import { goodBefore } from "../told/good-runs";

@@ -3,7 +3,8 @@ import { useInfiniteQuery, useQuery, useQueryClient } from "@tanstack/react-quer
 import { useEffect, useMemo } from "react";
 import { fetchHistory, type HistoryEntry } from "../../api/documents/history";
 import { useVersions, type Version } from "../../api/graphs";
-import { newestRun, useLive } from "../../api/live/use-live";
+import { newestRun } from "../../api/live/open-runs";
+import { useLive } from "../../api/live/use-live";
 import { type ListedRun, listRuns, NO_FILTER } from "../../api/review";
 import { useThrottledLink } from "../../sync/use-room";
 import { type GoodRun, goodRuns } from "./good-runs";

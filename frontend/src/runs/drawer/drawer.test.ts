@@ -68,6 +68,20 @@ test("several robots in one run have a tab each, with their own actions", () => 
   ]);
 });
 
+test("while a run is stopped none of its robots is said to wait", () => {
+  const actions = {
+    Drive_0: action("d", "STOPPING", [visit(0, null)]),
+    Hold_0: action("h", "UNINITIALIZED"),
+  };
+  const lanes = [lane("Drive_0", "atlas"), lane("Hold_0", "birch")];
+  const said = (part: object) =>
+    robotTabs([run({ actions, state: "stopping", ...part })], lanes, false).map(
+      ({ words }) => words,
+    );
+  expect(said({})).toEqual(["stopping", "stopping"]);
+  expect(said({ unconfirmed: "why" })).toEqual(["stop unconfirmed", "stop unconfirmed"]);
+});
+
 test("values say whether they were seen or only sent, and what an action began after", () => {
   const doc = new Y.Doc();
   const look = addAction(doc, { name: "Look" });

@@ -29,7 +29,7 @@ function said(run: Run, names: ReadonlySet<string> | null, unheard: boolean) {
     return { tone: "run", words: more.length > 0 ? `${first} +${more.length}` : first } as const;
   }
   const { tone, word } = runLabel(run);
-  if (names !== null && run.ended_at === null) return { tone: "idle", words: "waits" } as const;
+  if (names !== null && run.state === "running") return { tone: "idle", words: "waits" } as const;
   return { tone, words: word };
 }
 

@@ -124,7 +124,7 @@ export function RunHead(props: Props) {
             {goes ? "Back to live" : "Back to its end"}
           </Button>
         )}
-        {goes && <ConfirmRestButton run={run} />}
+        {goes && <ConfirmRestButton key={run.id} run={run} />}
         {goes && <PauseButton run={run} />}
         <Ways run={run} />
         {folded !== null && <FoldButton folded={folded} onFold={onFold} />}

@@ -91,7 +91,7 @@ function What({ folder, robot }: { folder: IndexFolderLook; robot: string }) {
   );
 }
 
-interface DeedProps {
+interface WriteButtonProps {
   folder: IndexFolderLook;
   robot: string;
   busy: boolean;
@@ -99,7 +99,7 @@ interface DeedProps {
 }
 
 /** The button; where it would replace files it is held, or asks. */
-function Deed({ folder, robot, busy, onWrite }: DeedProps) {
+function WriteButton({ folder, robot, busy, onWrite }: WriteButtonProps) {
   const replaced = folder.writable.filter(({ replaces }) => replaces !== "");
   const label = `Write them where ${robot} looks them up`;
   const icon = <IconFilePencil size={14} aria-hidden />;
@@ -151,7 +151,12 @@ export function IndexWriting({ item, look, robot, graph, seq, onLookAgain }: Pro
     <span className={style.remedies}>
       {folder !== null && !write.isSuccess && <What folder={folder} robot={robot} />}
       {can && may && !write.isSuccess && (
-        <Deed folder={folder} robot={robot} busy={write.isPending} onWrite={() => write.mutate()} />
+        <WriteButton
+          folder={folder}
+          robot={robot}
+          busy={write.isPending}
+          onWrite={() => write.mutate()}
+        />
       )}
       {can && !may && <span>Whoever may operate robots can do that.</span>}
       {write.isError && (

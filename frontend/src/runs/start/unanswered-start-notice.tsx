@@ -6,7 +6,7 @@ import { Link } from "wouter";
 import { useLive } from "../../api/live/use-live";
 import { SIMULATOR } from "../../api/robots";
 import { findStart, type Run, type StartFound } from "../../api/runs";
-import { runLabel } from "../../status/progress";
+import { useRunStatus } from "../../status/run-status";
 import { colorOfName } from "../../ui/name-colors";
 import style from "./unanswered-start-notice.module.css";
 import { type SentStart, unansweredStarts } from "./unanswered-starts";
@@ -37,12 +37,13 @@ export function unknownWords(
 }
 
 function Found({ run }: { run: Run }) {
+  const { word } = useRunStatus(run);
   return (
     <p className={style.found}>
       <i style={{ background: colorOfName(run.engine) }} aria-hidden />
       <span>
         Started after all: <Link to={`/runs/${run.id}`}>run {run.number}</Link> on{" "}
-        {run.simulated ? "the simulator" : run.engine}, {runLabel(run).word}.
+        {run.simulated ? "the simulator" : run.engine}, {word}.
       </span>
     </p>
   );

@@ -11,8 +11,16 @@ const ConfirmRestDialog = lazyPart(() =>
   import("./confirm-rest-dialog").then((part) => part.ConfirmRestDialog),
 );
 
-/** `loud`: on the red of a notice. */
-export function ConfirmRestButton({ run, loud = false }: { run: Run; loud?: boolean }) {
+interface Props {
+  /** As long as the button is there: what somebody says is about the robot that they looked at. */
+  run: Run;
+  /** On the red of a notice. */
+  loud?: boolean;
+  /** Whether it says at which robot. */
+  named?: boolean;
+}
+
+export function ConfirmRestButton({ run, loud = false, named = false }: Props) {
   const may = useMay("operate");
   const [asking, setAsking] = useState<boolean | null>(null);
   if (!may || !needsRestConfirmation(run)) return null;
@@ -26,7 +34,7 @@ export function ConfirmRestButton({ run, loud = false }: { run: Run; loud?: bool
         leftSection={<IconEye size={14} aria-hidden />}
         onClick={() => setAsking(true)}
       >
-        I looked …
+        {named ? `I looked at ${run.engine} …` : "I looked …"}
       </Button>
       <OverlayBoundary>
         {asking !== null && (

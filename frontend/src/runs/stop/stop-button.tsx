@@ -2,7 +2,8 @@
 import { IconSquareFilled } from "@tabler/icons-react";
 import { useEffect } from "react";
 import type { LiveLink, LiveSocket } from "../../api/live/live-socket";
-import { foreignGraphs, openRuns, useLive } from "../../api/live/use-live";
+import { foreignGraphs, openRuns } from "../../api/live/open-runs";
+import { useLive } from "../../api/live/use-live";
 import type { Run } from "../../api/runs";
 import style from "./stop-button.module.css";
 

@@ -11,7 +11,7 @@ import {
   unreachableNotice,
 } from "./stop-notice";
 
-const stop: StopRequest = { id: "s", run: "r", at: 1000, state: "heard", detail: "" };
+const stop: StopRequest = { id: "s", run: "r", at: 1000, runs: [], state: "heard", detail: "" };
 
 function now(part: Partial<Run> | null, link: LiveState["link"] = "live"): LiveState {
   const run = {
@@ -45,6 +45,37 @@ test("stopped is said when the run's state says so", () => {
   const ended = now({ state: "stopped", ended_at: "1970-01-01T00:00:02Z" });
   expect(noticeOf(stop, ended, 2500)).toEqual({ tone: "done", text: "Run 7: stopped." });
   expect(noticeOf(stop, ended, 60_000)).toBeNull();
+});
+
+test("a Stop of everything says of its own runs what became of them, whatever the clocks say", () => {
+  const all = { ...stop, run: "all", runs: ["r"] } as const;
+  const ended = now({ state: "stopped", ended_at: "1969-01-01T00:00:02Z" }); // the runner's clock is behind
+  expect(noticeOf(all, ended, 2500)).toEqual({ tone: "done", text: "Run 7: stopped." });
+  const before = { ...all, runs: [] };
+  const lost = now({ state: "lost", ended_at: "2100-01-01T00:00:00Z" }); // ended before it was asked
+  expect(noticeOf(before, lost, 2500)?.text).toBe("The runner says that nothing runs.");
+});
+
+test("a run that is started after a Stop of everything is not said to be stopping", () => {
+  const all = { ...stop, run: "all", runs: ["gone"] } as const;
+  expect(noticeOf(all, now({ state: "running" }), 60_000)).toBeNull();
+});
+
+test("that nothing runs is said only where nothing can", () => {
+  const all = { ...stop, run: "all", runs: [] } as const;
+  const robot = { name: "David", state: "answering", simulated: false, holds: [] };
+  const beside = (part: object) =>
+    ({ ...now(null), engines: [{ ...robot, ...part }] }) as unknown as LiveState;
+  expect(noticeOf(all, beside({}), 1500)?.tone).toBe("done");
+  const held = { graph: "theirs", state: "RUNNING", active: true, run: null, stopping: "" };
+  expect(noticeOf(all, beside({ holds: [held] }), 1500)?.text).toBe("Stopping theirs on David …");
+  const silent = noticeOf(all, beside({ state: "busy", why: "It does not answer." }), 1500);
+  expect(silent?.tone).toBe("loud");
+  expect(silent?.text).toContain("NOT KNOWN what David runs");
+  const loud = { ...held, stopping: "theirs has not stopped yet" };
+  expect(noticeOf(all, beside({ holds: [loud] }), 9000)?.text).toContain(
+    "STOP UNCONFIRMED: theirs on David: theirs has not stopped yet",
+  );
 });
 
 test("without the runner nothing is claimed", () => {

@@ -3,7 +3,9 @@ import { CloseButton } from "@mantine/core";
 import { IconAlertOctagon } from "@tabler/icons-react";
 import { useState } from "react";
 import type { LiveState, StopRequest } from "../../api/live/live-socket";
-import { foreignGraphs, openRuns, useLive } from "../../api/live/use-live";
+import { foreignGraphs, openRuns } from "../../api/live/open-runs";
+import { useLive } from "../../api/live/use-live";
+import type { Robot } from "../../api/robots";
 import { needsRestConfirmation, type Run } from "../../api/runs";
 import { HelpLink } from "../../status/help-link";
 import { useRootMark } from "../../ui/hooks/use-root-mark";
@@ -14,6 +16,7 @@ import style from "./stop-notice.module.css";
 const LOUD = 2_500; // ms without proof until the notice shouts
 const HEARD = 1_200; // ms within which the runner answers a Stop, if it does
 const GONE = 6_000; // ms that a proven stop stays to be read
+const MOST_SILENT = 3; // robots that can be said to be at rest from here; each run says so of its own
 
 /** `since` goes on with each moment, so it is seen but not announced again and again. */
 export type StopNoticeText = {
@@ -24,11 +27,9 @@ export type StopNoticeText = {
 } | null;
 
 function targets(stop: StopRequest, now: LiveState): Run[] {
-  if (stop.run !== "all") {
-    return [...now.runs.values()].filter((run) => [run.id, run.group].includes(stop.run));
-  }
-  return [...now.runs.values()].filter(
-    (run) => run.ended_at === null || Date.parse(run.ended_at) >= stop.at,
+  const all = stop.run === "all";
+  return [...now.runs.values()].filter((run) =>
+    all ? stop.runs.includes(run.id) : [run.id, run.group].includes(stop.run),
   );
 }
 
@@ -86,11 +87,47 @@ export function noticeOf(stop: StopRequest, now: LiveState, at: number): StopNot
     const ends = lost.map((run) => `run ${run.number} on ${run.engine}: ${run.detail}`).join(" ");
     return { tone: "loud", text: `STOP UNCONFIRMED: ${ends} Look at the robot.` };
   }
+  const foreign = stop.run === "all" ? foreignNotice(now, since) : null;
+  if (foreign !== null) return foreign;
   if (waited > GONE) return null;
   if (stop.state === "asked") return { tone: "quiet", text: "Stop", since };
-  if (runs.length === 0) return { tone: "done", text: "The runner says that nothing runs." };
+  return doneNotice(runs, stop.run === "all" ? now.engines.filter(isUnknown) : []);
+}
+
+/** What others run and what is being stopped, until it is proven; then the loudest first. */
+function foreignNotice(now: LiveState, since?: string): StopNoticeText {
+  const stopping = foreignGraphs(now).filter(({ held }) => held.stopping !== null);
+  const [first] = stopping.sort((a, b) => Number(!a.held.stopping) - Number(!b.held.stopping));
+  if (first === undefined) return null;
+  const { robot, held } = first;
+  if (!held.stopping) {
+    return {
+      tone: "quiet",
+      text: `Stopping ${held.graph} on ${robot.name} …`,
+      ...(since && { since }),
+    };
+  }
+  const text = `STOP UNCONFIRMED: ${held.graph} on ${robot.name}: ${held.stopping}.`;
+  return { tone: "loud", stays: true, text };
+}
+
+/** Whether nobody can say what a robot runs. */
+function isUnknown(robot: Robot): boolean {
+  return !robot.simulated && robot.state !== "answering" && robot.state !== "restarted";
+}
+
+/** Everything has ended that the runner knows of. */
+function doneNotice(runs: readonly Run[], unknown: readonly Robot[]): StopNoticeText {
   const ends = runs.map((run) => `Run ${run.number}: ${run.state}`).join(" · ");
-  return { tone: "done", text: `${ends}.` };
+  if (unknown.length === 0) {
+    const text = runs.length === 0 ? "The runner says that nothing runs." : `${ends}.`;
+    return { tone: "done", text };
+  }
+  const names = unknown.map(({ name }) => name).join(", ");
+  const one = unknown.length === 1 ? "runs" : "run";
+  const why = unknown[0]?.why ?? "";
+  const head = runs.length === 0 ? "No run from here goes on." : `${ends}.`;
+  return { tone: "loud", text: `${head} NOT KNOWN what ${names} ${one}. ${why}`.trimEnd() };
 }
 
 /** A run that was said to be over and is not: nothing else is as urgent. */
@@ -116,11 +153,8 @@ export function othersNotice(now: LiveState): StopNoticeText {
     (run) => Boolean(run.unconfirmed) || (run.desired === "stopped" && reasonOf(run) !== ""),
   );
   if (shouting.length > 0) return unconfirmed(shouting);
-  const held = foreignGraphs(now).find((each) => each.held.stopping);
-  if (held === undefined) return null;
-  const { robot, held: graph } = held;
-  const text = `STOP UNCONFIRMED: ${graph.graph} on ${robot.name}: ${graph.stopping}.`;
-  return { tone: "loud", stays: true, text };
+  const foreign = foreignNotice(now);
+  return foreign?.tone === "loud" ? foreign : null;
 }
 
 const UNREACHED = 6_000; // ms that the runner may take to answer before a page says that it does not
@@ -184,10 +218,10 @@ export function StopNotice() {
       </button>
     );
   }
-  const looked =
+  const silent =
     notice.tone === "loud" && now.link !== "down"
-      ? openRuns(now).find(needsRestConfirmation)
-      : undefined;
+      ? openRuns(now).filter(needsRestConfirmation)
+      : [];
   return (
     <div
       className={style.notice}
@@ -208,7 +242,13 @@ export function StopNotice() {
           </>
         )}
       </span>
-      {looked && <ConfirmRestButton run={looked} loud />}
+      {silent.length > 0 && (
+        <span className={style.looked}>
+          {silent.slice(0, MOST_SILENT).map((run) => (
+            <ConfirmRestButton key={run.id} run={run} loud named={silent.length > 1} />
+          ))}
+        </span>
+      )}
       {notice.stays && (
         <CloseButton size="sm" aria-label="Put aside" title="Put aside" onClick={aside.put} />
       )}
