@@ -280,7 +280,9 @@ def _stop(options: argparse.Namespace) -> int:
             return refused(error)
     doubts = [_unconfirmed(run) for run in runs if not _is_at_rest(run)]
     doubts += [f"STOP UNCONFIRMED for {each}. {_LOOK}" for each in graphs]
-    doubts += [f"NOT KNOWN what {each} runs: {why}" for each, why in asked.get("unknown", {}).items()]
+    doubts += [
+        f"NOT KNOWN what {each} runs: {why}" for each, why in asked.get("unknown", {}).items()
+    ]
     for said in doubts:
         print(one_line(said), file=sys.stderr)
     if not doubts:
@@ -304,6 +306,8 @@ def _unproven(stopped: dict[str, list[str]], robots: list[dict[str, Any]]) -> li
         for graph in graphs:
             held = holds.get(graph)
             if silent or (held is not None and (held["active"] or held["stopping"] is not None)):
-                why = (held or {}).get("stopping") or (robot or {}).get("why") or "no proof has come"
+                why = (
+                    (held or {}).get("stopping") or (robot or {}).get("why") or "no proof has come"
+                )
                 found.append(f"{graph} on {name}: {why.rstrip('.')}")
     return found

@@ -1483,13 +1483,20 @@ export interface RunnerApi {
     };
     /**
      * Stopping
-     * @description The runs that a Stop concerns.
+     * @description What a Stop concerns: runs, and when everything is stopped `graphs` of others by robot.
+     *     `unknown`: why nothing is known of what a robot runs, by robot.
      */
     Stopping: {
         /** @enum {string} */
         type: "stopping";
         stop_id: string;
         runs: string[];
+        graphs: {
+            [key: string]: string[];
+        };
+        unknown: {
+            [key: string]: string;
+        };
     };
     /**
      * StorageShown

@@ -21,7 +21,7 @@ from action_assistant.runner.analysis.keyframes import SnapshotJournal
 from action_assistant.runner.archives.archive_store import ArchiveStore
 from action_assistant.runner.review.ongoing_runs import OngoingRun, settled
 from action_assistant.runner.review.service import ReviewService
-from action_assistant.runner.runs.history import RunnerJournal, RunHistory
+from action_assistant.runner.runs.history import RunHistory, RunnerJournal
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.runner.runs.run import Run
 from action_assistant.web.auth.caller import done_for_nobody

@@ -291,7 +291,9 @@ async def test_a_conflict_is_refused_until_it_has_a_choice(editor: Editor) -> No
     actions = (await editor.now(editor.origin))["actions"]
     assert (actions[f"{DOCK}|in/speed"], actions[CHARGE]) == ("2", "Charge")
     speed = next(
-        each for each in await editor.blame.of(editor.origin, DOCK, None) if each.field == "in/speed"
+        each
+        for each in await editor.blame.of(editor.origin, DOCK, None)
+        if each.field == "in/speed"
     )
     assert (speed.author.id, speed.seq) == ("ben", merged.seq)
     assert speed.merged is not None
