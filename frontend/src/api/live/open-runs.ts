@@ -38,3 +38,10 @@ function isOurs(now: LiveState, robot: Robot, held: HeldGraph): boolean {
       run.engine === robot.name && (run.id === held.run || isPart(held.graph, run.graph_name)),
   );
 }
+
+/** Robots that do not answer now: what they run is not known. */
+export function unheardRobots(now: LiveState): Robot[] {
+  return now.engines.filter(
+    ({ simulated, state }) => !simulated && state !== "answering" && state !== "restarted",
+  );
+}

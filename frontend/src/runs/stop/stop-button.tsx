@@ -2,7 +2,7 @@
 import { IconSquareFilled } from "@tabler/icons-react";
 import { useEffect } from "react";
 import type { LiveLink, LiveSocket } from "../../api/live/live-socket";
-import { foreignGraphs, openRuns } from "../../api/live/open-runs";
+import { foreignGraphs, openRuns, unheardRobots } from "../../api/live/open-runs";
 import { useLive } from "../../api/live/use-live";
 import type { Run } from "../../api/runs";
 import style from "./stop-button.module.css";
@@ -31,10 +31,11 @@ function useStopKey(live: LiveSocket | null): void {
   }, [live]);
 }
 
-export function stopButtonText(link: LiveLink, count: number): string {
+/** `unknown`: how many robots do not say what they run. */
+export function stopButtonText(link: LiveLink, count: number, unknown = 0): string {
   if (link === "down") return "state unknown";
   if (link === "connecting") return "asking …";
-  if (count === 0) return "nothing runs";
+  if (count === 0) return unknown === 0 ? "nothing runs" : `${unknown} unknown`;
   return count === 1 ? "1 run" : `${count} runs`;
 }
 
@@ -77,7 +78,7 @@ export function StopButton({ graph }: Props) {
           STOP{meant || all === 0 ? "" : " ALL"}
         </span>
         <span className={style.count} aria-hidden>
-          {stopButtonText(now.link, meant ? here.length : all)}
+          {stopButtonText(now.link, meant ? here.length : all, unheardRobots(now).length)}
         </span>
       </button>
       {beside && (

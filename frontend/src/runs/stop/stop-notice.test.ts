@@ -175,6 +175,8 @@ test("a runner that is not reached is never silence", () => {
     expect(notice?.text).toContain("The runner does not answer.");
     expect(notice?.text).toContain("hardware stop");
     expect(stopButtonText(link, 0)).not.toBe("nothing runs");
+    expect(stopButtonText("live", 0, 1)).toBe("1 unknown");
+    expect(stopButtonText("live", 2, 1)).toBe("2 runs");
   }
   expect(unreachableNotice(now(null), 60_000)).toBeNull();
   const mute = {

@@ -3,7 +3,7 @@ import { CloseButton } from "@mantine/core";
 import { IconAlertOctagon } from "@tabler/icons-react";
 import { useState } from "react";
 import type { LiveState, StopRequest } from "../../api/live/live-socket";
-import { foreignGraphs, openRuns } from "../../api/live/open-runs";
+import { foreignGraphs, openRuns, unheardRobots } from "../../api/live/open-runs";
 import { useLive } from "../../api/live/use-live";
 import type { Robot } from "../../api/robots";
 import { needsRestConfirmation, type Run } from "../../api/runs";
@@ -91,7 +91,7 @@ export function noticeOf(stop: StopRequest, now: LiveState, at: number): StopNot
   if (foreign !== null) return foreign;
   if (waited > GONE) return null;
   if (stop.state === "asked") return { tone: "quiet", text: "Stop", since };
-  return doneNotice(runs, stop.run === "all" ? now.engines.filter(isUnknown) : []);
+  return doneNotice(runs, stop.run === "all" ? unheardRobots(now) : []);
 }
 
 /** What others run and what is being stopped, until it is proven; then the loudest first. */
@@ -109,11 +109,6 @@ function foreignNotice(now: LiveState, since?: string): StopNoticeText {
   }
   const text = `STOP UNCONFIRMED: ${held.graph} on ${robot.name}: ${held.stopping}.`;
   return { tone: "loud", stays: true, text };
-}
-
-/** Whether nobody can say what a robot runs. */
-function isUnknown(robot: Robot): boolean {
-  return !robot.simulated && robot.state !== "answering" && robot.state !== "restarted";
 }
 
 /** Everything has ended that the runner knows of. */
