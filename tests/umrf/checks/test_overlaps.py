@@ -110,6 +110,35 @@ def test_a_pause_of_what_cannot_be_running_then_is_no_pause() -> None:
     assert "only a pause and a resume" in found(beside, "H5")[0].message
 
 
+def together(value: Graph) -> Together:
+    subject = Subject(value, PINNED)
+    reach = Reachable(subject)
+    return Together(subject, reach.runs, reach.reports)
+
+
+def test_what_has_reported_and_is_started_again_runs_beside_what_waited_for_it() -> None:
+    """B begins with the graph, and again when A ends; C needs both."""
+    twice = graph(action("A", children=["B", "C"]),
+                  action("B", [{"name": "A", "required": False, "conditions": SAFE}], ["C"]),
+                  action("C", ["A", "B"]), entry=["A", "B"])  # fmt: skip
+    _, again, joined = (each.key for each in twice.actions)
+    assert together(twice).may_run(again, joined)
+    once = graph(action("A", children=["B", "C"]), action("B", ["A"], ["C"]),
+                 action("C", ["A", "B"]))  # fmt: skip
+    _, first, after = (each.key for each in once.actions)
+    assert not together(once).may_run(first, after)
+
+
+def test_what_was_bypassed_has_reported_before_what_leads_to_it_begins() -> None:
+    """A bypasses F, which C leads to; J needs B and F, so that it begins when C does."""
+    value = graph(action("A", children=["B", "F"]), action("B", ["A"], ["C", "J"]),
+                  action("C", ["B"], ["F"]),
+                  action("F", [asks("A", "on_true -> bypass"), "C"], ["J"]),
+                  action("J", ["B", "F"]))  # fmt: skip
+    _, _, before, _, joined = (each.key for each in value.actions)
+    assert together(value).may_run(joined, before)
+
+
 def test_what_runs_one_after_the_other_is_not_run_while_a_stop_is_on_its_way() -> None:
     """Three in a circle and a timer that stops them all: only one of them runs at a time."""
     stop = asks("T", "on_true -> stop", "on_false -> stop")

@@ -39,6 +39,7 @@ class Together:
         self._with: list[Mask] = [0] * count  # while it runs
         #: When it passes on an outcome because it is bypassed, which is none of its own ends.
         self._passing: dict[tuple[Key, Precondition], Mask] = {}
+        self._behind_kept: dict[Mask, Mask] = {}
         self._lively = {a.key for a in subject.real if a.type == "spontaneous"}
         self._required = {
             key: [r.parent for r in listed if r.required and r.parent in self.place]
@@ -77,7 +78,7 @@ class Together:
             return self._runs - {key}
         mask = self._when(key, outcome) | self._started(key, outcome)
         for other in waited:
-            mask &= self._whenever(other) | self._after[self.place[other]]
+            mask &= self._beside(other)
         return {self.keys[place] for place in _places(mask)} - {key}
 
     def goes_on(self, key: Key, other: Key, outcome: Precondition) -> bool:
@@ -112,6 +113,43 @@ class Together:
     def _after(self) -> list[Mask]:
         """What comes after each action, by arrows."""
         return behind([self._children(key) for key in self.keys])
+
+    @cached_property
+    def _repeated(self) -> Mask:
+        """Actions that may have reported and go on again although nothing leads from them to themselves:
+        they are started in several ways, or by what goes round."""
+        found = 0
+        for place, after in enumerate(self._after):
+            if after >> place & 1:
+                found |= after
+            listed = [
+                relation
+                for relation in self._subject.incoming.get(self.keys[place], [])
+                if relation.parent in self._reports
+            ]
+            optional = sum(not relation.required for relation in listed)
+            if optional + (optional < len(listed)) > 1:
+                found |= 1 << place
+        return found
+
+    def _beside(self, required: Key) -> Mask:
+        """What may go on once this one has reported, as what waits for it begins."""
+        place = self.place[required]
+        found = self._whenever(required) | self._after[place] | self._repeated & 1 << place
+        # To be bypassed takes no time: what follows on what goes on then comes after it has reported.
+        for outcome in PRECONDITIONS:
+            found |= self._behind(self._passing.get((required, outcome), 0))
+        return found
+
+    def _behind(self, mask: Mask) -> Mask:
+        """What comes after any of these, by arrows."""
+        found = self._behind_kept.get(mask)
+        if found is None:
+            found = 0
+            for place in _places(mask):
+                found |= self._after[place]
+            self._behind_kept[mask] = found
+        return found
 
     def _children(self, key: Key) -> list[int]:
         listed = self._subject.outgoing.get(key, [])
@@ -186,7 +224,7 @@ class Together:
         self._count(1 + len(self._required.get(child, ())))
         for required in self._required.get(child, ()):
             if required != parent:
-                found &= self._whenever(required) | self._after[self.place[required]]
+                found &= self._beside(required)
         new = found
         for other in _places(found & started & ~around):
             self._count(1)
@@ -214,13 +252,12 @@ class Together:
         """Whether what the same end would start can begin while the other (a place) goes on: what it
         waits for besides has to have reported by then."""
         listed = self._required.get(key, ())
-        if self._needs[self.place[key]] >> beside & ~self._after[beside] >> beside & 1:
+        again = self._after[beside] | self._repeated
+        if self._needs[self.place[key]] >> beside & ~again >> beside & 1:
             return False
         self._count(len(listed))
         return all(
-            required == parent
-            or (self._whenever(required) | self._after[self.place[required]]) >> beside & 1
-            for required in listed
+            required == parent or self._beside(required) >> beside & 1 for required in listed
         )
 
     def _again(self, key: Key) -> None:
