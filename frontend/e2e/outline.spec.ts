@@ -42,6 +42,7 @@ test("a graph is drawn in the outline by keyboard alone", async ({ browser }) =>
   // Start with Spot.
   await page.keyboard.press("c");
   await page.keyboard.type("Spot");
+  await expect(page.getByRole("option", { name: "Spot" })).toBeVisible();
   await page.keyboard.press("ArrowDown");
   await page.keyboard.press("Enter");
   await expect(row(page)).toContainText("Entry");
