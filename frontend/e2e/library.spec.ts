@@ -17,6 +17,7 @@ async function addParameter(page: Page, name: string, type: string): Promise<voi
   await page.getByRole("combobox", { name: "Type of the parameter" }).click();
   await page.getByRole("option", { name: type, exact: true }).click();
   await page.locator("form").getByRole("button", { name: "Add", exact: true }).click();
+  await expect(page.getByRole("button", { name: `What the parameter ${name} is` })).toBeVisible();
 }
 
 async function renameParameter(page: Page, from: string, to: string): Promise<void> {
