@@ -9,7 +9,7 @@ from typing import Any
 
 import msgspec
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from pycrdt import Array, Doc, Map, Text, merge_updates
 
@@ -124,6 +124,8 @@ def known(folded: Folded | None) -> Any:
 
 
 @settings(max_examples=examples(150), deadline=None)
+@example(seed=561, nested=False, late=True, spoilt=False)
+@example(seed=637, nested=True, late=True, spoilt=False)
 @given(st.integers(0, 2**32), st.booleans(), st.booleans(), st.booleans())
 def test_a_document_knows_the_same(seed: int, nested: bool, late: bool, spoilt: bool) -> None:
     chance = random.Random(seed)

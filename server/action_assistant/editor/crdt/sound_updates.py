@@ -16,8 +16,10 @@ from pycrdt import Doc, get_update
 from action_assistant.editor.crdt.messages import ByteReader
 from action_assistant.editor.crdt.updates.update_scan import stored_outline
 
-#: The beginning of an update with structs of one client: how many, whose.
-_ONE_CLIENT: Final = re.compile(rb"\x01[\x01-\x7f]([\x80-\xff]*[\x00-\x7f])")
+#: The beginning of an update with structs of one client: how many, whose, from which clock.
+_ONE_CLIENT: Final = re.compile(
+    rb"\x01[\x01-\x7f]([\x80-\xff]*[\x00-\x7f])([\x80-\xff]*[\x00-\x7f])"
+)
 #: Whatever a struct that lies in another one looks like: its kind, neighbours not told, then a 0.
 _MAY_LIE_INSIDE: Final = re.compile(rb"[\x01-\x09\x21-\x29]\x80*\x00")
 _APART: Final = b"\xff"  # ends nothing that looks so
@@ -36,17 +38,23 @@ class Clients:
     after them."""
 
     def __init__(self, bodies: Sequence[bytes], authors: Sequence[str]) -> None:
-        """Raises Malformed."""
+        """Raises Malformed; Uncertain where a client's updates do not come in their order, since then its
+        last one does not tell where it ends."""
         self.authors: Final[dict[int, str]] = {}
         self.ends: Final[dict[int, int]] = {}
         last: dict[bytes, bytes] = {}  # of each client that is alone in an update
+        clocks: dict[bytes, tuple[int, bytes]] = {}  # of that, in an order as the numbers have
         for body, author in zip(bodies, authors, strict=True):
             begins = _ONE_CLIENT.match(body)
             if begins is None:
                 if body[:1] != b"\x00":  # it has more than deletions
                     self._add(body, author)
                 continue
-            client_bytes = begins[1]
+            client_bytes, clock = begins.groups()
+            at = len(clock), clock[::-1]
+            if at < clocks.get(client_bytes, at):
+                raise Uncertain
+            clocks[client_bytes] = at
             if client_bytes not in last:
                 self.authors.setdefault(ByteReader(client_bytes).number(), author)
             last[client_bytes] = body
