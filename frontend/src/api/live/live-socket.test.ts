@@ -37,6 +37,14 @@ const newest = () => {
 const run = (state: string, ended: string | null = null) =>
   ({ id: "r", number: 1, state, ended_at: ended }) as unknown as Run;
 
+/** A link to a runner in which these runs go on. */
+function opened(...runs: object[]): LiveSocket {
+  const live = new LiveSocket("http://h:1");
+  live.open();
+  newest().say({ type: "hello", engines: [], runs });
+  return live;
+}
+
 const posted = vi.fn();
 
 beforeEach(() => {
@@ -76,9 +84,7 @@ test("one socket, by the runner's own address", () => {
 });
 
 test("a runner that falls silent is unknown, and asked again", async () => {
-  const live = new LiveSocket("http://h:1");
-  live.open();
-  newest().say({ type: "hello", engines: [], runs: [run("running")] });
+  const live = opened(run("running"));
   expect(live.state.link).toBe("live");
   await vi.advanceTimersByTimeAsync(3_000);
   expect(live.state.link).toBe("live");
@@ -92,9 +98,7 @@ test("a runner that falls silent is unknown, and asked again", async () => {
 });
 
 test("Stop goes by socket and by POST at once", async () => {
-  const live = new LiveSocket("http://h:1");
-  live.open();
-  newest().say({ type: "hello", engines: [], runs: [run("running")] });
+  const live = opened(run("running"));
   live.stop("r");
   expect(JSON.parse(newest().sent[0] ?? "")).toMatchObject({ type: "stop", run: "r" });
   expect(posted).toHaveBeenCalledWith("POST", "http://h:1/api/runs/r/stop");
@@ -104,10 +108,23 @@ test("Stop goes by socket and by POST at once", async () => {
   live.close();
 });
 
+test("a Stop is heard although the socket fails just then", async () => {
+  const live = opened(run("running"));
+  newest().send = () => {
+    throw new DOMException("it is closing", "InvalidStateError");
+  };
+  const warned = vi.spyOn(console, "warn").mockImplementation(() => undefined);
+  live.stop("r");
+  await vi.advanceTimersByTimeAsync(10);
+  expect(posted).toHaveBeenCalledWith("POST", "http://h:1/api/runs/r/stop");
+  expect(live.state.stops.at(-1)?.state).toBe("heard");
+  expect(warned).toHaveBeenCalledOnce();
+  warned.mockRestore();
+  live.close();
+});
+
 test("a Stop that nobody hears is sent again until somebody does", async () => {
-  const live = new LiveSocket("http://h:1");
-  live.open();
-  newest().say({ type: "hello", engines: [], runs: [run("running")] });
+  const live = opened(run("running"));
   newest().close();
   let dead = true;
   vi.stubGlobal("fetch", async (url: string, init: RequestInit) => {
@@ -195,9 +212,7 @@ test("one run that cannot be stopped now keeps no other from being stopped", asy
 });
 
 test("a Stop of everything is about the runs that went on then, and those that the runner stops since", async () => {
-  const live = new LiveSocket("http://h:1");
-  live.open();
-  newest().say({ type: "hello", engines: [], runs: [run("running")] });
+  const live = opened(run("running"));
   live.stop("all");
   await vi.advanceTimersByTimeAsync(10);
   const said = (id: string, desired: string) =>
@@ -215,9 +230,7 @@ test("a Stop of everything is about the runs that went on then, and those that t
 });
 
 test("how old a proof is does not follow from whose clock is right", () => {
-  const live = new LiveSocket("http://h:1");
-  live.open();
-  newest().say({ type: "hello", engines: [], runs: [] });
+  const live = opened();
   const theirs = Date.now() - 600_000; // the runner's clock is ten minutes behind
   const moment = (ms: number) => new Date(ms).toISOString();
   const beat = { type: "beat", at: moment(theirs), heard: {}, seen: { r: moment(theirs - 400) } };
@@ -253,9 +266,7 @@ test("when only a proxy says no, a Stop is sent again", async () => {
 });
 
 test("a run that ended while the link was down is asked for", async () => {
-  const live = new LiveSocket("http://h:1");
-  live.open();
-  newest().say({ type: "hello", engines: [], runs: [run("running")] });
+  const live = opened(run("running"));
   newest().close();
   await vi.advanceTimersByTimeAsync(1_000);
   newest().say({ type: "hello", engines: [], runs: [] });
@@ -281,9 +292,7 @@ test("a run that is told as it was draws nothing, and how it stands is told at o
 });
 
 test("a new name dials anew without a moment of doubt", () => {
-  const live = new LiveSocket("http://h:1");
-  live.open();
-  newest().say({ type: "hello", engines: [], runs: [run("running")] });
+  const live = opened(run("running"));
   live.redial();
   expect(Wire.all.length).toBe(2);
   expect(Wire.all[0]?.readyState).toBe(3);
@@ -292,9 +301,7 @@ test("a new name dials anew without a moment of doubt", () => {
 });
 
 test("a beat says when each robot last answered, without another render of everything", () => {
-  const live = new LiveSocket("http://127.0.0.1:8001");
-  live.open();
-  newest().say({ type: "hello", engines: [], runs: [] });
+  const live = opened();
   const all = vi.fn();
   const seers = vi.fn();
   live.subscribe(all);

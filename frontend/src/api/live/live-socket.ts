@@ -165,12 +165,17 @@ export class LiveSocket {
     }
   }
 
-  #sendStop(run: string, id: string): Promise<unknown> {
+  async #sendStop(run: string, id: string): Promise<unknown> {
+    const posted = postStop(this.#runner, run, id); // first: a socket that fails keeps it from nothing
     if (this.#socket?.readyState === WebSocket.OPEN) {
       const message: PageMessage = { type: "stop", run, stop_id: id };
-      this.#socket.send(JSON.stringify(message));
+      try {
+        this.#socket.send(JSON.stringify(message));
+      } catch (error) {
+        console.warn("A Stop goes by POST alone", error);
+      }
     }
-    return postStop(this.#runner, run, id);
+    return posted;
   }
 
   /** Takes in a run that this page has just started, before the socket tells of it. */
