@@ -129,19 +129,19 @@ class FakeLink:
                     )
                 await anyio.sleep(1)
 
-    def _hear(self, sound: object) -> None:
-        match sound:
+    def _hear(self, value: object) -> None:
+        match value:
             case Feedback():
-                self._subscribers.tell(sound)
-            case OverheardCommand() if self._name in sound.targets:
+                self._subscribers.tell(value)
+            case OverheardCommand() if self._name in value.targets:
                 self._subscribers.tell(
                     ForeignCommand(
                         at=clock_us(),
-                        command=sound.command,
-                        graph=sound.graph,
-                        umrf=sound.umrf,
-                        targets=sound.targets,
-                        sender=sound.sender,
+                        command=value.command,
+                        graph=value.graph,
+                        umrf=value.umrf,
+                        targets=value.targets,
+                        sender=value.sender,
                     )
                 )
             case LogLine(text=text) if len(self._network.publishers("feedback")) <= 1:

@@ -291,9 +291,9 @@ class FakeNetwork:
         seen = tuple(snapshot(text, at=at, source="feedback") for text in reversed(history))
         self.tell(Shown(actor=actor, snapshots=seen))
 
-    def tell(self, sound: RosValue) -> None:
+    def tell(self, value: RosValue) -> None:
         """Everybody who listens hears it."""
-        self._subscribers.tell(sound)
+        self._subscribers.tell(value)
 
     def _later(self, wait_s: float, work: Callable[[], None]) -> None:
         self._at(now() + wait_s, work)
@@ -347,9 +347,9 @@ class FakeNetwork:
         """Every path that somebody serves."""
         return tuple(sorted({each.path for each in self.nodes if each.seen}))
 
-    def hearing(self, ear: Callable[[RosValue], None]) -> AbstractContextManager[None]:
+    def hearing(self, subscriber: Callable[[RosValue], None]) -> AbstractContextManager[None]:
         """Be told what comes by itself."""
-        return self._subscribers.listening(ear)
+        return self._subscribers.listening(subscriber)
 
 
 def _put(event: anyio.Event, got: list[GetResponse], answer: GetResponse) -> None:

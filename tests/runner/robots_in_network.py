@@ -69,8 +69,8 @@ class RobotsInNetwork:
                 await anyio.sleep(0.5)
                 yield control
 
-    def _hear(self, sound: object) -> None:
-        text = getattr(sound, "text", "")
+    def _hear(self, value: object) -> None:
+        text = getattr(value, "text", "")
         if text:
             self.lines.append((now(), text))
 

@@ -10,9 +10,9 @@ def command(graph: str) -> OverheardCommand:
 
 def test_what_comes_is_taken_in_order_and_only_the_first_needs_somebody_to_take_it() -> None:
     queue = MessageQueue()
-    sounds: list[RosValue] = [LogLine("a", "1"), command("x"), LogLine("a", "2"), command("y")]
-    assert [queue.add(each) for each in sounds] == [True, False, False, False]
-    assert queue.take() == (sounds, 0, 0)
+    values: list[RosValue] = [LogLine("a", "1"), command("x"), LogLine("a", "2"), command("y")]
+    assert [queue.add(each) for each in values] == [True, False, False, False]
+    assert queue.take() == (values, 0, 0)
     assert queue.add(command("z"))
     assert queue.take() == ([command("z")], 0, 0)
     assert queue.take() == ([], 0, 0)
@@ -24,11 +24,11 @@ def test_a_flood_of_lines_pushes_out_no_command_and_both_are_bounded_and_counted
     for number in range(2_000):
         queue.add(LogLine("a", str(number)))
     taken = queue.take()
-    assert taken.sounds[0] == command("first")
-    assert taken.sounds[-1] == LogLine("a", "1999")
-    assert (len(taken.sounds), taken.dropped, taken.dropped_commands) == (513, 1_488, 0)
+    assert taken.values[0] == command("first")
+    assert taken.values[-1] == LogLine("a", "1999")
+    assert (len(taken.values), taken.dropped, taken.dropped_commands) == (513, 1_488, 0)
     for number in range(600):
         queue.add(command(str(number)))
     taken = queue.take()
-    assert taken.sounds[0] == command("88")
-    assert (len(taken.sounds), taken.dropped, taken.dropped_commands) == (512, 0, 88)
+    assert taken.values[0] == command("88")
+    assert (len(taken.values), taken.dropped, taken.dropped_commands) == (512, 0, 88)

@@ -58,7 +58,7 @@ M = TypeVar("M", bound=Message)
 Clock: TypeAlias = Callable[[], int]
 
 
-Ear: TypeAlias = Callable[[RosValue], None]
+Subscriber: TypeAlias = Callable[[RosValue], None]
 
 
 class Domain:
@@ -190,9 +190,9 @@ class Domain:
 
     # --- what comes by itself -----------------------------------------------------------------
 
-    def hearing(self, ear: Ear) -> AbstractContextManager[None]:
+    def hearing(self, subscriber: Subscriber) -> AbstractContextManager[None]:
         """Be told, on the event loop, what comes by itself."""
-        return self._subscribers.listening(ear)
+        return self._subscribers.listening(subscriber)
 
     def _listen(self) -> None:
         topics, node, out = self.topics, self._node, self.outlets
@@ -209,14 +209,14 @@ class Domain:
             if ours.sent(message, info.get("source_timestamp")):
                 return
             graph, umrf = _named(message)
-            sound = OverheardCommand(
+            value = OverheardCommand(
                 command=command,
                 graph=graph,
                 umrf=umrf,
                 targets=tuple(message.targets),
                 sender=self._sender(topic),
             )
-            self._tell(sound)
+            self._tell(value)
 
         self._node.create_subscription(kind, topic, heard, qos(50))
 
@@ -239,9 +239,9 @@ class Domain:
     def _log_line(self, message: Log) -> None:
         self._tell(LogLine(message.name, message.msg))
 
-    def _tell(self, sound: RosValue) -> None:
+    def _tell(self, value: RosValue) -> None:
         """On the thread of this domain."""
-        if self._waiting.add(sound):
+        if self._waiting.add(value):
             self._to_loop(self._hand_over)
 
     def _hand_over(self) -> None:
@@ -252,9 +252,9 @@ class Domain:
         if taken.dropped_commands:
             count = taken.dropped_commands
             log.error("domain %d: %d commands of others came too fast", self.number, count)
-        for sound in taken.sounds:
+        for value in taken.values:
             try:
-                self._subscribers.tell(sound)
+                self._subscribers.tell(value)
             except Exception:  # whoever fails at one must not miss the others
                 log.exception("domain %d: a message could not be told", self.number)
 

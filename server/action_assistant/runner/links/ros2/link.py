@@ -336,44 +336,44 @@ class Ros2Link:
 
     # --- what is heard ------------------------------------------------------------------------
 
-    def _hear(self, sound: RosValue) -> None:
-        match sound:
+    def _hear(self, value: RosValue) -> None:
+        match value:
             case Feedback():
-                self._hear_feedback(sound)
+                self._hear_feedback(value)
             case OverheardCommand():
-                if self._name in sound.targets:
+                if self._name in value.targets:
                     self._subscribers.tell(
                         ForeignCommand(
                             at=self._clock_us(),
-                            command=sound.command,
-                            graph=sound.graph,
-                            umrf=sound.umrf,
-                            targets=sound.targets,
-                            sender=sound.sender,
+                            command=value.command,
+                            graph=value.graph,
+                            umrf=value.umrf,
+                            targets=value.targets,
+                            sender=value.sender,
                         )
                     )
             case LogLine():
-                if self._domain and self._said(sound.logger):
-                    self._domain.outlets.said(self._name, sound.text)
+                if self._domain and self._said(value.logger):
+                    self._domain.outlets.said(self._name, value.text)
                     self._subscribers.tell(
-                        EngineLog(at=self._clock_us(), text=sound.text.strip(), graph=sound.graph)
+                        EngineLog(at=self._clock_us(), text=value.text.strip(), graph=value.graph)
                     )
             case _:
-                assert_never(sound)
+                assert_never(value)
 
-    def _hear_feedback(self, sound: Feedback) -> None:
+    def _hear_feedback(self, value: Feedback) -> None:
         """With several engines on a domain, the name inside tells them apart; what carries a run of
         ours is ours under any name."""
         domain = self._domain
         if domain is None:
             return
-        if sound.actor != self._name and not self._alone(domain):
-            ours = tuple(each for each in sound.snapshots if each.run in self._runs)
+        if value.actor != self._name and not self._alone(domain):
+            ours = tuple(each for each in value.snapshots if each.run in self._runs)
             if not ours:
                 return
-            sound = Feedback(actor=sound.actor, snapshots=ours)
-        domain.outlets.shown(sound.snapshots)
-        self._subscribers.tell(sound)
+            value = Feedback(actor=value.actor, snapshots=ours)
+        domain.outlets.shown(value.snapshots)
+        self._subscribers.tell(value)
 
     def _said(self, logger: str) -> bool:
         """Whether a line can only be this engine's: nodes of one name cannot be told apart."""

@@ -20,7 +20,7 @@ _Numbered: TypeAlias = tuple[int, RosValue]
 class QueuedMessages(NamedTuple):
     """What has waited, oldest first, and how much of it was pushed out."""
 
-    sounds: list[RosValue]
+    values: list[RosValue]
     dropped: int
     dropped_commands: int
 
@@ -39,16 +39,16 @@ class MessageQueue:
         self._dropped = self._dropped_commands = 0
         self._is_empty = True
 
-    def add(self, sound: RosValue) -> bool:
+    def add(self, value: RosValue) -> bool:
         """Keep it, and whether it is the first to wait: then somebody has to take it."""
         with self._lock:
             self._number += 1
-            if isinstance(sound, OverheardCommand):
+            if isinstance(value, OverheardCommand):
                 self._dropped_commands += len(self._commands) == _KEPT
-                self._commands.append((self._number, sound))
+                self._commands.append((self._number, value))
             else:
                 self._dropped += len(self._others) == _KEPT
-                self._others.append((self._number, sound))
+                self._others.append((self._number, value))
             is_first, self._is_empty = self._is_empty, False
             return is_first
 
@@ -59,4 +59,4 @@ class MessageQueue:
             dropped, dropped_commands = self._dropped, self._dropped_commands
             self._begin()
         in_order = merge(commands, others, key=itemgetter(0))
-        return QueuedMessages([sound for _, sound in in_order], dropped, dropped_commands)
+        return QueuedMessages([value for _, value in in_order], dropped, dropped_commands)
