@@ -1,5 +1,6 @@
 """Stand-in robots over real rclpy: on a thread of the test, or in a process that can be killed."""
 
+import json
 import os
 import signal
 import subprocess
@@ -17,6 +18,27 @@ from action_assistant.runner.emulator.messages import EngineTraits, Said
 from action_assistant.runner.emulator.node import EmulatorNode
 from action_assistant.umrf.facts import PINNED
 from action_assistant.umrf.semantics import script_from
+
+_FOREIGN_START = Path(__file__).parents[2] / "frontend" / "e2e" / "foreign_start.py"
+
+
+@contextmanager
+def started_by_others(domain: int, graph: dict[str, Any], robot: str = "David") -> Iterator[None]:
+    """Somebody else on that domain starts a graph on a robot, which listens as the runner does."""
+    other = subprocess.Popen(
+        [sys.executable, str(_FOREIGN_START), robot, "2"],
+        stdin=subprocess.PIPE,
+        env={**os.environ, "ROS_DOMAIN_ID": str(domain)},
+        text=True,
+    )
+    assert other.stdin is not None
+    other.stdin.write(json.dumps(graph))
+    other.stdin.close()
+    try:
+        yield
+    finally:
+        other.terminate()
+        other.wait(10)
 
 
 @contextmanager

@@ -12,17 +12,25 @@ from action_assistant.runner.links.port import EngineLog, ForeignCommand, Report
 from ros.echo_engine import EchoEngine
 from ros.test_ros2_link import answering, engine, eventually, robot
 
+_HEARD_S = 0.3  # in which what was published has come
+
 
 def flood(node: EchoEngine, other: EchoEngine) -> None:
-    """Two commands with many lines between them, while the event loop takes nothing in."""
+    """Two commands with many lines between them, while the event loop takes nothing in: it is held up
+    by the sleeps, in which the thread of the domain hears what was published."""
     other.publish("stop", umrf_graph_name="first", targets=["robot"])
-    time.sleep(0.3)
+    time.sleep(_HEARD_S)
     for number in range(1_500):
         node.log(f"The line {number}.")
-        time.sleep(0.0005)
-    time.sleep(0.3)
+        time.sleep(0.0005)  # faster, and the middleware's own queue would lose them
+    time.sleep(_HEARD_S)
     other.publish("stop", umrf_graph_name="last", targets=["robot"])
-    time.sleep(0.3)
+    time.sleep(_HEARD_S)
+
+
+def places(heard: list[Report], kind: type[Report]) -> list[int]:
+    """Where reports of a kind stand among all."""
+    return [at for at, each in enumerate(heard) if isinstance(each, kind)]
 
 
 async def test_a_flood_of_log_lines_hides_no_command_of_others(domain: int) -> None:
@@ -34,11 +42,11 @@ async def test_a_flood_of_log_lines_hides_no_command_of_others(domain: int) -> N
                 other.speak()
                 await eventually(lambda: link.standing.others == 1)
                 flood(node, other)
-                foreign = lambda: [each for each in heard if isinstance(each, ForeignCommand)]  # noqa: E731
-                await eventually(lambda: len(foreign()) == 2, 5)
-            assert [each.graph for each in foreign()] == ["first", "last"]
-            lines = [at for at, each in enumerate(heard) if isinstance(each, EngineLog)]
-            first, last = [at for at, each in enumerate(heard) if isinstance(each, ForeignCommand)]
+                await eventually(lambda: len(places(heard, ForeignCommand)) == 2, 5)
+            first, last = places(heard, ForeignCommand)
+            commands = [each for each in heard if isinstance(each, ForeignCommand)]
+            assert [each.graph for each in commands] == ["first", "last"]
+            lines = places(heard, EngineLog)
             between = [at for at in lines if first < at < last]
             assert len(lines) < 1_500  # of these the oldest went
             assert len(between) > 200

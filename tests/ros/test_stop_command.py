@@ -1,13 +1,8 @@
 """Stop on the command line with a robot that does not obey: over rclpy, with the real product."""
 
 import json
-import os
 import signal
-import subprocess
-import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +12,9 @@ pytest.importorskip(
     "rclpy", reason="rclpy is not here; `make ros-test` brings it", exc_type=ImportError
 )
 
-from ros.robots import RobotProcess
+from ros.robots import RobotProcess, started_by_others
 from support.product import Product, running
 
-FOREIGN_START = Path(__file__).parents[2] / "frontend" / "e2e" / "foreign_start.py"
 STUBBORN: dict[str, Any] = {"*": [{"never": True, "ignores_stop": True}]}
 GRAPH = {
     "graph_name": "pair",
@@ -74,26 +68,6 @@ def test_stop_says_unconfirmed_and_exits_1_until_somebody_has_looked(
         david.end()
 
 
-@contextmanager
-def _started_by_others(domain: int) -> Iterator[None]:
-    """Somebody else on that domain starts the graph on David; the runner and David listen."""
-    environment = {**os.environ, "ROS_DOMAIN_ID": str(domain)}
-    other = subprocess.Popen(
-        [sys.executable, str(FOREIGN_START), "David", "2"],
-        stdin=subprocess.PIPE,
-        env=environment,
-        text=True,
-    )
-    assert other.stdin is not None
-    other.stdin.write(json.dumps(GRAPH))
-    other.stdin.close()
-    try:
-        yield
-    finally:
-        other.terminate()
-        other.wait(10)
-
-
 def _moving(product: Product) -> None:
     """Wait until the runner shows that the graph of others moves."""
     with product.runner() as runner:
@@ -123,7 +97,7 @@ def test_stop_all_waits_for_proof_of_what_others_started_too(
             with product.runner() as runner:
                 runner.post("/api/robots", json={"name": "David", "domain": domain})
             _answering(product)
-            with _started_by_others(domain):
+            with started_by_others(domain, GRAPH):
                 _moving(product)
                 told = product.cli("stop", "--all", "--wait", "10")
                 assert told.returncode == code, told

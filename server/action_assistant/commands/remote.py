@@ -271,7 +271,8 @@ def _stop(options: argparse.Namespace) -> int:
             deadline = time.monotonic() + options.wait
             while True:
                 runs = [insisting(server, "GET", f"/api/runs/{run}") for run in asked["runs"]]
-                graphs = _unproven(others, insisting(server, "GET", "/api/robots"))
+                robots = insisting(server, "GET", "/api/robots") if others else []
+                graphs = _unproven(others, robots)
                 settled = all(_is_at_rest(run) or run["unconfirmed"] for run in runs)
                 if (settled and not graphs) or time.monotonic() > deadline:
                     break

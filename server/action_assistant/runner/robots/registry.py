@@ -145,7 +145,7 @@ class Robots:
         for name in self.names:
             try:
                 told = await self.robot_log.newest(name, _TOLD)
-            except Exception:
+            except Exception:  # the other robots' stops are to go on
                 log.exception("whether something was being stopped on %s cannot be read", name)
                 continue
             for asked in left_unproven(event for _, event in told):

@@ -53,6 +53,6 @@ def end_connection(transport: asyncio.Transport, shutdown: Callable[[], None]) -
     """End a connection as its protocol does it, by `shutdown`; where that fails, without a word."""
     try:
         shutdown()
-    except Exception as error:  # noqa: BLE001 - those that are ended after this one
+    except Exception as error:  # noqa: BLE001 - the next ones are to be ended, too
         log.warning("a connection is cut off, it cannot be ended otherwise: %r", error)
         transport.abort()

@@ -1,0 +1,88 @@
+"""The real engine behind the whole product: a graph that others started is stopped, and what its code did.
+
+The action takes three seconds to obey, of the five that its engine waits. Whoever says "stopped" before its code has ended is wrong.
+"""
+
+import time
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+pytest.importorskip(
+    "rclpy", reason="rclpy is not here; `make ros-test` brings it", exc_type=ImportError
+)
+
+from ros.robots import started_by_others
+from support.product import running
+from support.real_engine import answers, browser, needs_engine, real_engine, until
+
+SLOW = {
+    "graph_name": "theirs",
+    "graph_entry": [{"name": "OxSlowStop"}],
+    "graph_exit": [{"name": "OxSlowStop"}],
+    "actions": [
+        {
+            "name": "OxSlowStop",
+            "type": "sync",
+            "input_parameters": {
+                "delay": {"pvf_type": "number", "pvf_value": 120},
+                "stop_time": {"pvf_type": "number", "pvf_value": 3},
+            },
+        }
+    ],
+}
+
+pytestmark = [needs_engine, pytest.mark.timeout(240)]
+
+
+def held(runner: httpx.Client) -> list[dict[str, Any]]:
+    """What David holds."""
+    found: list[dict[str, Any]] = runner.get("/api/robots/David").json()["holds"]
+    return found
+
+
+def told(runner: httpx.Client) -> list[str]:
+    """What David's log says of stops, oldest first."""
+    lines = runner.get("/api/robots/David/events").json()
+    return [each["kind"] for each in reversed(lines) if each["kind"].startswith("stop_")]
+
+
+def test_everything_is_stopped_when_its_code_has_ended(domain: int, tmp_path: Path) -> None:
+    with (
+        real_engine(tmp_path, domain) as events,
+        running(tmp_path / "data") as product,
+        browser(product, "Ada") as ada,
+    ):
+        assert ada.post("/api/robots", json={"name": "David", "domain": domain}).is_success
+        until("David answers", lambda: answers(ada, "David"))
+        with started_by_others(domain, SLOW):
+            until("it moves", lambda: any(each["active"] for each in held(ada)))
+            assert events() == ["begin"]
+            said = product.cli("stop", "--all", "--wait", "30")
+            assert events() == ["begin", "stop", "end"]
+            assert (said.returncode, said.stdout) == (0, "stopped\n"), said
+
+
+def test_a_runner_that_was_killed_goes_on_until_its_code_has_ended(
+    domain: int, tmp_path: Path
+) -> None:
+    with (
+        real_engine(tmp_path, domain) as events,
+        running(tmp_path / "data") as product,
+        browser(product, "Ada") as ada,
+    ):
+        assert ada.post("/api/robots", json={"name": "David", "domain": domain}).is_success
+        until("David answers", lambda: answers(ada, "David"))
+        with started_by_others(domain, SLOW):
+            until("it moves", lambda: any(each["active"] for each in held(ada)))
+            assert ada.post("/api/stop").json()["graphs"] == {"David": ["theirs"]}
+            until("its code is told", lambda: "stop" in events())
+            time.sleep(0.5)  # so that what was asked is on the disk, also on a slow one
+            product.kill()
+            product.start()
+            with browser(product, "Ada") as back:
+                until("it is proven", lambda: told(back) == ["stop_asked", "stop_proven"])
+                assert events() == ["begin", "stop", "end"]
+                assert all(each["stopping"] is None for each in held(back))
