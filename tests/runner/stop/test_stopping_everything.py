@@ -7,7 +7,7 @@ import anyio
 
 from action_assistant.runner.api.live import Hub
 from action_assistant.runner.links.port import Order
-from action_assistant.runner.stop.stopped_all import StoppedAll
+from action_assistant.runner.stop.foreign_stop import StoppedAll
 from runner.harness import ANN, BEN, Harness, clock_us, engine, order, sequence, until, virtual
 from runner.registered_robots import NEVER, Open, fleet
 

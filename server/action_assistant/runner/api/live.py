@@ -27,7 +27,7 @@ from action_assistant.runner.robots.registration import Robot
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.run import Run
-from action_assistant.runner.stop.stopped_all import StoppedAll
+from action_assistant.runner.stop.foreign_stop import StoppedAll
 from action_assistant.web.auth.access import session_of
 
 log: Final = logging.getLogger(__name__)

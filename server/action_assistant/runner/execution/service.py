@@ -42,9 +42,8 @@ from action_assistant.runner.start.start_checks import (
     Started,
     StartSources,
 )
-from action_assistant.runner.stop.foreign_stop import ForeignStopLoop
+from action_assistant.runner.stop.foreign_stop import ForeignStopLoop, StoppedAll
 from action_assistant.runner.stop.late_activity import LateActivity
-from action_assistant.runner.stop.stopped_all import StoppedAll
 from action_assistant.web.auth.caller import done_for_nobody
 from action_assistant.web.workers.lanes import RunInWorker
 

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from typing import Final, TypeAlias
 
 import anyio
+import msgspec
 from anyio.abc import TaskGroup
 
 from action_assistant.errors import NotFound
@@ -39,6 +40,16 @@ _NO_LINK: Final = "there is no link to this robot"
 _REMOVED: Final = "the robot was taken out of the registry meanwhile: look at it"
 
 Present: TypeAlias = Callable[[str], KnownEngine | None]
+
+
+class StoppedAll(msgspec.Struct, frozen=True):
+    """The answer to a stop of everything. `runs`: of ours that are being stopped. `graphs`: those of
+    others that are, by robot. `unknown`: why nothing is known of what a robot runs, by robot: whatever
+    it runs is not being stopped unless it was seen before."""
+
+    runs: list[str]
+    graphs: dict[str, list[str]] = {}
+    unknown: dict[str, str] = {}
 
 
 class _ForeignStop:
