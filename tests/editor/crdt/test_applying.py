@@ -1,4 +1,4 @@
-"""The short way to apply one update does what the library's own does."""
+"""The short way to apply updates does what the library's own does."""
 
 from typing import Any
 
@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pycrdt import Doc, Map
 
-from action_assistant.editor.crdt.applying import apply_alone, applying
+from action_assistant.editor.crdt.applying import apply_updates, applying
 from action_assistant.editor.crdt.messages import Malformed
 from support.doses import examples
 
@@ -50,9 +50,24 @@ def test_it_leaves_the_same_document_and_tells_observers_the_same(
     made += made[: chance.randrange(len(made) + 1)]  # some come twice
     (short, heard), (usual, told) = watched(), watched()
     for update in made:
-        apply_alone(short, update)
+        apply_updates(short, update)
         usual.apply_update(update)
         assert short.get_update() == usual.get_update()
+    assert heard == told
+
+
+@settings(max_examples=examples(50), deadline=None)
+@given(changes)
+def test_many_together_are_one_transaction_as_with_the_library(
+    changed: list[tuple[str, Any]],
+) -> None:
+    made = updates(changed)
+    (short, heard), (usual, told) = watched(), watched()
+    apply_updates(short, *made)
+    with usual.transaction():
+        for update in made:
+            usual.apply_update(update)
+    assert short.get_update() == usual.get_update()
     assert heard == told
 
 
@@ -61,8 +76,8 @@ def test_what_cannot_be_read_is_told_and_the_document_goes_on(broken: bytes) -> 
     doc, _ = watched()
     (update,) = updates([("a", "1")])
     with pytest.raises(Malformed), applying():
-        apply_alone(doc, broken)
-    apply_alone(doc, update)
+        apply_updates(doc, broken)
+    apply_updates(doc, update)
     with doc.transaction():  # none was left open
         doc.get("things", type=Map)["b"] = "2"
     assert doc.get("things", type=Map).to_py() == {"a": "1", "b": "2"}

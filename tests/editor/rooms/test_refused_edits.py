@@ -6,7 +6,7 @@ import pytest
 from pycrdt import Doc, Map
 
 from action_assistant.editor.crdt import messages, replica
-from action_assistant.editor.crdt.applying import apply_alone
+from action_assistant.editor.crdt.applying import apply_updates
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import BadInput
 from action_assistant.journal.journal import Journal
@@ -41,12 +41,12 @@ async def test_an_update_that_breaks_the_library_is_refused_and_harms_nobody(
 ) -> None:
     (poison,) = updates(("poison", "1"))
 
-    def apply(doc: Doc[Any], update: bytes) -> None:
-        if update == poison:
+    def apply(doc: Doc[Any], *updates: bytes) -> None:
+        if poison in updates:
             raise PanicException("index out of bounds")
-        apply_alone(doc, update)
+        apply_updates(doc, *updates)
 
-    monkeypatch.setattr(replica, "apply_alone", apply)
+    monkeypatch.setattr(replica, "apply_updates", apply)
     ada, eve = Client("ada"), Client("eve")
     async with rooms.enter(STREAM) as room:
         ada.join(room)

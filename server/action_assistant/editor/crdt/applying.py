@@ -1,4 +1,4 @@
-"""Calls of the CRDT library with foreign bytes: their failures, and the short way for one update."""
+"""Calls of the CRDT library with foreign bytes: their failures, and a short way for updates."""
 
 from contextlib import AbstractContextManager
 from typing import Any, Final
@@ -37,14 +37,15 @@ def applying() -> AbstractContextManager[None]:
     return _APPLYING
 
 
-def apply_alone(doc: "Doc[Any]", update: bytes) -> None:
-    """As `doc.apply_update(update)` where no transaction is under way; what observers raise is not told. In
-    a busy editor the library's layer of Python is a twentieth of all that an edit costs, more than the change
-    itself."""
+def apply_updates(doc: "Doc[Any]", *updates: bytes) -> None:
+    """As `doc.apply_update(update)` for each, in one transaction, where none is under way; what observers raise
+    is not told. In a busy editor the library's layer of Python is a twentieth of all that an edit costs, more
+    than the change itself, and a quarter of what many cost together."""
     core = doc._doc  # noqa: SLF001 - no public way is as short; tests hold both to be the same
     transaction = core.create_transaction()
     try:
-        core.apply_update(transaction, update)
+        for update in updates:
+            core.apply_update(transaction, update)
     finally:
         transaction.commit()
         transaction.drop()

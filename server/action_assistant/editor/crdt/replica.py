@@ -10,13 +10,13 @@ from typing import Any, Final, Literal
 import msgspec
 from pycrdt import Doc
 
-from action_assistant.editor.crdt.applying import Panicked, apply_alone, applying
+from action_assistant.editor.crdt.applying import Panicked, apply_updates, applying
 from action_assistant.editor.crdt.document_quota import DocumentQuota
 from action_assistant.editor.crdt.event_columns import EventColumns, Told
 from action_assistant.editor.crdt.messages import NOTHING_NEW, ByteReader, Malformed
 from action_assistant.editor.crdt.nesting import Nesting
 from action_assistant.editor.crdt.opening_time import OpeningTime
-from action_assistant.editor.crdt.sound_updates import Clients, check_nothing_waits, lies_deep
+from action_assistant.editor.crdt.sound_updates import Clients, check_nothing_misses, lies_deep
 from action_assistant.editor.crdt.updates.applied_updates import (
     check_cut_items,
     check_unchanged,
@@ -152,7 +152,7 @@ class Replica:
         self.owners = clients.authors | self.owners
         self._apply(*events.bodies)
         self._known = clocks(self.doc.get_state())
-        check_nothing_waits(self.doc, self._known, clients.ends)
+        check_nothing_misses(self._known, clients.ends)
         self._quota.took(events.size)
 
     def replay_each(self, events: Sequence[Event]) -> Iterator[Event]:
@@ -271,7 +271,7 @@ class Replica:
         depths = self.nesting.depths(read.placed, known)
         if any(end > known.get(client, 0) for client, _, end in read.brings):
             with applying():
-                apply_alone(self.doc, update)
+                apply_updates(self.doc, update)
             changed = True
         else:
             changed = self._deletes(update)
@@ -321,12 +321,10 @@ class Replica:
         if not updates:
             return
         with applying():
-            if len(updates) == 1:
+            if len(updates) == 1:  # of a document that may be watched
                 self.doc.apply_update(updates[0])
-                return
-            with self.doc.transaction():
-                for update in updates:
-                    self.doc.apply_update(update)
+            else:
+                apply_updates(self.doc, *updates)
 
     def lacking(self, state: bytes) -> bytes:
         """What somebody with this state vector lacks. Raises Malformed, Panicked."""

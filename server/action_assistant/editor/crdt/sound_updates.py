@@ -2,24 +2,23 @@
 
 A room reads every update as a whole before it is stored, and the chain proves that it is still the same.
 Opening a graph need not do that again: it asks whose the clients are, whether anything may lie deeper
-than in a root, and afterwards whether anything waits. For workers: what a room never took may end them.
+than in a root, and afterwards whether anything is missing. For workers: what a room never took may end them.
+
+Rooms have always told what waits, deletions too, as such. So the others build on what came before them, and
+those of one client come in their order: where one were missing, so would be the end of that client's last.
 """
 
 import bisect
 import itertools
 import re
 from collections.abc import Mapping, Sequence
-from typing import Any, Final
-
-from pycrdt import Doc, get_update
+from typing import Final
 
 from action_assistant.editor.crdt.messages import ByteReader
 from action_assistant.editor.crdt.updates.update_scan import stored_outline
 
-#: The beginning of an update with structs of one client: how many, whose, from which clock.
-_ONE_CLIENT: Final = re.compile(
-    rb"\x01[\x01-\x7f]([\x80-\xff]*[\x00-\x7f])([\x80-\xff]*[\x00-\x7f])"
-)
+#: The beginning of an update with structs of one client: how many, whose.
+_ONE_CLIENT: Final = re.compile(rb"\x01[\x01-\x7f]([\x80-\xff]*[\x00-\x7f])")
 #: Whatever a struct that lies in another one looks like: its kind, neighbours not told, then a 0.
 _MAY_LIE_INSIDE: Final = re.compile(rb"[\x01-\x09\x21-\x29]\x80*\x00")
 _APART: Final = b"\xff"  # ends nothing that looks so
@@ -38,23 +37,17 @@ class Clients:
     after them."""
 
     def __init__(self, bodies: Sequence[bytes], authors: Sequence[str]) -> None:
-        """Raises Malformed; Uncertain where a client's updates do not come in their order, since then its
-        last one does not tell where it ends."""
+        """Raises Malformed."""
         self.authors: Final[dict[int, str]] = {}
         self.ends: Final[dict[int, int]] = {}
         last: dict[bytes, bytes] = {}  # of each client that is alone in an update
-        clocks: dict[bytes, tuple[int, bytes]] = {}  # of that, in an order as the numbers have
         for body, author in zip(bodies, authors, strict=True):
             begins = _ONE_CLIENT.match(body)
             if begins is None:
                 if body[:1] != b"\x00":  # it has more than deletions
                     self._add(body, author)
                 continue
-            client_bytes, clock = begins.groups()
-            at = len(clock), clock[::-1]
-            if at < clocks.get(client_bytes, at):
-                raise Uncertain
-            clocks[client_bytes] = at
+            client_bytes = begins[1]
             if client_bytes not in last:
                 self.authors.setdefault(ByteReader(client_bytes).number(), author)
             last[client_bytes] = body
@@ -96,17 +89,8 @@ def _starts(bodies: Sequence[bytes]) -> list[int]:
     return list(itertools.accumulate((len(body) or 1 for body in bodies), initial=0))
 
 
-def check_nothing_waits(doc: "Doc[Any]", known: Mapping[int, int], ends: Mapping[int, int]) -> None:
-    """Raise Uncertain where a document lacks something that updates built on, or lost some. `known`:
-    how many clocks it has of each client, `ends`: how many it should have."""
+def check_nothing_misses(known: Mapping[int, int], ends: Mapping[int, int]) -> None:
+    """Raise Uncertain where a document lacks something that updates built on. `known`: how many clocks it
+    has of each client, `ends`: how many it should have."""
     if any(known.get(client, 0) < end for client, end in ends.items()):
         raise Uncertain
-    # All deletions, and of structs only those with others missing before them.
-    rest = ByteReader(get_update(doc.get_update(), doc.get_state()))
-    if rest.number():
-        raise Uncertain
-    for _ in range(rest.number()):
-        clocks = known.get(rest.number(), 0)
-        for _ in range(rest.number()):
-            if rest.number() + rest.number() > clocks:
-                raise Uncertain
