@@ -12,14 +12,18 @@ import platform
 import re
 import subprocess
 import sys
+import time
 from importlib.metadata import version
 from pathlib import Path
 from typing import Final
 
+import psutil
+
 FOLDER: Final = Path(__file__).parent
 PAGE: Final = FOLDER.parent / "docs" / "performance.md"
 FRAMES: Final = FOLDER.parent / "frontend" / "test-results" / "speed.json"
-QUIET: Final = 0.5  # load per core up to which a run counts as quiet
+QUIET: Final = 0.1  # of the processors, used by others, up to which a run counts as quiet
+LOOK: Final = 3.0  # seconds for which others are looked at
 sys.path.insert(0, str(FOLDER))
 
 from table import Table, lines  # noqa: E402 - the folder is no package
@@ -43,13 +47,15 @@ def main(names: list[str]) -> int:
 
 def block(name: str) -> str:
     """The tables of one benchmark under a line that says where, when and how quietly."""
-    before = load()
+    others, paces = [used()], [pace()]
     found = browser() if name == "browser" else list(importlib.import_module(name).tables())
-    noise = max(before, load())
-    word = "quiet" if noise <= QUIET else "busy with other work, so only CPU time says something"
+    others.append(used())
+    paces.append(pace())
+    word = "quiet" if max(others) <= QUIET else "busy, so only CPU time says something"
     head = (
         f"`make performance ARGS={name}`, {datetime.datetime.now(datetime.UTC):%Y-%m-%d %H:%M} UTC, "
-        f"{facts()}; machine {word} (load {noise:.1f} per core).\n\n"
+        f"{facts()}; machine {word} (others used {max(others):.0%} of it before or after); "
+        f"a million steps of Python took {paces[0]:.0f} ms before, {paces[1]:.0f} after.\n\n"
     )
     return head + "\n".join("\n".join(lines(table)) + "\n" for table in found)
 
@@ -62,9 +68,22 @@ def facts() -> str:
     )
 
 
-def load() -> float:
-    """How many others want each core."""
-    return os.getloadavg()[0] / (os.cpu_count() or 1)
+def used() -> float:
+    """The share of all processors that is used while nothing is measured."""
+    return 1.0 - float(psutil.cpu_times_percent(interval=LOOK).idle) / 100.0
+
+
+def pace() -> float:
+    """Milliseconds that a million steps take, the best of five times: what else shares a processor's core may
+    double it from one hour to the next, and `used` does not see that."""
+    times = []
+    for _ in range(5):
+        started = time.perf_counter()
+        total = 0
+        for step in range(1_000_000):
+            total += step * step
+        times.append(time.perf_counter() - started)
+    return min(times) * 1000.0
 
 
 def browser() -> list[Table]:
