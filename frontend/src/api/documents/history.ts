@@ -97,6 +97,10 @@ export function revertEdits(
   return fetchJson(`${below(id)}/revert`, { method: "POST", body });
 }
 
-export function refreshHistory(client: QueryClient, id: string): Promise<void> {
-  return client.invalidateQueries({ queryKey: ["history", id] });
+/** Reads again what is on screen. An edit of ours is shown before what it was is written down: what is being read
+ * may be from between, and is given up, since the library would keep the first answer of a moment. */
+export async function refreshHistory(client: QueryClient, id: string): Promise<void> {
+  const all = { queryKey: ["history", id] };
+  await client.cancelQueries(all);
+  await client.invalidateQueries(all);
 }
