@@ -4,8 +4,9 @@ A room reads every update as a whole before it is stored, and the chain proves t
 Opening a graph need not do that again: it asks whose the clients are, whether anything may lie deeper
 than in a root, and afterwards whether anything is missing. For workers: what a room never took may end them.
 
-Rooms tell what waits, deletions too, as such, and did so before there was any data to keep. So the others build on what came before them, and
-those of one client come in their order: where one were missing, so would be the end of that client's last.
+Rooms tell what waits, deletions too, as such, and did so before there was any data to keep. So the others
+build on what came before them, and those of one client come in their order: where one were missing, so would
+be the end of that client's last.
 """
 
 import bisect
