@@ -3,7 +3,8 @@
 The action takes three seconds to obey, of the five that its engine waits. Whoever says "stopped" before its code has ended is wrong.
 """
 
-import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ pytest.importorskip(
 )
 
 from ros.robots import started_by_others
-from support.product import running
+from support.product import Product, running
 from support.real_engine import answers, browser, needs_engine, real_engine, until
 
 SLOW = {
@@ -49,7 +50,11 @@ def told(runner: httpx.Client) -> list[str]:
     return [each["kind"] for each in reversed(lines) if each["kind"].startswith("stop_")]
 
 
-def test_everything_is_stopped_when_its_code_has_ended(domain: int, tmp_path: Path) -> None:
+@contextmanager
+def moving(
+    domain: int, tmp_path: Path
+) -> Iterator[tuple[Callable[[], list[str]], Product, httpx.Client]]:
+    """What the code of others has written down, the product beside it, and somebody at a browser."""
     with (
         real_engine(tmp_path, domain) as events,
         running(tmp_path / "data") as product,
@@ -60,29 +65,26 @@ def test_everything_is_stopped_when_its_code_has_ended(domain: int, tmp_path: Pa
         with started_by_others(domain, SLOW):
             until("it moves", lambda: any(each["active"] for each in held(ada)))
             assert events() == ["begin"]
-            said = product.cli("stop", "--all", "--wait", "30")
-            assert events() == ["begin", "stop", "end"]
-            assert (said.returncode, said.stdout) == (0, "stopped\n"), said
+            yield events, product, ada
+
+
+def test_everything_is_stopped_when_its_code_has_ended(domain: int, tmp_path: Path) -> None:
+    with moving(domain, tmp_path) as (events, product, _):
+        said = product.cli("stop", "--all", "--wait", "30")
+        assert events() == ["begin", "stop", "end"]
+        assert (said.returncode, said.stdout) == (0, "stopped\n"), said
 
 
 def test_a_runner_that_was_killed_goes_on_until_its_code_has_ended(
     domain: int, tmp_path: Path
 ) -> None:
-    with (
-        real_engine(tmp_path, domain) as events,
-        running(tmp_path / "data") as product,
-        browser(product, "Ada") as ada,
-    ):
-        assert ada.post("/api/robots", json={"name": "David", "domain": domain}).is_success
-        until("David answers", lambda: answers(ada, "David"))
-        with started_by_others(domain, SLOW):
-            until("it moves", lambda: any(each["active"] for each in held(ada)))
-            assert ada.post("/api/stop").json()["graphs"] == {"David": ["theirs"]}
-            until("its code is told", lambda: "stop" in events())
-            time.sleep(0.5)  # so that what was asked is on the disk, also on a slow one
-            product.kill()
-            product.start()
-            with browser(product, "Ada") as back:
-                until("it is proven", lambda: told(back) == ["stop_asked", "stop_proven"])
-                assert events() == ["begin", "stop", "end"]
-                assert all(each["stopping"] is None for each in held(back))
+    with moving(domain, tmp_path) as (events, product, ada):
+        assert ada.post("/api/stop").json()["graphs"] == {"David": ["theirs"]}
+        until("its code is told", lambda: "stop" in events())
+        until("it is written down", lambda: told(ada) == ["stop_asked"])
+        product.kill()
+        product.start()
+        with browser(product, "Ada") as back:
+            until("it is proven", lambda: told(back) == ["stop_asked", "stop_proven"])
+            assert events() == ["begin", "stop", "end"]
+            assert all(each["stopping"] is None for each in held(back))
