@@ -16,7 +16,7 @@ from action_assistant.editor.crdt.event_columns import EventColumns, Told
 from action_assistant.editor.crdt.messages import NOTHING_NEW, ByteReader, Malformed
 from action_assistant.editor.crdt.nesting import Nesting
 from action_assistant.editor.crdt.opening_time import OpeningTime
-from action_assistant.editor.crdt.sound_updates import Clients, check_nothing_misses, lies_deep
+from action_assistant.editor.crdt.sound_updates import Clients, check_nothing_is_missing, lies_deep
 from action_assistant.editor.crdt.updates.applied_updates import (
     check_cut_items,
     check_unchanged,
@@ -152,7 +152,7 @@ class Replica:
         self.owners = clients.authors | self.owners
         self._apply(*events.bodies)
         self._known = clocks(self.doc.get_state())
-        check_nothing_misses(self._known, clients.ends)
+        check_nothing_is_missing(self._known, clients.ends)
         self._quota.took(events.size)
 
     def replay_each(self, events: Sequence[Event]) -> Iterator[Event]:

@@ -90,7 +90,7 @@ def _starts(bodies: Sequence[bytes]) -> list[int]:
     return list(itertools.accumulate((len(body) or 1 for body in bodies), initial=0))
 
 
-def check_nothing_misses(known: Mapping[int, int], ends: Mapping[int, int]) -> None:
+def check_nothing_is_missing(known: Mapping[int, int], ends: Mapping[int, int]) -> None:
     """Raise Uncertain where a document lacks something that updates built on. `known`: how many clocks it
     has of each client, `ends`: how many it should have."""
     if any(known.get(client, 0) < end for client, end in ends.items()):
