@@ -239,13 +239,16 @@ async def test_a_long_log_reads_the_same_in_one_piece_or_in_many(
 
 @pytest.mark.usefixtures("all_aside")
 @pytest.mark.parametrize("seq", [1, 2, 233, 234])
+@pytest.mark.parametrize(
+    "change", ["at = at + 1", "at = 'then'", "author = x'616461'", "body = 'text'"]
+)
 async def test_what_is_not_as_it_was_written_ends_a_long_log_there(
-    tmp_path: Path, seq: int
+    tmp_path: Path, seq: int, change: str
 ) -> None:
     url = f"sqlite:///{tmp_path / 'editor.db'}"
     await (await written(url)).close()
     with closing(sqlite3.connect(tmp_path / "editor.db")) as database, database:
-        database.execute("UPDATE event SET at = at + 1 WHERE seq = ?", (seq,))
+        database.execute(f"UPDATE event SET {change} WHERE seq = ?", (seq,))
     journal = await Journal.open(url, branch="editor", fold=nothing)
     whole = await stored(journal, "graph/g", learn=True)
     found = await stored(journal, "graph/g", learn=True, run_in_worker=aside)

@@ -18,7 +18,6 @@ from action_assistant.web.workers.lanes import Crashed, OutOfTime, RunInWorker, 
 log: Final = logging.getLogger(__name__)
 
 _SMALL: Final = 32 * 1024  # bytes that are put together at once: milliseconds, as a way aside takes
-_SENT_PER_S: Final = 200_000_000  # bytes, about, that a worker is given
 
 
 class Loaded(msgspec.Struct, frozen=True):
@@ -124,7 +123,7 @@ async def _folded(
     folding = asyncio.ensure_future(_folded_aside(document, events, learn, run_in_worker))
     folding.add_done_callback(_heard)
     try:
-        await asyncio.sleep(events.size / _SENT_PER_S)  # checking would take turns with sending
+        await asyncio.sleep(0)  # it is sent before checking takes turns with that
         good = await tail.sound()  # while it works
         if good == len(events):
             return await folding

@@ -1,8 +1,10 @@
 """The events of a stream as they were written, up to the first that is not."""
 
 import asyncio
+import itertools
 import logging
-from collections.abc import Sequence
+import struct
+from collections.abc import Iterable, Sequence
 from typing import Any, Final
 
 from sqlalchemy import bindparam, select
@@ -78,13 +80,13 @@ class LogTail:
         return good
 
     def _in_place(self, rows: Sequence[Sequence[Any]]) -> StoredColumns | None:
-        """Those before the first that is no event, or not the next one; None when there are none."""
+        """Those before the first that is no event, or not the next one; None when there are none. Where
+        they come in order and their bodies are bytes, the others' types are left to the chain."""
         if not rows:
             return None
         columns = StoredColumns(*zip(*rows, strict=True))
         expected = range(self.seq + 1, self.seq + 1 + len(rows))
-        kinds = [set(map(type, column)) for column in columns]
-        if kinds == [{each} for each in _TYPES] and columns.seqs == tuple(expected):
+        if columns.seqs == tuple(expected) and set(map(type, columns.bodies)) == {bytes}:
             self.seq += len(rows)
             return columns
         return self._in_place(rows[: self._good(rows)])
@@ -163,9 +165,18 @@ def _linked(chain: bytes, stream: str, slices: Sequence[StoredColumns]) -> int:
     """How many of these events are in the chain that goes on from here."""
     count = 0
     for each in slices:
-        good = linked(chain, stream, each)
+        good = _linked_of_one(chain, stream, each)
         count += good
         if good < len(each.seqs):
             break
         chain = each.chains[-1]
     return count
+
+
+def _linked_of_one(chain: bytes, stream: str, events: StoredColumns) -> int:
+    try:
+        return linked(chain, stream, events)
+    except (AttributeError, TypeError, struct.error):  # something in them is not of its type
+        rows: Iterable[Sequence[Any]] = zip(*events, strict=True)
+        typed = list(itertools.takewhile(lambda row: tuple(map(type, row)) == _TYPES, rows))
+        return linked(chain, stream, StoredColumns(*zip(*typed, strict=True))) if typed else 0
