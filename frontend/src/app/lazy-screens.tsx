@@ -49,11 +49,13 @@ export async function preloadWhenIdle(): Promise<void> {
   if (!connection?.saveData) await preloadParts(idle);
 }
 
+const IDLE = { timeout: 2_000 }; // ms: a page that draws nothing may not be called idle for many seconds
+
 function idle(): Promise<void> {
   return new Promise((resolve) => {
     // Safari has no such thing.
     if (typeof requestIdleCallback === "undefined") setTimeout(resolve, 500);
-    else requestIdleCallback(() => resolve());
+    else requestIdleCallback(() => resolve(), IDLE);
   });
 }
 

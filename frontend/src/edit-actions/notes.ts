@@ -9,6 +9,7 @@ import {
 import { CARD } from "../canvas/geometry/arrange";
 import { relationId } from "../graph/document-keys";
 import { writeNote } from "../graph/edit/notes";
+import { whenThere } from "../ui/focus-field";
 import type { EditAction } from "./edit-action";
 import { type EditorContext, freeFrom, selectedNotes, selectedRelations } from "./editor-context";
 
@@ -87,6 +88,19 @@ export const write: EditAction = {
   },
 };
 
+/** What shows the details, once its parts have been loaded. */
+const FORM = '[aria-label="Details"] [role="tabpanel"]:not([hidden], :has([aria-busy="true"]))';
+const PATIENCE = 300; // frames, some seconds, for a form that has to be loaded first
+const TYPED_IN = "input, textarea, [contenteditable=true]";
+
+/** Whoever types in another field than `before` by now stays there. */
+function focusFirst(form: HTMLElement, before: Element | null): void {
+  const now = document.activeElement;
+  if (now !== before && now?.matches(TYPED_IN)) return;
+  const field = form.querySelector<HTMLElement>("input, textarea");
+  (field ?? form.querySelector<HTMLElement>("button"))?.focus();
+}
+
 export const details: EditAction = {
   name: "details",
   label: "Open the details",
@@ -98,14 +112,9 @@ export const details: EditAction = {
   enabled: () => true,
   run: (context) => {
     context.setPanel("details");
+    const before = document.activeElement;
     // Where the panel slides in, it cannot have the focus before it is seen.
-    setTimeout(() => {
-      const panel = document.querySelector(
-        '[aria-label="Details"] [role="tabpanel"]:not([hidden])',
-      );
-      const field = panel?.querySelector<HTMLElement>("input, textarea");
-      (field ?? panel?.querySelector<HTMLElement>("button"))?.focus();
-    }, 60);
+    setTimeout(() => whenThere(FORM, (form) => focusFirst(form, before), PATIENCE), 60);
   },
 };
 

@@ -18,6 +18,7 @@ import { useSinceOn } from "./use-since-on";
 
 const NEWEST = 10; // runs among which the last good one is sought
 const QUIET = 900; // ms without an edit, after which marks follow
+const IDLE = { timeout: 1_000 }; // ms: a page that draws nothing may not be called idle for many seconds
 const NONE: readonly never[] = [];
 
 /** Runs that went well are few enough to be asked for alone, once one has ended. */
@@ -51,7 +52,7 @@ function quietly(work: () => void): { soon(): void; stop(): void } {
   const soon = () => {
     stop();
     timer = setTimeout(() => {
-      idle = whenIdle(work) as number;
+      idle = whenIdle(work, IDLE) as number;
     }, QUIET);
   };
   return { soon, stop };
