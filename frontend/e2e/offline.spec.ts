@@ -62,8 +62,8 @@ function waiting(page: Page): Promise<Record<string, number>> {
 test("edits made while the server is gone survive closing the tab and are merged on return", async ({
   browser,
 }) => {
-  const ada = await product.person(browser, "Ada");
-  const mari = await product.person(browser, "Mari");
+  const ada = await product.person(browser, "Ada", { loadsAhead: true });
+  const mari = await product.person(browser, "Mari", { loadsAhead: true });
   const graph = await newGraph("survives");
   await enter(ada.page, graph);
   await add(ada.page, "Before");
@@ -94,8 +94,8 @@ test("edits made while the server is gone survive closing the tab and are merged
 
 test("on a shared tablet nobody's edits are sent under another name", async ({ browser }) => {
   test.skip(LONG !== "", LONG);
-  const ada = await product.person(browser, "Ada");
-  const mari = await product.person(browser, "Mari");
+  const ada = await product.person(browser, "Ada", { loadsAhead: true });
+  const mari = await product.person(browser, "Mari", { loadsAhead: true });
   const graph = await newGraph("shared");
   await enter(ada.page, graph);
   await add(ada.page, "First");
@@ -146,8 +146,8 @@ test("100 edits without a network and those of others meet: nothing is lost, and
 }) => {
   test.skip(LONG !== "", LONG);
   test.setTimeout(180_000);
-  const ada = await product.person(browser, "Ada");
-  const mari = await product.person(browser, "Mari");
+  const ada = await product.person(browser, "Ada", { loadsAhead: true });
+  const mari = await product.person(browser, "Mari", { loadsAhead: true });
   const graph = await newGraph("many");
   await enter(ada.page, graph);
   await add(ada.page, "Part");
@@ -192,7 +192,7 @@ test("the page opens without a server, with what the device keeps, and says what
   browser,
 }) => {
   test.skip(LONG !== "", LONG);
-  const ada = await product.person(browser, "Ada", { serviceWorkers: "allow" });
+  const ada = await product.person(browser, "Ada", { loadsAhead: true, serviceWorkers: "allow" });
   const graph = await newGraph("kept");
   await enter(ada.page, graph);
   await add(ada.page, "Kept");

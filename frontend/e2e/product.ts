@@ -163,10 +163,11 @@ export class Product {
   async person(
     browser: Browser,
     name: string,
-    options: Parameters<Browser["newContext"]>[0] = {},
+    { loadsAhead = !process.env.CI, ...options }: PersonOptions = {},
   ): Promise<Person> {
     const context = await browser.newContext(options);
     this.contexts.push(context);
+    if (!loadsAhead) await context.addInitScript(saveData);
     const page = await context.newPage();
     const failures: string[] = [];
     page.on("pageerror", (error) => failures.push(error.message));
@@ -177,6 +178,14 @@ export class Product {
     await field.waitFor({ state: "detached" });
     return { context, page, failures };
   }
+}
+
+/** `loadsAhead`: whether the page loads what it does not show yet while it has nothing to do, as it does but
+ * where data is to be saved. That costs more than the first page, so in CI only those do who need it. */
+export type PersonOptions = Parameters<Browser["newContext"]>[0] & { loadsAhead?: boolean };
+
+function saveData(): void {
+  Object.defineProperty(navigator, "connection", { value: { saveData: true } });
 }
 
 /** Somebody at a browser. `failures` are errors that the page threw. */

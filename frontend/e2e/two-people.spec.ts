@@ -10,8 +10,8 @@ let mari: Person;
 
 test.beforeAll(async ({ browser }) => {
   await product.start();
-  ada = await product.person(browser, "Ada");
-  mari = await product.person(browser, "Mari");
+  ada = await product.person(browser, "Ada", { loadsAhead: true });
+  mari = await product.person(browser, "Mari", { loadsAhead: true });
 });
 
 test.afterAll(() => product.dispose());
