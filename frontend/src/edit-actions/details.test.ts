@@ -4,8 +4,7 @@ import type { EditorContext } from "./editor-context";
 import { details } from "./notes";
 
 const context = { setPanel: () => {} } as unknown as EditorContext;
-const panel = (content: string) =>
-  `<section aria-label="Details"><div role="tabpanel">${content}</div></section>`;
+const form = (content: string) => `<div data-form>${content}</div>`;
 
 function later(): void {
   vi.advanceTimersByTime(200);
@@ -23,16 +22,17 @@ afterEach(() => {
 
 function show(content: string): void {
   const main = document.querySelector("main");
-  if (main !== null) main.innerHTML = panel(content);
+  if (main !== null) main.innerHTML = `<section aria-label="Details">${content}</section>`;
 }
 
 test("a form that is loaded only now gets the keyboard when it is there", () => {
   details.run(context);
   later();
-  show('<button id="problem"></button><div role="status" aria-busy="true">Loading …</div>');
+  const before = '<div data-form style="display: none !important"><input id="graph"></div>';
+  show(`<button id="problem"></button>${before}Loading …`);
   later();
   expect(document.activeElement?.id).toBe("card");
-  show('<button id="problem"></button><input id="name">');
+  show(`<button id="problem"></button>${form('<input id="name">')}`);
   later();
   expect(document.activeElement?.id).toBe("name");
 });
@@ -41,13 +41,13 @@ test("whoever types elsewhere by then stays there", () => {
   details.run(context);
   later();
   document.getElementById("search")?.focus();
-  show('<input id="name">');
+  show(form('<input id="name">'));
   later();
   expect(document.activeElement?.id).toBe("search");
 });
 
 test("where nothing can be typed the first button gets it", () => {
-  show('<button id="fix"></button>');
+  show(form('<button id="fix"></button>'));
   details.run(context);
   later();
   expect(document.activeElement?.id).toBe("fix");

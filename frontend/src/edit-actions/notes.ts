@@ -88,8 +88,8 @@ export const write: EditAction = {
   },
 };
 
-/** What shows the details, once its parts have been loaded. */
-const FORM = '[aria-label="Details"] [role="tabpanel"]:not([hidden], :has([aria-busy="true"]))';
+/** The form of what is chosen, once it has been loaded; the one before is hidden by React until then. */
+const FORM = '[aria-label="Details"] [data-form]:not([style*="display: none"])';
 const PATIENCE = 300; // frames, some seconds, for a form that has to be loaded first
 const TYPED_IN = "input, textarea, [contenteditable=true]";
 

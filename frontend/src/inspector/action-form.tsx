@@ -49,7 +49,7 @@ export function ActionForm({ action }: { action: Action }) {
   const { doc, graph, openOverlay } = useEditorContext();
   if (action.missing) return <Ghost action={action} />;
   return (
-    <div className={style.form}>
+    <div className={style.form} data-form>
       <div className={style.nameRow}>
         <NameField action={action} onRename={(name) => rename(doc, action.key, name)} />
         <SharedField of={action.key} field="number">
