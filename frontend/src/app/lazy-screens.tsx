@@ -3,6 +3,7 @@ import type { ReactNode } from "react";
 import { basePath } from "../api/page-url";
 import { type LazyPart, lazyPart, preloadParts } from "../ui/parts/lazy-part";
 import { PartBoundary } from "../ui/parts/part-boundary";
+import { whenIdle } from "../ui/parts/when-idle";
 import type { Crumb } from "../ui/top-bar";
 import { PageBar, PageFrame } from "./page-frame";
 
@@ -49,13 +50,11 @@ export async function preloadWhenIdle(): Promise<void> {
   if (!connection?.saveData) await preloadParts(idle);
 }
 
-const IDLE = { timeout: 2_000 }; // ms: a page that draws nothing may not be called idle for many seconds
+const IDLE_WITHIN = 2_000; // ms for each of them
 
 function idle(): Promise<void> {
   return new Promise((resolve) => {
-    // Safari has no such thing.
-    if (typeof requestIdleCallback === "undefined") setTimeout(resolve, 500);
-    else requestIdleCallback(() => resolve(), IDLE);
+    whenIdle(resolve, IDLE_WITHIN);
   });
 }
 

@@ -11,6 +11,7 @@ import { useEditorContext } from "../../edit-actions/editor-context";
 import { mapsFrom } from "../../graph/document-keys";
 import { readGraph } from "../../graph/read";
 import { useRoom } from "../../sync/use-room";
+import { whenIdle } from "../../ui/parts/when-idle";
 import { type GoodRun, goodRuns } from "../told/good-runs";
 import { SinceMarker } from "./since-marker";
 import { SinceSign } from "./since-sign";
@@ -18,7 +19,7 @@ import { useSinceOn } from "./use-since-on";
 
 const NEWEST = 10; // runs among which the last good one is sought
 const QUIET = 900; // ms without an edit, after which marks follow
-const IDLE = { timeout: 1_000 }; // ms: a page that draws nothing may not be called idle for many seconds
+const IDLE_WITHIN = 1_000; // ms
 const NONE: readonly never[] = [];
 
 /** Runs that went well are few enough to be asked for alone, once one has ended. */
@@ -42,17 +43,15 @@ function useLastGood(id: string): GoodRun | null {
 /** Calls `work` once nothing has happened for a while and the page has nothing else to do. */
 function quietly(work: () => void): { soon(): void; stop(): void } {
   let timer: ReturnType<typeof setTimeout> | undefined;
-  let idle = 0;
-  const whenIdle = globalThis.requestIdleCallback ?? ((run: () => void) => setTimeout(run, 50));
-  const never = globalThis.cancelIdleCallback ?? clearTimeout;
+  let callOff = () => {};
   const stop = () => {
     clearTimeout(timer);
-    never(idle as never);
+    callOff();
   };
   const soon = () => {
     stop();
     timer = setTimeout(() => {
-      idle = whenIdle(work, IDLE) as number;
+      callOff = whenIdle(work, IDLE_WITHIN);
     }, QUIET);
   };
   return { soon, stop };
