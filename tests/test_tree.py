@@ -1,5 +1,7 @@
-"""The tree of the server: folders that can be looked over, no circles, one name for one thing; and
-how long files and functions are, of the page's files too (its functions: `frontend/src/tree.test.ts`).
+"""Check the structure of the server: no import circles, few layers, tests that mirror the code.
+
+Two alarms, for the page's files too: a file of more than 700 lines and a function of more than 60
+statements need a reason. They ask for a look, not for a split by count.
 """
 
 import ast
@@ -13,27 +15,17 @@ import pytest
 PACKAGE: Final = "action_assistant"
 TESTS: Final = Path(__file__).parent
 SERVER: Final = TESTS.parent / "server" / PACKAGE
-MOST: Final = 15  # modules of a folder
 #: Below each of these, packages stand on so many floors at most.
 FLOORS: Final = {"runner": 6, "editor": 6, "web": 6, "umrf": 6}
 ROOT: Final = TESTS.parent
-LINES: Final = 400  # of a file
-OWN_LINES: Final = 40  # of a function
+LINES: Final = 700  # of a file
+STATEMENTS: Final = 60  # of a function, without the functions inside it
 SOURCES: Final = ("server", "tests", "bench", "frontend/src", "frontend/e2e")
 GENERATED: Final = ROOT / "frontend/src/api/schema"
 #: Files that are longer, and why a split would be worse.
-LONG_FILES: Final = {
-    "server/action_assistant/runner/execution/service.py": "starts and stops over the same open runs",
-    "server/action_assistant/runner/execution/run_loop.py": "all that one open run holds and does",
-    "server/action_assistant/umrf/semantics/core.py": "one recursion: results, runs, stops, pauses",
-}
+LONG_FILES: Final[dict[str, str]] = {}
 #: Functions that are longer, and why.
-LONG_FUNCTIONS: Final = {
-    "migrations/editor/editor_0001_log_and_catalogue.py upgrade": "migrations never change again",
-    "migrations/runner/runner_0001_log_and_runs.py upgrade": "migrations never change again",
-}
-#: Class names that stand in several modules, and why they may.
-SHARED: Final[dict[str, str]] = {}
+LONG_FUNCTIONS: Final[dict[str, str]] = {}
 
 
 def modules() -> dict[str, Path]:
@@ -96,15 +88,6 @@ PACKAGES: Final = sorted(name for name, path in MODULES.items() if path.name == 
 
 
 @pytest.mark.parametrize("package", PACKAGES)
-def test_a_folder_holds_neither_many_modules_nor_one(package: str) -> None:
-    folder = MODULES[package].parent
-    there = [path.stem for path in folder.glob("*.py") if path.stem != "__init__"]
-    below = [path for path in folder.iterdir() if (path / "__init__.py").exists()]
-    assert len(there) <= MOST, f"{len(there)} modules in {package}"
-    assert len(there) != 1 or below, f"{package} has one module: {there}"
-
-
-@pytest.mark.parametrize("package", PACKAGES)
 def test_imports_make_no_circles_between_what_stands_in_a_folder(package: str) -> None:
     floors(package)
 
@@ -126,36 +109,17 @@ def test_folders_of_tests_mirror_those_of_the_server() -> None:
     folders = {path.parent.relative_to(TESTS) for path in TESTS.rglob("test_*.py")}
     mirrored = {each for each in folders if each.parts and (SERVER / each.parts[0]).is_dir()}
     assert {str(each) for each in mirrored if not (SERVER / each / "__init__.py").exists()} == set()
-    for folder in mirrored:
-        assert len(list((TESTS / folder).glob("test_*.py"))) <= MOST, f"many tests in {folder}"
 
 
-def test_a_class_name_stands_in_one_module() -> None:
-    where = defaultdict(set)
-    for name, path in MODULES.items():
-        for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.ClassDef):
-                where[node.name].add(name)
-    several = {name: sorted(places) for name, places in where.items() if len(places) > 1}
-    assert {name: at for name, at in several.items() if name not in SHARED} == {}
-    assert set(SHARED) <= set(several), "a reason without a name that needs it"
-
-
-def own_lines(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
-    """From `def` to its end; functions inside, their decorators, and its docstring do not count."""
-    assert function.end_lineno is not None
-    lines = set(range(function.lineno, function.end_lineno + 1))
-    first = function.body[0]
-    inside: list[tuple[int, int | None]] = []
-    if ast.get_docstring(function, clean=False) is not None:
-        inside.append((first.lineno, first.end_lineno))
-    for node in ast.walk(function):
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and node is not function:
-            starts = [node.lineno, *(each.lineno for each in node.decorator_list)]
-            inside.append((min(starts), node.end_lineno))
-    for begin, end in inside:
-        lines -= set(range(begin, (end or begin) + 1))
-    return len(lines)
+def statements(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+    """Return the number of statements of a function, without those of functions inside it."""
+    count, waiting = 0, list(ast.iter_child_nodes(function))
+    while waiting:
+        node = waiting.pop()
+        count += isinstance(node, ast.stmt)
+        if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+            waiting.extend(ast.iter_child_nodes(node))
+    return count
 
 
 def test_functions_are_short() -> None:
@@ -165,8 +129,8 @@ def test_functions_are_short() -> None:
             for node in ast.walk(ast.parse(path.read_text())):
                 if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
                     name = f"{path.relative_to(ROOT)} {node.name}"
-                    found[name] = max(found[name], own_lines(node))
-    long = {name: lines for name, lines in found.items() if lines > OWN_LINES}
+                    found[name] = max(found[name], statements(node))
+    long = {name: lines for name, lines in found.items() if lines > STATEMENTS}
     assert {name: lines for name, lines in long.items() if name not in LONG_FUNCTIONS} == {}
     assert set(LONG_FUNCTIONS) <= set(long), "a reason without a function that needs it"
 
