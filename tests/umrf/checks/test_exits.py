@@ -8,14 +8,16 @@ whether it was FINISHED or stayed RUNNING with nothing running.
 
 import json
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from action_assistant.umrf.check import blocking, check
+from action_assistant.umrf.check import blocking, check, check_reading
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.fixes import fix
 from action_assistant.umrf.model import Graph
+from action_assistant.umrf.packages.structures import structure
 from action_assistant.umrf.semantics import Behaviour, Engine, Script
 
 ALL = {"on_true": "run", "on_false": "run", "on_error": "run", "on_stopped": "ignore"}
@@ -196,3 +198,60 @@ def test_a_sub_graph_that_stays_running_is_found_in_the_graph_around_it() -> Non
     ).graph
     certain = [p.code for p in check(outer, graphs={"g": decision()}) if p.severity == "error"]
     assert certain == ["subgraph"]
+
+
+CASES = Path(__file__).parent.parent / "cases"
+
+
+def test_an_output_that_nobody_gives_is_its_first_allowed_value() -> None:
+    """The product's own generated package does the same, and the engine FINISHES the graph."""
+    reading = codec.read((CASES / "allowed_output_at_exit.graph.json").read_text())
+    assert blocking(check_reading(reading)) == []
+    engine = Engine()
+    engine.start(reading.graph, 0.0)
+    engine.advance(60_000.0)
+    assert engine.states()["allowed_output_at_exit"].state == "FINISHED"
+
+
+@pytest.mark.parametrize(
+    ("leaf", "given", "left"),
+    [
+        ({"pvf_value": "bad", "pvf_allowed_values": ["ok", "bad"]}, None, "bad"),
+        ({"pvf_allowed_values": ["ok", "bad"]}, None, "ok"),
+        ({"pvf_allowed_values": ["ok", "bad"]}, {"text": "bad"}, "bad"),
+        ({"pvf_allowed_values": ["ok", "bad"]}, {"text": None}, "ok"),
+        ({"pvf_allowed_values": []}, None, ""),
+        ({}, None, ""),
+    ],
+)
+def test_an_output_has_one_default_everywhere(
+    leaf: dict[str, Any], given: dict[str, Any] | None, left: str
+) -> None:
+    """The simulator hands over what a generated package begins with."""
+    kept = {"name": "OxEcho", "instance_id": 1, "type": "sync", "input_parameters": {"text": TEXT}}
+    joined = graph([echo(0, **leaf), kept], [(0, 1, only("on_true"))], [0], [(1, ALL, True)])
+    engine = Engine(script=Script({"OxEcho_0": (Behaviour(outputs=given),)}))
+    engine.start(joined, 0.0)
+    engine.advance(1_500.0)
+    slot = engine.graphs["g"].nodes["OxEcho_1"].inputs["text"]
+    assert slot.value == left
+    if given is None:
+        structs, _ = structure(joined.actions[0], "output_parameters")
+        assert (structs.values[0].initial or "") == left
+
+
+def test_what_hangs_on_the_value_that_an_action_gives_is_not_certain() -> None:
+    """The other end could give one of the values that the exit takes in."""
+    ends = [work(0), echo(1), echo(2, pvf_allowed_values=["ok"])]
+    ways = [(0, 1, only("on_true")), (0, 2, only("on_false"))]
+    forked = graph(ends, ways, [0], [(1, ALL, False), (2, ALL, False)])
+    (told,) = [each for each in check(forked) if each.code == "H8"]
+    assert told.severity == "warning"
+
+
+def test_an_output_that_no_end_has_is_missed_for_certain() -> None:
+    ends = [work(0), work(1), echo(2, pvf_allowed_values=["ok"])]
+    ways = [(0, 1, only("on_true")), (0, 2, only("on_false"))]
+    forked = graph(ends, ways, [0], [(1, ALL, False), (2, ALL, False)])
+    (told,) = [each for each in check(forked) if each.code == "H8"]
+    assert told.severity == "error"

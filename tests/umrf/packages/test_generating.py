@@ -145,6 +145,27 @@ def test_an_output_is_its_first_allowed_value_until_the_action_says_otherwise(
     assert " x{};" in files["include/ta_try/input_parameters.hpp"].decode()
 
 
+@pytest.mark.parametrize(
+    ("kind", "value", "initial"),
+    [
+        ("string", "b", '{"b"}'),
+        ("number", 3, "{3.0}"),
+        ("bool", False, "{false}"),
+        ("strings", ['a "q"', ""], '{"a \\"q\\"", ""}'),
+        ("numbers", [1, -2.5], "{1.0, -2.5}"),
+        ("bools", [True, False], "{true, false}"),
+        ("strings", ["cut \x00 off"], "{}"),
+        ("numbers", [], "{}"),
+    ],
+)
+def test_an_output_with_a_value_has_it_until_the_action_says_otherwise(
+    kind: str, value: object, initial: str
+) -> None:
+    outputs = {"x": {"pvf_type": kind, "pvf_value": value}}
+    files = package_files(described(output_parameters=outputs))
+    assert f" x{initial};" in files["include/ta_try/output_parameters.hpp"].decode()
+
+
 def test_a_list_with_allowed_values_is_no_output() -> None:
     listed = {"a": {"pvf_type": "numbers", "pvf_allowed_values": [[1.5]]}}
     assert package_files(described(input_parameters=listed))

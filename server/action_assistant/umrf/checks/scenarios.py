@@ -9,7 +9,8 @@ from action_assistant.umrf.checks.trials import Coverage, Trial, Trials
 from action_assistant.umrf.courses.network import Network
 from action_assistant.umrf.fixes import with_optional_outputs
 from action_assistant.umrf.model import EXIT, Graph, Key, Relation, Severity
-from action_assistant.umrf.semantics.parts import exit_owner
+from action_assistant.umrf.semantics.parts import exit_inputs, exit_owner
+from action_assistant.umrf.semantics.values import slots_of
 
 _BLOCKED: Final = {"H2", "H6", "H7", "H8", "H9", "no-entry", "ghost", "actors"}
 
@@ -111,7 +112,9 @@ def _report_at_exit(subject: Subject, net: Network, found: list[Trial]) -> None:
         start = f"{trial.when}, the graph stays RUNNING for ever"
         if end.inputs and "" not in told:
             told.add("")
-            _report_outputs(subject, severity, start, net.names[end.last] if end.last >= 0 else "")
+            last = net.names[end.last] if end.last >= 0 else ""
+            certain = severity == "error" and not _may_fit(subject, last)
+            _report_outputs(subject, "error" if certain else "warning", start, last)
         for relation in _exits(subject.graph):
             name = subject.name(relation.parent)
             if name not in end.lacking or name in told:
@@ -125,6 +128,24 @@ def _report_at_exit(subject: Subject, net: Network, found: list[Trial]) -> None:
                 "H8", severity, message, relation=relation, member="/required",
                 fix="not-required" if is_mend else None,
             )  # fmt: skip
+
+
+def _may_fit(subject: Subject, last: str) -> bool:
+    """Whether another value than the default could be what the exit takes in: only actions know what they
+    give. Those of the action whose outputs the exit takes in count if it was the `last` to end."""
+    owner = exit_owner(subject.graph)
+    limited = {
+        name: slot.type
+        for name, slot in exit_inputs(subject.graph).items()
+        if slot.required and slot.allowed
+    }
+    ends = (subject.actions[r.parent] for r in _exits(subject.graph) if r.parent in subject.actions)
+    return any(
+        slot.type == limited.get(name)
+        for action in ends
+        if action is not owner or action.full_name == last
+        for name, slot in slots_of(action.outputs).items()
+    )
 
 
 def _report_outputs(subject: Subject, severity: Severity, start: str, last: str) -> None:

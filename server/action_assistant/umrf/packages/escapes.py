@@ -127,15 +127,21 @@ def cpp_string(text: str) -> CppString:
     return CppString(f'"{_CONTROLS.sub(octal, escaped)}"')
 
 
-def cpp_initial(value: str | float | bool | None) -> CppInitial:
-    """Empty braces for None. Raises ValueError for numbers that are none."""
+def cpp_initial(value: str | float | bool | tuple[str | float | bool, ...] | None) -> CppInitial:
+    """Return the initializer of a member; empty braces for None. Raises ValueError for numbers that are
+    none."""
+    values = () if value is None else value if isinstance(value, tuple) else (value,)
+    return CppInitial(f"{{{', '.join(map(_literal, values))}}}")
+
+
+def _literal(value: str | float | bool) -> str:
     if isinstance(value, str):
-        return CppInitial(f"{{{cpp_string(value)}}}")
-    if isinstance(value, bool) or value is None:
-        return CppInitial("{}" if value is None else f"{{{value}}}".lower())
+        return cpp_string(value)
+    if isinstance(value, bool):
+        return str(value).lower()
     if not math.isfinite(value):
         raise ValueError(f"no literal: {value!r}")
-    return CppInitial(f"{{{float(value)!r}}}")
+    return repr(float(value))
 
 
 def cpp_comment(text: str, indent: int = 0) -> CppComment:

@@ -12,6 +12,8 @@ from action_assistant.umrf.packages.naming import NameRefusal, member_name
 from action_assistant.umrf.parameters import MAX_PATH, fits, flat_name, keys_of
 
 Field: TypeAlias = Literal["input_parameters", "output_parameters"]
+Scalar: TypeAlias = str | float | bool
+Initial: TypeAlias = Scalar | tuple[Scalar, ...] | None
 
 #: C++ types by native ones. Of others the engine knows no value: it hands on what an action gave.
 CPP_TYPES: Final = {
@@ -33,7 +35,7 @@ class StructValue(msgspec.Struct, frozen=True):
     access: str
     kind: str
     required: bool
-    initial: str | float | bool | None = None
+    initial: Initial = None
 
     @property
     def cpp_type(self) -> str:
@@ -108,7 +110,7 @@ class _StructReader:
             access=".".join(names),
             kind=str(leaf["pvf_type"]),
             required=leaf.get("pvf_required") is not False,
-            initial=_first_allowed(leaf) if self.gives else None,
+            initial=_default(leaf) if self.gives else None,
         )
         other, there = group.members.setdefault(names[-1], (keys[-1], value))
         if there is not value:
@@ -186,12 +188,28 @@ def _allowed(leaf: dict[str, Json]) -> list[Json]:
     return allowed if isinstance(allowed, list) else [] if allowed is None else [allowed]
 
 
-def _first_allowed(leaf: dict[str, Json]) -> str | float | bool | None:
-    """An engine aborts at the end of an action that leaves such an output without value, so there is
-    one from the beginning. A text with NUL would end there in C++."""
-    for value in _allowed(leaf):
-        if isinstance(value, bool) or (isinstance(value, str) and "\x00" not in value):
-            return value
-        if isinstance(value, Number) and math.isfinite(value.value):
-            return value.value
+def _default(leaf: dict[str, Json]) -> Initial:
+    """What an output is until the action says otherwise, as in simulations: the value of the file, else
+    the first allowed one that C++ can spell. An engine aborts at the end of an action that leaves an
+    output with allowed values empty."""
+    given = [leaf["pvf_value"]] if "pvf_value" in leaf else []
+    return next(
+        (said for each in (*given, *_allowed(leaf)) if (said := _spelled(each)) is not None), None
+    )
+
+
+def _spelled(value: Json) -> Initial:
+    """The value where C++ has literals for it."""
+    if not isinstance(value, list):
+        return _scalar(value)
+    members = tuple(each for member in value if (each := _scalar(member)) is not None)
+    return members if len(members) == len(value) else None
+
+
+def _scalar(value: Json) -> Scalar | None:
+    """A single value where C++ has a literal for it. A text with NUL would end there."""
+    if isinstance(value, bool) or (isinstance(value, str) and "\x00" not in value):
+        return value
+    if isinstance(value, Number) and math.isfinite(value.value):
+        return value.value
     return None

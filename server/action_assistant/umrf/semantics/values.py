@@ -56,6 +56,13 @@ class Slot:
         """Whether there is something to work with."""
         return self.value is not MISSING
 
+    def default(self) -> Any:
+        """What an action that says nothing leaves here: the value of the file, else the first allowed
+        one, else the neutral one of its type. Generated packages begin with the same."""
+        if self.has_value():
+            return self.value
+        return self.allowed[0] if self.allowed else NEUTRAL.get(self.type, Opaque(self.type))
+
     def receive(self, kind: str, value: Any) -> None:
         """Takes what a parent hands over, unless type, lock or allowed values forbid it."""
         if value is MISSING or kind != self.type or not self.updatable:
@@ -88,13 +95,12 @@ def slots_of(parameters: Iterable[Parameter]) -> dict[str, Slot]:
 
 
 def fill_outputs(outputs: dict[str, Slot], given: dict[str, Any] | None) -> None:
-    """What an action leaves behind: the script's value, else `pvf_value`, else a neutral one."""
+    """Fill what an action leaves behind: the script's value, else the default of the output."""
     for name, slot in outputs.items():
         value = (given or {}).get(name)
-        if value is not None:
-            slot.value = float(value) if type(value) is int else value
-        elif slot.value is MISSING:
-            slot.value = NEUTRAL.get(slot.type, Opaque(slot.type))
+        if value is None:
+            value = slot.default()
+        slot.value = float(value) if type(value) is int else value
 
 
 def hand_over(outputs: dict[str, Slot], remap: Sequence[Remap], inputs: dict[str, Slot]) -> None:
