@@ -172,3 +172,96 @@ test("functions are short", { timeout: 60_000 }, () => {
   const names = new Set(long.map(([name]) => name));
   expect(Object.keys(LONG_FUNCTIONS).filter((name) => !names.has(name))).toEqual([]);
 });
+
+/** What tells which key was pressed; `ui/keys.ts` alone reads it. */
+const KEY_MEMBERS = new Set(["key", "code", "keyCode", "which", "charCode"]);
+const ONLY_OF_KEYS = new Set(["isComposing", "keyCode", "charCode"]);
+const KEY_EVENTS = new Set(["keydown", "keyup", "keypress"]);
+
+/** Whether a function is given as a handler of keys, or something that holds it says so in its type. */
+function handlesKeys(node: ts.SignatureDeclaration): boolean {
+  for (let at: ts.Node = node; at.parent !== undefined; at = at.parent) {
+    const { parent } = at;
+    if (ts.isJsxAttribute(parent)) return parent.name.getText().startsWith("onKey");
+    if (ts.isPropertyAssignment(parent)) return parent.name.getText().startsWith("onKey");
+    if (ts.isCallExpression(parent)) {
+      const [kind] = parent.arguments;
+      return kind !== undefined && ts.isStringLiteral(kind) && KEY_EVENTS.has(kind.text);
+    }
+    if (ts.isVariableDeclaration(parent)) return /Keyboard/.test(parent.type?.getText() ?? "");
+    if (ts.isBinaryExpression(parent)) {
+      const holder = parent.left.getText().replace(/\.current$/, "");
+      const line = new RegExp(`\\b${holder}\\b.*`).exec(node.getSourceFile().text)?.[0] ?? "";
+      return /Keyboard/.test(line);
+    }
+    if (ts.isStatement(parent)) return false;
+  }
+  return false;
+}
+
+const isKeyEvent = (parameter: ts.ParameterDeclaration): boolean => {
+  const type = parameter.type?.getText() ?? "";
+  if (/Keyboard|KeyPress|\bPressed\b/.test(type)) return true;
+  return parameter.parent.parameters[0] === parameter && handlesKeys(parameter.parent);
+};
+
+/** Return where a file reads by itself which key was pressed, or whether an input method composes. */
+function keyReadings(file: string, text = textOf(file)): string[] {
+  if (!/Keyboard|KeyPress|Pressed|\bonKey|"key(?:down|up|press)"|\bevent\.key\b/.test(text))
+    return [];
+  const source = ts.createSourceFile(file, text, ts.ScriptTarget.Latest, true);
+  const found: string[] = [];
+  const report = (node: ts.Node) => {
+    const { line } = source.getLineAndCharacterOfPosition(node.getStart());
+    found.push(`${file}:${line + 1} ${node.getText()}`);
+  };
+  const visit = (node: ts.Node, events: ReadonlySet<string>): void => {
+    let known = events;
+    if (ts.isFunctionLike(node)) {
+      const own = node.parameters.filter(isKeyEvent);
+      for (const { name } of own.filter((each) => ts.isObjectBindingPattern(each.name))) {
+        for (const each of (name as ts.ObjectBindingPattern).elements)
+          if (KEY_MEMBERS.has((each.propertyName ?? each.name).getText())) report(each);
+      }
+      known = new Set([...events, ...own.map(({ name }) => name.getText())]);
+    }
+    if (ts.isPropertyAccessExpression(node)) {
+      const [whose, member] = [node.expression.getText(), node.name.text];
+      const named = member === "key" && /^(?:event|evt|ev|e)$/.test(whose);
+      const ofEvent = named || known.has(whose.replace(/\.nativeEvent$/, ""));
+      if (ONLY_OF_KEYS.has(member) || (ofEvent && KEY_MEMBERS.has(member))) report(node);
+    }
+    if (
+      ts.isVariableDeclaration(node) &&
+      ts.isObjectBindingPattern(node.name) &&
+      known.has(node.initializer?.getText() ?? "")
+    ) {
+      for (const each of node.name.elements)
+        if (KEY_MEMBERS.has((each.propertyName ?? each.name).getText())) report(each);
+    }
+    ts.forEachChild(node, (child) => visit(child, known));
+  };
+  visit(source, new Set());
+  return found;
+}
+
+test("only ui/keys.ts reads which key was pressed, for every layout and input method", () => {
+  expect(modules.filter((file) => file !== "ui/keys.ts").flatMap((f) => keyReadings(f))).toEqual(
+    [],
+  );
+});
+
+test.each([
+  'window.addEventListener("keydown", (press) => press.key === "z");',
+  'window.addEventListener("keydown", ({ key }) => key === "z");',
+  "const f = (press: React.KeyboardEvent) => press.code;",
+  "const f = (press: KeyboardEvent) => { const { key } = press; };",
+  "const f: React.KeyboardEventHandler = (press) => press.key;",
+  "const f = (event: { key: string }) => event.key;",
+  "const f = useRef<(event: KeyboardEvent) => boolean>(none);\nf.current = ({ key }) => key;",
+  'const a = <input onKeyDown={(press) => press.key === "Enter"} />;',
+  "const a = <input onKeyDown={(press) => press.nativeEvent.isComposing} />;",
+  "const a = { onKeyUp: (press) => press.which };",
+])("a handler that reads keys by itself is found: %s", (text) => {
+  expect(keyReadings("handler.tsx", text)).toHaveLength(1);
+});

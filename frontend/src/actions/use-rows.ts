@@ -1,13 +1,14 @@
 /** Keys and presses of a list of links: one listener for all of them, however many there are. */
 import { type RefObject, useEffect } from "react";
 import { useLocation, useRouter } from "wouter";
+import { keyOf } from "../ui/keys";
 
 /** Up and down go from row to row, and from the search into the list. */
 export function useRowKeys(list: RefObject<HTMLElement | null>): void {
   useEffect(() => {
     const element = list.current;
     const walk = (event: KeyboardEvent) => {
-      const step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
+      const step = { ArrowDown: 1, ArrowUp: -1 }[keyOf(event)];
       if (step === undefined || element === null) return;
       const rows = [...element.querySelectorAll<HTMLElement>("[data-row], [data-search]")];
       const at = rows.findIndex((row) => row.contains(document.activeElement));

@@ -1,4 +1,6 @@
 /** Handles of the outcomes of a chosen arrow, on its pill: each can be led to another card. */
+
+import { keyOf } from "../ui/keys";
 import { useOutcomeDrag } from "./arrows/outcome-drag";
 import { OutcomeSign, outcomeColor, outcomeWord } from "./outcome";
 import style from "./outcome-arrow.module.css";
@@ -22,7 +24,7 @@ export function OutcomeHandles(props: Parameters<typeof useOutcomeDrag>[0]) {
       onPointerCancel={drag.stop}
       // The arrow has its own answer to these two; every other key is a shortcut as elsewhere.
       onKeyDown={(event) => {
-        if (event.key === "Enter" || event.key === " ") event.stopPropagation();
+        if (["Enter", " "].includes(keyOf(event))) event.stopPropagation();
       }}
       onClick={(event) => {
         event.stopPropagation();

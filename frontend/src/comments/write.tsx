@@ -2,6 +2,7 @@
 import { Button, Textarea } from "@mantine/core";
 import { type ReactNode, useState } from "react";
 import { printedKeys } from "../edit-actions/edit-action";
+import { keyOf } from "../ui/keys";
 import style from "./comments.module.css";
 
 interface WriteProps {
@@ -40,8 +41,9 @@ export function Write({ label, button, onSay, autoFocus = false, onCancel, child
         value={text}
         onChange={(event) => setText(event.currentTarget.value)}
         onKeyDown={(event) => {
-          if (event.key === "Enter" && (event.ctrlKey || event.metaKey)) say();
-          if (event.key === "Escape") onCancel?.();
+          const key = keyOf(event);
+          if (key === "Enter" && (event.ctrlKey || event.metaKey)) say();
+          if (key === "Escape") onCancel?.();
         }}
       />
       {text !== "" && children}

@@ -30,6 +30,19 @@ test("undo and redo are told apart by Shift", () => {
   expect(editActionFor(EDIT_ACTIONS, press("z"))?.name).toBe("zoom-selection");
 });
 
+test("shortcuts work on Cyrillic, Greek and Arabic layouts, by the place of the key", () => {
+  const typed = (key: string, code: string, mods = {}) => ({ ...press(key, mods), code });
+  const nameOf = (event: ReturnType<typeof typed>) => editActionFor(EDIT_ACTIONS, event)?.name;
+  for (const key of ["я", "ζ", "ئ", "ㅋ"]) {
+    expect(nameOf(typed(key, "KeyZ", { ctrlKey: true }))).toBe("undo");
+    expect(nameOf(typed(key, "KeyZ", { ctrlKey: true, shiftKey: true }))).toBe("redo");
+  }
+  expect(nameOf(typed("с", "KeyC"))).toBe("connect"); // the Cyrillic letter
+  expect(nameOf(typed("w", "KeyZ", { ctrlKey: true }))).toBeUndefined(); // French
+  const composing = { ...typed("Enter", "Enter"), isComposing: true };
+  expect(editActionFor(EDIT_ACTIONS, composing)).toBeNull();
+});
+
 test("letters that stand alone can be switched off, and nothing else with them", () => {
   expect(editActionFor(EDIT_ACTIONS, press("c"))?.name).toBe("connect");
   expect(editActionFor(EDIT_ACTIONS, press("c"), false)).toBeNull();

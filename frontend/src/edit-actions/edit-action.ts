@@ -1,5 +1,6 @@
 /** An edit action: something a person can do in the editor, as a value. Toolbar, menus, palette, keys and help are made of these. */
 import type { Icon } from "@tabler/icons-react";
+import { type KeyPress, keysOf } from "../ui/keys";
 import type { EditorContext } from "./editor-context";
 
 /** Under which heading help and menus list it. */
@@ -38,8 +39,7 @@ export function labelOf(editAction: EditAction, context: EditorContext): string 
 
 export const onMac = typeof navigator !== "undefined" && /Mac|iP(hone|ad)/.test(navigator.platform);
 
-export interface Pressed {
-  readonly key: string;
+export interface Pressed extends KeyPress {
   readonly ctrlKey: boolean;
   readonly metaKey: boolean;
   readonly shiftKey: boolean;
@@ -47,14 +47,20 @@ export interface Pressed {
 }
 
 /** Whether a key press is this shortcut. */
-export function isPressed(shortcut: string, event: Pressed, mac = onMac): boolean {
+export function isPressed(
+  shortcut: string,
+  event: Pressed,
+  mac = onMac,
+  pressed = keysOf(event),
+): boolean {
   const parts = shortcut.split("+");
   const last = parts.pop() ?? "";
   const key = last === "Plus" ? "+" : last;
   const mod = mac ? event.metaKey : event.ctrlKey;
   const other = mac ? event.ctrlKey : event.metaKey;
-  const letter =
-    key.length === 1 ? event.key.toLowerCase() === key.toLowerCase() : event.key === key;
+  const letter = pressed.some((name) =>
+    key.length === 1 ? name.toLowerCase() === key.toLowerCase() : name === key,
+  );
   // Signs such as "+" or "?" carry their own Shift on some keyboards.
   const sign = key.length === 1 && !/[a-z0-9]/i.test(key);
   const shift = sign || event.shiftKey === parts.includes("Shift");
@@ -100,9 +106,12 @@ export function editActionFor(
   event: Pressed,
   singles = true,
 ): EditAction | null {
-  return (
+  const found = keysOf(event).map((pressed) =>
     editActions.find((editAction) =>
-      editAction.shortcuts.some((key) => (singles || !isSingleKey(key)) && isPressed(key, event)),
-    ) ?? null
+      editAction.shortcuts.some(
+        (key) => (singles || !isSingleKey(key)) && isPressed(key, event, onMac, [pressed]),
+      ),
+    ),
   );
+  return found.find((editAction) => editAction !== undefined) ?? null;
 }

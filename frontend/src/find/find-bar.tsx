@@ -22,6 +22,7 @@ import { expandedGraphs } from "../canvas/levels/expanded-graphs";
 import { printedKeys } from "../edit-actions/edit-action";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { Tooltip } from "../ui/floating/tooltip";
+import { keyOf } from "../ui/keys";
 import { find, findInside, type Hit } from "./find";
 import style from "./find-bar.module.css";
 
@@ -119,8 +120,9 @@ export function FindBar({ problems, onClose }: Props) {
     if (old instanceof HTMLElement) old.focus();
   };
   const onKey = (event: React.KeyboardEvent) => {
-    const step = { ArrowDown: 1, ArrowUp: -1, Enter: event.shiftKey ? -1 : 1 }[event.key];
-    if (event.key === "Escape") close();
+    const key = keyOf(event);
+    const step = { ArrowDown: 1, ArrowUp: -1, Enter: event.shiftKey ? -1 : 1 }[key];
+    if (key === "Escape") close();
     else if (step !== undefined) {
       // The first Enter goes to the first hit, later ones on.
       const fresh = !context.selection.has(hits[current]?.id.split("/")[0] ?? "");

@@ -18,6 +18,7 @@ import { useSelectedByOthers } from "../sync/use-room";
 import { announcer } from "../ui/announcer";
 import { Empty } from "../ui/empty";
 import { useIsPhone } from "../ui/hooks/use-screen-size";
+import { keyOf } from "../ui/keys";
 import style from "./outline.module.css";
 import { OutlineRow, type RowHandlers } from "./outline-row";
 import { PhoneRow } from "./phone-row";
@@ -165,13 +166,14 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
     const target = event.target as HTMLElement;
     if (row === undefined || target.dataset.row === undefined || event.ctrlKey || event.metaKey)
       return;
+    const key = keyOf(event);
     const rowAction = rowActionFor(row, event);
-    const next = event.altKey ? null : stepFrom(rows, at, event.key);
-    const opens = event.key === "ArrowRight" && row.open === false;
-    const closes = event.key === "ArrowLeft" && row.open === true;
+    const next = event.altKey ? null : stepFrom(rows, at, key);
+    const opens = key === "ArrowRight" && row.open === false;
+    const closes = key === "ArrowLeft" && row.open === true;
     if (opens || closes) flip(row.id);
     else if (next !== null && next >= 0) focus(next);
-    else if (event.key === " ") choose(row);
+    else if (key === " ") choose(row);
     else if (rowAction) act(rowAction, row);
     else return;
     event.preventDefault();

@@ -13,6 +13,7 @@ import {
 } from "../graph/edit";
 import { type Action, ENTRY, type Key, type Precondition, spokenOutcomes } from "../graph/model";
 import { endName } from "../graph/relation-words";
+import { type KeyPress, keyOf } from "../ui/keys";
 import type { RowEditKind } from "./row-edit";
 import type { BundleRow, OutlineItem } from "./rows";
 
@@ -27,7 +28,7 @@ export interface RowAction {
     | "enter"
     | "expand";
   readonly label: string;
-  /** As in `KeyboardEvent.key`, with `Alt+` before it where needed. */
+  /** As named by `keyOf`, with `Alt+` before it where needed. */
   readonly key: string;
   readonly changes: boolean;
 }
@@ -89,9 +90,9 @@ export function rowActionsOf(row: OutlineItem): readonly RowAction[] {
 
 export function rowActionFor(
   row: OutlineItem,
-  event: { key: string; altKey: boolean },
+  event: KeyPress & { readonly altKey: boolean },
 ): RowAction | null {
-  const pressed = event.altKey ? `Alt+${event.key}` : event.key;
+  const pressed = event.altKey ? `Alt+${keyOf(event)}` : keyOf(event);
   const key = pressed === "Backspace" ? "Delete" : pressed;
   return rowActionsOf(row).find((rowAction) => rowAction.key === key) ?? null;
 }

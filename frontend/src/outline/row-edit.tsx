@@ -8,6 +8,7 @@ import { asOneEdit, connect, rename, retarget, setEntry, setResponse } from "../
 import { changeNote } from "../graph/edit/notes";
 import { ENTRY, EXIT, type Precondition, RESPONSES, type Response } from "../graph/model";
 import { endName } from "../graph/relation-words";
+import { keyOf } from "../ui/keys";
 import style from "./outline.module.css";
 import { outcomesOf } from "./row-actions";
 import type { OutlineItem } from "./rows";
@@ -47,8 +48,9 @@ function Rename({ row, onDone }: Props) {
       onFocus={(event) => event.currentTarget.select()}
       onChange={(event) => setName(event.currentTarget.value)}
       onKeyDown={(event) => {
-        if (event.key === "Enter") save();
-        if (event.key === "Escape") onDone(null);
+        const key = keyOf(event);
+        if (key === "Enter") save();
+        if (key === "Escape") onDone(null);
       }}
       onBlur={save}
     />
@@ -88,7 +90,7 @@ function Connect({ row, onDone }: Props) {
         value={null}
         onChange={to}
         onKeyDown={(event) => {
-          if (event.key === "Escape") onDone(null);
+          if (keyOf(event) === "Escape") onDone(null);
         }}
         flex={1}
       />
@@ -128,7 +130,7 @@ function Pick({ row, change, onDone }: Props) {
       value={response ? row.response : row.relation.child}
       onChange={pick}
       onKeyDown={(event) => {
-        if (event.key === "Escape") onDone(null);
+        if (keyOf(event) === "Escape") onDone(null);
       }}
     />
   );
@@ -153,11 +155,12 @@ function Write({ row, onDone }: Props) {
       value={text}
       onChange={(event) => setText(event.currentTarget.value)}
       onKeyDown={(event) => {
-        if (event.key === "Enter" && !event.shiftKey) {
+        const key = keyOf(event);
+        if (key === "Enter" && !event.shiftKey) {
           event.preventDefault();
           save();
         }
-        if (event.key === "Escape") onDone(null);
+        if (key === "Escape") onDone(null);
       }}
       onBlur={save}
     />

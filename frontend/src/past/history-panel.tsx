@@ -8,6 +8,7 @@ import { errorText } from "../api/http";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { doneWords } from "../history/history-words";
 import { usePersonColors, useThrottledLink } from "../sync/use-room";
+import { keyOf } from "../ui/keys";
 import { Segments } from "../ui/segments";
 import { day, useNow } from "../ui/times";
 import { EntryRow } from "./entry-row";
@@ -23,12 +24,13 @@ const sentence = (words: string): string => words.charAt(0).toUpperCase() + word
 
 /** ↑ and ↓ go from entry to entry, and to the ways back of the chosen one by Tab. */
 function onArrowKeys(event: KeyboardEvent<HTMLElement>): void {
-  if (event.key !== "ArrowDown" && event.key !== "ArrowUp") return;
+  const step = { ArrowDown: 1, ArrowUp: -1 }[keyOf(event)];
+  if (step === undefined) return;
   const all = [...event.currentTarget.querySelectorAll<HTMLElement>("[data-entry], [data-run] a")];
   const at = all.indexOf(document.activeElement as HTMLElement);
   if (at < 0) return;
   event.preventDefault();
-  all[at + (event.key === "ArrowDown" ? 1 : -1)]?.focus();
+  all[at + step]?.focus();
 }
 
 /** What is said of an entry besides what it changed. */

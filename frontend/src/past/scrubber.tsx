@@ -2,6 +2,7 @@
 import type { CSSProperties, KeyboardEvent } from "react";
 import type { Version } from "../api/graphs";
 import { authorName, versionName } from "../api/graphs";
+import { keyOf } from "../ui/keys";
 import style from "./scrubber.module.css";
 import { momentAt, type TimelineItem } from "./told/timeline";
 
@@ -66,8 +67,9 @@ export function Scrubber(props: Props) {
   const place = (seq: number) => ({ "--at": (seq - 1) / span }) as CSSProperties;
   const [from, to] = [Math.min(at, other ?? at), Math.max(at, other ?? at)];
   const onKeyDown = (event: KeyboardEvent) => {
-    const by = STEPS.get(event.key);
-    if (by === undefined && event.key !== "Escape") return;
+    const key = keyOf(event);
+    const by = STEPS.get(key);
+    if (by === undefined && key !== "Escape") return;
     event.preventDefault();
     event.stopPropagation();
     if (by === undefined) onLeave();

@@ -5,6 +5,7 @@ import type { Arrow, CanvasNode } from "../canvas/elements";
 import type { CanvasView as BenchView } from "../edit-actions/editor-context";
 import type { SharedView } from "../sync/presence/presence";
 import { useFollowing, useRoom } from "../sync/use-room";
+import { keyOf } from "../ui/keys";
 
 const GLIDE = 120; // ms; views come at most every 50 ms
 
@@ -81,7 +82,8 @@ export function useFollowedView({ flow, frame, view: own, onPanned }: FollowedVi
     if (whom === null) return;
     onPanned();
     const onKey = (event: KeyboardEvent) => {
-      if (event.key !== "Escape" || (event.target as Element | null)?.closest?.(OWN_ESCAPE)) return;
+      if (keyOf(event) !== "Escape" || (event.target as Element | null)?.closest?.(OWN_ESCAPE))
+        return;
       event.preventDefault(); // it has done its work
       follow(null);
     };

@@ -4,6 +4,7 @@ import { IconAdjustmentsHorizontal } from "@tabler/icons-react";
 import { useEffect, useState } from "react";
 import { useGraphs, useVersions, versionName } from "../api/graphs";
 import type { RunFilter } from "../api/review";
+import { keyOf } from "../ui/keys";
 
 interface Props {
   filter: RunFilter;
@@ -39,7 +40,7 @@ function Person({ filter, onChange }: Props) {
       value={text}
       onChange={(event) => setText(event.currentTarget.value)}
       onBlur={take}
-      onKeyDown={(event) => event.key === "Enter" && take()}
+      onKeyDown={(event) => keyOf(event) === "Enter" && take()}
     />
   );
 }

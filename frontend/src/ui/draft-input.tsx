@@ -1,6 +1,7 @@
 /** A field with a draft of its own: what is typed is written when it fits and the typing pauses. */
 import { Textarea, TextInput, type TextInputProps } from "@mantine/core";
 import { useCallback, useEffect, useRef, useState } from "react";
+import { keyOf } from "./keys";
 
 const PAUSE = 700; // ms
 
@@ -75,7 +76,7 @@ export function DraftInput(props: Props) {
     spellCheck: false,
   };
   const onEscape = (event: React.KeyboardEvent) => {
-    if (event.key !== "Escape") return;
+    if (keyOf(event) !== "Escape") return;
     clearTimeout(timer.current);
     unwritten.current = false;
     setDraft(null);
@@ -103,7 +104,7 @@ export function DraftInput(props: Props) {
       onChange={(event) => change(event.currentTarget.value)}
       onKeyDown={(event) => {
         onEscape(event);
-        if (event.key === "Enter") leave();
+        if (keyOf(event) === "Enter") leave();
       }}
     />
   );

@@ -2,6 +2,7 @@
 import { Kbd, TextInput } from "@mantine/core";
 import { IconSearch } from "@tabler/icons-react";
 import { type ReactNode, useEffect, useId, useRef, useState } from "react";
+import { keyOf } from "./keys";
 import style from "./pick-list.module.css";
 
 export interface Option {
@@ -121,11 +122,12 @@ export function PickList(props: Props) {
   };
   const onKeyDown = (event: React.KeyboardEvent) => {
     const last = options.length - 1;
-    if (event.key === "ArrowDown") setAt((i) => (i >= last ? 0 : i + 1));
-    else if (event.key === "ArrowUp") setAt((i) => (i <= 0 ? last : i - 1));
-    else if (event.key === "Home" && search === "") setAt(0);
-    else if (event.key === "End" && search === "") setAt(last);
-    else if (event.key === "Enter") pick(options[at]);
+    const key = keyOf(event);
+    if (key === "ArrowDown") setAt((i) => (i >= last ? 0 : i + 1));
+    else if (key === "ArrowUp") setAt((i) => (i <= 0 ? last : i - 1));
+    else if (key === "Home" && search === "") setAt(0);
+    else if (key === "End" && search === "") setAt(last);
+    else if (key === "Enter") pick(options[at]);
     else if (search !== "" || !onEmptyKey?.(event)) return;
     event.preventDefault();
     event.stopPropagation();

@@ -1,5 +1,6 @@
 /** Drag and drop by pointer events, so that it works for fingers too. */
 import { type PointerEvent as ReactPointerEvent, useEffect, useSyncExternalStore } from "react";
+import { keyOf } from "./keys";
 import style from "./pointer-drag.module.css";
 
 export interface DraggedItem<T> {
@@ -46,7 +47,7 @@ export class PointerDrag<T> {
     };
     const end = (drop: boolean) => (up: PointerEvent | KeyboardEvent) => {
       if ("pointerId" in up && up.pointerId !== id) return;
-      if ("key" in up && up.key !== "Escape") return;
+      if (up instanceof KeyboardEvent && keyOf(up) !== "Escape") return;
       window.removeEventListener("pointermove", onMove);
       window.removeEventListener("pointerup", onUp);
       window.removeEventListener("pointercancel", onCancel);

@@ -2,6 +2,7 @@
 
 import { Fragment, type ReactNode, useState } from "react";
 import { Link, useRouter } from "wouter";
+import { keyOf } from "./keys";
 import style from "./top-bar.module.css";
 
 export interface Crumb {
@@ -68,8 +69,9 @@ function Here({ crumb: { label, rename } }: { crumb: Crumb }) {
       onFocus={(event) => event.currentTarget.select()}
       onBlur={(event) => save(event.currentTarget.value)}
       onKeyDown={(event) => {
-        if (event.key === "Enter") save(event.currentTarget.value);
-        if (event.key === "Escape") setWriting(false);
+        const key = keyOf(event);
+        if (key === "Enter") save(event.currentTarget.value);
+        if (key === "Escape") setWriting(false);
       }}
     />
   );

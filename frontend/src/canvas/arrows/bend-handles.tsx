@@ -2,6 +2,7 @@
 import { EdgeLabelRenderer, useStore } from "@xyflow/react";
 import { type KeyboardEvent, use, useContext, useEffect, useRef } from "react";
 import { MOST_WAYPOINTS } from "../../graph/waypoints";
+import { keyOf } from "../../ui/keys";
 import { type BendHandle, useBendDrag, withBend } from "./bend-drag";
 import style from "./bend-handles.module.css";
 import { middlesOf } from "./bend-places";
@@ -83,12 +84,13 @@ function Handles({ arrow, bundle, line, editing }: Props & { editing: LineEditin
     change(withBend(line.via, handle, at), handle.index, dx !== 0 || dy !== 0);
   };
   const onKeyDown = (event: KeyboardEvent, handle: BendHandle) => {
-    const way = WAYS[event.key];
+    const key = keyOf(event);
+    const way = WAYS[key];
     const by = event.shiftKey ? FAR : 1;
-    const gone = handle.kind === "bend" && ["Delete", "Backspace"].includes(event.key);
+    const gone = handle.kind === "bend" && ["Delete", "Backspace"].includes(key);
     if (way) add(handle, [way[0] * by, way[1] * by]);
     else if (gone) remove(handle);
-    else if (event.key === "Escape" && dragged) drag.end(false);
+    else if (key === "Escape" && dragged) drag.end(false);
     else return;
     event.preventDefault();
     event.stopPropagation();

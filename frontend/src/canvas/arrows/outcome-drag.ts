@@ -2,6 +2,7 @@
 import { useReactFlow } from "@xyflow/react";
 import { type PointerEvent, useEffect, useRef, useState } from "react";
 import type { Precondition } from "../../graph/model";
+import { keyOf } from "../../ui/keys";
 import type { Bundle } from "./bundles";
 import type { LineEditing } from "./line-store";
 import type { Point } from "./scene";
@@ -33,7 +34,7 @@ export function useOutcomeDrag({ bundle, editing, onDrag }: Dragging) {
   useEffect(() => {
     if (dragged === null) return;
     const onKey = (event: KeyboardEvent) => {
-      if (event.key !== "Escape") return;
+      if (keyOf(event) !== "Escape") return;
       event.stopPropagation();
       stop();
     };

@@ -2,6 +2,7 @@
 import { Portal } from "@mantine/core";
 import { type RefObject, use, useEffect, useId, useMemo, useRef, useState } from "react";
 import { linkText, type OpenLink, openLink } from "../../graph/note-links";
+import { keyOf } from "../../ui/keys";
 import { matching, OptionList, optionId } from "../../ui/pick-list";
 import { NoteLinksContext } from "./action-link";
 import style from "./link-completion.module.css";
@@ -46,11 +47,12 @@ function useKeys(
     if (area === null) return;
     const onKey = (event: KeyboardEvent) => {
       const { offer, set, take } = now.current;
-      if (offer === null || event.isComposing || event.ctrlKey || event.metaKey) return;
-      if (event.key === "ArrowDown") set(turned(offer, 1));
-      else if (event.key === "ArrowUp") set(turned(offer, -1));
-      else if (event.key === "Escape") set(null);
-      else if ((event.key === "Enter" || event.key === "Tab") && !event.shiftKey) {
+      if (offer === null || event.ctrlKey || event.metaKey) return;
+      const key = keyOf(event);
+      if (key === "ArrowDown") set(turned(offer, 1));
+      else if (key === "ArrowUp") set(turned(offer, -1));
+      else if (key === "Escape") set(null);
+      else if ((key === "Enter" || key === "Tab") && !event.shiftKey) {
         take(offer.options[offer.chosen]?.id);
       } else return;
       event.preventDefault();

@@ -5,6 +5,7 @@ import { type NodeProps, NodeResizer, NodeToolbar, Position } from "@xyflow/reac
 import { createContext, memo, use, useEffect, useRef } from "react";
 import { type NewNote, NOTE_COLORS, type Note } from "../../graph/edit/notes";
 import { Tooltip } from "../../ui/floating/tooltip";
+import { keyOf } from "../../ui/keys";
 import { useChangeMark } from "../changes/change-marks";
 import { ChangeTag } from "../changes/change-tag";
 import { FoldButton } from "./fold-button";
@@ -52,9 +53,9 @@ export function NoteField({ note, notes }: { note: Note; notes: NoteEditing }) {
         onBlur={done}
         onKeyDown={(event) => {
           event.stopPropagation();
-          const ends =
-            event.key === "Enter" && (note.kind === "frame" || event.ctrlKey || event.metaKey);
-          if (event.key !== "Escape" && !ends) return;
+          const key = keyOf(event);
+          const ends = key === "Enter" && (note.kind === "frame" || event.ctrlKey || event.metaKey);
+          if (key !== "Escape" && !ends) return;
           event.preventDefault();
           const card = event.currentTarget.closest<HTMLElement>(".react-flow__node");
           done();

@@ -44,6 +44,15 @@ test("STOP's keys are nobody else's, whatever is held with them and whatever was
   expect(refusalOf(shortcutOf(press(".", "M"), true) ?? "")).toMatch(/STOP/);
 });
 
+test("shortcuts of one's own are the same on every layout, and older ones of other scripts stay", () => {
+  expect(shortcutOf({ ...press("ы", "C"), code: "KeyS" }, false)).toBe("Mod+s");
+  const stop = shortcutOf({ ...press("ю", "C"), code: "Period" }, false) ?? "";
+  expect(refusalOf(stop)).toMatch(/STOP/);
+  const own = assigned(EDIT_ACTIONS, {}, "tidy", ["ф"]);
+  const pressed = { ...press("ф"), code: "KeyA" };
+  expect(editActionFor(withOwn(EDIT_ACTIONS, own), pressed)?.name).toBe("tidy");
+});
+
 test("what browsers, screen readers and the walk through the page need is refused with its reason", () => {
   expect(refusalOf("Mod+w")).toMatch(/Browsers/);
   expect(refusalOf("Mod+Alt+k")).toMatch(/Screen readers/);

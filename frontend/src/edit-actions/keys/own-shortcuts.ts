@@ -5,6 +5,7 @@
  * nothing there can stand in the way of STOP.
  */
 import { useSyncExternalStore } from "react";
+import { keyOf } from "../../ui/keys";
 import type { EditAction, Pressed } from "../edit-action";
 import { onMac, printedKeys } from "../edit-action";
 
@@ -15,7 +16,7 @@ const MODIFIERS = ["Control", "Shift", "Alt", "Meta", "AltGraph", "CapsLock", "D
 
 /** What is pressed, as a shortcut; null as long as it is only modifiers. */
 export function shortcutOf(event: Pressed, mac = onMac): string | null {
-  const { key } = event;
+  const key = keyOf(event);
   if (MODIFIERS.includes(key) || (mac ? event.ctrlKey : event.metaKey)) return null;
   const last =
     key === "+" ? "Plus" : key === " " ? "Space" : key.length === 1 ? key.toLowerCase() : key;

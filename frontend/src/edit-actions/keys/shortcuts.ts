@@ -3,6 +3,7 @@ import { useLocalStorage } from "@mantine/hooks";
 import { notifications } from "@mantine/notifications";
 import { useEffect, useRef } from "react";
 import { whenThere } from "../../ui/focus-field";
+import { keyOf } from "../../ui/keys";
 import { EDIT_ACTIONS } from "../all";
 import { copiedSelection, pasteText, rememberCopied } from "../clipboard";
 import { type EditAction, editActionFor, isEnabled } from "../edit-action";
@@ -76,14 +77,15 @@ export function useShortcuts(context: EditorContext): void {
     const editActions = withOwn(EDIT_ACTIONS, own);
     const onKey = (event: KeyboardEvent) => {
       if (event.defaultPrevented) return;
+      const key = keyOf(event);
       if (isTaken(event.target) && !worksInForms(event, editActions)) return;
-      if (MOVING.has(event.key) && !isOnCanvas(event.target)) return;
-      if (event.key === "/" && singles) {
+      if (MOVING.has(key) && !isOnCanvas(event.target)) return;
+      if (key === "/" && singles) {
         event.preventDefault();
         search(now.current);
         return;
       }
-      if (event.key === "Tab" && isOverCanvas()) {
+      if (key === "Tab" && isOverCanvas()) {
         event.preventDefault();
         addAtPointer(now.current);
         return;
@@ -91,7 +93,7 @@ export function useShortcuts(context: EditorContext): void {
       const editAction = editActionFor(editActions, event, singles);
       if (editAction === null || editAction.event !== undefined) return;
       // A button does what Enter does to it.
-      if (event.key === "Enter" && event.target instanceof HTMLButtonElement) return;
+      if (key === "Enter" && event.target instanceof HTMLButtonElement) return;
       // What an edit action takes is also kept from the browser while the action has nothing to do.
       event.preventDefault();
       if (isEnabled(editAction, now.current)) editAction.run(now.current);
@@ -100,7 +102,8 @@ export function useShortcuts(context: EditorContext): void {
     // Cards move by arrow keys of their own, which know neither undo nor frames, and take Shift with
     // Enter for one more to choose: ours come first.
     const onCanvasKey = (event: KeyboardEvent) => {
-      const ours = event.key.startsWith("Arrow") || (event.key === "Enter" && event.shiftKey);
+      const key = keyOf(event);
+      const ours = key.startsWith("Arrow") || (key === "Enter" && event.shiftKey);
       if (!ours || isTaken(event.target)) return;
       if (!(event.target instanceof Element) || !event.target.closest(".react-flow")) return;
       if (hasOwnKeys(event.target)) return;

@@ -70,3 +70,16 @@ test("a pointer that moves over the list chooses", () => {
   enter();
   expect(names()).toEqual(["Say"]);
 });
+
+test("Enter that ends a word of an input method adds nothing, the next one does", () => {
+  const composing = { key: "Enter", bubbles: true, isComposing: true };
+  fire(found("input"), new KeyboardEvent("keydown", composing));
+  // Safari tells of it after the composition has ended, by this number alone.
+  fire(
+    found("input"),
+    new KeyboardEvent("keydown", { ...composing, isComposing: false, keyCode: 229 }),
+  );
+  expect(names()).toEqual([]);
+  enter();
+  expect(names()).toEqual(["Drive"]);
+});

@@ -12,6 +12,7 @@ import {
 import { asOneEdit, connect, insertInto, type NewAction } from "../../graph/edit";
 import type { Position } from "../../graph/model";
 import { endName } from "../../graph/relation-words";
+import { keyOf } from "../../ui/keys";
 import style from "./quick-add.module.css";
 
 interface Props {
@@ -89,10 +90,11 @@ export function QuickAdd({ context, request, known, onClose }: Props) {
     onClose();
   };
   const onKeyDown = (event: React.KeyboardEvent) => {
-    if (event.key === "Escape") onClose();
-    else if (event.key === "Enter") choose(list[at], true);
-    else if (event.key === "ArrowDown") setAt((i) => Math.min(i + 1, list.length - 1));
-    else if (event.key === "ArrowUp") setAt((i) => Math.max(i - 1, 0));
+    const key = keyOf(event);
+    if (key === "Escape") onClose();
+    else if (key === "Enter") choose(list[at], true);
+    else if (key === "ArrowDown") setAt((i) => Math.min(i + 1, list.length - 1));
+    else if (key === "ArrowUp") setAt((i) => Math.max(i - 1, 0));
     else return;
     event.preventDefault();
     event.stopPropagation();

@@ -6,6 +6,7 @@ import type { EditorContext } from "../../edit-actions/editor-context";
 import { connect, moveRelation, retarget } from "../../graph/edit";
 import type { Key, Position, Precondition } from "../../graph/model";
 import { ENTRY } from "../../graph/model";
+import { keyOf } from "../../ui/keys";
 import { nodeAt, pointOf } from "./hit-test";
 
 export interface Pending {
@@ -43,7 +44,7 @@ export function useConnecting(context: EditorContext, openAddAt: AddAt) {
   useEffect(() => {
     if (pending === null) return;
     const onKey = (event: KeyboardEvent) => {
-      if (event.key === "Escape") setPending(null);
+      if (keyOf(event) === "Escape") setPending(null);
     };
     window.addEventListener("keydown", onKey, { capture: true });
     return () => window.removeEventListener("keydown", onKey, { capture: true });

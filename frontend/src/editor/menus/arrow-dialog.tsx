@@ -8,6 +8,7 @@ import { addActionAt, type EditorContext, freePosition } from "../../edit-action
 import { asOneEdit, connect, type NewAction } from "../../graph/edit";
 import { ENTRY, EXIT, type Key, type Precondition } from "../../graph/model";
 import { endName } from "../../graph/relation-words";
+import { keyOf, typedCharacter } from "../../ui/keys";
 import { colorOfName } from "../../ui/name-colors";
 import { matching, type Option, PickList } from "../../ui/pick-list";
 import { candidates } from "../canvas/quick-add";
@@ -66,7 +67,8 @@ function OutcomePicker({ onPick }: { onPick: (outcome: Precondition) => void }) 
   const row = useRef<HTMLDivElement>(null);
   const [at, setAt] = useState(0);
   const press = useRef<(event: KeyboardEvent) => boolean>(() => false);
-  press.current = ({ key }) => {
+  press.current = (event) => {
+    const key = keyOf(event);
     const chosen = LETTERS[key.toLowerCase()];
     const step = STEPS[key];
     if (chosen) onPick(chosen);
@@ -120,7 +122,7 @@ function OutcomeRow({
           tabIndex={outcome === value ? 0 : -1}
           onClick={() => onPick(outcome)}
           onKeyDown={(event) => {
-            const next = stepped(value, event.key);
+            const next = stepped(value, keyOf(event));
             if (next === null) return;
             event.preventDefault();
             onPick(next);
@@ -141,7 +143,8 @@ function stepped(outcome: Precondition, key: string): Precondition | null {
 }
 
 /** In the empty field these choose the outcome: a name begins with none of them. */
-function outcomeByKey(now: Precondition, { key }: React.KeyboardEvent): Precondition | null {
+function outcomeByKey(now: Precondition, event: React.KeyboardEvent): Precondition | null {
+  const key = keyOf(event);
   if (key >= "1" && key <= "4") return OUTCOMES[Number(key) - 1] ?? null;
   return key === "ArrowLeft" || key === "ArrowRight" ? stepped(now, key) : null;
 }
@@ -157,17 +160,17 @@ function useEarlyKeys(onOutcome: (outcome: Precondition) => void): () => string 
   useEffect(() => {
     const onKey = (event: KeyboardEvent) => {
       const inField = event.target instanceof HTMLElement && event.target.matches("input, button");
-      if (inField || event.ctrlKey || event.metaKey || event.altKey || event.key.length !== 1)
-        return;
+      const typed = typedCharacter(event);
+      if (inField || event.ctrlKey || event.metaKey || event.altKey || typed === "") return;
       const field = document.querySelector<HTMLElement>("[role=dialog] [role=combobox]");
       event.stopPropagation();
       // What is focused now is what the key writes into.
       if (field !== null) field.focus();
       else {
         event.preventDefault();
-        const digit = early.current === "" && OUTCOMES[Number(event.key) - 1];
+        const digit = early.current === "" && OUTCOMES[Number(keyOf(event)) - 1];
         if (digit) tell.current(digit);
-        else early.current += event.key;
+        else early.current += typed;
       }
     };
     window.addEventListener("keydown", onKey, { capture: true });

@@ -15,6 +15,7 @@ import {
   withOwn,
 } from "../../edit-actions/keys/own-shortcuts";
 import { ShortcutKeys } from "../../edit-actions/keys/shortcut-keys";
+import { keyOf } from "../../ui/keys";
 import style from "./shortcut-sheet.module.css";
 
 interface Props {
@@ -52,10 +53,11 @@ function KeysWanted({ editAction, own, setChanging }: Omit<Props, "changing">) {
     setChanging(null);
   };
   const onKeyDown = (event: React.KeyboardEvent) => {
-    if (event.key === "Tab" && !event.ctrlKey && !event.altKey) return; // to the buttons
+    const key = keyOf(event);
+    if (key === "Tab" && !event.ctrlKey && !event.altKey) return; // to the buttons
     event.preventDefault();
     event.stopPropagation();
-    if (event.key === "Escape") return setChanging(null);
+    if (key === "Escape") return setChanging(null);
     const keys = shortcutOf(event);
     if (keys === null || event.repeat) return;
     const problem = wishFor(editAction, own, keys);

@@ -15,6 +15,7 @@ import type { ToldProblem } from "../../graph/problems/told-problems";
 import { Tooltip } from "../../ui/floating/tooltip";
 import { whenThere } from "../../ui/focus-field";
 import { type ListTab, useListTab } from "../../ui/hooks/use-list-tab";
+import { keyOf } from "../../ui/keys";
 import style from "./list-rail.module.css";
 import { type EditorSidePanel, ENTRY_BUTTON, type Panels, ROW } from "./use-panels";
 
@@ -57,7 +58,7 @@ function usePutAway(open: boolean, putAway: () => void, opener: () => HTMLElemen
     const inside = ({ target }: Event, where: string) =>
       target instanceof Element && target.closest(where) !== null;
     const onKey = (event: KeyboardEvent) => {
-      if (event.key !== "Escape" || !inside(event, "[data-list]")) return;
+      if (keyOf(event) !== "Escape" || !inside(event, "[data-list]")) return;
       event.preventDefault();
       now.current.putAway();
       now.current.opener()?.focus();

@@ -7,6 +7,7 @@ import { type EditorContext, useEditorContext } from "../../edit-actions/editor-
 import { useSingleKeys } from "../../edit-actions/keys/shortcuts";
 import { endsOf } from "../../graph/document-keys";
 import { Tooltip } from "../../ui/floating/tooltip";
+import { keyOf } from "../../ui/keys";
 import style from "../past-bar.module.css";
 import { type ChangedThing, countWords, type GraphChanges, walkOrder } from "./graph-difference";
 
@@ -35,13 +36,13 @@ function useWalkKeys(go: (by: 1 | -1) => void): void {
   useEffect(() => {
     if (!singles) return;
     const onKey = (event: KeyboardEvent) => {
-      const by = event.key === "n" ? 1 : event.key === "p" ? -1 : null;
+      const by = { n: 1, p: -1 }[keyOf(event)] ?? null;
       const typed =
         "input:not([type=range], [type=radio], [type=checkbox]), textarea, select, [role=dialog], [role=menu]";
       const taken = event.target instanceof Element && event.target.closest(typed) !== null;
       if (by === null || taken || event.ctrlKey || event.metaKey || event.altKey) return;
       event.preventDefault();
-      now.current(by);
+      now.current(by as 1 | -1);
     };
     // Before the shortcuts of the editor, which have other uses for these letters.
     window.addEventListener("keydown", onKey, { capture: true });

@@ -9,6 +9,7 @@ import {
 } from "@tabler/icons-react";
 import { type ReactNode, useEffect, useRef } from "react";
 import { Tooltip } from "../../ui/floating/tooltip";
+import { keyOf } from "../../ui/keys";
 import { duration } from "../../ui/times";
 import style from "./replay-controls.module.css";
 import { REPLAY_SPEEDS, type ReplayCursor } from "./use-replay";
@@ -28,7 +29,8 @@ function usePlayerKeys(replay: ReplayCursor): void {
     const onKey = (event: KeyboardEvent) => {
       const typed =
         "input, textarea, select, [role=slider], [role=tab], [role=dialog], [role=menu]";
-      const own = event.key === " " ? `button, a, ${typed}` : typed;
+      const key = keyOf(event);
+      const own = key === " " ? `button, a, ${typed}` : typed;
       const taken = event.target instanceof HTMLElement && event.target.closest(own) !== null;
       if (taken || event.defaultPrevented || event.ctrlKey || event.metaKey || event.altKey) return;
       const { seek, play, step, playing, start } = now.current;
@@ -38,7 +40,7 @@ function usePlayerKeys(replay: ReplayCursor): void {
         ["ArrowLeft", () => step(-1)],
         ["Home", () => seek(start)],
         ["End", () => seek(null)],
-      ]).get(event.key);
+      ]).get(key);
       if (handler === undefined) return;
       event.preventDefault();
       handler();

@@ -1,6 +1,7 @@
 /** The drawer below the canvas: as high as the person pulls it, which the device remembers. */
 import { useLocalStorage } from "@mantine/hooks";
 import { type KeyboardEvent, type PointerEvent, type ReactNode, useRef, useState } from "react";
+import { keyOf } from "../../ui/keys";
 import style from "./drawer-frame.module.css";
 
 const LEAST = 96; // px: the head and two lanes
@@ -46,7 +47,7 @@ function Handle({ height, room, setPulled, keep }: ReturnType<typeof useDrawerHe
     setPulled(null);
   };
   const onKeyDown = (event: KeyboardEvent) => {
-    const by = event.key === "ArrowUp" ? STEP : event.key === "ArrowDown" ? -STEP : 0;
+    const by = { ArrowUp: STEP, ArrowDown: -STEP }[keyOf(event)] ?? 0;
     if (by === 0) return;
     event.preventDefault();
     event.stopPropagation();

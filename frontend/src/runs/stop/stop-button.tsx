@@ -5,6 +5,7 @@ import type { LiveLink, LiveSocket } from "../../api/live/live-socket";
 import { foreignGraphs, openRuns, unheardRobots } from "../../api/live/open-runs";
 import { useLive } from "../../api/live/use-live";
 import type { Run } from "../../api/runs";
+import { isStopKey } from "../../ui/keys";
 import style from "./stop-button.module.css";
 
 interface Props {
@@ -12,16 +13,11 @@ interface Props {
   graph?: string;
 }
 
-/** Ctrl+. or ⌘. : not taken by browsers, and reachable without looking. */
-function isStopAll(event: Pick<KeyboardEvent, "key" | "ctrlKey" | "metaKey">): boolean {
-  return event.key === "." && (event.ctrlKey || event.metaKey);
-}
-
 /** Also while somebody types, in dialogs and menus: nothing is asked before a Stop. */
 function useStopKey(live: LiveSocket | null): void {
   useEffect(() => {
     const onKey = (event: KeyboardEvent) => {
-      if (!isStopAll(event) || event.repeat) return;
+      if (!isStopKey(event) || event.repeat) return;
       event.preventDefault();
       event.stopImmediatePropagation();
       live?.stop("all");

@@ -9,6 +9,7 @@ import {
   useState,
 } from "react";
 import type { Run } from "../../api/runs";
+import { keyOf } from "../../ui/keys";
 import { colorOfName } from "../../ui/name-colors";
 import { duration, instant, stopwatch } from "../../ui/times";
 import { progressOf, progressOfAction, type Tone } from "../progress";
@@ -168,6 +169,7 @@ function useSeeking(axis: TimeAxis, cursor: number | null, onSeek: Props["onSeek
     onSeek(axis.start + part * axis.span);
   };
   const onKeyDown = (event: KeyboardEvent) => {
+    const key = keyOf(event);
     const here = cursor ?? Math.min(Date.now(), axis.start + axis.span);
     const goal = new Map<string, number | null>([
       ["ArrowLeft", here - 1000],
@@ -175,10 +177,10 @@ function useSeeking(axis: TimeAxis, cursor: number | null, onSeek: Props["onSeek
       ["Home", axis.start],
       ["End", null],
     ]);
-    if (onSeek === undefined || !goal.has(event.key)) return;
+    if (onSeek === undefined || !goal.has(key)) return;
     event.preventDefault();
     event.stopPropagation();
-    onSeek(goal.get(event.key) ?? null);
+    onSeek(goal.get(key) ?? null);
   };
   return { ruler, pull: { onPointerDown: seek, onPointerMove: seek }, onKeyDown };
 }

@@ -1,6 +1,7 @@
 /** A button that asks to be held, so that a slip of the finger starts nothing. */
 import { Button, type ButtonProps } from "@mantine/core";
 import { type KeyboardEvent, type ReactNode, useEffect, useRef, useState } from "react";
+import { keyOf } from "../keys";
 import { lazyPart } from "../parts/lazy-part";
 import { OpeningBoundary } from "../parts/part-boundary";
 import style from "./hold-button.module.css";
@@ -44,7 +45,7 @@ export function HoldButton({ label, name, question, disabled = false, size, icon
     if (holding && slipped) setAsking(true);
     setHolding(false);
   };
-  const isHoldKey = (event: KeyboardEvent) => event.key === "Enter" || event.key === " ";
+  const isHoldKey = (event: KeyboardEvent) => ["Enter", " "].includes(keyOf(event));
 
   const button = (
     <Button

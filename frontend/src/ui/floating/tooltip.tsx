@@ -16,6 +16,7 @@ import {
   useState,
 } from "react";
 import { createPortal } from "react-dom";
+import { keyOf } from "../keys";
 import style from "./tooltip.module.css";
 import { tooltipPlace } from "./tooltip-place";
 
@@ -41,7 +42,7 @@ function useEnd(target: HTMLElement | null, end: () => void): void {
       const kept = document.activeElement === target && target.matches(":focus-visible");
       if (!kept && !(over instanceof Node && target.contains(over))) end();
     };
-    const onKey = ({ key }: KeyboardEvent) => key === "Escape" && end();
+    const onKey = (event: KeyboardEvent) => keyOf(event) === "Escape" && end();
     const asking = new AbortController();
     const options = { capture: true, passive: true, signal: asking.signal };
     document.addEventListener("pointerover", onOver, options);
