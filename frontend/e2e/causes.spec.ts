@@ -20,7 +20,7 @@ test.afterAll(async () => {
 const FAILURES = [
   ["pack_order", 'Grip was started with speed = "fast": a number was expected.', "Grip", "error"],
   ["search_shelf", "Search is not known to Robin, so it refused the graph.", "Search", "waits"],
-  ["photo_round", "Join waits for Look, which never reported its end.", "Join", "waits"],
+  ["photo_round", "Ben pressed Stop while Look ran (93.4–94.6 s)", "Look", "running"],
   ["night_watch", "The engine of Robin was restarted; what happened after is unknown.", "", ""],
   ["inspect", "Somebody else started inspect on Robin; this run was ended by it.", "", ""],
 ] as const;

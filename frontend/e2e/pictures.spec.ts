@@ -101,7 +101,7 @@ test("why a run failed", async ({ browser }) => {
   await page.getByRole("button", { name: "Show five recorded runs that failed" }).click();
   await page.getByRole("link", { name: /photo_round/ }).click();
   const why = page.getByRole("region", { name: "Why" });
-  await expect(why.getByRole("listitem").first()).toContainText("Join waits for Look");
+  await expect(why.getByRole("listitem").first()).toContainText("Ben pressed Stop while Look ran");
   await why.getByRole("button").first().click();
   await page.waitForTimeout(1_200);
   await picture(page, "why-light");

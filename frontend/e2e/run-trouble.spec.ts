@@ -139,7 +139,10 @@ test("a run in which nothing moves says what it waits for, and keeps it as its c
   await stopAll(page);
   await page.goto(`${product.url}/runs/${(await runs())[0]?.id}`);
   const why = page.getByRole("region", { name: "Why" });
-  await expect(why.getByRole("listitem").first()).toContainText("Work_1 waits for its input");
+  await expect(why.getByRole("listitem").first()).toContainText(
+    "pressed Stop while no action was seen",
+  );
+  await expect(why.getByRole("listitem").nth(1)).toContainText("Work_1 waits for its input");
   await page.screenshot({ path: test.info().outputPath("stalled-cause.png") });
 });
 

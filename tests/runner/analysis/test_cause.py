@@ -15,9 +15,14 @@ from action_assistant.runner.runs.events import (
     AlarmRaised,
     Author,
     Ended,
+    ModifyRefused,
+    ModifyRequested,
     Observed,
+    PauseRequested,
+    Proof,
     Published,
     Requested,
+    ResumeRequested,
     RunEvent,
     Silent,
     StopRequested,
@@ -35,8 +40,7 @@ from runner.review.test_service import eventually
 EXAMPLES = {
     "wrong_parameter": 'Grip was started with speed = "fast": a number was expected.',
     "missing_action": "Search is not known to Robin, so it refused the graph.",
-    "hang_in_a_join": "Join waits for Look, which never reported its end. It went on until Ben "
-    "pressed Stop.",
+    "hang_in_a_join": "Ben pressed Stop while Look ran (93.4–94.6 s), as far as was seen.",
     "engine_restart": "The engine of Robin was restarted; what happened after is unknown.",
     "foreign_start": "Somebody else started inspect on Robin; this run was ended by it.",
 }
@@ -111,25 +115,79 @@ def test_an_action_that_ended_in_error_is_named_with_its_own_words() -> None:
     assert found(LINE, told, Ended(5, "error", "on_error")) == ["A ended in error: “jammed”"]
 
 
-def test_of_a_stop_in_the_middle_only_what_went_on_is_told() -> None:
+S = 1_000_000
+
+
+def test_a_stop_is_explained_by_who_pressed_it_and_what_ran_then() -> None:
     told = Observed(4, (state(3, "A_0", "RUNNING"),))
-    stop = StopRequested(6, Author("ben", "Ben"))
-    assert found(LINE, told, stop, Ended(7, "stopped")) == [
-        "A had not reported its end when Ben pressed Stop."
-    ]
-    nameless = StopRequested(6, Author("owner", ""))  # people name themselves when they like to
-    assert found(LINE, told, nameless, Ended(7, "stopped")) == [
-        "A had not reported its end when somebody pressed Stop."
+    halted = Observed(7 * S, (state(7 * S, "A_0", "STOPPING"), state(7 * S + 1, "A_0", "FINISHED")))
+    for who, said in ((Author("ben", "Ben"), "Ben"), (Author("owner", ""), "Somebody")):
+        stop = StopRequested(7 * S // 10, who)
+        assert found(LINE, told, stop, halted, Ended(8 * S, "stopped")) == [
+            f"{said} pressed Stop while A ran (0.7 s)."
+        ]
+
+
+def test_what_was_only_seen_running_before_a_stop_is_not_said_to_have_run_for_certain() -> None:
+    told = Observed(4, (state(3, "A_0", "RUNNING"),))
+    assert found(LINE, told, StopRequested(2 * S, ANN)) == [
+        "Ann pressed Stop while A ran (2.0 s), as far as was seen."
     ]
 
 
-def test_a_join_is_said_to_wait_only_when_another_parent_has_reported() -> None:
+def test_a_stop_before_anything_ran_says_so() -> None:
+    stop = StopRequested(1, ANN)
+    run = replay(
+        [begun(LINE), stop, Ended(2, "stopped", None, "Stopped before anything was sent.")]
+    )
+    assert run is not None
+    assert words(causes(run, LINE)[0], run) == "Ann pressed Stop before anything was sent."
+    assert found(LINE, stop, Ended(3, "stopped")) == [
+        "Ann pressed Stop before any action was seen to run."
+    ]
+
+
+def test_a_stop_during_a_silence_or_after_a_restart_says_so() -> None:
+    ran = Observed(4, (state(3, "A_0", "RUNNING"),))
+    stop = StopRequested(9 * S, ANN)
+    silent = found(LINE, ran, Silent(8 * S, 5 * S, "it does not answer"), stop)
+    assert silent[0] == (
+        "Ann pressed Stop while Robin gave no answer: before that A ran (9.0 s), as far as was seen."
+    )
+    restarted = AlarmRaised(8 * S, "engine_restarted", "The engine was restarted.")
+    assert found(LINE, ran, restarted, stop)[0] == (
+        "Ann pressed Stop after the engine of Robin had been restarted."
+    )
+
+
+def test_a_pause_or_a_change_by_a_person_is_named_before_anything_else() -> None:
+    ran = Observed(4, (state(3, "A_0", "RUNNING"),))
+    paused = Observed(6, (state(6, "A_0", "PAUSED"), GraphState(6, "task", "PAUSED")))
+    restarted = AlarmRaised(8 * S, "engine_restarted", "The engine was restarted.")
+    told = (ran, PauseRequested(5, ANN), paused, restarted, Ended(9 * S, "lost", None, "gone"))
+    assert found(LINE, *told)[0] == "Ann paused the run while A ran (0.0 s), as far as was seen."
+    resumed = (*told[:3], ResumeRequested(7, ANN), *told[3:])
+    assert not any("pause" in each for each in found(LINE, *resumed))
+    changed = ModifyRequested(
+        at=7, author=ANN, version="w", digest="e", actions={"A_0": "A"}, umrf=""
+    )
+    assert found(LINE, ran, changed, restarted)[0] == (
+        "Ann gave the run another version of its graph while it went on."
+    )
+    undone = ModifyRefused(at=8, version="v", digest="d", actions={"A_0": "A"}, why="no")
+    assert "Ann" not in found(LINE, ran, changed, undone, restarted)[0]
+
+
+def test_a_join_is_said_to_have_waited_after_the_stop_and_only_when_another_parent_reported() -> (
+    None
+):
     both = (state(3, "A_0", "RUNNING"), state(3, "B_0", "RUNNING"))
     stop, end = StopRequested(9, ANN), Ended(10, "stopped")
-    assert not any("waits" in each for each in found(FORK, Observed(3, both), stop, end))
+    assert not any("waited" in each for each in found(FORK, Observed(3, both), stop, end))
     done = (NodeResult(4, "task", "A_0", "on_true"), state(4, "A_0", "FINISHED"))
     assert found(FORK, Observed(4, (*both, *done)), stop, end) == [
-        "Join waits for B, which never reported its end. It went on until Ann pressed Stop."
+        "Ann pressed Stop while B ran (0.0 s), as far as was seen.",
+        "Join waited for B, which had not been seen to end by then.",
     ]
 
 
@@ -139,9 +197,41 @@ def test_an_arrow_that_passes_the_outcome_over_is_named() -> None:
         NodeResult(4, "task", "A_0", "on_true"), state(4, "A_0", "FINISHED"),
         NodeResult(5, "task", "B_0", "on_false"), state(5, "B_0", "FINISHED"),
     )  # fmt: skip
-    assert found(FORK, Observed(5, told), StopRequested(9, ANN), Ended(10, "stopped"))[0] == (
-        "Join waits for B, which ended false: its arrow passes that over."
+    assert found(FORK, Observed(5, told), StopRequested(9, ANN), Ended(10, "stopped")) == [
+        "Ann pressed Stop while no action was seen running.",
+        "Join waited for B, which ended false: its arrow passes that over.",
+    ]
+
+
+def test_a_run_is_not_ended_by_a_stranger_when_it_was_over_before() -> None:
+    over = Observed(
+        4, (state(3, "A_0", "RUNNING"), state(4, "A_0", "ERROR"), GraphState(4, "task", "ERROR"))
     )
+    alarm = AlarmRaised(5, "foreign_stop", "Somebody else …")
+    told = found(LINE, over, alarm, Ended(7, "error", "on_error"))
+    assert told[0] == "Somebody else told Robin to stop this run."
+    restarted = AlarmRaised(6, "engine_restarted", "The engine was restarted.")
+    told = found(
+        LINE, AlarmRaised(5, "foreign_start", "…"), restarted, Ended(7, "lost", None, "gone")
+    )
+    assert not any("ended by it" in each for each in told)
+
+
+def test_an_alarm_that_later_events_contradict_is_no_cause() -> None:
+    ran = Observed(9, (state(9, "A_0", "RUNNING"), state(10, "A_0", "ERROR")))
+    stalled = AlarmRaised(5, "stalled", "NOTHING MOVES: it will not go on")
+    assert found(LINE, stalled, ran, Ended(11, "error", "on_error")) == ["A ended in error."]
+    lost = AlarmRaised(5, "stop_unconfirmed", "STOP UNCONFIRMED: the engine does not hold it")
+    told = (StopRequested(4, ANN), lost, Proof(6, 6, "h"), Ended(7, "stopped"))
+    assert not any("UNCONFIRMED" in each for each in found(LINE, *told))
+
+
+def test_what_was_never_sent_is_not_said_to_be_refused_by_the_robot() -> None:
+    run = replay([begun(LINE), Ended(3, "refused", None, "Its turn did not come.")])
+    assert run is not None
+    assert [words(each, run) for each in causes(run, LINE)] == [
+        "Nothing was started: Its turn did not come."
+    ]
 
 
 def test_a_foreign_start_ends_a_run_only_where_nobody_here_pressed_stop() -> None:
@@ -266,7 +356,7 @@ def test_what_was_made_good_inside_is_not_the_cause_of_what_failed_after_it() ->
 def test_of_a_stop_only_what_went_on_inmost_is_told() -> None:
     told = (state(3, "A_0", "RUNNING"), part(3, "task__A__0", "Grip_0", "RUNNING"))
     assert found(LINE, Observed(4, told), StopRequested(6, ANN), Ended(7, "stopped")) == [
-        "A › Grip had not reported its end when Ann pressed Stop."
+        "Ann pressed Stop while A › Grip ran (0.0 s), as far as was seen."
     ]
 
 

@@ -4,10 +4,19 @@ from typing import Any
 
 import msgspec
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from action_assistant.runner.analysis.comparison import SentTree, compare
 from action_assistant.runner.links.observations import NodeResult, NodeState
-from action_assistant.runner.runs.events import Ended, Observed, Published
+from action_assistant.runner.runs.events import (
+    AlarmRaised,
+    Author,
+    Ended,
+    Observed,
+    Published,
+    StopRequested,
+)
 from action_assistant.runner.runs.fold import replay
 from action_assistant.runner.runs.run import Run
 from action_assistant.umrf.digest import digest
@@ -23,7 +32,7 @@ def went(
     number: int, *course: tuple[str, str], graph: Graph = PLAN, **more: Any
 ) -> tuple[Run, str]:
     """A run in which these actions ended so, one second each; `-` for one that has no end."""
-    umrf = codec.write(graph)
+    umrf = codec.write(graph, codec.Stamp("g1", "v1", f"r{number}"))
     events: list[Any] = [
         msgspec.structs.replace(
             REQUESTED,
@@ -47,6 +56,7 @@ def went(
                 NodeState(at, graph.name, name, "FINISHED"),
             )
             events.append(Observed(at, ended))
+    events += more.get("more", [])
     events.append(Ended(at, more.get("end", "finished"), "on_true"))
     run = replay(events)
     assert run is not None
@@ -204,3 +214,97 @@ def test_an_action_waits_for_what_parted_in_its_own_visit_only() -> None:
     parting = compared(good, own).parting
     assert parting is not None
     assert (parting.step.action, parting.step.visit) == ("Work_0", 1)
+
+
+STOPPED = StopRequested(2_700_000, Author("ada", "Ada"))
+
+
+def test_a_run_that_somebody_stopped_parts_because_of_that_before_anything_else() -> None:
+    stopped = went(2, ("Work_0", "true"), ("Work_1", "-"), end="stopped", more=[STOPPED])
+    good = went(1, ("Work_0", "true"), ("Work_1", "true"), ("Late_0", "true"))
+    because = compared(good, stopped).because
+    assert (because.kind, because.run) == ("operator_stop", 2)
+    assert because.text == "in run 2 Ada pressed Stop while Work 1 ran (0.7 s), as far as was seen"
+    swapped = compared(stopped, good).because
+    assert (swapped.kind, swapped.run) == ("operator_stop", 2)
+
+
+def test_runs_that_part_nowhere_and_ended_otherwise_tell_who_stopped_one() -> None:
+    stopped = went(2, ("Work_0", "true"), ("Work_1", "-"), end="stopped", more=[STOPPED])
+    found = compared(GOOD, stopped)
+    assert found.parting is None
+    assert found.because.text.startswith("in run 2 Ada pressed Stop")
+    assert compared(GOOD, GOOD).because is None
+
+
+def test_a_stop_after_they_had_parted_is_not_named_as_the_cause() -> None:
+    late = went(2, ("Work_0", "error"), ("Work_1", "-"), end="stopped", more=[STOPPED])
+    assert compared(GOOD, late).because is None
+
+
+def test_an_alarm_of_one_run_is_named_before_any_difference_of_the_graphs() -> None:
+    alarm = AlarmRaised(1_900_000, "engine_restarted", "The engine was restarted.")
+    lost = went(2, ("Work_0", "true"), end="lost", more=[alarm])
+    because = compared(GOOD, lost).because
+    assert because.kind == "engine_restarted"
+    assert because.text.startswith("in run 2 the engine of simulator was restarted")
+
+
+def test_a_fault_that_the_simulator_was_told_is_named() -> None:
+    bad = went(2, ("Work_0", "true"), ("Work_1", "error"))
+    script = '{"behaviours": {"Work_1": [{"result": "on_error"}]}}'
+    found = compare(GOOD[0], bad[0], SentTree(GOOD[1]), SentTree(bad[1], {}, script))
+    assert found.because is not None
+    assert found.because.text == "in run 2 the script of the simulator says what Work_1 did"
+
+
+@given(st.permutations(range(3)), st.booleans())
+def test_an_arrow_that_was_there_is_not_said_to_be_added_when_identities_changed(
+    order: list[int], renamed: bool
+) -> None:
+    plan = sequence(actions=3)
+    keys = {each.key: f"other{number:07d}" for number, each in enumerate(plan.actions)}
+    actions = [msgspec.structs.replace(each, key=keys[each.key]) for each in plan.actions]
+    again = msgspec.structs.replace(
+        plan,
+        actions=tuple(actions[place] for place in order),
+        relations=tuple(
+            msgspec.structs.replace(
+                each,
+                parent=keys.get(each.parent, each.parent),
+                child=keys.get(each.child, each.child),
+            )
+            for each in plan.relations
+        ),
+    )
+    one = went(1, ("Work_0", "true"), ("Work_1", "true"), graph=plan)
+    found = compared(one, went(2, ("Work_0", "true"), graph=again))
+    assert (found.graph.actions, found.graph.relations) == ((), ())
+    assert [step.relation for step in found.steps] == ["same", "only_a"]
+
+
+def test_an_action_with_another_number_is_found_by_what_it_is() -> None:
+    value = '{"pvf_type": "number", "pvf_value": %s}'
+    first, second = (
+        msgspec.structs.replace(each, inputs=(Parameter("speed", value % speed),))
+        for each, speed in zip(PLAN.actions, ("0.2", "0.9"), strict=True)
+    )
+    plan = msgspec.structs.replace(PLAN, actions=(first, second))
+    moved = msgspec.structs.replace(second, key="another00000", instance_id=7)
+    again = msgspec.structs.replace(
+        plan,
+        actions=(first, moved),
+        relations=tuple(
+            msgspec.structs.replace(
+                each,
+                parent="another00000" if each.parent == second.key else each.parent,
+                child="another00000" if each.child == second.key else each.child,
+            )
+            for each in plan.relations
+        ),
+    )
+    found = compared(went(1, graph=plan), went(2, graph=again))
+    assert found.graph.relations == ()
+    assert [(each.change, each.aid) for each in found.graph.actions] == [
+        ("changed", "another00000")
+    ]

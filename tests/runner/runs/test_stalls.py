@@ -88,7 +88,8 @@ async def test_what_a_run_in_which_nothing_moves_waits_for_is_said_once_and_is_i
         await control.stop(run, BEN)
         assert await ended(control, run) == "stopped"
     found = scene.harness.journal.history(run)
-    named = causes(found, graph)
+    stop, *named = causes(found, graph)
+    assert words(stop, found) == "Ben pressed Stop while no action was seen running."
     assert [each.action for each in named] == ["Work_1"], named
     assert named[0].at == found.alarms[0].at
     assert words(named[0], found) in alarm.text
@@ -162,8 +163,9 @@ async def test_a_sub_graph_in_which_nothing_moves_is_named_and_stays_the_cause_a
         await control.stop(run, BEN)
         assert await ended(control, run) == "stopped"
     found = scene.harness.journal.history(run)
-    first, *_ = causes(found, graph)
-    assert (first.action, words(first, found)) == ("Sub_0", f"{told}.")
+    stop, second, *_ = causes(found, graph)
+    assert words(stop, found).startswith("Ben pressed Stop while Sub ran")
+    assert (second.action, words(second, found)) == ("Sub_0", f"{told}.")
 
 
 def test_an_entry_that_lacks_a_value_is_named_before_anything_ran() -> None:

@@ -806,6 +806,16 @@ export interface RunnerApi {
         messages_b: string[];
     };
     /**
+     * PartingCause
+     * @description Something that happened in one of the runs and explains where they part: what a person did, an
+     *     alarm, or what the simulator was told to do. `run`: the number of that run.
+     */
+    PartingCause: {
+        kind: string;
+        run: number;
+        text: string;
+    };
+    /**
      * PlaceInside
      * @description Where in a sub-graph a problem is. `levels` are the full names of the actions that lead there, `aids`
      *     their ids: from that of the graph around it, down to the one that stands for `graph`. `where` is in the
@@ -1161,7 +1171,8 @@ export interface RunnerApi {
      * RunComparison
      * @description Run `a` against run `b`. `graph` is the difference of what was sent; `parameters` those of its
      *     changes that touch the values of actions; `subgraphs` names the graphs inside that were sent along
-     *     and were not the same.
+     *     and were not the same. `because`: what happened on the way that explains the parting, before any
+     *     difference of the graphs; null where nothing is known that does.
      */
     RunComparison: {
         a: RunnerApi["RunSummary"];
@@ -1174,6 +1185,7 @@ export interface RunnerApi {
         steps: RunnerApi["ComparedVisit"][];
         left_out: number;
         parting: RunnerApi["Parting"] | null;
+        because: RunnerApi["PartingCause"] | null;
         text: string;
     };
     /**

@@ -19,7 +19,7 @@ import type { RunBarParts } from "../run/run-page";
 import { GraphChanges } from "./changes";
 import style from "./compare-page.module.css";
 import { ComparedCanvas, Legend } from "./compared-cards";
-import { differencesOf, likelyCause, outermostAid, sameAsSeen } from "./differences";
+import { causeSentence, differencesOf, outermostAid, sameAsSeen } from "./differences";
 import { GhostLanes } from "./ghost-lanes";
 import { Steps } from "./steps-table";
 
@@ -59,17 +59,18 @@ function Said({ found }: { found: Comparison }) {
 
 /** What came of it in one sentence, with what most likely made them part. */
 function Verdict({ found }: { found: Comparison }) {
-  const cause = likelyCause(found);
+  const cause = causeSentence(found);
   return (
-    <section className={style.verdict} data-parts={found.parting !== null || undefined}>
+    <section
+      className={style.verdict}
+      data-parts={found.parting !== null || undefined}
+      data-operator={found.because?.kind.startsWith("operator_") || undefined}
+    >
       <IconArrowsDiff size={18} aria-hidden />
       <div>
         <p>
           <b>{found.text}</b>
-          {cause !== null && <span> Likely because {cause}.</span>}
-          {found.parting !== null && cause === null && (
-            <span> Nothing that is known differed before.</span>
-          )}
+          {cause !== null && <span> {cause}</span>}
         </p>
         <Said found={found} />
       </div>

@@ -3,6 +3,7 @@ import { expect, test } from "vitest";
 import type { ComparedStep, Comparison } from "../../api/review";
 import type { Visit } from "../../api/runs";
 import {
+  causeSentence,
   comparedActions,
   differencesOf,
   likelyCause,
@@ -117,6 +118,30 @@ test("the likely cause is the nearest thing that differed, and none where nothin
   expect(likelyCause(comparison([closes], { graph: changed }))).toBe(
     "its torque was 8 instead of 12.5",
   );
+});
+
+test("what happened on the way comes before any difference of the graphs, and no false cause is named", () => {
+  const text = "in run 43 Ada pressed Stop while Close ran (0.7 s)";
+  const because = { kind: "operator_stop", run: 43, text };
+  const stopped = comparison([closes], { because, same_engine: false });
+  expect(causeSentence(stopped)).toBe(`Likely because ${text}.`);
+  expect(causeSentence(comparison([], { because }))).toBe(`In${text.slice(2)}.`);
+  expect(causeSentence(comparison([]))).toBeNull();
+  const arrow = {
+    change: "changed" as const,
+    parent: "Drive_0",
+    child: "Close_0",
+    ends: [],
+    when: [],
+  };
+  const fields = [{ field: "waypoints/run", before: null, after: "[]" }];
+  const graph = { ...comparison([]).graph, relations: [{ ...arrow, fields }] };
+  const moved = comparison([closes], {
+    graph,
+    same_graph: false,
+  } as unknown as Partial<Comparison>);
+  expect(causeSentence(moved)).toBe("Nothing that differed before is known to explain it.");
+  expect(causeSentence(comparison([closes]))).toBe("Nothing that is known differed before.");
 });
 
 test("visits of one action are told together, their durations as the range of their sum", () => {

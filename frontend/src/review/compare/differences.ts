@@ -186,8 +186,13 @@ function ranWithOther({ a, b }: ComparedStep): string | null {
   return `it ran with ${name.replaceAll("::", " / ")} ${is} instead of ${was}`;
 }
 
-/** What most likely made the runs part: the nearest thing that differed before. Null: nothing known did. */
+/** What decides whether an arrow runs its child: neither its waypoints nor its place in a list. */
+const ARROW_DECIDES = /^(on_|required$|remap\/)/;
+
+/** What most likely made the runs part: what happened on the way (what a person did first), else the
+ *  nearest thing that differed before. Null: nothing known did. */
 export function likelyCause(found: Comparison): string | null {
+  if (found.because) return found.because.text;
   const { parting } = found;
   if (parting === null) return null;
   const { step } = parting;
@@ -200,8 +205,23 @@ export function likelyCause(found: Comparison): string | null {
   const input = ranWithOther(step);
   if (input !== null) return input;
   if (own !== undefined && own.change !== "changed") return `${own.name} was ${own.change}`;
-  const led = found.graph.relations.find(({ child }) => child === step.action);
+  const led = found.graph.relations.find(
+    ({ child, change, fields }) =>
+      child === step.action &&
+      (change !== "changed" || fields.some(({ field }) => ARROW_DECIDES.test(field))),
+  );
   if (led !== undefined) return `the arrow ${led.parent} → ${led.child} was ${led.change}`;
   if (!found.same_engine) return `they ran on ${found.a.engine} and on ${found.b.engine}`;
   return null;
+}
+
+/** The likely cause as a sentence, or that there is none. */
+export function causeSentence(found: Comparison): string | null {
+  const cause = likelyCause(found);
+  if (found.parting === null)
+    return cause === null ? null : `${cause.charAt(0).toUpperCase()}${cause.slice(1)}.`;
+  if (cause !== null) return `Likely because ${cause}.`;
+  return found.same_graph && found.same_engine && found.subgraphs.length === 0
+    ? "Nothing that is known differed before."
+    : "Nothing that differed before is known to explain it.";
 }

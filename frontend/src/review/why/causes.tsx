@@ -1,5 +1,5 @@
 /** Why a run did not end well, at the top of its page: each cause with a way to where it shows. */
-import { IconAlertTriangle } from "@tabler/icons-react";
+import { IconAlertTriangle, IconHandStop } from "@tabler/icons-react";
 import { type Cause, needsExplanation, useCauses } from "../../api/review";
 import type { Run } from "../../api/runs";
 import { placesOf } from "../../status/level-places";
@@ -47,12 +47,19 @@ export function FailureCauses({ runner, run, onShow }: Props) {
   const found = useCauses(runner, run).data;
   if (!needsExplanation(run) || found === undefined) return null;
   const places = placesOf(run);
+  const operator = found[0]?.kind.startsWith("operator_") ?? false;
+  const Icon = operator ? IconHandStop : IconAlertTriangle;
   const plain = run.ended_at === null || run.state === "stopped" || run.result === null;
   if (found.length === 0 && plain) return null;
   return (
-    <section className={style.causes} aria-label="Why" data-known={found.length > 0 || undefined}>
+    <section
+      className={style.causes}
+      aria-label="Why"
+      data-known={found.length > 0 || undefined}
+      data-operator={operator || undefined}
+    >
       <h2>
-        <IconAlertTriangle size={15} aria-hidden /> Why
+        <Icon size={15} aria-hidden /> Why
       </h2>
       {found.length === 0 ? (
         <p>No cause is recorded.</p>

@@ -27,7 +27,7 @@ from action_assistant.umrf.model import Graph
 _PREFIX: Final = "about/"
 _WORDS: Final = 8_000  # characters of messages that a search looks through
 #: Raise it when a run adds up to something else than before: older sums are made again.
-FIGURES: Final = 2
+FIGURES: Final = 3
 _TOOK: Final = 100  # durations kept per action and run
 
 Label = Annotated[str, msgspec.Meta(min_length=1, max_length=60, pattern=r"^\S(.*\S)?$")]

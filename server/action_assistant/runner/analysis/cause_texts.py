@@ -1,17 +1,21 @@
 """Causes in plain sentences, for the page and for the list of runs. Pure."""
 
-from collections.abc import Iterable, Mapping
-from typing import assert_never
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Final, assert_never
 
 from action_assistant.runner.analysis.causes import (
     ActionFailed,
     Cause,
     EngineRestarted,
     ForeignCause,
+    OperatorChange,
+    OperatorPause,
+    OperatorStop,
+    RanThen,
     RefusalCause,
     Silence,
     Stalled,
-    Unended,
     UnknownAction,
     Waiting,
     Warned,
@@ -20,11 +24,22 @@ from action_assistant.runner.analysis.causes import (
 from action_assistant.runner.analysis.levels import INTO, LevelPlace, places_of
 from action_assistant.runner.runs.run import Run
 
+_NAMED: Final = 3  # actions in one sentence
+_TENTH_US: Final = 100_000
+_SAME_S: Final = 0.101  # bounds that differ by no more say one figure
+
 
 def words(cause: Cause, run: Run) -> str:
     """A cause in one plain sentence. The moment stands beside it."""
     who = called(run, cause.action) if cause.action is not None else ""
     match cause:
+        case OperatorStop():
+            return _stop_in_words(cause, run)
+        case OperatorPause():
+            did = "paused the run" if cause.seen else "asked for a pause"
+            return f"{_named(cause.by)} {did}{_while_in_words(cause.ran, run)}."
+        case OperatorChange():
+            return f"{_named(cause.by)} gave the run another version of its graph while it went on."
         case WrongParameter():
             return (
                 f"{who} was started with {cause.parameter} = {cause.value}: "
@@ -36,8 +51,6 @@ def words(cause: Cause, run: Run) -> str:
             return f"{who or 'An action'} is not known to {robot}, so it refused the graph."
         case Waiting():
             return _waits_in_words(cause, run, who)
-        case Unended():
-            return f"{who} had not reported its end when {_stopper(run)} pressed Stop."
         case EngineRestarted():
             return f"The engine of {run.engine} was restarted; what happened after is unknown."
         case ForeignCause():
@@ -46,8 +59,8 @@ def words(cause: Cause, run: Run) -> str:
             how = "in error" if result == "error" else "false"
             seen = " (inferred)" if cause.inferred else ""
             return f"{who} ended {how}{seen}" + (f": “{quote}”" if quote else ".")
-        case RefusalCause(quote=quote):
-            return _refusal_in_words(run.engine, quote)
+        case RefusalCause(quote=quote, sent=sent):
+            return _refusal_in_words(run.engine, quote, sent=sent)
         case Silence(quote=quote):
             told = f" {quote}" if quote else ""
             return f"What happened after this moment is unknown.{told}"
@@ -57,7 +70,64 @@ def words(cause: Cause, run: Run) -> str:
             assert_never(cause)
 
 
-def _refusal_in_words(engine: str, quote: str) -> str:
+def _stop_in_words(cause: OperatorStop, run: Run) -> str:
+    who = _named(cause.by)
+    lead = f"{who} sent Stop from a program" if cause.program else f"{who} pressed Stop"
+    if cause.restarted:
+        return f"{lead} after the engine of {run.engine} had been restarted."
+    until_then = _while_in_words(cause.ran, run, ": before that ")
+    match cause.state:
+        case "requested" if run.incarnation is None:
+            return f"{lead} before anything was sent."
+        case "requested" | "published" if not cause.begun:
+            return f"{lead} before any action was seen to run."
+        case "unknown":
+            return f"{lead} while {run.engine} gave no answer{until_then}."
+        case "lost":
+            return f"{lead} after {run.engine} had stopped showing the run{until_then}."
+        case "paused":
+            held = [called(run, each.action) for each in cause.ran[:_NAMED]]
+            where = f", in {_listed(held, len(cause.ran))}" if held else ""
+            return f"{lead} while the run was paused{where}."
+        case _ if cause.ran:
+            return f"{lead}{_while_in_words(cause.ran, run)}."
+        case _:
+            return f"{lead} while no action was seen running."
+
+
+def _while_in_words(ran: Sequence[RanThen], run: Run, lead: str = " while ") -> str:
+    """Which actions ran at that moment, and for how long they had."""
+    if not ran:
+        return ""
+    told = [f"{called(run, each.action)} ({_lasted(each)})" for each in ran[:_NAMED]]
+    who = f"{_listed(told, len(ran))} ran"
+    if len(ran) == 1:
+        who = f"{called(run, ran[0].action)} ran ({_lasted(ran[0])})"
+    doubt = "" if all(each.proven for each in ran) else ", as far as was seen"
+    return f"{lead}{who}{doubt}"
+
+
+def _listed(told: Sequence[str], count: int) -> str:
+    if count > len(told):
+        return f"{', '.join(told)} and {count - len(told)} more"
+    return told[0] if count == 1 else f"{', '.join(told[:-1])} and {told[-1]}"
+
+
+def _lasted(ran: RanThen) -> str:
+    """How long it had run, between its bounds, in seconds."""
+    least, most = math.floor(ran.least / _TENTH_US) / 10, math.ceil(ran.most / _TENTH_US) / 10
+    if most - least <= _SAME_S:
+        return f"{round(ran.most / 1e6, 1)} s"
+    return f"≤ {most} s" if not least else f"{least}–{most} s"
+
+
+def _named(by: str) -> str:
+    return by or "Somebody"
+
+
+def _refusal_in_words(engine: str, quote: str, *, sent: bool) -> str:
+    if not sent:
+        return f"Nothing was started: {quote or 'it is not known why.'}"
     if quote.startswith((f"{engine} refused the start", f"{engine} holds the graph")):
         return quote
     return f"{engine} refused the start: {quote or 'it did not say why.'}"
@@ -66,9 +136,10 @@ def _refusal_in_words(engine: str, quote: str) -> str:
 def _waits_in_words(cause: Waiting, run: Run, child: str) -> str:
     parent = called(run, cause.parent)
     if cause.ended:
-        return f"{child} waits for {parent}, which ended {cause.ended}: its arrow passes that over."
-    end = f" It went on until {_stopper(run)} pressed Stop." if cause.until == "stop" else ""
-    return f"{child} waits for {parent}, which never reported its end.{end}"
+        return (
+            f"{child} waited for {parent}, which ended {cause.ended}: its arrow passes that over."
+        )
+    return f"{child} waited for {parent}, which had not been seen to end by then."
 
 
 def _command_in_words(cause: ForeignCause) -> str:
@@ -83,11 +154,6 @@ def _command_in_words(cause: ForeignCause) -> str:
     }
     did = verbs.get(cause.command, f"told {cause.robot} something")
     return f"Somebody else {did}" + ("; this run was ended by it." if cause.ended else ".")
-
-
-def _stopper(run: Run) -> str:
-    by = run.stopped_by
-    return (by.name if by is not None else "") or "somebody"
 
 
 def called(run: Run, full_name: str) -> str:

@@ -1,7 +1,8 @@
 """The causes of a run's bad end, as far as its own events prove them.
 
 Pure. A cause is named only with its evidence: a moment, and the action that it shows at. What nothing
-proves is not named; no cause is an answer, too.
+proves is not named; no cause is an answer, too. What a person at this runner did comes first, and no
+cause says what a later event of the run contradicts.
 """
 
 import re
@@ -14,7 +15,7 @@ from action_assistant.runner.analysis.failing import failing_visit
 from action_assistant.runner.analysis.levels import places_of
 from action_assistant.runner.runs import refusals, stall
 from action_assistant.runner.runs.events import Overridden
-from action_assistant.runner.runs.run import Alarm, Run
+from action_assistant.runner.runs.run import Alarm, Intervention, Run, State
 from action_assistant.runner.runs.visits import ActionRun, Message, Visit
 from action_assistant.umrf.json.text import parse_small
 from action_assistant.umrf.model import EXIT, Action, Graph, Precondition, Relation
@@ -24,6 +25,9 @@ _REFUSAL: Final = "origin [in start"
 _TYPES: Final = re.compile(r"is an? (\w+) here and an? (\w+) in the action")
 _LONGEST: Final = 80  # characters of a value in a sentence
 _PROBLEMS: Final = frozenset({"unknown-action", "signature"})
+#: Alarms of the runner that are causes of their own kind, or of none.
+RESTARTED: Final = "engine_restarted"
+UNCONFIRMED: Final = "stop_unconfirmed"
 
 
 class _Evidence(msgspec.Struct, frozen=True, kw_only=True):
@@ -49,17 +53,51 @@ class UnknownAction(_Evidence, frozen=True, tag="unknown_action", tag_field="kin
     why: str
 
 
+class RanThen(msgspec.Struct, frozen=True, kw_only=True):
+    """An action that ran when a person did something. `proven`: events show that it ran at that very
+    moment; else it was seen running before, and no end of it had been seen. It had begun between
+    `least` and `most` microseconds before."""
+
+    action: str
+    proven: bool
+    least: int
+    most: int
+
+
+class OperatorStop(_Evidence, frozen=True, tag="operator_stop", tag_field="kind"):
+    """A person pressed Stop. `program`: by a program. `state`: what the run was then, as far as was
+    known; `ran`: which actions ran; `begun`: whether any had begun. `restarted`: its engine had been
+    restarted before."""
+
+    by: str
+    program: bool
+    state: State
+    ran: tuple[RanThen, ...] = ()
+    begun: bool = True
+    restarted: bool = False
+
+
+class OperatorPause(_Evidence, frozen=True, tag="operator_pause", tag_field="kind"):
+    """A person paused the run and nobody let it go on. `seen`: the engine showed it paused."""
+
+    by: str
+    ran: tuple[RanThen, ...] = ()
+    seen: bool = False
+
+
+class OperatorChange(_Evidence, frozen=True, tag="operator_change", tag_field="kind"):
+    """A person gave the run another version of its graph while it went on."""
+
+    by: str
+
+
 class Waiting(_Evidence, frozen=True, tag="waiting", tag_field="kind"):
-    """`action` never ran, since it waits for `parent`: that goes on since `at` and never reported,
-    or it ended as `ended` says, which the arrow between them passes over."""
+    """`action` never ran, since it waited for `parent`: that had begun at `at` and had not been seen
+    to end when the run was given up, or it had ended as `ended` says, which the arrow between them
+    passes over."""
 
     parent: str
     ended: str = ""
-    until: Literal["stop", "silence", "end", "now"] = "now"
-
-
-class Unended(_Evidence, frozen=True, tag="unended", tag_field="kind"):
-    """`action` goes on since `at`, and no end of it was seen before somebody stopped the run."""
 
 
 class Stalled(_Evidence, frozen=True, tag="stalled", tag_field="kind"):
@@ -88,7 +126,10 @@ class ActionFailed(_Evidence, frozen=True, tag="action_failed", tag_field="kind"
 
 
 class RefusalCause(_Evidence, frozen=True, tag="refused", tag_field="kind"):
-    """Nothing was begun: the runner or the engine said no."""
+    """Nothing was begun. `sent`: the start had been sent, so that it was the engine that said no; else
+    it never left this computer."""
+
+    sent: bool = True
 
 
 class Silence(_Evidence, frozen=True, tag="silence", tag_field="kind"):
@@ -99,11 +140,16 @@ class Warned(_Evidence, frozen=True, tag="warned", tag_field="kind"):
     """Another alarm: the engine did something that it should not."""
 
 
+#: What people at this runner did.
+OPERATOR: Final = (OperatorStop, OperatorPause, OperatorChange)
+
 Cause: TypeAlias = (
-    WrongParameter
+    OperatorStop
+    | OperatorPause
+    | OperatorChange
+    | WrongParameter
     | UnknownAction
     | Waiting
-    | Unended
     | Stalled
     | EngineRestarted
     | ForeignCause
@@ -129,6 +175,9 @@ def _nothing_failed(run: Run) -> bool:
 
 
 def _found(run: Run, graph: Graph | None) -> Iterator[Cause]:
+    if run.reshaped:
+        graph = None  # something else ran than what was sent, so that its arrows prove nothing
+    yield from operator(run)
     yield from _restarts(run)
     yield from _commands(run)
     refused = tuple(_refusals(run, graph))
@@ -143,13 +192,86 @@ def _found(run: Run, graph: Graph | None) -> Iterator[Cause]:
         yield from _waits(run, graph)
     if not refused:
         yield from _silence(run)
-    told = {each.code for each in run.alarms if stalls and each.code == stall.STALLED}
-    yield from _alarms(run, told | ({refusals.REFUSED} if refused else set()))
+    yield from _alarms(run, {refusals.REFUSED} if refused else set())
+
+
+def operator(run: Run) -> tuple[OperatorStop | OperatorPause | OperatorChange, ...]:
+    """What people at this runner did to a run, a Stop first."""
+    found: list[OperatorStop | OperatorPause | OperatorChange] = []
+    asked = run.interventions
+    found += [_stop(run, each) for each in asked if each.kind == "stop"]
+    if not found and run.stop_requested_at is not None and run.stopped_by is not None:
+        early = Intervention(
+            kind="stop", at=run.stop_requested_at, by=run.stopped_by, state="running"
+        )
+        found.append(_stop(run, early))
+    standing = [each for each in asked if each.kind in {"pause", "resume"}][-1:]
+    for each in standing:
+        if each.kind == "pause":
+            seen = run.graph_state == "PAUSED" or any(
+                action.state == "PAUSED" for action in run.actions.values()
+            )
+            found.append(OperatorPause(at=each.at, by=each.by.name, ran=_ran(run, each), seen=seen))
+    found += [
+        OperatorChange(at=each.at, by=each.by.name) for each in asked if each.kind == "modify"
+    ]
+    return tuple(found)
+
+
+def _stop(run: Run, asked: Intervention) -> OperatorStop:
+    restarted = any(each.code == RESTARTED and each.at <= asked.at for each in run.alarms)
+    ran = _ran(run, asked)
+    return OperatorStop(
+        at=asked.at,
+        action=ran[0].action if ran else None,
+        by=asked.by.name,
+        program=asked.by.by == "program",
+        state=asked.state,
+        ran=ran,
+        begun=any(
+            each.visits and each.visits[0].not_before <= asked.at for each in run.actions.values()
+        ),
+        restarted=restarted,
+    )
+
+
+def _ran(run: Run, asked: Intervention) -> tuple[RanThen, ...]:
+    """The inmost actions that ran at that moment, those of which that is proven first."""
+    found: list[RanThen] = []
+    for name in asked.active:
+        visit = _at(run.actions.get(name, ActionRun()), asked.at)
+        if visit is not None:
+            proven = _surely_ran(run, name, visit, asked)
+            least, most = max(0, asked.at - visit.start), max(0, asked.at - visit.not_before)
+            found.append(RanThen(action=name, proven=proven, least=least, most=most))
+    around = _around(run, {each.action for each in found})
+    inmost = [each for each in found if each.action not in around]
+    return tuple(sorted(inmost, key=lambda each: (not each.proven, each.most, each.action)))
+
+
+def _at(action: ActionRun, moment: int) -> Visit | None:
+    """The visit that may have gone on at that moment."""
+    for visit in reversed(action.visits):
+        if visit.not_before <= moment:
+            ended = visit.not_after is not None and visit.not_after < moment
+            return None if ended else visit
+    return None
+
+
+def _surely_ran(run: Run, name: str, visit: Visit, asked: Intervention) -> bool:
+    """Whether events show that it ran at that moment. One that a Stop has stopped ran then, where nothing
+    else can have stopped it."""
+    if visit.start > asked.at:
+        return False
+    if visit.until is not None and visit.until >= asked.at:
+        return True
+    was_stopped = visit.result == "stopped" and asked.kind == "stop"
+    return was_stopped and not run.stoppable and run.actions[name].aid is not None
 
 
 def _restarts(run: Run) -> Iterator[Cause]:
     for alarm in run.alarms:
-        if alarm.code == "engine_restarted":
+        if alarm.code == RESTARTED:
             yield EngineRestarted(at=alarm.at, quote=alarm.text)
 
 
@@ -168,13 +290,26 @@ def _commands(run: Run) -> Iterator[Cause]:
             )
 
 
+#: How a run ends that somebody else stops, or starts anew.
+_ENDS: Final[dict[str, frozenset[str]]] = {
+    "stop": frozenset({"stopped"}),
+    "start": frozenset({"stopped", "lost"}),
+}
+
+
 def _ended_by(run: Run, command: str, alarm: Alarm) -> bool:
-    """Whether a command that ends runs came before an end that nobody here asked for."""
+    """Whether a command that ends runs came before an end of just that kind, which nobody here asked
+    for, and before anything else that ends a run."""
+    others = [
+        each for each in run.alarms if each.code == RESTARTED and each.at <= (run.ended_at or 0)
+    ]
+    over = run.over_at if run.over_at is not None else run.ended_at
+    was_lost = command == "start" and run.end == "error" and run.at_rest is not None
     return (
-        command in {"start", "stop"}
-        and run.end in {"stopped", "halted", "lost", "error"}
+        (was_lost or run.end in _ENDS.get(command, ()))
         and run.desired != "stopped"
-        and (run.ended_at or 0) >= alarm.at
+        and not others
+        and (over or 0) >= alarm.at
     )
 
 
@@ -185,7 +320,8 @@ def _refusals(run: Run, graph: Graph | None) -> Iterator[Cause]:
     lacking = [each for each in run.despite if each.code in _PROBLEMS]
     if line is None or _UNRESOLVED not in line.text or not lacking:
         if run.end == "refused":
-            yield RefusalCause(at=run.ended_at or run.requested_at, quote=run.detail)
+            sent = run.incarnation is not None
+            yield RefusalCause(at=run.ended_at or run.requested_at, quote=run.detail, sent=sent)
         elif line is not None:
             yield RefusalCause(at=line.at, quote=_first_line(line))
         return
@@ -213,8 +349,8 @@ def _parameters(run: Run, graph: Graph) -> Iterator[Cause]:
         if each.code != "parameter-type" or name is None or action is None or types is None:
             continue
         failed = _failed(run.actions[name])
-        if failed is not None:
-            parameter, value = _given(action, each)
+        parameter, value = _given(action, each)
+        if failed is not None and _was_given(failed, parameter, value):
             yield WrongParameter(
                 at=failed.start,
                 action=name,
@@ -232,6 +368,12 @@ def _given(action: Action, problem: Overridden) -> tuple[str, str]:
     value = leaf.get("pvf_value") if isinstance(leaf, dict) else None
     text = "nothing" if value is None else msgspec.json.encode(value, enc_hook=str).decode()
     return path, text[:_LONGEST]
+
+
+def _was_given(visit: Visit, parameter: str, value: str) -> bool:
+    """Whether the engine reported no other value for this visit: a parent may have handed one over."""
+    reported = (visit.inputs or {}).get(parameter.replace("/", "::"))
+    return reported is None or reported[:_LONGEST] == value
 
 
 def _failures(run: Run) -> Iterator[Cause]:
@@ -262,26 +404,17 @@ def _stalls(run: Run, graph: Graph | None) -> Iterator[Stalled]:
 
 
 def _waits(run: Run, graph: Graph) -> Iterator[Cause]:
-    """Joins that one of their parents keeps waiting, when the run was given up."""
+    """Joins that one of their parents kept waiting, when the run was given up."""
     if run.end in {"finished", "error", "refused"}:
         return
-    moment, until = _given_up(run)
+    moment = _given_up(run)
     if moment is None:
         return
     names = {action.key: action.full_name for action in graph.actions}
-    held: set[str] = set()
     for child in graph.actions:
         if child.full_name in run.actions and not run.actions[child.full_name].visits:
             arrows = [r for r in graph.relations if r.child == child.key and r.required]
-            for wait in _waiting(run, names, child.full_name, arrows, moment, until):
-                held.add(wait.parent)
-                yield wait
-    if until == "stop":
-        going = {name: _going(action, moment) for name, action in run.actions.items()}
-        held |= _around(run, {name for name, visit in going.items() if visit is not None})
-        for name, visit in going.items():
-            if visit is not None and name not in held:
-                yield Unended(at=visit.start, action=name)
+            yield from _waiting(run, names, child.full_name, arrows, moment)
 
 
 def _around(run: Run, going: set[str]) -> set[str]:
@@ -291,22 +424,15 @@ def _around(run: Run, going: set[str]) -> set[str]:
     return {name for name in going if found[name].way in levels}
 
 
-def _given_up(run: Run) -> tuple[int | None, Literal["stop", "silence", "end"]]:
+def _given_up(run: Run) -> int | None:
     """From which moment on the actions tell nothing more."""
     if run.stop_requested_at is not None:
-        return run.stop_requested_at, "stop"
-    if run.unknown_since is not None:
-        return run.unknown_since, "silence"
-    return run.ended_at, "end"
+        return run.stop_requested_at
+    return run.unknown_since if run.unknown_since is not None else run.ended_at
 
 
 def _waiting(
-    run: Run,
-    names: dict[str, str],
-    child: str,
-    arrows: list[Relation],
-    moment: int,
-    until: Literal["stop", "silence", "end"],
+    run: Run, names: dict[str, str], child: str, arrows: list[Relation], moment: int
 ) -> Iterator[Waiting]:
     """A join has several parents, of which one has reported and another one has not."""
     parents = [(names[arrow.parent], arrow) for arrow in arrows if arrow.parent in names]
@@ -316,14 +442,13 @@ def _waiting(
         action = run.actions.get(name, ActionRun())
         going = _going(action, moment)
         if going is not None:
-            yield Waiting(at=going.start, action=child, parent=name, until=until)
+            yield Waiting(at=going.start, action=child, parent=name)
         elif (over := _over(action, moment)) is not None and _passes_over(arrow, over):
             yield Waiting(
                 at=over.not_after or over.start,
                 action=child,
                 parent=name,
                 ended=over.result or "",
-                until=until,
             )
 
 
@@ -359,7 +484,7 @@ def _passes_over(arrow: Relation, visit: Visit) -> bool:
 
 
 def _silence(run: Run) -> Iterator[Cause]:
-    restarted = any(alarm.code == "engine_restarted" for alarm in run.alarms)
+    restarted = any(alarm.code == RESTARTED for alarm in run.alarms)
     if run.unknown_since is not None and not restarted:
         yield Silence(at=run.unknown_since, quote=run.detail)
     elif run.end == "lost" and run.detail and not restarted:
@@ -367,11 +492,20 @@ def _silence(run: Run) -> Iterator[Cause]:
 
 
 def _alarms(run: Run, told: set[str]) -> Iterator[Cause]:
+    """Other alarms, except those that what came after them contradicts."""
     for alarm in run.alarms:
-        if alarm.code in told:
+        if alarm.code in told or alarm.code in {RESTARTED, stall.STALLED}:
             continue
-        if alarm.code != "engine_restarted" and not alarm.code.startswith("foreign_"):
+        if not alarm.code.startswith("foreign_") and not _was_settled(run, alarm):
             yield Warned(at=alarm.at, quote=alarm.text)
+
+
+def _was_settled(run: Run, alarm: Alarm) -> bool:
+    """Whether rest was proven, or seen, after an alarm that says that it is not."""
+    if alarm.code != UNCONFIRMED:
+        return False
+    rested = [run.proof_at, run.at_rest.at if run.at_rest is not None else None]
+    return any(each is not None and each >= alarm.at for each in rested)
 
 
 def _failed(action: ActionRun) -> Visit | None:

@@ -1,17 +1,21 @@
 """Two runs side by side: what was sent, where they ran, and the first visit in which they part."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Final, Literal, TypeAlias
 
 import msgspec
+from msgspec.structs import replace
 
+from action_assistant.runner.analysis.cause_texts import words
+from action_assistant.runner.analysis.causes import OPERATOR, Cause, Silence, causes, operator
 from action_assistant.runner.analysis.levels import INTO, LevelPlace, places_of
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.visits import ActionRun, Visit
 from action_assistant.umrf.difference import ActionChange, Difference, difference
 from action_assistant.umrf.files import codec
-from action_assistant.umrf.model import Graph
+from action_assistant.umrf.json.text import parse_small
+from action_assistant.umrf.model import Action, Graph, Key
 
 _MOST: Final = 2_000  # steps in an answer
 _SLOWER: Final = 1.5  # times as long
@@ -47,10 +51,20 @@ class Parting(msgspec.Struct, frozen=True, kw_only=True):
     messages_b: list[str]
 
 
+class PartingCause(msgspec.Struct, frozen=True, kw_only=True):
+    """Something that happened in one of the runs and explains where they part: what a person did, an
+    alarm, or what the simulator was told to do. `run`: the number of that run."""
+
+    kind: str
+    run: int
+    text: str
+
+
 class RunComparison(msgspec.Struct, frozen=True, kw_only=True):
     """Run `a` against run `b`. `graph` is the difference of what was sent; `parameters` those of its
     changes that touch the values of actions; `subgraphs` names the graphs inside that were sent along
-    and were not the same."""
+    and were not the same. `because`: what happened on the way that explains the parting, before any
+    difference of the graphs; null where nothing is known that does."""
 
     a: views.RunSummary
     b: views.RunSummary
@@ -62,24 +76,30 @@ class RunComparison(msgspec.Struct, frozen=True, kw_only=True):
     steps: list[ComparedVisit]
     left_out: int
     parting: Parting | None
+    because: PartingCause | None = None
     text: str
 
 
 class SentTree(msgspec.Struct, frozen=True):
-    """What was sent: a graph, and the digests of those inside of it by their names."""
+    """What was sent: a graph, the digests of those inside of it by their names, and the script of a
+    simulated run."""
 
     umrf: str
     inside: Mapping[str, str] = {}
+    script: str = ""
 
 
 def compare(a: Run, b: Run, sent_a: SentTree, sent_b: SentTree) -> RunComparison:
     """Compare two runs that may be of different graphs. Total."""
-    graph = difference((0, _graph(sent_a.umrf)), (0, _graph(sent_b.umrf)))
-    twins = _pairs(a, b)
+    graph_b = _graph(sent_b.umrf)
+    graph_a, identities = aligned(_graph(sent_a.umrf), graph_b)
+    graph = difference((0, graph_a), (0, graph_b))
+    twins = _pairs(a, b, identities)
     begun = sorted(_steps(a, b, twins), key=lambda step: _begun(step, a, b))
     steps = _own_first(_inner_first(begun))
     parts = (step for step in steps if _parts(step))
     parting = next((_parting(step, a, b, twins) for step in parts), None)
+    because = _because(parting, (a, sent_a), (b, sent_b), twins)
     return RunComparison(
         a=views.summary(a),
         b=views.summary(b),
@@ -91,6 +111,7 @@ def compare(a: Run, b: Run, sent_a: SentTree, sent_b: SentTree) -> RunComparison
         steps=steps[:_MOST],
         left_out=max(0, len(steps) - _MOST),
         parting=parting,
+        because=because,
         text=_verdict(a, b, steps, parting),
     )
 
@@ -102,6 +123,50 @@ def _graph(umrf: str) -> Graph:
         codec.Unreadable
     ):  # a run of ours was readable when it began; an import may not have been
         return Graph(name="")
+
+
+def aligned(a: Graph, b: Graph) -> tuple[Graph, dict[Key, Key]]:
+    """Graph `a` with the identities of `b` for each action that is the same in both, and which those
+    are. An action is the same by its identity; else by its full name; else by its name, type and
+    parameters, where only one on each side has these. Identities change where somebody takes actions
+    out of a graph and puts them back, or imports a file again."""
+    same = {each.key: each.key for each in b.actions if each.key in {one.key for one in a.actions}}
+    for says in (_called, _described):
+        left_a = _alone_by(says, (each for each in a.actions if each.key not in same))
+        left_b = _alone_by(says, (each for each in b.actions if each.key not in same.values()))
+        same |= {left_a[what]: left_b[what] for what in left_a.keys() & left_b.keys()}
+    changed = {old: new for old, new in same.items() if old != new}
+    taken = {each.key for each in b.actions} - set(same.values())
+    if not changed or taken & {each.key for each in a.actions if each.key not in same}:
+        return a, changed
+    actions = tuple(replace(each, key=changed.get(each.key, each.key)) for each in a.actions)
+    relations = tuple(
+        replace(
+            each,
+            parent=changed.get(each.parent, each.parent),
+            child=changed.get(each.child, each.child),
+        )
+        for each in a.relations
+    )
+    return replace(a, actions=actions, relations=relations), changed
+
+
+def _called(action: Action) -> tuple[object, ...]:
+    return (action.full_name,)
+
+
+def _described(action: Action) -> tuple[object, ...]:
+    return action.name, action.type, action.inputs, action.outputs
+
+
+def _alone_by(
+    says: Callable[[Action], tuple[object, ...]], actions: Iterable[Action]
+) -> dict[tuple[object, ...], Key]:
+    """Identities by what actions say of themselves, where only one says so."""
+    found: dict[tuple[object, ...], list[Key]] = {}
+    for each in actions:
+        found.setdefault(says(each), []).append(each.key)
+    return {what: keys[0] for what, keys in found.items() if len(keys) == 1}
 
 
 def _changed_inside(a: Mapping[str, str], b: Mapping[str, str]) -> list[str]:
@@ -146,12 +211,13 @@ class _Twins(msgspec.Struct, frozen=True):
         return a.actions.get(self.a or ""), b.actions.get(self.b or "")
 
 
-def _pairs(a: Run, b: Run) -> list[_Twins]:
+def _pairs(a: Run, b: Run, identities: Mapping[Key, Key]) -> list[_Twins]:
     """Actions of both runs, by identity where they have one, so that a renamed action is the same.
-    Those inside have none: their names count below the action that they are inside of."""
+    Those inside have none: their names count below the action that they are inside of. `identities`:
+    those of `b` by those of `a` that are the same action."""
     in_a, in_b = places_of(a), places_of(b)
-    same = {_identity(a, name, place): name for name, place in in_a.items()}
-    found = {name: same.get(_identity(b, name, place)) for name, place in in_b.items()}
+    same = {_identity(a, name, place, identities): name for name, place in in_a.items()}
+    found = {name: same.get(_identity(b, name, place, {})) for name, place in in_b.items()}
     matched = set(found.values())
     named = {place.way: name for name, place in in_a.items() if name not in matched}
     found |= {name: named.get(in_b[name].way) for name, twin in found.items() if twin is None}
@@ -162,11 +228,14 @@ def _pairs(a: Run, b: Run) -> list[_Twins]:
     ]
 
 
-def _identity(run: Run, name: str, place: LevelPlace) -> tuple[str, ...]:
+def _identity(
+    run: Run, name: str, place: LevelPlace, identities: Mapping[Key, Key]
+) -> tuple[str, ...]:
     """The same in all runs: the identity of the outermost action, and the names below it."""
     first, *below = place.way
     outermost = run.actions.get(first if below else name)
-    return ((outermost.aid if outermost is not None else None) or first, *below)
+    aid = outermost.aid if outermost is not None else None
+    return (identities.get(aid, aid) if aid else first, *below)
 
 
 def _visits(action: ActionRun | None) -> Mapping[int, Visit]:
@@ -265,6 +334,80 @@ def _parting(step: ComparedVisit, a: Run, b: Run, twins: Sequence[_Twins]) -> Pa
     said_a, said_b = _said(one, step.a), _said(other, step.b)
     text = f"{_named(step)}: {_did(step.a, a)}, {_did(step.b, b)}."
     return Parting(step=step, text=text, messages_a=said_a, messages_b=said_b)
+
+
+#: Alarms that may be behind an action that did not run, or did not end as in the other run.
+_ALARMS: Final = frozenset(
+    {"engine_restarted", "engine_gone", "foreign_stop", "foreign_start", "foreign_pause"}
+    | {"foreign_resume", "foreign_modify", "stalled"}
+)
+
+
+def _because(
+    parting: Parting | None,
+    a: tuple[Run, SentTree],
+    b: tuple[Run, SentTree],
+    twins: Sequence[_Twins],
+) -> PartingCause | None:
+    """What happened in one of the runs and explains where they part: first what a person did in either,
+    then alarms, then what the simulator was told. Of runs that part nowhere and yet ended otherwise:
+    what is behind that."""
+    step = parting.step if parting is not None else None
+    if step is None and a[0].end == b[0].end:
+        return None
+    sides = [(b[0], step.b if step else None), (a[0], step.a if step else None)]
+    for found in (_operators, _troubles):
+        for run, shown in sides:
+            for cause in found(run):
+                if _explains(cause.at, run, shown):
+                    return _happened(str(cause.__struct_config__.tag), run, words(cause, run))
+    if step is None or step.levels:
+        return None
+    pair = next(pair for pair in twins if pair.action == step.action)
+    told = [_told(sent, name) for (_, sent), name in ((a, pair.a), (b, pair.b))]
+    if told[0] == told[1]:
+        return None
+    run = b[0] if told[1] is not None else a[0]
+    return _happened("script", run, f"The script of the simulator says what {step.name} did.")
+
+
+def _operators(run: Run) -> Iterator[Cause]:
+    yield from operator(run)
+
+
+def _troubles(run: Run) -> Iterator[Cause]:
+    """Alarms and silence, as the causes of a run name them: what later events contradict is left out."""
+    moments = {each.at for each in run.alarms if each.code in _ALARMS}
+    for cause in causes(run, None):
+        if isinstance(cause, Silence) or (not isinstance(cause, OPERATOR) and cause.at in moments):
+            yield cause
+
+
+def _explains(at: int, run: Run, shown: views.VisitShown | None) -> bool:
+    """Whether what happened then can be behind the visit of that run, or behind there being none: an
+    action that told its result was done with by itself."""
+    if shown is None:
+        return run.ended_at is None or at <= run.ended_at
+    if shown.result in {"true", "false"}:
+        return False
+    return shown.not_after is None or views.time(at) <= shown.not_after
+
+
+def _happened(kind: str, run: Run, text: str) -> PartingCause:
+    said = text.removesuffix(".")
+    if said.startswith(("Somebody", "The ", "What ")):
+        said = said[0].lower() + said[1:]
+    return PartingCause(kind=kind, run=run.number, text=f"in run {run.number} {said}")
+
+
+def _told(sent: SentTree, name: str | None) -> object:
+    """What the script of a simulated run says of an action; None of one that has none."""
+    script = parse_small(sent.script) if sent.script else None
+    says = script.get("behaviours") if isinstance(script, dict) else None
+    if not isinstance(says, dict) or name is None:
+        return None
+    said: object = says.get(name, says.get("*"))
+    return said
 
 
 def _named(step: ComparedVisit) -> str:

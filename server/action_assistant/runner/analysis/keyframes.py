@@ -39,7 +39,7 @@ from action_assistant.runner.runs.run import Run
 from action_assistant.web.workers.lanes import RunInWorker
 
 #: Raise it when `runs.follow` tells something else of the same events: older keyframes are void then.
-FOLD: Final = 3
+FOLD: Final = 4
 #: Events between two keyframes, and in one page of a replay.
 APART: Final = 2_000
 _READ: Final = 5 * APART  # events that are read at once

@@ -244,7 +244,8 @@ class ReviewService:
 
     async def _sent_tree(self, run_id: str) -> SentTree:
         sent = await self._control.history.requested(run_id)
-        return SentTree(sent.umrf, {each.name: each.digest for each in sent.subgraphs})
+        inside = {each.name: each.digest for each in sent.subgraphs}
+        return SentTree(sent.umrf, inside, sent.script)
 
     async def export(self, run_id: str, form: Format) -> bytes:
         """The run as a file. Raises NotFound."""

@@ -7,7 +7,7 @@ knows a clock, a link or a database.
 from collections.abc import Callable, Iterable
 from itertools import chain, groupby
 from operator import attrgetter
-from typing import Final, assert_never
+from typing import Final, Literal, assert_never
 
 from msgspec.structs import replace
 
@@ -35,7 +35,7 @@ from action_assistant.runner.runs.events import (
 )
 from action_assistant.runner.runs.observed import key_of as key_of
 from action_assistant.runner.runs.observed import names_all, observe
-from action_assistant.runner.runs.run import Alarm, Run
+from action_assistant.runner.runs.run import Alarm, Intervention, Run
 from action_assistant.runner.runs.visits import (
     KEPT,
     ActionRun,
@@ -151,17 +151,32 @@ def _desired(run: Run, event: PauseRequested | ResumeRequested | StopRequested) 
     match event:
         case PauseRequested():
             held = _held(run)
-            return held if is_stopped else replace(held, desired="paused")
+            return held if is_stopped else replace(_asked(held, event, "pause"), desired="paused")
         case ResumeRequested():
-            return run if is_stopped else replace(run, desired="running")
+            return run if is_stopped else replace(_asked(run, event, "resume"), desired="running")
         case StopRequested() if is_stopped:
             return run
         case StopRequested():
             return replace(
-                run, desired="stopped", stop_requested_at=event.at, stopped_by=event.author
+                _asked(run, event, "stop"),
+                desired="stopped",
+                stop_requested_at=event.at,
+                stopped_by=event.author,
             )
         case _:
             assert_never(event)
+
+
+def _asked(
+    run: Run,
+    event: PauseRequested | ResumeRequested | StopRequested | ModifyRequested,
+    kind: Literal["stop", "pause", "resume", "modify"],
+) -> Run:
+    """Note what a person asked for, beside what was known of the run at that moment."""
+    asked = Intervention(
+        kind=kind, at=event.at, by=event.author, state=run.state, active=run.active
+    )
+    return replace(run, interventions=(*run.interventions, asked)[-KEPT:])
 
 
 def _held(run: Run) -> Run:
@@ -241,7 +256,7 @@ def _modified(run: Run, event: ModifyRequested) -> Run:
         for name, aid in event.actions.items()
     }
     return replace(
-        run,
+        _asked(run, event, "modify"),
         version=event.version,
         digest=event.digest,
         actions=run.actions | actions,
@@ -256,7 +271,15 @@ def _unmodified(run: Run, event: ModifyRefused) -> Run:
         for name, action in run.actions.items()
         if name in event.actions or action.seen_at
     }
-    return replace(run, version=event.version, digest=event.digest, actions=actions)
+    last = run.interventions[-1:]
+    kept = run.interventions[:-1] if last and last[0].kind == "modify" else run.interventions
+    return replace(
+        run,
+        version=event.version,
+        digest=event.digest,
+        actions=actions,
+        interventions=kept,
+    )
 
 
 def _reopen(run: Run, event: MovesAgain) -> Run:

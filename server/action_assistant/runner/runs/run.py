@@ -45,6 +45,17 @@ class Alarm(msgspec.Struct, frozen=True):
     text: str
 
 
+class Intervention(msgspec.Struct, frozen=True, kw_only=True):
+    """What a person asked of the run at `at`. `state` and `active` are what was known at that moment:
+    the state of the run, and the actions that had been seen running and not seen to end."""
+
+    kind: Literal["stop", "pause", "resume", "modify"]
+    at: int
+    by: Author
+    state: State
+    active: tuple[str, ...] = ()
+
+
 class Run(msgspec.Struct, frozen=True, kw_only=True):
     """All that is known of one run. Times are microseconds UTC."""
 
@@ -91,6 +102,7 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     stop_requested_at: int | None = None
     stopped_by: Author | None = None
     stops_sent: int = 0
+    interventions: tuple[Intervention, ...] = ()  # the newest; of several stops only the first
     alarms: tuple[Alarm, ...] = ()
     log: tuple[Message, ...] = ()  # the newest lines of the engine
 

@@ -42,10 +42,12 @@ _OUTCOMES: Final[dict[str, Precondition]] = {
 
 
 class ForParent(msgspec.Struct, frozen=True, tag="parent", tag_field="for"):
-    """`action` (None: the end of the graph) needs `parent` to have ended, which never ran."""
+    """`action` (None: the end of the graph) needs `parent` to have ended, which was not seen; nor was
+    its begin, unless it had `begun`."""
 
     action: str | None
     parent: str
+    begun: bool = False
 
 
 class ForInput(msgspec.Struct, frozen=True, tag="input", tag_field="for"):
@@ -204,7 +206,8 @@ class _Stalled:
             return list(self._unanswered(name, fired))
         missing = [each for each in arrows if each.required and not self._has_ended(each.parent)]
         if missing:
-            return [ForParent(name, self._name(each.parent)) for each in missing]
+            parents = [self._name(each.parent) for each in missing]
+            return [ForParent(name, each, bool(self._seen(each).visits)) for each in parents]
         lacking: list[Wait] = [*self._lacking(action, running)]
         return lacking or [*self._unsure(name, running)]
 
@@ -305,6 +308,8 @@ def in_words(wait: Wait) -> str:
     """One plain sentence."""
     who = wait.action if wait.action is not None else "The end of the graph"
     match wait:
+        case ForParent(parent=parent, begun=True):
+            return f"{who} waits for {parent}, which has not been seen to end."
         case ForParent(parent=parent):
             return f"{who} waits for {parent}, which has not run."
         case ForInput(input=name, giver=giver) if giver:
