@@ -3,20 +3,29 @@ import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import type { EditorContext } from "./editor-context";
 import { details } from "./notes";
 
-const context = { setPanel: () => {} } as unknown as EditorContext;
-const form = (content: string) => `<div data-form>${content}</div>`;
+/** An editor in which one action, or nothing, is chosen. */
+const contextWith = (...keys: string[]) =>
+  ({
+    setPanel: () => {},
+    selection: new Set(keys),
+    graph: { actions: [{ key: "lift" }], relations: [], notes: [], positions: new Map() },
+  }) as unknown as EditorContext;
+const context = contextWith();
+const form = (content: string, of = "graph") => `<div data-form="${of}">${content}</div>`;
 
 function later(): void {
   vi.advanceTimersByTime(200);
 }
 
 beforeEach(() => {
+  vi.stubGlobal("CSS", { escape: (text: string) => text }); // jsdom has none
   vi.useFakeTimers();
   document.body.innerHTML = '<button id="card"></button><input id="search"><main></main>';
   document.getElementById("card")?.focus();
 });
 
 afterEach(() => {
+  vi.unstubAllGlobals();
   vi.useRealTimers();
 });
 
@@ -28,7 +37,7 @@ function show(content: string): void {
 test("a form that is loaded only now gets the keyboard when it is there", () => {
   details.run(context);
   later();
-  const before = '<div data-form style="display: none !important"><input id="graph"></div>';
+  const before = '<div data-form="graph" style="display: none !important"><input id="graph"></div>';
   show(`<button id="problem"></button>${before}Loading …`);
   later();
   expect(document.activeElement?.id).toBe("card");
@@ -51,4 +60,14 @@ test("where nothing can be typed the first button gets it", () => {
   details.run(context);
   later();
   expect(document.activeElement?.id).toBe("fix");
+});
+
+test("the form of the selection before is not given the keyboard", () => {
+  show(form('<input id="name">'));
+  details.run(contextWith("lift"));
+  later();
+  expect(document.activeElement?.id).toBe("card");
+  show(form('<input id="lift-name">', "lift"));
+  later();
+  expect(document.activeElement?.id).toBe("lift-name");
 });

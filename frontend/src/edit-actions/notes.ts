@@ -9,9 +9,16 @@ import {
 import { CARD } from "../canvas/geometry/arrange";
 import { relationId } from "../graph/document-keys";
 import { writeNote } from "../graph/edit/notes";
+import { EXIT } from "../graph/model";
 import { whenThere } from "../ui/focus-field";
 import type { EditAction } from "./edit-action";
-import { type EditorContext, freeFrom, selectedNotes, selectedRelations } from "./editor-context";
+import {
+  type EditorContext,
+  freeFrom,
+  selectedActions,
+  selectedNotes,
+  selectedRelations,
+} from "./editor-context";
 
 const SIZE = [200, 84] as const; // px of a new note
 const AIR = 28; // px between a frame and what lies in it
@@ -88,8 +95,23 @@ export const write: EditAction = {
   },
 };
 
-/** The form of what is chosen, once it has been loaded; the one before is hidden by React until then. */
-const FORM = '[aria-label="Details"] [data-form]:not([style*="display: none"])';
+/** Return the `data-form` of the form that shows the selection; null if several things are selected. */
+function formOfSelection(context: EditorContext): string | null {
+  const chosen = [
+    ...selectedNotes(context),
+    ...selectedActions(context).map(({ key }) => key),
+    ...selectedRelations(context).map(relationId),
+  ];
+  if (chosen.length > 1) return null;
+  return chosen[0] ?? (context.selection.has(EXIT) ? EXIT : "graph");
+}
+
+/**
+ * Select the form of what is chosen once it is shown. A slow page shows the form of the selection
+ * before for a moment: a field of that form would lose the keyboard again with it.
+ */
+const selectorOf = (form: string) =>
+  `[aria-label="Details"] [data-form="${CSS.escape(form)}"]:not([style*="display: none"])`;
 const PATIENCE = 300; // frames, some seconds, for a form that has to be loaded first
 const TYPED_IN = "input, textarea, [contenteditable=true]";
 
@@ -113,8 +135,11 @@ export const details: EditAction = {
   run: (context) => {
     context.setPanel("details");
     const before = document.activeElement;
+    const chosen = formOfSelection(context);
+    if (chosen === null) return;
+    const form = selectorOf(chosen);
     // Where the panel slides in, it cannot have the focus before it is seen.
-    setTimeout(() => whenThere(FORM, (form) => focusFirst(form, before), PATIENCE), 60);
+    setTimeout(() => whenThere(form, (found) => focusFirst(found, before), PATIENCE), 60);
   },
 };
 

@@ -27,7 +27,7 @@ function wholeNumber(draft: string): string | null {
 function Ghost({ action }: { action: Action }) {
   const { doc } = useEditorContext();
   return (
-    <div className={style.say} data-tone="error">
+    <div className={style.say} data-tone="error" data-form={action.key}>
       <IconGhost2 size={16} aria-hidden />
       <div>
         Arrows name{" "}
@@ -49,7 +49,7 @@ export function ActionForm({ action }: { action: Action }) {
   const { doc, graph, openOverlay } = useEditorContext();
   if (action.missing) return <Ghost action={action} />;
   return (
-    <div className={style.form} data-form>
+    <div className={style.form} data-form={action.key}>
       <div className={style.nameRow}>
         <NameField action={action} onRename={(name) => rename(doc, action.key, name)} />
         <SharedField of={action.key} field="number">

@@ -14,7 +14,7 @@ export function GraphForm() {
   const { doc, graph } = useEditorContext();
   const arrows = graph.relations.length;
   return (
-    <div className={style.form} data-form>
+    <div className={style.form} data-form="graph">
       <SharedField of="graph" field="name">
         <DraftInput
           label="Graph"

@@ -51,7 +51,7 @@ export function NoteForm({ note }: { note: Note }) {
   const [width, height] = note.size;
   const area = useRef<HTMLTextAreaElement>(null);
   return (
-    <div className={style.form} data-form>
+    <div className={style.form} data-form={note.key}>
       <SharedField of={note.key} field="text">
         <DraftInput
           label={frame ? "Title" : "Text"}

@@ -31,7 +31,7 @@ export function RelationForm({ relation }: { relation: Relation }) {
   const entry = relation.parent === ENTRY;
   const nothing = ignoredWords(graph, relation);
   return (
-    <div className={style.form} data-form>
+    <div className={style.form} data-form={id}>
       <div className={style.ends}>
         <button
           type="button"

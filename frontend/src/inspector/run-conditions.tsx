@@ -8,7 +8,7 @@ import style from "./inspector.module.css";
 export function RunConditions({ of, title }: { of: Key; title: string }) {
   const { graph } = useEditorContext();
   return (
-    <section className={style.section} data-form>
+    <section className={style.section} data-form={of}>
       <div className={style.heading}>
         <h2>{title}</h2>
       </div>
