@@ -14,12 +14,14 @@ from action_assistant.umrf.check import blocking, check_reading, refused_by_pars
 from action_assistant.umrf.facts import PINNED
 from action_assistant.umrf.files.codec import read
 from action_assistant.umrf.model import Signature
-from action_assistant.umrf.semantics import GraphStateEvent, HazardEvent, simulate
+from action_assistant.umrf.semantics import GraphStateEvent, HazardEvent, NodeStateEvent, simulate
 from support.recordings import CORPUS, NO_CORPUS, engine_runs, lines, runs_of
 
 KNOWN: dict[str, Any] = json.loads((Path(__file__).parent / "blocked.json").read_text())
 #: What is in a recording that did not go well.
 BAD_ENDS = {"crash", "std::terminate", "timeout", "throw", "final_hang", "final_throw"}
+#: What begins so often in a graph that is FINISHED goes on for ever.
+_LAPS = 100
 
 
 def accepted() -> list[str]:
@@ -37,6 +39,7 @@ def behaviour(path: Path) -> str:
     """What the engine does with a graph, by the rules that the recordings confirm."""
     reading = read(path.read_bytes())
     states: list[str] = []
+    begun = 0
     for trace in simulate(reading.graph, facts=PINNED, states=reading.states, max_events=3_000):
         match trace:
             case HazardEvent(code="refused"):
@@ -45,10 +48,14 @@ def behaviour(path: Path) -> str:
                 return "aborts"
             case HazardEvent(effect="hang"):
                 return "hangs"
+            case NodeStateEvent(state="RUNNING") if "FINISHED" in states:
+                begun += 1
             case GraphStateEvent(graph=name, state=state) if name == reading.graph.name:
                 states.append(state)
             case _:
                 pass
+    if begun > _LAPS:
+        return "never rests"
     return "runs" if "RUNNING" in states else "never starts"
 
 

@@ -45,7 +45,7 @@ def check(
     """
     subject = Subject(graph, facts)
     check_structure(subject)
-    check_flow(subject)
+    check_flow(subject, set(graphs or ()) - set(library or ()))
     check_values(subject, library, graphs or {})
     check_subgraphs(subject, graphs or {}, library or {}, resolution)
     _check_actors(subject)

@@ -97,7 +97,7 @@ CODES: Final[dict[str, Code]] = {
         "this build reads freed memory and may abort with every running graph, or answer nothing any more",
     ),
     "H4": Code(
-        "hazard", _WARNING, "`run` may reach an action that is being paused or stopped",
+        "hazard", _WARNING, "`run` may reach an action that is being paused or stopped, or still loads",
         "the engine aborts with every running graph",
     ),
     "H5": Code(
@@ -117,8 +117,12 @@ CODES: Final[dict[str, Code]] = {
         "the engine recurses until it dies with every running graph",
     ),
     "H12": Code(
-        "hazard", _WARNING, "the graph can be FINISHED while actions still run",
+        "hazard", _BOTH, "the graph can be FINISHED while actions still run (error: a spontaneous one does when all goes well)",
         "the engine ignores every stop of the graph",
+    ),
+    "H14": Code(
+        "hazard", _WARNING, "an action may still load when another one ends and halts the graph",
+        "it runs in a graph that is HALTED, and nothing follows it",
     ),
     "subgraph": Code(
         "hazard", _ERROR, "a sub-graph that has an error itself",
@@ -181,7 +185,7 @@ STRUCTURAL: Final[frozenset[str]] = REFUSED | {
 
 #: Of what is possible, what comes first: it kills or blocks the engine, it cannot be stopped, it never
 #: ends. H3 stands in nearly every graph from the wild.
-_WORST: Final = ("H4", "H5", "H12", "H8", "H3")
+_WORST: Final = ("H4", "H5", "H12", "H8", "H14", "H3")
 
 
 def rank(problem: Problem) -> tuple[Severity, int]:

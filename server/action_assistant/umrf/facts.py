@@ -6,7 +6,7 @@ from typing import Final
 import msgspec
 
 ALL_HAZARDS: Final = frozenset(
-    {"H1", "H2", "H2b", "H3", "H4", "H5", "H6", "H7", "H8", "H9", "H10", "H11", "H12"}
+    {"H1", "H2", "H2b", "H3", "H4", "H5", "H6", "H7", "H8", "H9", "H10", "H11", "H12", "H14", "H15"}
 )
 
 

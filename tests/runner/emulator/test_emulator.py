@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from action_assistant.runner.emulator.engine import EmulatedEngine
 from action_assistant.runner.emulator.messages import (
@@ -29,6 +30,7 @@ from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics import script_from
 from runner.harness import sequence
+from umrf.semantics.traces import graph_of
 
 WORK = json.dumps({"name": "Work", "type": "sync", "instance_id": 0})
 ENDLESS = {"*": [{"never": True}]}
@@ -268,6 +270,23 @@ def test_a_stop_passes_by_an_action_that_is_just_being_loaded() -> None:
     assert (shown["graph_state"], states(shown)["Work_0"]) == ("STOPPED", "UNINITIALIZED")
     shown = asked(david, 600)["patrol"]
     assert (shown["graph_state"], states(shown)["Work_0"]) == ("STOPPED", "RUNNING")
+
+
+def test_a_behaviour_says_how_long_its_action_loads() -> None:
+    """The loading action moves in a graph that a leaf has halted, and no feedback told of it before."""
+    slow = {"B": [{"after_s": 0.01}], "C": [{"load_s": 1.5, "never": True}]}
+    patrol = replace(graph_of("entry>A", "A>B", "A>C", "C>exit"), name="patrol")
+    david = robot({"*": [{"after_s": 0.2}], **slow}, EngineTraits(loss=0.0, loading_ms=3.0))
+    david.hear(start(patrol), 0)
+    david.advance(1_000)
+    shown = asked(david, 1_000)["patrol"]
+    assert (shown["graph_state"], states(shown)["C_0"]) == ("HALTED", "UNINITIALIZED")
+    shown = asked(david, 2_000)["patrol"]
+    assert (shown["graph_state"], states(shown)["C_0"]) == ("HALTED", "RUNNING")
+    david.hear(Stop(graph_name="patrol", targets=DAVID), 2_100)
+    david.advance(2_600)
+    shown = asked(david, 2_600)["patrol"]
+    assert (shown["graph_state"], states(shown)["C_0"]) == ("STOPPED", "FINISHED")
 
 
 def test_a_modify_is_done_or_refused_and_a_refused_one_leaves_the_graph_paused() -> None:

@@ -3,8 +3,10 @@
 import json
 from typing import Any
 
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 
 from action_assistant.umrf.check import check
 from action_assistant.umrf.checks.flow import Reachable
@@ -25,9 +27,10 @@ from support.doses import examples
 from umrf.drawn import busy_graphs
 
 SAFE = ["on_error -> ignore"]
-Calls = list[tuple[str, float]]
+Calls = list[tuple[str, float, float]]
 CALLS = st.lists(
-    st.tuples(st.sampled_from(["on_true", "on_false", "on_error"]), st.sampled_from([0.1, 0.7, 1.3, 3.1])),
+    st.tuples(st.sampled_from(["on_true", "on_false", "on_error"]), st.sampled_from([0.1, 0.7, 1.3, 3.1]),
+              st.sampled_from([0.0, 0.0, 0.4, 1.5, 8.0])),
     min_size=24, max_size=24,
 )  # fmt: skip
 
@@ -37,7 +40,7 @@ def scripted(graph: Graph, calls: Calls) -> Script:
     pairs = zip(calls[::2], calls[1::2], strict=True)
     return Script(
         {
-            action.full_name: tuple(Behaviour(result=r, after_s=t) for r, t in each)
+            action.full_name: tuple(Behaviour(result=r, after_s=t, load_s=o) for r, t, o in each)
             for action, each in zip(graph.actions, pairs, strict=False)
         }
     )
@@ -68,12 +71,25 @@ def test_what_runs_at_once_in_any_simulation_was_said_to_be_able_to(
                 pass
 
 
-@given(busy_graphs(), CALLS)
-@settings(max_examples=examples(200), deadline=None, suppress_health_check=list(HealthCheck))
+@st.composite
+def lively_graphs(draw: st.DrawFn) -> Graph:
+    """Busy graphs of which some actions are spontaneous."""
+    graph = draw(busy_graphs())
+    kinds = draw(
+        st.lists(st.sampled_from(["sync", "sync", "sync", "spontaneous"]), min_size=12, max_size=12)
+    )
+    actions = tuple(
+        replace(each, type=kind) for each, kind in zip(graph.actions, kinds, strict=False)
+    )
+    return replace(graph, actions=actions)
+
+
+@given(st.one_of(busy_graphs(), lively_graphs()), CALLS)
+@settings(max_examples=examples(300), deadline=None, suppress_health_check=list(HealthCheck))
 def test_a_hazard_of_any_simulation_is_one_that_check_told(graph: Graph, calls: Calls) -> None:
     told = {problem.code for problem in check(graph)}
     for trace in simulate(graph, script=scripted(graph, calls), max_events=400, until_ms=60_000):
-        if isinstance(trace, HazardEvent) and trace.code in ("H3", "H4", "H12"):
+        if isinstance(trace, HazardEvent) and trace.code in ("H3", "H4", "H12", "H14"):
             assert trace.code in told, trace
 
 
@@ -101,7 +117,7 @@ def asks(name: str, *said: str) -> dict[str, Any]:
 
 def test_a_pause_of_what_cannot_be_running_then_is_no_pause() -> None:
     """C is asked to pause before it ever ran."""
-    pausing = asks("A", "on_true -> pause")
+    pausing = asks("A", "on_true -> pause", "on_false -> ignore")
     idle = graph(action("A", children=["B", "C"]), action("B", ["A"], ["C"]),
                  action("C", [pausing, asks("B")]), exits=["C"])  # fmt: skip
     assert found(idle, "H5") == []
@@ -218,3 +234,87 @@ def test_what_waits_for_another_does_not_begin_beside_it() -> None:
         exits=[{"name": "C", "conditions": ["on_error -> run"]}],
     )
     assert found(value, "H12") == []
+
+
+# Spontaneous actions, which no stop reaches in a graph that is FINISHED
+
+
+def lively(value: Graph, *names: str) -> Graph:
+    kinds = tuple(
+        replace(a, type="spontaneous" if a.name in names else "sync") for a in value.actions
+    )
+    return replace(value, actions=kinds)
+
+
+def endless(value: Graph) -> tuple[str, str]:
+    (problem,) = found(value, "H12")
+    return problem.severity, problem.message
+
+
+LEADS_TO_EXIT = {
+    "it leads to the exit itself": graph(action("A"), exits=["A"]),
+    "behind another one": graph(action("B", children=["A"]), action("A", ["B"]), entry=["B"], exits=["A"]),
+    "another one stands before the exit": graph(action("A", children=["B"]), action("B", ["A"]), exits=["B"]),
+    "beside the way to the exit": graph(
+        action("C", children=["A", "B"]), action("A", ["C"]), action("B", ["C"]), entry=["C"], exits=["B"]),
+    "the exit waits for both": graph(action("A"), action("B"), entry=["A", "B"], exits=["A", "B"]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("shape", LEADS_TO_EXIT)
+def test_a_spontaneous_action_that_outlasts_the_graph_when_all_goes_well_is_an_error(
+    shape: str,
+) -> None:
+    value = lively(LEADS_TO_EXIT[shape], "A")
+    severity, message = endless(value)
+    assert severity == "error"
+    assert message.startswith("If all goes well, the graph is FINISHED, and A_0")
+    traces = list(
+        simulate(value, max_events=400, script=Script({"B_0": (Behaviour(after_s=0.5),)}))
+    )
+    finished = next(
+        n
+        for n, t in enumerate(traces)
+        if getattr(t, "state", "") == "FINISHED" and t.graph == "g" and not hasattr(t, "node")
+    )
+    assert any(isinstance(t, HazardEvent) and t.code == "H12" for t in traces)
+    begun = [t for t in traces[finished:] if isinstance(t, NodeStateEvent) and t.state == "RUNNING"]
+    assert len(begun) > 20
+
+
+def test_one_that_outlasts_the_graph_on_another_way_is_possible_with_its_condition() -> None:
+    safe = {"name": "A", "conditions": ["on_true -> ignore", "on_false -> run", *SAFE]}
+    assert endless(lively(graph(action("A"), exits=[safe]), "A")) == (
+        "warning",
+        "If A_0 ends with on_false, the graph is FINISHED, and A_0, which is spontaneous, begins again "
+        "and again: the engine then ignores every stop of the graph.",
+    )
+    other = graph(action("A"), action("B"), entry=["A", "B"],
+                  exits=[{"name": "B", "conditions": ["on_true -> ignore", "on_false -> run", *SAFE]}])  # fmt: skip
+    severity, message = endless(lively(other, "A"))
+    assert (severity, message.startswith("If B_0 ends with on_false while A_0 runs,")) == (
+        "warning",
+        True,
+    )
+
+
+def test_a_spontaneous_action_that_throws_begins_again_as_on_the_real_node() -> None:
+    """On the real node 39 begins and ends in 2 s, 77 two seconds after a stop."""
+    value = lively(
+        graph(action("A"), exits=[{"name": "A", "conditions": ["on_error -> run"]}]), "A"
+    )
+    fails = Script({"A_0": (Behaviour(after_s=0.1, result="on_error"),)})
+    traces = list(simulate(value, script=fails, until_ms=2_000, commands=[(1_000, "stop", None)]))
+    begun = [t.t_ms for t in traces if isinstance(t, NodeStateEvent) and t.state == "RUNNING"]
+    assert len(begun) >= 20
+    assert begun[-1] >= 1_900
+
+
+def test_one_that_is_stopped_on_the_way_to_the_exit_outlasts_nothing() -> None:
+    stops = {
+        "name": "B",
+        "required": False,
+        "conditions": ["on_true -> stop", "on_false -> stop", *SAFE],
+    }
+    value = graph(action("A", [stops]), action("B", children=["A"]), entry=["A", "B"], exits=["B"])
+    assert found(lively(value, "A"), "H12") == []

@@ -213,7 +213,8 @@ export interface RunnerApi {
      *
      *     `never`: does not end by itself. `ignores_stop`: goes on until its own end. `stop_error`: throws
      *     in onStop, which the engine calls ERROR at once, whatever its code does. `pauses`: has an onPause.
-     *     `init_error`: throws when it is loaded. `no_library`: indexed, but its library is not there, so
+     *     `load_s`: how long it loads (library and `onInit`) when it is triggered for the first time, which this
+     *     engine does not count as running. `init_error`: throws when it is loaded. `no_library`: indexed, but its library is not there, so
      *     that no graph with it can be built (said of its first call). `outputs`: values by flat name.
      */
     Behaviour: {
@@ -226,6 +227,8 @@ export interface RunnerApi {
         result?: "on_true" | "on_false" | "on_error";
         /** @default 0.05 */
         stop_s?: number;
+        /** @default 0 */
+        load_s?: number;
         /** @default true */
         pauses?: boolean;
         /** @default false */

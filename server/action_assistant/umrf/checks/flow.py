@@ -4,9 +4,15 @@ See docs/umrf-and-the-engine.md 2.3; H2, H3, H8.
 """
 
 from collections import deque
+from collections.abc import Container
 
 from action_assistant.umrf.checks.loops import ENDS, check_instant_loops, check_spontaneous, loops
-from action_assistant.umrf.checks.overlaps import check_responses, check_stragglers
+from action_assistant.umrf.checks.overlaps import (
+    check_endless,
+    check_loading,
+    check_responses,
+    check_stragglers,
+)
 from action_assistant.umrf.checks.places import Subject, more
 from action_assistant.umrf.checks.together import Together
 from action_assistant.umrf.model import (
@@ -20,8 +26,8 @@ from action_assistant.umrf.model import (
 )
 
 
-def check_flow(subject: Subject) -> None:
-    """Reports all of it."""
+def check_flow(subject: Subject, nested: Container[str] = frozenset()) -> None:
+    """Reports all of it. `nested`: the names of actions that are graphs themselves."""
     _check_sides(subject)
     if not subject.real:
         subject.report(
@@ -35,11 +41,13 @@ def check_flow(subject: Subject) -> None:
     reach = Reachable(subject)
     together = Together(subject, reach.runs, reach.reports)
     _check_bypasses(subject, reach)
-    check_responses(subject, reach.reports, together)
+    check_responses(subject, reach.reports, together, nested)
+    check_loading(subject, reach.reports, together, nested)
     _check_waiting(subject, reach)
     _check_exit(subject, reach)
     check_spontaneous(subject)
     check_instant_loops(subject, reach.runs, reach.reports)
+    check_endless(subject, reach.reports, together)
     check_stragglers(subject, reach.reports, together)
 
 

@@ -4,22 +4,38 @@ leave something running. Only what can happen is told.
 See docs/umrf-and-the-engine.md 2.3, 2.5; H4, H5, H12.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Container, Mapping
 from typing import Final
 
 import msgspec
 
 from action_assistant.umrf.checks.places import Subject, joined, more
-from action_assistant.umrf.checks.together import Together
-from action_assistant.umrf.model import ENTRY, EXIT, PRECONDITIONS, Key, Precondition, Relation
+from action_assistant.umrf.checks.together import Together, places
+from action_assistant.umrf.courses.network import Network
+from action_assistant.umrf.courses.whole import whole
+from action_assistant.umrf.model import (
+    ENTRY,
+    EXIT,
+    PRECONDITIONS,
+    Action,
+    Graph,
+    Key,
+    Precondition,
+    Relation,
+    Severity,
+)
 
 #: Ways to the exit that are looked at one by one; of more, those count that say the same as the first.
 _ENDS: Final = 200
 _Reports = Mapping[Key, Collection[Precondition]]
 
 
-def check_responses(subject: Subject, reports: _Reports, together: Together) -> None:
-    """What a response does to a child that is in the wrong state."""
+def check_responses(
+    subject: Subject, reports: _Reports, together: Together, nested: Container[str] = frozenset()
+) -> None:
+    """What a response does to a child that is in the wrong state. `nested`: names of actions that are
+    graphs themselves, which run as soon as they are told to."""
+    killed: set[Key] = set()
     for key, relations in subject.incoming.items():
         if key == EXIT:
             continue
@@ -31,7 +47,8 @@ def check_responses(subject: Subject, reports: _Reports, together: Together) -> 
             others = {k for k, o in asking.get(answer, ()) if together.goes_on(key, k, o)}
             late = {k for k in runs - others if together.may_run(k, key)}
             met[answer] = others
-            if others and late:
+            if others and late and key not in killed:
+                killed.add(key)
                 message = (
                     f"{_names(subject, late)} may run {subject.name(key)} just when "
                     f"{_names(subject, others)} {answer}s it: this engine then aborts with every "
@@ -41,6 +58,13 @@ def check_responses(subject: Subject, reports: _Reports, together: Together) -> 
         if met["pause"] and met["stop"]:
             message = f"{subject.name(key)} may be stopped while it is paused: it ends in ERROR after 5 s."
             subject.report("H5", "warning", message, action=subject.actions[key])
+        early = {k for k, o in asking.get("run", ()) if k != key and together.goes_on(key, k, o)}
+        if early and key not in killed and subject.name(key).rpartition("_")[0] not in nested:
+            message = (
+                f"{_names(subject, early)} may run {subject.name(key)} while it still loads for somebody "
+                "else (its library, its onInit): this engine then aborts with every running graph."
+            )
+            subject.report("H4", "warning", message, action=subject.actions[key])
     for relation in subject.sound:
         _check_without_effect(subject, relation, reports.get(relation.parent, ()), together)
 
@@ -85,6 +109,109 @@ def _check_without_effect(
 # Ends that leave something running
 
 
+def check_loading(
+    subject: Subject, reports: _Reports, together: Together, nested: Container[str] = frozenset()
+) -> None:
+    """H14: ends that halt the graph beside an action that may still load, told once. `nested` as in
+    `check_responses`."""
+    if "H14" not in subject.facts.hazards:
+        return
+    runs_at_once = {action.key for action in subject.real if action.name in nested}
+    found: list[tuple[Action, Precondition, set[Key]]] = []
+    for outcome in PRECONDITIONS:
+        for action in subject.real:
+            if outcome not in reports.get(action.key, ()):
+                continue
+            listed = subject.outgoing.get(action.key, [])
+            if any(r.conditions.answer(outcome) != "ignore" for r in listed):
+                continue
+            if beside := together.at_end(action.key, outcome) - runs_at_once:
+                found.append((action, outcome, beside))
+    if not found:
+        return
+    action, outcome, beside = found[0]
+    others = more(len(found) - 1, "end", "ends")
+    who = _shortened(subject, beside)
+    who = who if len(beside) == 1 else f"one of {who}"
+    message = (
+        f"If {action.full_name} ends with {outcome} while {who} still loads (its library, its onInit), "
+        "the graph is HALTED: this engine does not count what loads as running. It "
+        f"then runs all the same, and nothing follows it.{others}"
+    )
+    subject.report("H14", "warning", message, action=action)
+
+
+def check_endless(subject: Subject, reports: _Reports, together: Together) -> None:
+    """H12 of spontaneous actions, told once: when the graph is FINISHED they begin again and again, and no
+    stop reaches them. An error if that comes when all goes well."""
+    lively = {action.key for action in subject.real if action.type == "spontaneous"}
+    if "H12" not in subject.facts.hazards or not lively:
+        return
+    found: list[tuple[Relation, list[Precondition], set[Key]]] = []
+    for relation in subject.incoming.get(EXIT, []):
+        left: set[Key] = set()
+        outcomes: list[Precondition] = []
+        for outcome in PRECONDITIONS:
+            if going := _going_on(subject, relation, outcome, lively, together):
+                outcomes.append(outcome)
+                left |= going
+        if outcomes and not relation.listing:
+            found.append((relation, outcomes, left))
+    if not found:
+        return
+    certain = _endless_when_well(subject.graph)
+    relation, outcomes, left = next(
+        (each for each in found if certain and certain & _full_names(subject, each[2])), found[0]
+    )
+    end = subject.name(relation.parent)
+    rest = more(len(found) - 1, "way to the exit", "ways to the exit")
+    goes_on = f"begins again and again: the engine then ignores every stop of the graph.{rest}"
+    also = [each for each, _, _ in found if each is not relation]
+    who, when = min(certain or _full_names(subject, left)), "If all goes well"
+    if not certain:
+        when = f"If {end} ends with {' or '.join(outcomes)}"
+        when += "" if who == end else f" while {who} runs"
+    message = f"{when}, the graph is FINISHED, and {who}, which is spontaneous, {goes_on}"
+    severity: Severity = "error" if certain else "warning"
+    subject.report("H12", severity, message, relation=relation, member="/conditions", also=also)
+
+
+def _going_on(
+    subject: Subject,
+    relation: Relation,
+    outcome: Precondition,
+    lively: Collection[Key],
+    together: Together,
+) -> set[Key]:
+    """The spontaneous actions that may go on when this way has led to the exit with this outcome."""
+    parent = relation.parent
+    if relation.conditions.answer(outcome) == "ignore":
+        return set()
+    going = together.at_end(parent, outcome)
+    if together.outlasts(parent, outcome):
+        going = going | {parent}
+    stopped = {
+        r.child for r in subject.outgoing.get(parent, []) if r.conditions.answer(outcome) == "stop"
+    }
+    return (going & set(lively)) - stopped
+
+
+def _full_names(subject: Subject, keys: Collection[Key]) -> set[str]:
+    return {subject.name(key) for key in keys}
+
+
+def _endless_when_well(graph: Graph) -> set[str]:
+    """The spontaneous actions that go on when all ends with on_true and the graph is FINISHED: those that
+    do whichever of what runs side by side is quicker, as far as the graph ends at all."""
+    found: list[set[str]] = []
+    for slower_first in (False, True):
+        net = Network(graph, slower_first=slower_first)
+        end, _ = whole(net, graph, "", "on_true")
+        if end.kind == "finished":
+            found.append({net.names[place] for place in places(end.endless)})
+    return set.intersection(*found) if found else set()
+
+
 class _Early(msgspec.Struct, frozen=True):
     """A way to the exit that does not wait for what may still run. `bypassed`: with which outcomes it
     does not wait for anybody."""
@@ -108,7 +235,7 @@ def check_stragglers(subject: Subject, reports: _Reports, together: Together) ->
     if not found:
         return
     first = found[0]
-    who, end = _left(subject, first), subject.name(first.relation.parent)
+    who, end = _shortened(subject, first.left), subject.name(first.relation.parent)
     if first.started:
         start = f"When {end} ends, the graph is FINISHED although {who} runs on"
     else:
@@ -127,8 +254,8 @@ def _same(one: Relation, other: Relation) -> bool:
     return one.required == other.required and one.conditions == other.conditions
 
 
-def _left(subject: Subject, early: _Early) -> str:
-    names = sorted(subject.name(key) for key in early.left)
+def _shortened(subject: Subject, keys: Collection[Key]) -> str:
+    names = sorted(_full_names(subject, keys))
     shown = joined(set(names[:3]))
     return shown if len(names) <= 3 else f"{shown} or one of {len(names) - 3:,} others"
 
@@ -150,6 +277,9 @@ def _early(
             continue
         waited = () if answer == "bypass" else others
         around = together.at_end(relation.parent, outcome, waited)
+        if answer == "bypass" and together.outlasts(relation.parent, outcome):
+            around = around | {relation.parent}
+        around = {key for key in around if subject.actions[key].type != "spontaneous"}
         begun = _begun(subject, relation.parent, outcome) & around
         if answer == "bypass":
             if around:

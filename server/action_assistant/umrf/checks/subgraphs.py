@@ -36,7 +36,7 @@ from action_assistant.umrf.signatures import signature_of_graph, with_inputs
 _ERRORS: Final = 20
 #: What of a sub-graph may go wrong for the graph around it: it takes the engine with it, or never ends, or
 #: is not reached by a stop.
-_REACHES_OUT: Final = frozenset({"H4", "H5", "H8", "H12"})
+_REACHES_OUT: Final = frozenset({"H4", "H5", "H8", "H12", "H14"})
 
 
 @dataclass(frozen=True)
@@ -236,7 +236,7 @@ def _inner(name: str, facts: EngineFacts, graphs: _Graphs) -> _Inner:
     graph = graphs.by_name[name]
     inside = Subject(with_inputs(graph), facts)
     check_structure(inside)
-    check_flow(inside)
+    check_flow(inside, {each.name for each in inside.real if graphs.of(each.name) is not None})
     check_values(inside, None)
     _check_each(inside, name, graphs)
     check_scenarios(inside)

@@ -79,13 +79,22 @@ class Together:
         mask = self._when(key, outcome) | self._started(key, outcome)
         for other in waited:
             mask &= self._beside(other)
-        return {self.keys[place] for place in _places(mask)} - {key}
+        return {self.keys[place] for place in places(mask)} - {key}
 
     def goes_on(self, key: Key, other: Key, outcome: Precondition) -> bool:
         """Whether `key` can be running when `other` reports this outcome."""
         if key not in self._runs or outcome not in self._reports.get(other, ()):
             return False
         return not self.known or bool(self._when(other, outcome) >> self.place[key] & 1)
+
+    def outlasts(self, key: Key, outcome: Precondition) -> bool:
+        """Whether `key` itself may go on when it reports this outcome: a spontaneous action begins again,
+        and one that is bypassed may be running."""
+        if key not in self._runs or outcome not in self._reports.get(key, ()):
+            return False
+        if not self.known or (key in self._lively and outcome != "on_stopped"):
+            return True
+        return bool(self._passing.get((key, outcome), 0) >> self.place[key] & 1)
 
     def _when(self, key: Key, outcome: Precondition) -> Mask:
         own = self._with[self.place[key]] if key in self._runs else 0
@@ -146,7 +155,7 @@ class Together:
         found = self._behind_kept.get(mask)
         if found is None:
             found = 0
-            for place in _places(mask):
+            for place in places(mask):
                 found |= self._after[place]
             self._behind_kept[mask] = found
         return found
@@ -226,7 +235,7 @@ class Together:
             if required != parent:
                 found &= self._beside(required)
         new = found
-        for other in _places(found & started & ~around):
+        for other in places(found & started & ~around):
             self._count(1)
             if self._is_enough():
                 return
@@ -237,7 +246,7 @@ class Together:
         self._with[place] |= new
         self._again(child)
         self._count(new.bit_count())
-        for other in _places(new) if not self._is_enough() else ():
+        for other in places(new) if not self._is_enough() else ():
             if not self._with[other] >> place & 1:
                 self._with[other] |= 1 << place
                 self._again(self.keys[other])
@@ -267,7 +276,8 @@ class Together:
             self._open.append(key)
 
 
-def _places(mask: Mask) -> Iterator[int]:
+def places(mask: Mask) -> Iterator[int]:
+    """Yield the places of the bits that are set."""
     while mask:
         lowest = mask & -mask
         yield lowest.bit_length() - 1

@@ -20,7 +20,8 @@ class Outcome(NamedTuple):
     """How a graph ends. `early`: FINISHED while something runs. Of one that is stuck: `waiting`, who
     was asked and still waits (a bit for each place); `lacking`, the parents that the exit has not
     heard of; `inputs`, whether it lacks outputs, which `last` (a place) did not give. `cut`: it was
-    not followed to an end, nor into a lap that is like another."""
+    not followed to an end, nor into a lap that is like another. `endless`: the spontaneous actions
+    that go on in a graph that is FINISHED."""
 
     kind: Kind
     early: bool = False
@@ -29,6 +30,7 @@ class Outcome(NamedTuple):
     inputs: bool = False
     last: int = -1
     cut: bool = False
+    endless: Mask = 0
 
 
 class Course:

@@ -5,7 +5,7 @@ which stop others as they please, and to hold the two together.
 """
 
 from action_assistant.umrf.courses.course import LAPS, MORE, Kind, Outcome
-from action_assistant.umrf.courses.network import Network
+from action_assistant.umrf.courses.network import Mask, Network
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics.engine import Engine
 from action_assistant.umrf.semantics.graphs import GraphRefused
@@ -81,12 +81,22 @@ def whole(net: Network, graph: Graph, full_name: str, result: str) -> tuple[Outc
     if kind is None:
         kind = "endless" if engine.graphs[graph.name].state == "RUNNING" else "never"
     if kind != "stuck":
-        return Outcome(kind, seen.early, cut=kind == "endless"), events
+        endless = _going_on(net, engine, graph.name) if kind == "finished" else 0
+        return Outcome(kind, seen.early, cut=kind == "endless", endless=endless), events
     running = engine.graphs[graph.name]
     ended = running.exit
     lacking = frozenset(n for n, link in ended.links.items() if link.required and not link.received)
     inputs = not ended.has_inputs()
     return Outcome(kind, seen.early, seen.waiting, lacking, inputs, seen.last), events
+
+
+def _going_on(net: Network, engine: Engine, name: str) -> Mask:
+    """The spontaneous actions that run in a graph of this engine, and that nobody has told to stop."""
+    return sum(
+        1 << net.place[node.full_name]
+        for node in engine.graphs[name].nodes.values()
+        if node.type == "spontaneous" and node.state == "RUNNING"
+    )
 
 
 class _Seen:

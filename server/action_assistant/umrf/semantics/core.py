@@ -68,8 +68,9 @@ class Core(Clock):
         self.actor = actor
         #: Whether commands wait for each other.
         self.serial = True
-        #: How long an action takes from its trigger to RUNNING the first time (dlopen, onInit).
-        #: Meanwhile nothing counts it as active: a stop passes it by (recording engine_frozen.2).
+        #: How long an action takes at least from its trigger to RUNNING the first time (dlopen, onInit);
+        #: a behaviour may say more. Meanwhile nothing counts it as active: a stop passes it by
+        #: (recording engine_frozen.2).
         self.loading_ms = 0.0
         self._executions: list[Execution] = []
 
@@ -104,6 +105,7 @@ class Core(Clock):
         if ignored == len(node.children) and others == 0:
             graph.result = "on_halted"
             self._graph_state(graph, "HALTED")
+            self._left_loading(graph, "HALTED")
             self._sub_halted(graph)
 
     def _ask(
@@ -175,7 +177,8 @@ class Core(Clock):
         graph.result = result
         self._graph_state(graph, "FINISHED")
         self._out.append(GraphResultEvent(self._t(), graph.name, result))
-        if graph.active - last.active > 0:
+        others = graph.active - (last.active and last.returning) > 0 or graph.loading > 0
+        if others or (last.returning and self._begins_again(last)):
             message = "The graph is FINISHED while actions still run; a stop does not reach them."
             self._hazard(graph, "H12", "goes on", message)
         if self.locked and not self.serial and graph.above is not None:
@@ -183,7 +186,21 @@ class Core(Clock):
             return
         self._soon(partial(self._sub_ended, graph, result))
 
+    def _left_loading(self, graph: Running, state: str) -> None:
+        """Tell that actions which still load will run in a graph that counts as ended."""
+        for node in graph.nodes.values():
+            if node.loading:
+                message = (
+                    f"{node.full_name} still loads, and runs then although the graph is {state}."
+                )
+                self._hazard(graph, "H14", "goes on", message, node)
+
     # The life of an action
+
+    @staticmethod
+    def _begins_again(node: Node) -> bool:
+        """Whether an action that has returned runs once more by itself: also after it threw."""
+        return node.type == "spontaneous" and node.state in ("RUNNING", "ERROR")
 
     def _run(self, graph: Running, node: Node) -> None:
         if node.state == "RUNNING" or node.name in RESERVED:
@@ -192,7 +209,7 @@ class Core(Clock):
             if not node.failed_to_load:
                 self._soon(partial(self._run_unloaded, graph, node))
                 return
-        elif node.active or node.busy_until > self.now:
+        elif node.active or node.loading or node.busy_until > self.now:
             message = (
                 f"“run” reaches {node.full_name}, whose thread still lives: the engine aborts."
             )
@@ -211,14 +228,16 @@ class Core(Clock):
             node.calls += 1
             self._state(graph, node, "RUNNING")
             self._soon(partial(self._start_sub, graph, node, node.subgraph))
-        elif self.loading_ms and not node.loaded:
+        elif not node.loaded and (takes := max(self.loading_ms, node.call.load_s * 1000)):
+            node.loading = True
             graph.loading += 1
-            self._at(self.now + self.loading_ms, partial(self._loaded, graph, node))
+            self._at(self.now + takes, partial(self._loaded, graph, node))
         elif self._load(graph, node):
             self._begin(graph, node)
 
     def _loaded(self, graph: Running, node: Node) -> None:
         """The action is there now, and runs, whatever has become of its graph."""
+        node.loading = False
         graph.loading -= 1
         if self.graphs.get(graph.name) is graph and not node.loaded and self._load(graph, node):
             self._begin(graph, node)
@@ -323,8 +342,8 @@ class Core(Clock):
         self._inform(graph, node, result)
         if self.crashed or graph.blocked is node:
             return
-        again = node.type == "spontaneous" and node.state == "RUNNING"
-        if not failed:
+        again = self._begins_again(node)
+        if not failed or again:
             self._state(graph, node, "FINISHED")
         node.returning = False
         for slot in node.inputs.values():
@@ -407,7 +426,7 @@ class Core(Clock):
 
     def _returned_late(self, graph: Running, node: Node, token: int) -> None:
         if node.token == token and self.graphs.get(graph.name) is graph:
-            self._inform(graph, node, _OUTCOMES[node.call.result])
+            self._after(graph, node, _OUTCOMES[node.call.result], failed=True)
 
     def _stop_downstream(self, graph: Running, node: Node, then: Task) -> None:
         """What a spontaneous action does to everything that it leads to before it informs."""

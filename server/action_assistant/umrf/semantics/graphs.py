@@ -261,7 +261,9 @@ class Graphs(Core):
 
     def _graph_stopped(self, graph: Running) -> None:
         graph.result = "on_error" if graph.stop_failed else "on_stopped"
-        self._graph_state(graph, "ERROR" if graph.stop_failed else "STOPPED")
+        state = "ERROR" if graph.stop_failed else "STOPPED"
+        self._graph_state(graph, state)
+        self._left_loading(graph, state)
         result: Outcome = "on_error" if graph.stop_failed else "on_stopped"
         self._soon(partial(self._sub_ended, graph, result))
 

@@ -79,12 +79,13 @@ class Node:
     `token` counts what makes scheduled events void. `loaded`: the plugin instance lives. `due_ms`:
     when the call returns by itself, `rest_ms`: what was left of it when it was paused. `pending`: the
     result of a call that returned while paused. `returning`: it returned, its children wait.
-    `execution`: the newest call of its code.
+    `execution`: the newest call of its code. `loading`: it was triggered and will run once it has
+    loaded, which no state shows.
     """
 
     __slots__ = (
         "actor", "again", "behaviours", "busy_until", "call", "calls", "children", "due_ms",
-        "execution", "failed_to_load", "full_name", "inputs", "instance_id", "key", "links", "loaded", "name", "outputs", "pending",
+        "execution", "failed_to_load", "full_name", "inputs", "instance_id", "key", "links", "loaded", "loading", "name", "outputs", "pending",
         "rest_ms", "returning", "started_ms", "state", "sub", "subgraph", "token", "type",
         "waiting_links",
     )  # fmt: skip
@@ -104,6 +105,7 @@ class Node:
         self.outputs: dict[str, Slot] = slots_of(action.outputs)
         self.state = "UNINITIALIZED"
         self.loaded = False
+        self.loading = False
         self.failed_to_load = False
         self.calls = 0
         self.call = behaviours[0]
@@ -125,8 +127,9 @@ class Node:
         return self.state in ACTIVE
 
     def holds_thread(self, at_ms: float) -> bool:
-        """Whether a thread of its has not ended by then: also of one that was given up as ERROR."""
-        return self.active or self.busy_until > at_ms
+        """Whether a thread of its has not ended by then: also of one that was given up as ERROR, and of
+        one that still loads."""
+        return self.active or self.loading or self.busy_until > at_ms
 
     def link(self, parent: str, link: NodeLink) -> None:
         """Adds a parent, unless an earlier listing has it."""

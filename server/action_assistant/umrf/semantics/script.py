@@ -16,13 +16,15 @@ class Behaviour(msgspec.Struct, frozen=True, kw_only=True):
 
     `never`: does not end by itself. `ignores_stop`: goes on until its own end. `stop_error`: throws
     in onStop, which the engine calls ERROR at once, whatever its code does. `pauses`: has an onPause.
-    `init_error`: throws when it is loaded. `no_library`: indexed, but its library is not there, so
+    `load_s`: how long it loads (library and `onInit`) when it is triggered for the first time, which this
+    engine does not count as running. `init_error`: throws when it is loaded. `no_library`: indexed, but its library is not there, so
     that no graph with it can be built (said of its first call). `outputs`: values by flat name.
     """
 
     after_s: float = 1.0
     result: Annotated[str, _OUTCOME] = "on_true"
     stop_s: float = 0.05
+    load_s: float = 0.0
     pauses: bool = True
     never: bool = False
     ignores_stop: bool = False
@@ -99,6 +101,7 @@ def _behaviours(key: str, calls: list[object]) -> Iterable[Behaviour]:
             raise ValueError(f"{place}: {e}") from None
         if behaviour.result not in OUTCOMES:
             raise ValueError(f"{place}/result: one of {', '.join(OUTCOMES)} is expected.")
-        if not (0 <= behaviour.after_s < 1e9 and 0 <= behaviour.stop_s < 1e9):
+        times = behaviour.after_s, behaviour.stop_s, behaviour.load_s
+        if not all(0 <= time < 1e9 for time in times):
             raise ValueError(f"{place}: times are seconds, not negative.")
         yield behaviour
