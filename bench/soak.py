@@ -118,9 +118,10 @@ PARTS: Final[dict[str, Part]] = {
         ),
     ),
     "sync": Part(
-        "1,000 schedules of a folder that is edited while it is kept in step with a server",
+        "1,000 schedules of a folder that is edited while it is kept in step with a server, with and "
+        "without hard links; and rounds of it that end at each of their steps",
         {"TEST_EXAMPLES": "100"},
-        ("tests/commands/sync/test_sync.py", "-k", "anybody_wrote"),
+        ("tests/commands/sync/test_sync.py", "-k", "anybody_wrote or any_step"),
     ),
     "archives": Part(
         "kill -9 at every step of putting runs and raw messages into archives",

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import msgspec
 
-from action_assistant.commands.packages.directories import Directory, closing, opened
+from action_assistant.commands.directories import Directory, closing, opened, why
 from action_assistant.errors import CannotStart
 
 
@@ -44,7 +44,7 @@ def contents(root: Path, paths: Iterable[str]) -> FolderContents:
             except FileNotFoundError:
                 pass
             except OSError as error:
-                barred[path] = _reason(error)
+                barred[path] = why(error)
     finally:
         top.close()
     return FolderContents(present, barred)
@@ -82,22 +82,11 @@ def write_all(root: Path, steps: Sequence[FileStep], known: Mapping[str, bytes])
                 with suppress(OSError):
                     _remove(top, _beside(step.path, name))
         if isinstance(error, OSError):
-            reason = f"Cannot write {root / at}: {_reason(error)}. Nothing was kept."
+            reason = f"Cannot write {root / at}: {why(error)}. Nothing was kept."
             raise CannotStart(reason) from error
         raise
     finally:
         top.close()
-
-
-def _reason(error: OSError) -> str:
-    """In words: with `O_NOFOLLOW`, a link is one level too many, or no folder."""
-    match error.errno:
-        case errno.ELOOP:
-            return "it is a link, which is not followed"
-        case errno.ENOTDIR:
-            return "what should be a folder above it is a file or a link"
-        case _:
-            return error.strerror or str(error)
 
 
 @contextmanager

@@ -1,140 +1,387 @@
-"""A folder of files that people edit meanwhile: nothing of theirs is ever overwritten."""
+"""The folder of `sync`: people edit its files meanwhile, and nothing of theirs is overwritten or deleted.
+
+A file gets another text in steps, and a process may end between any two of them. The state says before
+the first step what is coming, so that the next round can finish it or take it back (docs/decisions/066).
+"""
 
 import hashlib
+import itertools
 import os
+import re
+import secrets
+import stat
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
-from typing import Final
+from typing import Annotated, Final
 
 import msgspec
+from msgspec.structs import replace
 
+from action_assistant.commands.directories import Directory, Owner, is_component, opened, why
 from action_assistant.errors import CannotStart
 from action_assistant.umrf.files.file_names import ENDING, graph_file_name
 
 _STATE: Final = ".action-assistant-sync.json"
-_ASIDE: Final = ".aside"
+_FRESH: Final = re.compile(r"\.action-assistant-sync-([0-9a-f]{16})\.new")
+_ASIDE: Final = re.compile(r"\.action-assistant-sync-([0-9a-f]{16})\.aside")
+#: How files were put aside by versions up to November 2026.
+_FORMER_ASIDE: Final = re.compile(rf"\.(.+{re.escape(ENDING)})\.([0-9a-f]{{64}})\.aside", re.DOTALL)
+
+_Sha = Annotated[str, msgspec.Meta(pattern=r"\A[0-9a-f]{64}\Z")]
+_Token = Annotated[str, msgspec.Meta(pattern=r"\A[0-9a-f]{16}\Z")]
+_Seq = Annotated[int, msgspec.Meta(ge=0)]
+
+
+class PutAside(msgspec.Struct, frozen=True):
+    """A file that was replaced and is kept until the next round, under a name with this token. `sha`: what
+    it held when it was put aside."""
+
+    token: _Token
+    sha: _Sha
+
+
+class Coming(msgspec.Struct, frozen=True):
+    """What a file is about to hold: the text of the graph at the change `seq`."""
+
+    token: _Token
+    seq: _Seq
+    sha: _Sha
 
 
 class SyncedFile(msgspec.Struct, frozen=True):
     """A file and its graph when they were last in step: the change of the graph, and the SHA-256 of the
-    file, None once somebody has deleted it. `conflict`: the change of the copy that was put beside it."""
+    file, None once somebody has deleted it. `graph`: "" while the graph of a new file is being made.
+    `conflict`: the change of the copy that was put beside it; `copy`: the number of that copy."""
 
-    graph: str
-    seq: int
-    sha: str | None
-    conflict: int | None = None
+    graph: Annotated[str, msgspec.Meta(pattern=r"\A[A-Za-z0-9_-]*\Z")]
+    seq: _Seq
+    sha: _Sha | None
+    conflict: _Seq | None = None
+    copy: Annotated[int, msgspec.Meta(ge=1)] = 1
+    aside: PutAside | None = None
+    coming: Coming | None = None
+
+
+class FolderTrouble(msgspec.Struct, frozen=True):
+    """A sentence about the folder. `name`: the file that is left alone in this round because of it, "" if
+    none is. `is_open`: somebody has to see to it."""
+
+    text: str
+    name: str = ""
+    is_open: bool = True
 
 
 class Folder:
-    """The files, by name, and what is remembered of them."""
+    """The files by name, and the state that is remembered of them. Raises CannotStart where the folder or
+    its state cannot be read; everything else raises OSError."""
 
     def __init__(self, path: Path) -> None:
-        self._path = path
-        self.known: dict[str, SyncedFile] = self._remembered()
+        try:
+            self._at: Directory = opened(path)
+        except OSError as error:
+            raise CannotStart(f"Cannot read the folder {path}: {why(error)}.") from error
+        self._trouble: list[FolderTrouble] = []
+        self._unread: dict[str, msgspec.Raw] = {}
+        self.known: dict[str, SyncedFile] = self._remembered(path / _STATE)
+
+    def close(self) -> None:
+        """Close the folder."""
+        self._at.close()
 
     def names(self) -> list[str]:
-        """The files of graphs that are there."""
-        found = (p.name for p in self._path.iterdir() if p.name.endswith(ENDING))
-        return sorted(name for name in found if not name.startswith("."))
+        """Return the names of everything that is called like the file of a graph."""
+        return sorted(n for n in self._at.names() if _is_graph_file(n) and _is_utf8(n))
 
     def read(self, name: str) -> bytes | None:
-        """What is in a file; None where there is none."""
+        """Return what is in a file; None where there is none. Raises OSError for what is no file."""
         try:
-            return (self._path / name).read_bytes()
+            return self._at.read(name)[0]
         except FileNotFoundError:
             return None
 
-    def has_copy(self, name: str) -> bool:
-        """Whether the copy of a conflict is still there."""
-        return self._copy(name).exists()
+    def copy_of(self, name: str, file: SyncedFile) -> str | None:
+        """Return the name of the copy of a conflict, None once it is gone."""
+        copy = _copy(name, file.copy)
+        return copy if self._is_there(copy) else None
 
-    def put_copy(self, name: str, text: bytes) -> str:
-        """Put the server's text beside a file; the name of that copy."""
-        self._replace(self._copy(name), text)
-        return self._copy(name).name
+    def put_copy(self, name: str, text: bytes) -> int:
+        """Put the server's text beside a file, in place of nothing; return the number of that copy."""
+        rights = _rights(self._at.status(name))
+        fresh = _fresh(secrets.token_hex(8))
+        self._at.write_new(fresh, text, *rights)
+        number = 1
+        while not self._move(fresh, _copy(name, number)):
+            there = self._read_or_none(_copy(name, number))
+            if there is not None and text.startswith(there):  # of a round that ended early
+                self._at.complete(_copy(name, number), text, *rights)
+                break
+            number += 1
+        self._at.remove(fresh)
+        return number
 
     def remember(self, name: str, file: SyncedFile) -> None:
-        """Remember that a file and its graph are in step; it survives a crash."""
-        self.known[name] = file
-        self._replace(self._path / _STATE, msgspec.json.format(msgspec.json.encode(self.known)))
+        """Store that a file and its graph are in step; on the disk when this returns."""
+        self._store({**self.known, name: file})
+
+    def forget(self, name: str) -> None:
+        """Store that a file has no graph."""
+        self._store({each: file for each, file in self.known.items() if each != name})
 
     def free_name(self, graph_name: str) -> str:
-        """A name for the file of a graph that has none."""
+        """Return a name for the file of a graph that has none."""
         number = 1
         while True:
             name = graph_file_name(graph_name, number)
-            if name not in self.known and not (self._path / name).exists():
+            if name not in {*self.known, *self._unread} and not self._is_there(name):
                 return name
             number += 1
 
-    def make(self, name: str, text: bytes) -> bool:
-        """Make a file; False where there is one by now."""
-        fresh = self._fresh(name, text)
+    def make(self, name: str, graph: str, seq: int, text: bytes) -> bool:
+        """Make the file of a graph; False where something has that name by now."""
+        coming = Coming(secrets.token_hex(8), seq, sha(text))
+        self.remember(name, SyncedFile(graph, seq, None, coming=coming))
+        self._at.write_new(_fresh(coming.token), text, None)
+        made = self._move(_fresh(coming.token), name)
+        if made:
+            self.remember(name, SyncedFile(graph, seq, coming.sha))
+        else:
+            self.forget(name)
+        self._at.remove(_fresh(coming.token))
+        return made
+
+    def exchange(self, name: str, old: str, seq: int, text: bytes) -> bool:
+        """Give a file that is known the text of its graph at `seq`, if it still has the text whose SHA-256
+        is `old`; False where somebody was quicker. The old file is put aside until the next round, when
+        what somebody who had it open has written into it since is found."""
+        before = self.known[name]
+        coming = Coming(secrets.token_hex(8), seq, sha(text))
+        aside = PutAside(coming.token, old)
+        mode, owner = _rights(self._at.status(name))
+        self.remember(name, replace(before, aside=aside, coming=coming))
+        self._at.write_new(_fresh(coming.token), text, mode, owner)
         try:
-            os.link(fresh, self._path / name)
-        except FileExistsError:
+            self._at.replace(name, _aside(aside))
+        except FileNotFoundError:
+            exchanged = False
+        else:
+            moved = self._read_or_none(_aside(aside))
+            is_same = moved is not None and sha(moved) == old
+            exchanged = (
+                self._move(_fresh(coming.token) if is_same else _aside(aside), name) and is_same
+            )
+        if exchanged:
+            self.remember(name, SyncedFile(before.graph, seq, coming.sha, aside=aside))
+        else:
+            self.remember(name, replace(before, aside=aside))
+        self._at.remove(_fresh(coming.token))
+        return exchanged
+
+    def recover(self) -> list[FolderTrouble]:
+        """Finish or take back what an earlier round has begun, and keep what somebody has written into a
+        file before or after it was put aside, under a name of its own. To be called at the beginning of a
+        round; return what is to be told."""
+        known = dict(self.known)
+        for name, file in self.known.items():
+            try:
+                resumed = self._resumed(name, file)
+                if resumed is None:
+                    del known[name]
+                    continue
+                if resumed.aside is not None:
+                    self._look_after(name, _aside(resumed.aside), resumed.aside.sha)
+                known[name] = replace(resumed, aside=None)
+            except OSError as error:
+                self._trouble.append(FolderTrouble(f"{name}: {why(error)}", name))
+        if known != self.known:
+            self._store(known)
+        self._clear_up()
+        return self._trouble
+
+    def _resumed(self, name: str, file: SyncedFile) -> SyncedFile | None:
+        """Return a file without what is coming: it has come, or it never will. None for a new file that was
+        not made. Raises OSError."""
+        coming = file.coming
+        if coming is None:
+            return file
+        aside = None if file.aside is None else _aside(file.aside)
+        here = self.read(name)
+        was_moved = aside is not None and self._is_there(aside)
+        if here is None and aside is not None and was_moved:
+            self._move(aside, name)
+            here = self.read(name)
+        elif here is not None and (aside is None or was_moved):
+            here = self._completed(name, here, [_fresh(coming.token), aside])
+        if here is not None and sha(here) == coming.sha:
+            return SyncedFile(file.graph, coming.seq, coming.sha, aside=file.aside)
+        # A new file has no state to go back to: whatever has its name by now is somebody's own.
+        return None if file.sha is None and file.aside is None else replace(file, coming=None)
+
+    def _completed(self, name: str, here: bytes, sources: list[str | None]) -> bytes:
+        """Write the rest of a file of which there is only the beginning: where there are no hard links it
+        was being written when the process ended. Return what the file holds."""
+        for source in filter(None, sources):
+            text = self.read(source)
+            if text is not None and len(here) < len(text) and text.startswith(here):
+                self._at.complete(name, text, *_rights(self._at.status(source)))
+                return text
+        return here
+
+    def _look_after(
+        self, name: str, aside: str, old: str, what: str = "was written while it was exchanged"
+    ) -> None:
+        """Remove a file that was put aside, or keep it if somebody has written into it. Raises OSError."""
+        text = self.read(aside)
+        if text is None:
+            return
+        if sha(text) != old and text != self._read_or_none(name):
+            kept = self._kept(name, aside, text)
+            self._trouble.append(
+                FolderTrouble(f"{name}: {what}; that text is in {kept}", is_open=False)
+            )
+        self._at.remove(aside)
+
+    def _kept(self, name: str, aside: str, text: bytes) -> str:
+        """Give a file that was put aside a name of its own."""
+        names = (f"{name}.mine-{sha(text)[:8]}{more}" for more in _numbers())
+        return next(
+            kept for kept in names if self._move(aside, kept) or self._read_or_none(kept) == text
+        )
+
+    def _clear_up(self) -> None:
+        """Remove what rounds that ended early have left, and name what nothing is known of."""
+        kept = {_aside(file.aside) for file in self.known.values() if file.aside is not None}
+        coming = {
+            _fresh(file.coming.token) for file in self.known.values() if file.coming is not None
+        }
+        for entry in sorted(self._at.names()):
+            try:
+                if _FRESH.fullmatch(entry) and entry not in coming:
+                    self._at.remove(entry)
+                elif _ASIDE.fullmatch(entry) and entry not in kept:
+                    self._trouble.append(
+                        FolderTrouble(
+                            f"{entry}: was put aside, and its file is not known; it stays"
+                        )
+                    )
+                elif _is_graph_file(entry) and not _is_utf8(entry):
+                    self._trouble.append(FolderTrouble(f"{entry}: its name is not UTF-8", entry))
+                elif former := _FORMER_ASIDE.fullmatch(entry):
+                    self._look_after_former(entry, former[1], former[2])
+            except OSError as error:
+                self._trouble.append(FolderTrouble(f"{entry}: {why(error)}"))
+
+    def _look_after_former(self, aside: str, name: str, old: str) -> None:
+        """Do the same for a file that an earlier version has put aside."""
+        file = self.known.get(name)
+        if not self._is_there(name):
+            if file is not None and file.sha == old:
+                self._move(aside, name)
+            else:
+                self._look_after(name, aside, "", "is gone, and an older text of it was put aside")
+                return
+        self._look_after(name, aside, old)
+
+    def _read_or_none(self, name: str) -> bytes | None:
+        """Return what is in a file; None also for what is no file."""
+        try:
+            return self.read(name)
+        except OSError:
+            return None
+
+    def _is_there(self, name: str) -> bool:
+        """Return whether something has this name, be it a link that leads nowhere."""
+        try:
+            self._at.status(name)
+        except FileNotFoundError:
             return False
-        finally:
-            fresh.unlink()
         return True
 
-    def exchange(self, name: str, old: str, text: bytes) -> bool:
-        """Give a file another text if it still has the one whose SHA-256 is `old`; False where somebody
-        was quicker. The old file is put aside until the next round, when what somebody who had it open
-        has written into it since is found."""
-        aside = self._path / f".{name}.{old}{_ASIDE}"
-        fresh = self._fresh(name, text)
+    def _move(self, old: str, new: str) -> bool:
+        """Give a file a second name; False where something has that name. Where there are no hard links a
+        file is written anew, since renaming it might overwrite another; what is no file is renamed."""
         try:
-            (self._path / name).rename(aside)
-        except FileNotFoundError:
-            fresh.unlink()
+            self._at.link(old, new)
+        except FileExistsError:
             return False
-        was_same = sha(aside.read_bytes()) == old
+        except OSError:
+            found = self._at.status(old)
+            if not stat.S_ISREG(found.st_mode):
+                if self._is_there(new):
+                    return False
+                self._at.replace(old, new)
+                return True
+            try:
+                self._at.write_new(new, self._at.read(old)[0], *_rights(found))
+            except FileExistsError:
+                return False
+        return True
+
+    def _store(self, known: dict[str, SyncedFile]) -> None:
+        """Replace the state by another one, on the disk when this returns. Raises OSError."""
+        fresh = _fresh(secrets.token_hex(8))
+        rights: tuple[int, Owner] | tuple[None, None] = (None, None)
+        with suppress(FileNotFoundError):
+            rights = _rights(self._at.status(_STATE))
+        text = msgspec.json.format(msgspec.json.encode({**self._unread, **known}))
+        self._at.write_new(fresh, text, *rights)
+        self._at.replace(fresh, _STATE)
+        self.known = known
+
+    def _remembered(self, path: Path) -> dict[str, SyncedFile]:
+        """Return the entries of the state. One that names no file of this folder, or is no entry, is told,
+        not believed, and kept as it is. Raises CannotStart."""
         try:
-            os.link(fresh if was_same else aside, self._path / name)
-        except FileExistsError:  # somebody has just written it anew
-            was_same = False
-        fresh.unlink()
-        return was_same
-
-    def late_writings(self) -> dict[str, str]:
-        """Texts that somebody wrote into a file before or after it was put aside, kept under names of
-        their own: those, by the name of the file. To be asked at the beginning of a round."""
-        found: dict[str, str] = {}
-        for aside in sorted(self._path.glob(f".*{ENDING}.*{_ASIDE}")):
-            name, _, old = aside.name[1:].removesuffix(_ASIDE).rpartition(".")
-            text = aside.read_bytes()
-            if sha(text) == old or text == self.read(name):
-                aside.unlink()
-                continue
-            kept = self._path / f"{name}.mine-{sha(text)[:8]}"
-            aside.replace(kept)
-            found[name] = kept.name
-        return found
-
-    def _fresh(self, name: str, text: bytes) -> Path:
-        fresh = self._path / f".{name}.new"
-        with fresh.open("wb") as out:
-            out.write(text)
-            out.flush()
-            os.fsync(out.fileno())
-        return fresh
-
-    def _replace(self, path: Path, text: bytes) -> None:
-        self._fresh(path.name, text).replace(path)
-
-    def _copy(self, name: str) -> Path:
-        return self._path / f"{name}.server"
-
-    def _remembered(self) -> dict[str, SyncedFile]:
-        path = self._path / _STATE
-        try:
-            return msgspec.json.decode(path.read_bytes(), type=dict[str, SyncedFile])
-        except FileNotFoundError:
-            return {}
+            text = self.read(_STATE)
+            entries = {} if text is None else msgspec.json.decode(text, type=dict[str, msgspec.Raw])
         except (OSError, msgspec.DecodeError) as error:
-            raise CannotStart(f"Cannot read {path}: {error}.") from error
+            reason = why(error) if isinstance(error, OSError) else str(error)
+            raise CannotStart(f"Cannot read {path}: {reason}.") from error
+        known: dict[str, SyncedFile] = {}
+        for name, entry in entries.items():
+            try:
+                if not _is_graph_file(name):
+                    raise msgspec.ValidationError("that is no file of a graph in this folder")
+                known[name] = msgspec.json.decode(entry, type=SyncedFile)
+            except msgspec.ValidationError as error:
+                self._unread[name] = msgspec.Raw(entry)
+                told = f"{name}: its entry in {_STATE} is not used: {error}"
+                self._trouble.append(FolderTrouble(told, name))
+        return known
 
 
 def sha(text: bytes) -> str:
-    """The SHA-256 of a text, in hex."""
+    """Return the SHA-256 of a text, in hex."""
     return hashlib.sha256(text).hexdigest()
+
+
+def _is_graph_file(name: str) -> bool:
+    return name.endswith(ENDING) and not name.startswith(".") and is_component(name)
+
+
+def _is_utf8(name: str) -> bool:
+    """Return whether a name can be written into the state."""
+    return not any("\ud800" <= character <= "\udfff" for character in name)
+
+
+def _fresh(token: str) -> str:
+    return f".action-assistant-sync-{token}.new"
+
+
+def _aside(aside: PutAside) -> str:
+    return f".action-assistant-sync-{aside.token}.aside"
+
+
+def _copy(name: str, number: int) -> str:
+    return f"{name}.server{'' if number == 1 else f'-{number}'}"
+
+
+def _numbers() -> Iterator[str]:
+    """Yield endings that tell names apart, the first of them empty."""
+    yield ""
+    yield from (f"-{number}" for number in itertools.count(2))
+
+
+def _rights(found: os.stat_result) -> tuple[int, Owner]:
+    """Return who may do what with an entry, and whose it is."""
+    return stat.S_IMODE(found.st_mode), Owner(found.st_uid, found.st_gid)

@@ -1,21 +1,30 @@
 """The command `sync`: round after round, what has changed here goes there, and the other way."""
 
 import argparse
+import os
+import re
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Iterator
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from typing import Any, Final
 
 from msgspec.structs import replace
 
 from action_assistant.commands.client import No, Server, add_server, running
+from action_assistant.commands.directories import why
 from action_assistant.commands.sync.folder import Folder, SyncedFile, sha
 from action_assistant.errors import CannotStart
 from action_assistant.safe_text import one_line
+from action_assistant.system.posix import fcntl
+from action_assistant.umrf.digest import digest
+from action_assistant.umrf.files import codec
 
 _JSON: Final = {"content-type": "application/json"}
 _CONFLICT: Final = 409
 _TODAY: Final = "D3"
+_FIRST: Final = 1  # the change by which a graph is made
+_ID: Final = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def _add_sync(sync: argparse.ArgumentParser) -> None:
@@ -51,14 +60,32 @@ def _sync(options: argparse.Namespace) -> int:
         if line not in told:
             print(one_line(line), flush=True)
 
-    with running(options) as server:
+    with running(options) as server, _alone(options.folder):
         while True:
-            syncing = SyncRound(server, Folder(options.folder), tell)
-            syncing.run()
+            with closing(Folder(options.folder)) as folder:
+                syncing = SyncRound(server, folder, tell)
+                syncing.run()
             told = set(syncing.left)
             if not options.watch:
                 return 1 if syncing.left else 0
             time.sleep(max(options.every, 0.1))
+
+
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Keep a second `sync` out of a folder, where the system and the file system have locks. Raises
+    CannotStart."""
+    with ExitStack() as held:
+        if fcntl is not None:
+            at = os.open(folder, os.O_RDONLY)
+            held.callback(os.close, at)
+            try:
+                fcntl.flock(at, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError as error:
+                raise CannotStart(f"Another `sync` is at work in {folder}.") from error
+            except OSError:  # not on this file system
+                pass
+        yield
 
 
 class SyncRound:
@@ -71,29 +98,52 @@ class SyncRound:
         self._tell = tell
 
     def run(self) -> None:
-        """Bring everything into step that can be."""
-        for name, kept in self._folder.late_writings().items():
-            self._tell(f"{name}: was written while it was exchanged; that text is in {kept}")
-        graphs = {each["id"]: each for each in self._server.editor("GET", "/api/graphs").json()}
+        """Bring everything into step that can be. Raises CannotStart where there is no server any more, or
+        the folder cannot be used."""
+        try:
+            found, names = self._folder.recover(), self._folder.names()
+        except OSError as error:
+            raise CannotStart(f"Cannot use the folder: {why(error)}.") from error
+        barred: set[str] = set()
+        for trouble in found:
+            barred.add(trouble.name)
+            (self._leave if trouble.is_open else self._tell)(trouble.text)
+        graphs = self._graphs()
         for name, file in list(self._folder.known.items()):
-            try:
-                self._one(name, file, graphs.get(file.graph))
-            except No as error:
-                self._leave(f"{name}: {error}")
-        for name in self._folder.names():
-            if name not in self._folder.known:
-                self._bring(name)
+            if name not in barred and file.graph:
+                self._try(name, self._one, name, file, graphs.get(file.graph))
+        here = {file.graph for file in self._folder.known.values()}
+        for name in names:
+            known = self._folder.known.get(name)
+            if name not in barred and (known is None or not known.graph):
+                self._try(name, self._bring, name, graphs.keys() - here)
         here = {file.graph for file in self._folder.known.values()}
         for graph in sorted(graphs.values(), key=lambda each: str(each["name"])):
             if graph["id"] not in here:
-                self._fetch_new(graph)
+                self._try(str(graph["name"]), self._fetch_new, graph)
+
+    def _try(self, name: str, step: Callable[..., None], *given: Any) -> None:
+        """Do what brings one file or graph into step; what is in its way stops no other one."""
+        try:
+            step(*given)
+        except No as error:
+            self._leave(f"{name}: {error}")
+        except OSError as error:
+            self._leave(f"{name}: cannot be kept in step: {why(error)}")
+
+    def _graphs(self) -> dict[str, dict[str, Any]]:
+        """Return the graphs of the server by id. An id stands in paths, and is not believed to be one."""
+        found = self._server.editor("GET", "/api/graphs").json()
+        return {each["id"]: each for each in found if _ID.fullmatch(str(each["id"]))}
 
     def _one(self, name: str, file: SyncedFile, graph: dict[str, Any] | None) -> None:
         if file.conflict is not None:
-            if self._folder.has_copy(name):
-                self._leave(self._conflict_words(name))
+            if copy := self._folder.copy_of(name, file):
+                self._leave(_conflict_words(name, copy))
                 return
-            file = replace(file, seq=file.conflict, conflict=None)  # somebody has seen to it
+            file = replace(
+                file, seq=file.conflict, conflict=None, copy=1
+            )  # somebody has seen to it
         text = self._folder.read(name)
         if graph is None:
             if text is not None:
@@ -119,9 +169,10 @@ class SyncRound:
             if error.status != _CONFLICT:
                 raise
             seq, now = self._text(file.graph)
-            self._folder.put_copy(name, now)
-            self._folder.remember(name, replace(file, conflict=seq))
-            self._leave(self._conflict_words(name))
+            number = self._folder.put_copy(name, now)
+            held = replace(file, conflict=seq, copy=number)
+            self._folder.remember(name, held)
+            self._leave(_conflict_words(name, self._folder.copy_of(name, held) or ""))
             return
         for problem in merged["problems"]:
             self._tell(f"{name}: {problem['message']}")
@@ -136,47 +187,71 @@ class SyncRound:
         """The graph has changed: give the file its text."""
         seq, now = self._text(file.graph)
         assert file.sha is not None
-        if sha(now) != file.sha:
-            if not self._folder.exchange(name, file.sha, now):
-                return  # the next round sees what somebody has written
+        if sha(now) == file.sha:
+            self._folder.remember(name, SyncedFile(file.graph, seq, file.sha))
+        elif self._folder.exchange(name, file.sha, seq, now):
             self._tell(f"{name}: fetched")
-        self._folder.remember(name, SyncedFile(file.graph, seq, sha(now)))
+        # Otherwise the next round sees what somebody has written.
 
-    def _bring(self, name: str) -> None:
-        """A file that is new becomes a graph."""
+    def _bring(self, name: str, others: Collection[str]) -> None:
+        """A file that is new becomes a graph. `others`: the graphs that have no file."""
         text = self._folder.read(name)
         if text is None:
             return
+        begun = self._folder.known.get(name)
+        if begun is not None and begun.sha == sha(text):
+            wanted = _digest(text)
+            for graph in others:  # a round that ended early may have made it
+                if wanted is not None and _digest(self._first_text(graph)) == wanted:
+                    self._brought(name, SyncedFile(graph, _FIRST, sha(text)), text)
+                    return
+        self._folder.remember(name, SyncedFile("", 0, sha(text)))
         try:
             made = self._server.editor("POST", "/api/graphs", content=text, headers=_JSON).json()
-        except No as error:
-            self._leave(f"{name}: {error}")
-            return
+        except No:
+            self._folder.forget(name)
+            raise
         self._tell(f"{name}: is the graph {made['name']} now")
-        file = SyncedFile(made["id"], made["seq"], sha(text))
+        self._brought(name, SyncedFile(made["id"], made["seq"], sha(text)), text)
+
+    def _brought(self, name: str, file: SyncedFile, text: bytes) -> None:
+        """A file has become a graph."""
         self._folder.remember(name, file)
-        if made["reading"]["dialect"] != _TODAY:  # an edit of an older form could not be told apart
+        if codec.read(text).dialect != _TODAY:  # an edit of an older form could not be told apart
             self._tell(f"{name}: was an older form of UMRF; it has today's now")
             self._fetch(name, file)
+
+    def _first_text(self, graph: str) -> bytes:
+        """Return what a graph was when it was made."""
+        path = f"/api/graphs/{graph}/umrf"
+        return self._server.editor("GET", path, params={"at": _FIRST}).content
 
     def _fetch_new(self, graph: dict[str, Any]) -> None:
         """A graph that is new becomes a file."""
         seq, now = self._text(graph["id"])
         name = self._folder.free_name(graph["name"])
-        if self._folder.make(name, now):
+        if self._folder.make(name, graph["id"], seq, now):
             self._tell(f"{name}: is the file of the graph {graph['name']} now")
-            self._folder.remember(name, SyncedFile(graph["id"], seq, sha(now)))
 
     def _text(self, graph: str) -> tuple[int, bytes]:
         answer = self._server.editor("GET", f"/api/graphs/{graph}/umrf")
         return int(answer.headers["x-seq"]), answer.content
 
-    def _conflict_words(self, name: str) -> str:
-        return (
-            f"{name}: here and on the server the same was changed. The server's text is in {name}.server: "
-            f"bring over what you want of it and delete that copy; then {name} counts."
-        )
-
     def _leave(self, line: str) -> None:
         self.left.append(line)
         self._tell(line)
+
+
+def _digest(text: bytes) -> str | None:
+    """Return the digest of the graph in a text; None where it cannot be read."""
+    try:
+        return digest(codec.read(text).graph)
+    except codec.Unreadable:
+        return None
+
+
+def _conflict_words(name: str, copy: str) -> str:
+    return (
+        f"{name}: here and on the server the same was changed. The server's text is in {copy}: "
+        f"bring over what you want of it and delete that copy; then {name} counts."
+    )
