@@ -14,6 +14,7 @@ import {
   setEntry,
 } from "../graph/edit";
 import { notesOf, placeNotes, withContents } from "../graph/edit/notes";
+import type { UndoHistory } from "../graph/edit/undo-history";
 import {
   type Action,
   EXIT,
@@ -109,7 +110,7 @@ export interface EditorContext {
   /** The graph's own id. */
   readonly id: string;
   readonly doc: Y.Doc;
-  readonly undo: Y.UndoManager;
+  readonly undo: UndoHistory;
   readonly graph: Graph;
   readonly canUndo: boolean;
   readonly canRedo: boolean;

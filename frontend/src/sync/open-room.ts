@@ -2,6 +2,7 @@
 
 import type * as Y from "yjs";
 import { undoOf } from "../graph/edit";
+import type { UndoHistory } from "../graph/edit/undo-history";
 import { isEqual } from "../graph/equal";
 import { followGraph, type GraphSource } from "../graph/read";
 import { FollowedPerson } from "./presence/following";
@@ -15,7 +16,7 @@ export interface OpenRoom {
   readonly source: GraphSource;
   readonly presence: PresenceSource;
   readonly following: FollowedPerson;
-  readonly undo: Y.UndoManager;
+  readonly undo: UndoHistory;
   /** Calls back with the graph: what the link names is drawn with it. */
   onLink(listener: () => void): () => void;
   /** The graph and the link for what need not keep up with the hands of others. */

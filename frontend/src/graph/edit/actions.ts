@@ -1,7 +1,15 @@
 /** Edits of actions: add, remove, rename, fields. */
 
 import type * as Y from "yjs";
-import { actionKey, bundleOfKey, endsOf, extraKey, rootOf, splitKey } from "../document-keys";
+import {
+  actionKey,
+  bundleOfKey,
+  endsOf,
+  extraKey,
+  type Root,
+  rootOf,
+  splitKey,
+} from "../document-keys";
 import { newAid } from "../ids";
 import {
   type Action,
@@ -107,17 +115,15 @@ function healAndRemove(doc: Y.Doc, gone: ReadonlySet<Key>): void {
 }
 
 function remove(doc: Y.Doc, gone: ReadonlySet<Key>): void {
-  const actions = rootOf(doc, "actions");
-  const relations = rootOf(doc, "relations");
-  for (const key of [...actions.keys()]) if (gone.has(splitKey(key).head)) actions.delete(key);
   const isGone = (id: string) => {
     const ends = endsOf(id);
     return ends !== null && (gone.has(ends.parent) || gone.has(ends.child));
   };
-  for (const key of [...relations.keys()]) if (isGone(splitKey(key).head)) relations.delete(key);
-  for (const key of [...rootOf(doc, "positions").keys()])
-    if (isGone(splitKey(bundleOfKey(key) ?? "").head)) eraseKeys(doc, "positions", key);
-  eraseKeys(doc, "positions", ...gone);
+  const erase = (root: Root, fits: (key: string) => boolean) =>
+    eraseKeys(doc, root, ...[...rootOf(doc, root).keys()].filter(fits));
+  erase("actions", (key) => gone.has(splitKey(key).head));
+  erase("relations", (key) => isGone(splitKey(key).head));
+  erase("positions", (key) => gone.has(key) || isGone(splitKey(bundleOfKey(key) ?? "").head));
 }
 
 function heal(doc: Y.Doc, key: Key): void {

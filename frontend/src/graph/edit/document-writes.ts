@@ -23,6 +23,7 @@ import {
 } from "../model";
 import { readGraph, readTakenUp } from "../read";
 import { asNumber, asResponse } from "../values";
+import { UndoHistory } from "./undo-history";
 
 /** The origin of everything that the person at this page does. */
 const OWN_EDITS: unique symbol = Symbol("the person at this page");
@@ -33,11 +34,8 @@ export function asOneEdit<T>(doc: Y.Doc, work: () => T): T {
 }
 
 /** Undo and redo of the person's own edits; one edit (or one `asOneEdit`) is one step. */
-export function undoOf(doc: Y.Doc): Y.UndoManager {
-  const scope = (["meta", "actions", "relations", "positions", "comments"] as const).map((root) =>
-    rootOf(doc, root),
-  );
-  return new Y.UndoManager(scope, { trackedOrigins: new Set([OWN_EDITS]), captureTimeout: 0 });
+export function undoOf(doc: Y.Doc): UndoHistory {
+  return new UndoHistory(doc, OWN_EDITS);
 }
 
 export function writeKey(doc: Y.Doc, root: Root, key: string, value: unknown): void {
@@ -45,9 +43,12 @@ export function writeKey(doc: Y.Doc, root: Root, key: string, value: unknown): v
   if (!map.has(key) || map.get(key) !== value) map.set(key, value);
 }
 
+/** A shared type, which no page of ours writes, stays: undo could not bring it back. */
 export function eraseKeys(doc: Y.Doc, root: Root, ...keys: readonly string[]): void {
   const map = rootOf(doc, root);
-  for (const key of keys) if (map.has(key)) map.delete(key);
+  for (const key of keys) {
+    if (map.has(key) && !(map.get(key) instanceof Y.AbstractType)) map.delete(key);
+  }
 }
 
 /** The keys of an owner, `<head>` itself included. */

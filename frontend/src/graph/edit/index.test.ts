@@ -45,6 +45,7 @@ import {
   setResponse,
   undoOf,
 } from ".";
+import type { UndoHistory } from "./undo-history";
 
 // -- actions ----------------------------------------------------------------------------------
 
@@ -298,7 +299,7 @@ test("undoing an edit does not take back what a colleague wrote over it", () => 
 type Step = readonly [person: number, edit: number, x: number, y: number];
 
 /** One of the edits, aimed at whatever the person sees. */
-function act(doc: Y.Doc, undo: Y.UndoManager, [, edit, x, y]: Step): void {
+function act(doc: Y.Doc, undo: UndoHistory, [, edit, x, y]: Step): void {
   const { actions, relations } = graphIn(doc);
   const key = (n: number) => actions[n % Math.max(1, actions.length)]?.key ?? "nobodynobody";
   const relation = relations[x % Math.max(1, relations.length)];
@@ -335,7 +336,7 @@ test("whatever people do at once, all see the same graph, with names that differ
       for (const round of rounds) {
         for (const step of round) {
           const [person] = step;
-          act(people[person as 0 | 1], undos[person] as Y.UndoManager, step);
+          act(people[person as 0 | 1], undos[person] as UndoHistory, step);
         }
         exchange(...people);
         const graph = graphIn(people[0]);
