@@ -7,8 +7,10 @@ import msgspec
 
 from action_assistant.runner.emulator.engine import EmulatedEngine
 from action_assistant.runner.emulator.messages import EngineTraits, index_of
+from action_assistant.runner.runs.events import Override
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.visits import Visit
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import ENTRY, ENTRY_CONDITIONS, EXIT, Conditions, Graph, Relation
 from action_assistant.umrf.semantics import NodeStateEvent, script_from
 from runner import harness
@@ -60,7 +62,42 @@ def join(name: str = "join") -> Graph:
     return msgspec.structs.replace(line, relations=relations)
 
 
-GRAPHS = {"line": lambda: sequence("line", 4), "join": join, "loop": carousel, "ends": two_ends}
+def _stuck() -> Graph:
+    """One whose first action leads nowhere: it halts, and its parent is never told."""
+    line = sequence("Stuck", 2)
+    last = line.actions[1].key
+    arrows = tuple(
+        msgspec.structs.replace(each, conditions=Conditions()) if each.child == last else each
+        for each in line.relations
+    )
+    return msgspec.structs.replace(line, relations=arrows)
+
+
+#: What a robot has indexed: graphs inside of others.
+INSIDE = (sequence("Sub", 2), _stuck())
+
+
+def around(name: str = "around", inside: str = "Sub", *, again: bool = False) -> Graph:
+    """`Work_0`, then a graph of two actions, then `Work_2`; `again`: and from the start."""
+    line = sequence(name, 3)
+    first, inner, last = line.actions
+    actions = (first, msgspec.structs.replace(inner, name=inside), last)
+    if again:
+        back = Relation(parent=last.key, child=first.key, conditions=GO_ON, required=False)
+        arrows = tuple(each for each in line.relations if each.child != EXIT)
+        line = msgspec.structs.replace(line, relations=(*arrows, back))
+    return msgspec.structs.replace(line, actions=actions)
+
+
+GRAPHS = {
+    "line": lambda: sequence("line", 4),
+    "join": join,
+    "loop": carousel,
+    "ends": two_ends,
+    "sub": around,
+    "stuck": lambda: around("stuck", "Stuck"),
+    "sub_loop": lambda: around("sub_loop", again=True),
+}
 
 
 def lived(graph: str, script: dict[str, Any], network: NetworkFaults, stop: float | None) -> Lived:
@@ -79,7 +116,7 @@ async def _lived(
     robot = EmulatedEngine(
         "Robin",
         script=script_from({"behaviours": script}),
-        index=index_of([], []),
+        index=index_of([], [codec.write(each) for each in INSIDE]),
         quirks=EngineTraits(loss=network.loss),
         seed=network.seed,
         born_ms=now_ms(),
@@ -105,7 +142,17 @@ async def _lived(
                     await place.control.stop(run, BEN)
                 await all_over(place.control)
             history = place.harness.journal.history(run)
-    return Lived(history, place, {name: _real(name, traces, script) for name in history.actions})
+    real = {name: _real(*_inside(graph.name, name), traces, script) for name in history.actions}
+    return Lived(history, place, real)
+
+
+def _inside(graph: str, name: str) -> tuple[str, str]:
+    """The running graph of an action of a run, and its name there."""
+    around, _, node = name.rpartition("/")
+    return around or graph, node
+
+
+OVERRIDDEN = ("quiet", "others", "actions", "actors", "H5", "H8", "unknown-action", "subgraphs")
 
 
 async def _started(place: Place, graph: Graph) -> str:
@@ -114,17 +161,20 @@ async def _started(place: Place, graph: Graph) -> str:
 
     for _ in range(20):
         try:
-            return await place.start(graph)
+            override = Override(codes=OVERRIDDEN, reason="it is a test")
+            return await place.start(graph, override=override)
         except Refused:
             await anyio.sleep(1)
     raise AssertionError("it could not be started")
 
 
-def _real(name: str, traces: list[NodeStateEvent], script: dict[str, Any]) -> list[Real]:
+def _real(
+    graph: str, name: str, traces: list[NodeStateEvent], script: dict[str, Any]
+) -> list[Real]:
     """When the code of an action ran. One that ignores stop goes on after the engine has given up."""
     found: list[Real] = []
     state = ""
-    for trace in (each for each in traces if each.node == name):
+    for trace in (each for each in traces if (each.graph, each.node) == (graph, name)):
         at = harness.EPOCH + round(trace.t_ms * 1000)
         if trace.state == "RUNNING":
             found.append((at, None))

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from action_assistant.errors import Refused
 from action_assistant.runner.execution.echo_difference import differs
 from action_assistant.runner.execution.feedback_order import fresh
-from action_assistant.runner.execution.sub_graphs import SubGraphs
+from action_assistant.runner.execution.sub_graphs import LastLook, SubGraphs
 from action_assistant.runner.links.engine_process import has_ended
 from action_assistant.runner.links.observations import TERMINAL, Seen, Snapshot
 from action_assistant.runner.links.port import Answer, Link, NoAnswer
@@ -258,10 +258,11 @@ class Monitor:
 
     def _note(self, shown: list[Snapshot]) -> None:
         """Keep what an answer says beyond what is known already."""
-        since, self._seen_wall = self._seen_wall, shown[0].at
-        asked, self._seen_asked = self._seen_asked, shown[0].asked_at
+        usual = LastLook(self._seen_wall, self._seen_asked)
+        self._seen_wall, self._seen_asked = shown[0].at, shown[0].asked_at
+        looks = {each.graph: self._parts.last_look(each.graph, usual) for each in shown}
         news = tuple(
-            replace(each, since=since, since_asked=asked)
+            replace(each, since=looks[each.graph].at, since_asked=looks[each.graph].asked)
             for each in shown
             if is_news(self._it.run, each)
         )
