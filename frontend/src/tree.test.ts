@@ -265,3 +265,83 @@ test.each([
 ])("a handler that reads keys by itself is found: %s", (text) => {
   expect(keyReadings("handler.tsx", text)).toHaveLength(1);
 });
+
+const TEXT_FIELDS = new Set(
+  ["TextInput", "Textarea", "textarea", "input", "Autocomplete", "NumberInput"].concat([
+    "TagsInput",
+    "PasswordInput",
+    "ColorInput",
+    "JsonInput",
+  ]),
+);
+const NO_TEXT = /\btype="(?:radio|checkbox|range|file|date)"/;
+const DRAFT_HOOKS = /\buse(?:Draft|PendingText|KeptText)\(/;
+
+/** Text fields without a draft, and why nothing that is typed there looks saved and gets lost. */
+const DIALOG = "a dialog: its button says whether it is done";
+const UNDRAFTED: Readonly<Record<string, string>> = {
+  "account/account-panel.tsx AccountPanel": DIALOG,
+  "account/invitation.tsx Invitation": "a form of its own: its button lets its person in",
+  "account/name-prompt.tsx NamePrompt": DIALOG,
+  "account/share-dialog.tsx NewLink": DIALOG,
+  "account/share-link.tsx ShareLink": "read only: a link to copy",
+  "account/sign-in-bar.tsx SignInBar": "a secret: never kept",
+  "account/sign-in.tsx SignIn": "a secret: never kept",
+  "actions/action-list.tsx ActionList": "a search",
+  "actions/new-action-dialog.tsx Ask": DIALOG,
+  "courses/name-field.tsx NameField": DIALOG,
+  "drafts/new-draft-dialog.tsx NewDraftDialog": DIALOG,
+  "editor/canvas/quick-add.tsx QuickAdd": "a search: what it finds is added at once",
+  "find/find-bar.tsx FindBar": "a search",
+  "levels/extract-dialog.tsx Form": DIALOG,
+  "levels/flat-dialog.tsx Make": DIALOG,
+  "library/home/graph-cards.tsx GraphCards": "a search",
+  "library/home/rename-dialog.tsx Rename": DIALOG,
+  "library/sidebar.tsx Sidebar": "a search",
+  "review/more-filters.tsx Person": "a filter",
+  "review/run-filters.tsx RunFilters": "a filter",
+  "review/run/events.tsx RunEvents": "a filter",
+  "review/run/run-menu.tsx ExpectDialog": DIALOG,
+  "robots/robot-form.tsx Profile": DIALOG,
+  "robots/robot-form.tsx Reach": DIALOG,
+  "robots/robot-form.tsx RobotForm": DIALOG,
+  "runs/start/start-dialog.tsx Choice": DIALOG,
+  "runs/start/start-dialog.tsx StartDialog": DIALOG,
+  "runs/stop/confirm-rest-dialog.tsx ConfirmRestDialog": DIALOG,
+  "ui/pick-list.tsx PickList": "a search",
+};
+
+/** Return the functions of a file that draw a text field and hold no draft. */
+function undrafted(file: string, text = textOf(file)): string[] {
+  if (!/<(?:[A-Z]\w*|textarea|input)\b/.test(text)) return [];
+  const source = ts.createSourceFile(file, text, ts.ScriptTarget.Latest, true);
+  const found = new Set<string>();
+  const visit = (node: ts.Node, outer: ts.Node | null): void => {
+    const isField =
+      (ts.isJsxOpeningElement(node) || ts.isJsxSelfClosingElement(node)) &&
+      TEXT_FIELDS.has(node.tagName.getText()) &&
+      !NO_TEXT.test(node.attributes.getText());
+    if (isField && !DRAFT_HOOKS.test(outer?.getText() ?? ""))
+      found.add(`${file} ${outer === null ? "" : nameOf(outer)}`);
+    const around = outer ?? (ts.isFunctionLike(node) ? node : null);
+    ts.forEachChild(node, (child) => visit(child, around));
+  };
+  visit(source, null);
+  return [...found];
+}
+
+test("what is typed in a field is a draft until it is written, or the reason is named", () => {
+  const found = modules.flatMap((file) => undrafted(file));
+  expect(found.filter((field) => !(field in UNDRAFTED))).toEqual([]);
+  expect(Object.keys(UNDRAFTED).filter((field) => !found.includes(field))).toEqual([]);
+});
+
+test("a text field that writes after a pause by itself is found", () => {
+  const field = `export function Name() {
+    const [text, setText] = useState("");
+    useEffect(() => { const t = setTimeout(() => write(text), 700); return () => clearTimeout(t); });
+    return <TextInput value={text} onChange={(event) => setText(event.currentTarget.value)} />;
+  }`;
+  expect(undrafted("name.tsx", field)).toEqual(["name.tsx Name"]);
+  expect(undrafted("name.tsx", field.replace("useEffect(", "useDraft("))).toEqual([]);
+});

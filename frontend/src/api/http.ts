@@ -48,6 +48,8 @@ export interface RequestOptions {
   signal?: AbortSignal;
   /** Milliseconds until an answer must be there. */
   timeoutMs?: number;
+  /** Goes on when the page is closed meanwhile; only for small bodies. */
+  keepalive?: boolean;
 }
 
 const PATIENCE = 20_000; // ms
@@ -109,6 +111,7 @@ async function send(url: string, ask: RequestOptions): Promise<Response> {
   const init: RequestInit = {
     method: ask.method ?? "GET",
     credentials: "include",
+    keepalive: ask.keepalive ?? false,
     signal: ask.signal ? AbortSignal.any([ask.signal, patience]) : patience,
   };
   if (ask.body !== undefined) {

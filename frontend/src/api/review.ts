@@ -116,7 +116,11 @@ export function useMarks(runner: string | undefined, run: string) {
 }
 
 export function setMarks(runner: string, run: string, marks: Partial<RunMarks>): Promise<RunMarks> {
-  return fetchJson(`${runner}${path(run)}/marks`, { method: "PATCH", body: marks });
+  return fetchJson(`${runner}${path(run)}/marks`, {
+    method: "PATCH",
+    body: marks,
+    keepalive: true,
+  });
 }
 
 export function useLabels(runner: string | undefined) {

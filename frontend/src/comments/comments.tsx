@@ -22,7 +22,7 @@ const parameterWords = (parameter: string): string =>
 
 /** Begins a thread about an action, or one of its parameters. */
 function Begin({ action, name }: { action: Action; name: string }) {
-  const { doc } = useEditorContext();
+  const { doc, id } = useEditorContext();
   const { person } = usePerson();
   const [parameter, setParameter] = useState("");
   const all = [
@@ -35,7 +35,7 @@ function Begin({ action, name }: { action: Action; name: string }) {
     setParameter("");
   };
   return (
-    <Write label={`Comment on ${name}`} button="Comment" onSay={say}>
+    <Write place={[id, action.key]} label={`Comment on ${name}`} button="Comment" onSay={say}>
       {all.length > 0 && (
         <NativeSelect
           size="xs"

@@ -6,6 +6,7 @@ import { usePerson } from "../api/use-person";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { deleteMessage, reply, resolve, type Thread } from "../graph/edit/comments";
 import { usePersonColors } from "../sync/use-room";
+import { textScope, useWaitingTexts } from "../ui/drafts/kept-texts";
 import { initials } from "../ui/name-colors";
 import { ago, useNow } from "../ui/times";
 import style from "./comments.module.css";
@@ -55,10 +56,11 @@ interface ThreadCardProps {
 }
 
 export function ThreadCard({ thread, place, onPlace }: ThreadCardProps) {
-  const { doc, mayEdit } = useEditorContext();
+  const { doc, id, mayEdit } = useEditorContext();
   const { person } = usePerson();
+  const waits = useWaitingTexts(`${textScope(id, person.id)}comment/${thread.id}`) > 0;
   const colorOf = usePersonColors(thread.messages.map(({ author }) => author.id));
-  const [answering, setAnswering] = useState(false);
+  const [answering, setAnswering] = useState(() => waits);
   const me = () => ({ author: { id: person.id, name: person.name }, at: Date.now() });
   return (
     <li className={style.thread} data-resolved={thread.resolved || undefined}>
@@ -81,6 +83,7 @@ export function ThreadCard({ thread, place, onPlace }: ThreadCardProps) {
       {mayEdit &&
         (answering ? (
           <Write
+            place={[id, thread.id]}
             label="Answer"
             button="Answer"
             autoFocus

@@ -1,11 +1,15 @@
 /** Where somebody writes a comment or an answer. */
 import { Button, Textarea } from "@mantine/core";
-import { type ReactNode, useState } from "react";
+import type { ReactNode } from "react";
+import { usePerson } from "../api/use-person";
 import { printedKeys } from "../edit-actions/edit-action";
+import { textScope, useKeptText } from "../ui/drafts/kept-texts";
 import { keyOf } from "../ui/keys";
 import style from "./comments.module.css";
 
 interface WriteProps {
+  /** Where the text waits until it is sent: the graph and what it is about. */
+  place: readonly [graph: string, about: string];
   label: string;
   button: string;
   onSay: (text: string) => void;
@@ -15,8 +19,14 @@ interface WriteProps {
   children?: ReactNode;
 }
 
-export function Write({ label, button, onSay, autoFocus = false, onCancel, children }: WriteProps) {
-  const [text, setText] = useState("");
+export function Write(props: WriteProps) {
+  const { place, label, button, onSay, autoFocus = false, onCancel, children } = props;
+  const { person } = usePerson();
+  const [text, setText] = useKeptText(`${textScope(place[0], person.id)}comment/${place[1]}`);
+  const cancel = () => {
+    setText("");
+    onCancel?.();
+  };
   const say = () => {
     if (text.trim() === "") return;
     onSay(text.trim());
@@ -43,7 +53,7 @@ export function Write({ label, button, onSay, autoFocus = false, onCancel, child
         onKeyDown={(event) => {
           const key = keyOf(event);
           if (key === "Enter" && (event.ctrlKey || event.metaKey)) say();
-          if (key === "Escape") onCancel?.();
+          if (key === "Escape" && onCancel) cancel();
         }}
       />
       {text !== "" && children}
@@ -59,7 +69,7 @@ export function Write({ label, button, onSay, autoFocus = false, onCancel, child
             {button}
           </Button>
           {onCancel && (
-            <Button size="compact-sm" variant="subtle" onClick={onCancel}>
+            <Button size="compact-sm" variant="subtle" onClick={cancel}>
               Cancel
             </Button>
           )}

@@ -2,11 +2,13 @@
 import { Button, Modal, Textarea } from "@mantine/core";
 import { useState } from "react";
 import { type GraphDraft, proposeDraft } from "../api/documents/drafts";
+import { usePendingText } from "../ui/drafts/use-draft";
 import style from "./drafts.module.css";
 import { useDraftStep } from "./use-draft-step";
 
 export function ProposeDialog({ draft, onClose }: { draft: GraphDraft; onClose: () => void }) {
   const [note, setNote] = useState("");
+  usePendingText(note, null);
   const { busy, wrong, step } = useDraftStep();
   const propose = () =>
     step(async () => {

@@ -1,4 +1,6 @@
+import fc from "fast-check";
 import { expect, test } from "vitest";
+import type { RoomLink } from "../sync/room-connection";
 import { saveStatusText } from "./save-status";
 
 test("saved is said only when nothing waits and the room is live", () => {
@@ -22,4 +24,33 @@ test("a room that does not open says why, once that is known", () => {
     tone: "off",
     words: "No connection",
   });
+});
+
+test("what is typed and not in the graph yet counts as unsaved", () => {
+  const link = { state: "live", unsaved: 0, seq: 4 } as const;
+  const words = (drafts: Parameters<typeof saveStatusText>[2], room: RoomLink = link) =>
+    saveStatusText(room, true, drafts).words;
+  expect(words({ writing: 1, waiting: 0 })).toBe("Saving 1");
+  expect(words({ writing: 0, waiting: 1 })).toBe("1 draft not saved");
+  expect(words({ writing: 0, waiting: 2 })).toBe("2 drafts not saved");
+  expect(words({ writing: 1, waiting: 0 }, { ...link, state: "offline" })).toBe(
+    "Offline with 1 change",
+  );
+});
+
+test("saved is said exactly when the room is live and nothing waits, in a field or on the way", () => {
+  const number = fc.nat({ max: 2 });
+  const link: fc.Arbitrary<RoomLink> = fc.record({
+    state: fc.constantFrom("connecting", "live", "offline", "refused"),
+    unsaved: number,
+    seq: number,
+  });
+  const drafts = fc.record({ writing: number, waiting: number });
+  fc.assert(
+    fc.property(link, drafts, (room, drafts) => {
+      const isDone = room.unsaved + drafts.writing + drafts.waiting === 0;
+      const isSaved = room.state === "live" && room.seq > 0 && isDone;
+      expect(saveStatusText(room, true, drafts).words === "Saved").toBe(isSaved);
+    }),
+  );
 });

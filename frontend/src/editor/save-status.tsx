@@ -4,12 +4,17 @@ import {
   IconCheck,
   IconCloudOff,
   IconEye,
+  IconPencil,
   IconRefresh,
 } from "@tabler/icons-react";
+import { useSyncExternalStore } from "react";
+import { usePerson } from "../api/use-person";
 import { useEditorContext } from "../edit-actions/editor-context";
 import type { RefusalReason, RoomLink } from "../sync/room-connection";
 import { unsavedReason } from "../sync/unsaved-reasons";
 import { useLink, useRoom } from "../sync/use-room";
+import { textScope, useWaitingTexts } from "../ui/drafts/kept-texts";
+import { type DraftCounts, pendingDrafts } from "../ui/drafts/pending-drafts";
 import { Tooltip } from "../ui/floating/tooltip";
 import style from "./save-status.module.css";
 
@@ -29,7 +34,7 @@ const whys: Record<RefusalReason, string> = {
 };
 
 export interface SaveStatusText {
-  tone: "good" | "busy" | "off" | "bad" | "view";
+  tone: "good" | "busy" | "off" | "bad" | "view" | "draft";
   words: string;
 }
 
@@ -37,8 +42,15 @@ function changes(n: number): string {
   return n === 1 ? "1 change" : `${n} changes`;
 }
 
-/** Who may not edit has nothing to save. */
-export function saveStatusText(link: RoomLink, mayEdit = true): SaveStatusText {
+const NO_DRAFTS: DraftCounts = { writing: 0, waiting: 0 };
+
+/** Who may not edit has nothing to save. What is typed in a field and not in the graph yet is not saved. */
+export function saveStatusText(
+  room: RoomLink,
+  mayEdit = true,
+  { writing, waiting }: DraftCounts = NO_DRAFTS,
+): SaveStatusText {
+  const link = { ...room, unsaved: room.unsaved + writing };
   if (link.state === "refused") {
     const why = link.why ? whys[link.why] : "Refused";
     const kept = link.unsaved > 0 ? ` · ${changes(link.unsaved)} not saved` : "";
@@ -46,9 +58,10 @@ export function saveStatusText(link: RoomLink, mayEdit = true): SaveStatusText {
   }
   if (link.state === "live" && link.seq > 0) {
     if (!mayEdit && link.unsaved === 0) return { tone: "view", words: "View only" };
-    return link.unsaved === 0
+    if (link.unsaved > 0) return { tone: "busy", words: `Saving ${link.unsaved}` };
+    return waiting === 0
       ? { tone: "good", words: "Saved" }
-      : { tone: "busy", words: `Saving ${link.unsaved}` };
+      : { tone: "draft", words: `${waiting === 1 ? "1 draft" : `${waiting} drafts`} not saved` };
   }
   if (link.seq === 0) {
     return link.why === undefined
@@ -65,15 +78,29 @@ const signs = {
   off: IconCloudOff,
   bad: IconAlertTriangle,
   view: IconEye,
+  draft: IconPencil,
 };
+
+const DRAFTS_WHY =
+  "What you typed is not in the graph: it does not fit its field yet, or waits for its button.";
+
+/** What was typed on this page for this graph and is not written. */
+function useDraftCounts(): DraftCounts {
+  const { id } = useEditorContext();
+  const { person } = usePerson();
+  const { writing, waiting } = useSyncExternalStore(pendingDrafts.onChange, pendingDrafts.counts);
+  const texts = useWaitingTexts(textScope(id, person.id));
+  return { writing, waiting: waiting + texts };
+}
 
 export function SaveStatus() {
   const link = useLink();
   const { room } = useRoom();
   const { mayEdit } = useEditorContext();
-  const { tone, words } = saveStatusText(link, mayEdit);
+  const drafts = useDraftCounts();
+  const { tone, words } = saveStatusText(link, mayEdit, drafts);
   const Sign = signs[tone];
-  const why = unsavedReason(link);
+  const why = unsavedReason(link) ?? (drafts.waiting > 0 ? DRAFTS_WHY : null);
   return (
     <Tooltip label={why ?? ""} disabled={why === null} width={300} onFocus>
       <span

@@ -1,10 +1,10 @@
 /** The properties of an action. */
-import { Autocomplete, Button, Group } from "@mantine/core";
+import { Button, Group } from "@mantine/core";
 import { IconGhost2, IconPackage } from "@tabler/icons-react";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { adoptGhost, rename, setField } from "../graph/edit";
 import type { Action, Graph } from "../graph/model";
-import { DraftInput } from "../ui/draft-input";
+import { DraftChoice, DraftInput } from "../ui/draft-input";
 import { colorOfName } from "../ui/name-colors";
 import { ArrowList } from "./arrow-list";
 import { DescriptionField, NameField, TypeField } from "./fields/action-fields";
@@ -63,13 +63,11 @@ export function ActionForm({ action }: { action: Action }) {
         </SharedField>
       </div>
       <SharedField of={action.key} field="robot">
-        <Autocomplete
-          key={`actor-${action.actor}`}
+        <DraftChoice
           label="Robot"
-          size="sm"
           placeholder="any robot"
           data={robots(graph)}
-          defaultValue={action.actor}
+          value={action.actor}
           leftSection={
             <i
               className={style.robot}
@@ -77,12 +75,7 @@ export function ActionForm({ action }: { action: Action }) {
               aria-hidden
             />
           }
-          onBlur={(event) => {
-            if (event.currentTarget.value !== action.actor) {
-              setField(doc, action.key, "actor", event.currentTarget.value.trim());
-            }
-          }}
-          onOptionSubmit={(value) => setField(doc, action.key, "actor", value)}
+          onCommit={(robot) => setField(doc, action.key, "actor", robot.trim())}
         />
       </SharedField>
       <DescriptionField action={action} />

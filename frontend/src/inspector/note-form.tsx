@@ -47,7 +47,7 @@ function Colors({ note, onPick }: { note: Note; onPick: (color: NoteColor) => vo
 export function NoteForm({ note }: { note: Note }) {
   const { doc, graph, select } = useEditorContext();
   const frame = note.kind === "frame";
-  const change = (part: Parameters<typeof changeNote>[2]) => void changeNote(doc, note.key, part);
+  const change = (part: Parameters<typeof changeNote>[2]) => changeNote(doc, note.key, part);
   const [width, height] = note.size;
   const area = useRef<HTMLTextAreaElement>(null);
   return (

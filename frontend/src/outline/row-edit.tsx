@@ -8,6 +8,7 @@ import { asOneEdit, connect, rename, retarget, setEntry, setResponse } from "../
 import { changeNote } from "../graph/edit/notes";
 import { ENTRY, EXIT, type Precondition, RESPONSES, type Response } from "../graph/model";
 import { endName } from "../graph/relation-words";
+import { useDraft } from "../ui/drafts/use-draft";
 import { keyOf } from "../ui/keys";
 import style from "./outline.module.css";
 import { outcomesOf } from "./row-actions";
@@ -32,27 +33,34 @@ function ends(context: EditorContext, exit: boolean) {
 function Rename({ row, onDone }: Props) {
   const { doc } = useEditorContext();
   const old = row.kind === "action" ? row.action.name : "";
-  const [name, setName] = useState(old);
-  const save = () => {
-    const next = name.trim();
-    if (row.kind !== "action" || next === "" || next === old) return onDone(null);
-    rename(doc, row.action.key, next);
-    onDone(`${old} is called ${next}`);
+  const key = row.kind === "action" ? row.action.key : "";
+  const field = useDraft({
+    of: key,
+    value: old,
+    check: (draft) => (draft.trim() === "" ? "An action has a name." : null),
+    onCommit: (draft) => rename(doc, key, draft.trim()),
+    onLeaving: true,
+  });
+  const next = field.text.trim();
+  const end = (write: boolean) => {
+    const isNew = write && field.wrong === null && next !== old;
+    if (isNew) field.leave();
+    else field.discard();
+    onDone(isNew ? `${old} is called ${next}` : null);
   };
   return (
     <TextInput
       aria-label={`New name of ${old}`}
       autoFocus
-      value={name}
-      error={name.trim() === "" ? "An action has a name." : undefined}
+      value={field.text}
+      error={field.wrong ?? undefined}
       onFocus={(event) => event.currentTarget.select()}
-      onChange={(event) => setName(event.currentTarget.value)}
+      onChange={(event) => field.change(event.currentTarget.value)}
       onKeyDown={(event) => {
         const key = keyOf(event);
-        if (key === "Enter") save();
-        if (key === "Escape") onDone(null);
+        if (key === "Enter" || key === "Escape") end(key === "Enter");
       }}
-      onBlur={save}
+      onBlur={() => end(true)}
     />
   );
 }
@@ -139,11 +147,18 @@ function Pick({ row, change, onDone }: Props) {
 function Write({ row, onDone }: Props) {
   const { doc } = useEditorContext();
   const old = row.kind === "note" ? row.note.text : "";
-  const [text, setText] = useState(old);
-  const save = () => {
-    if (row.kind !== "note" || text === old) return onDone(null);
-    changeNote(doc, row.note.key, { text });
-    onDone("The text is written");
+  const note = row.kind === "note" ? row.note.key : "";
+  const field = useDraft({
+    of: note,
+    value: old,
+    onCommit: (text) => changeNote(doc, note, { text }),
+    onLeaving: true,
+  });
+  const end = (write: boolean) => {
+    const isNew = write && field.text !== old;
+    if (isNew) field.leave();
+    else field.discard();
+    onDone(isNew ? "The text is written" : null);
   };
   return (
     <Textarea
@@ -152,17 +167,17 @@ function Write({ row, onDone }: Props) {
       autosize
       maxRows={8}
       maxLength={5_000}
-      value={text}
-      onChange={(event) => setText(event.currentTarget.value)}
+      value={field.text}
+      onChange={(event) => field.change(event.currentTarget.value)}
       onKeyDown={(event) => {
         const key = keyOf(event);
         if (key === "Enter" && !event.shiftKey) {
           event.preventDefault();
-          save();
+          end(true);
         }
-        if (key === "Escape") onDone(null);
+        if (key === "Escape") end(false);
       }}
-      onBlur={save}
+      onBlur={() => end(true)}
     />
   );
 }

@@ -3,9 +3,18 @@ import { MantineProvider } from "@mantine/core";
 import { act } from "react";
 import { createRoot, type Root } from "react-dom/client";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
-import { DraftInput } from "./draft-input";
+import { DraftChoice, DraftInput } from "./draft-input";
+import { type LostDraft, pendingDrafts } from "./drafts/pending-drafts";
 
 vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);
+vi.stubGlobal(
+  "ResizeObserver",
+  class {
+    observe() {}
+    unobserve() {}
+    disconnect() {}
+  },
+);
 vi.stubGlobal("matchMedia", () => ({
   matches: false,
   addEventListener: () => {},
@@ -13,11 +22,11 @@ vi.stubGlobal("matchMedia", () => ({
 }));
 
 let root: Root;
-const onCommit = vi.fn<(value: string) => void>();
+const onCommit = vi.fn<(value: string) => boolean>();
 
 beforeEach(() => {
   vi.useFakeTimers();
-  onCommit.mockReset();
+  onCommit.mockReset().mockReturnValue(true);
   root = createRoot(document.body.appendChild(document.createElement("div")));
 });
 
@@ -27,14 +36,10 @@ afterEach(() => {
   vi.useRealTimers();
 });
 
+const render = (field: React.ReactNode) =>
+  act(() => root.render(<MantineProvider>{field}</MantineProvider>));
 const show = (value: string) =>
-  act(() =>
-    root.render(
-      <MantineProvider>
-        <DraftInput label="Name" value={value} onCommit={onCommit} />
-      </MantineProvider>,
-    ),
-  );
+  render(<DraftInput label="Name" value={value} onCommit={onCommit} />);
 
 function field(): HTMLInputElement {
   const found = document.querySelector("input");
@@ -80,4 +85,96 @@ test("a field that goes before the pause is over writes what was typed", () => {
   type("mine");
   act(() => root.render(null));
   expect(onCommit.mock.calls).toEqual([["mine"]]);
+});
+
+const hide = () => {
+  vi.spyOn(document, "visibilityState", "get").mockReturnValue("hidden");
+  document.dispatchEvent(new Event("visibilitychange"));
+  vi.restoreAllMocks();
+};
+const number = (draft: string) => (/^\d+$/.test(draft) ? null : "A number.");
+
+test.each([
+  ["the page goes", () => void window.dispatchEvent(new Event("pagehide"))],
+  ["the page goes out of sight", hide],
+  [
+    "the page is asked whether it may go",
+    () => void window.dispatchEvent(new Event("beforeunload")),
+  ],
+])("a draft counts as unsaved, and is written when %s", (_, leave) => {
+  show("old");
+  type("mine");
+  expect(pendingDrafts.counts()).toEqual({ writing: 1, waiting: 0 });
+  act(leave);
+  expect(onCommit.mock.calls).toEqual([["mine"]]);
+  expect(pendingDrafts.counts()).toEqual({ writing: 0, waiting: 0 });
+  pause();
+  act(() => field().blur());
+  expect(onCommit).toHaveBeenCalledTimes(1);
+});
+
+test("a field that waits for leaving is written when the page goes, too", () => {
+  render(<DraftChoice label="Robot" data={["a", "b"]} value="a" onCommit={onCommit} />);
+  type("lab");
+  pause();
+  expect(onCommit).not.toHaveBeenCalled();
+  act(() => void window.dispatchEvent(new Event("pagehide")));
+  expect(onCommit.mock.calls).toEqual([["lab"]]);
+});
+
+test("a draft that does not fit waits for its person, who is asked before the page goes", () => {
+  render(<DraftInput label="Number" value="1" check={number} onCommit={onCommit} />);
+  const leave = () => {
+    const event = new Event("beforeunload", { cancelable: true });
+    act(() => void window.dispatchEvent(event));
+    return event.defaultPrevented;
+  };
+  expect(leave()).toBe(false);
+  type("x");
+  expect(pendingDrafts.counts()).toEqual({ writing: 0, waiting: 1 });
+  expect(leave()).toBe(true);
+  expect(onCommit).not.toHaveBeenCalled();
+  type("12");
+  expect(leave()).toBe(false);
+  expect(onCommit.mock.calls).toEqual([["12"]]);
+});
+
+test("the draft is written before other listeners look whether everything is stored", () => {
+  const seen: unknown[] = [];
+  const look = () => seen.push(onCommit.mock.calls.length);
+  window.addEventListener("beforeunload", look); // as the room does, long before anybody types
+  show("old");
+  type("mine");
+  act(() => void window.dispatchEvent(new Event("beforeunload")));
+  window.removeEventListener("beforeunload", look);
+  expect(seen).toEqual([1]);
+});
+
+test("Enter and Escape of an input method neither write nor discard a draft", () => {
+  show("old");
+  type("mine");
+  for (const key of ["Enter", "Escape"]) {
+    const composing = new KeyboardEvent("keydown", { key, bubbles: true, isComposing: true });
+    act(() => void field().dispatchEvent(composing));
+  }
+  expect(onCommit).not.toHaveBeenCalled();
+  expect(field().value).toBe("mine");
+});
+
+test.each([
+  ["has no place any more", "mine", false],
+  ["does not fit when its field goes", "", true],
+])("a draft that %s is offered to its person", (_, typed, isWrong) => {
+  const lost: LostDraft[] = [];
+  const stop = pendingDrafts.onLost((draft) => lost.push(draft));
+  onCommit.mockReturnValue(false);
+  const check = () => (isWrong ? "It never fits." : null);
+  render(<DraftInput of="a1" label="Name" value="old" check={check} onCommit={onCommit} />);
+  type(typed || "odd");
+  act(() => root.render(null));
+  stop();
+  expect(lost.map(({ text, of, written }) => ({ text, of, written }))).toEqual([
+    { text: typed || "odd", of: "a1", written: false },
+  ]);
+  expect(pendingDrafts.counts()).toEqual({ writing: 0, waiting: 0 });
 });

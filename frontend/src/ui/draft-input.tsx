@@ -1,19 +1,11 @@
 /** A field with a draft of its own: what is typed is written when it fits and the typing pauses. */
-import { Textarea, TextInput, type TextInputProps } from "@mantine/core";
-import { useCallback, useEffect, useRef, useState } from "react";
+import { Autocomplete, Textarea, TextInput, type TextInputProps } from "@mantine/core";
+import { type DraftOptions, useDraft } from "./drafts/use-draft";
 import { keyOf } from "./keys";
 
-const PAUSE = 700; // ms
-
-interface Props {
+interface Props extends DraftOptions {
   label: React.ReactNode;
-  value: string;
-  /** What is wrong with a draft; null when it fits. */
-  check?: (draft: string) => string | null;
-  onCommit: (value: string) => void;
   lines?: boolean;
-  /** Written on leaving only: the field itself is drawn anew under what it says. */
-  onLeaving?: boolean;
   placeholder?: string;
   description?: string;
   mono?: boolean;
@@ -31,42 +23,14 @@ interface Props {
 
 /** Invalid drafts stay where they are and are explained; the last valid value stays written. */
 export function DraftInput(props: Props) {
-  const { value, check, onCommit, lines = false, mono = false, onLeaving = false } = props;
-  const [draft, setDraft] = useState<string | null>(null);
-  const timer = useRef<ReturnType<typeof setTimeout> | undefined>(undefined);
-  const latest = useRef({ draft, value, check, onCommit });
-  latest.current = { draft, value, check, onCommit };
-  // A draft stays in its field after it was written: what others write since is newer than it.
-  const unwritten = useRef(false);
-
-  const commit = useCallback(() => {
-    clearTimeout(timer.current);
-    const now = latest.current;
-    if (!unwritten.current || now.draft === null || now.check?.(now.draft)) return;
-    unwritten.current = false;
-    if (now.draft !== now.value) now.onCommit(now.draft);
-  }, []);
-  useEffect(() => commit, [commit]);
-
-  const shown = draft ?? value;
-  const wrong = draft === null ? null : (check?.(draft) ?? null);
+  const { value, lines = false, mono = false } = props;
+  const field = useDraft(props);
   const kept = value === "" ? "" : ` The last valid value, ${value}, is kept.`;
-  const change = (text: string) => {
-    setDraft(text);
-    unwritten.current = true;
-    clearTimeout(timer.current);
-    if (!onLeaving) timer.current = setTimeout(commit, PAUSE);
-  };
-  const leave = () => {
-    commit();
-    if (latest.current.draft !== null && !latest.current.check?.(latest.current.draft))
-      setDraft(null);
-  };
   const shared = {
     label: props.label,
-    value: shown,
-    error: wrong === null ? undefined : wrong + kept,
-    onBlur: leave,
+    value: field.text,
+    error: field.wrong === null ? undefined : field.wrong + kept,
+    onBlur: field.leave,
     ...(props.ariaLabel === undefined ? {} : { "aria-label": props.ariaLabel }),
     ...(props.placeholder === undefined ? {} : { placeholder: props.placeholder }),
     ...(props.description === undefined ? {} : { description: props.description }),
@@ -76,10 +40,7 @@ export function DraftInput(props: Props) {
     spellCheck: false,
   };
   const onEscape = (event: React.KeyboardEvent) => {
-    if (keyOf(event) !== "Escape") return;
-    clearTimeout(timer.current);
-    unwritten.current = false;
-    setDraft(null);
+    if (keyOf(event) === "Escape") field.discard();
   };
   if (lines) {
     return (
@@ -89,7 +50,7 @@ export function DraftInput(props: Props) {
         autosize
         minRows={2}
         maxRows={10}
-        onChange={(event) => change(event.currentTarget.value)}
+        onChange={(event) => field.change(event.currentTarget.value)}
         onKeyDown={onEscape}
       />
     );
@@ -101,10 +62,43 @@ export function DraftInput(props: Props) {
       rightSection={props.rightSection}
       {...(props.rightSectionWidth ? { rightSectionWidth: props.rightSectionWidth } : {})}
       {...(props.leftSection ? { leftSection: props.leftSection, leftSectionWidth: 24 } : {})}
-      onChange={(event) => change(event.currentTarget.value)}
+      onChange={(event) => field.change(event.currentTarget.value)}
       onKeyDown={(event) => {
         onEscape(event);
-        if (keyOf(event) === "Enter") leave();
+        if (keyOf(event) === "Enter") field.leave();
+      }}
+    />
+  );
+}
+
+interface ChoiceProps extends Omit<DraftOptions, "onLeaving"> {
+  label: string;
+  /** What others have written, to choose from. */
+  data: readonly string[];
+  placeholder?: string;
+  leftSection?: TextInputProps["leftSection"];
+}
+
+/** A field with proposals: written on leaving, or when one of them is taken. */
+export function DraftChoice({ label, data, placeholder, leftSection, ...options }: ChoiceProps) {
+  const field = useDraft({ ...options, onLeaving: true });
+  return (
+    <Autocomplete
+      label={label}
+      size="sm"
+      data={[...data]}
+      value={field.text}
+      error={field.wrong ?? undefined}
+      {...(placeholder === undefined ? {} : { placeholder })}
+      leftSection={leftSection}
+      onChange={field.change}
+      onBlur={field.leave}
+      onOptionSubmit={(value) => {
+        field.change(value);
+        field.commit();
+      }}
+      onKeyDown={(event) => {
+        if (keyOf(event) === "Escape") field.discard();
       }}
     />
   );

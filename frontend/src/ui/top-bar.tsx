@@ -2,6 +2,7 @@
 
 import { Fragment, type ReactNode, useState } from "react";
 import { Link, useRouter } from "wouter";
+import { useDraft } from "./drafts/use-draft";
 import { keyOf } from "./keys";
 import style from "./top-bar.module.css";
 
@@ -10,8 +11,8 @@ export interface Crumb {
   to?: string;
   /** Something within the page: named, yet not what the page is. */
   part?: boolean;
-  /** Gives the page another name. */
-  rename?: (name: string) => void;
+  /** Gives the page another name. Returns false where it has none any more. */
+  rename?: (name: string) => boolean;
 }
 
 interface Props {
@@ -38,17 +39,49 @@ function toContent(): void {
   main.focus();
 }
 
+interface NameProps {
+  name: string;
+  rename: (name: string) => boolean;
+  onDone: () => void;
+}
+
+function NameWriting({ name, rename, onDone }: NameProps) {
+  const field = useDraft({
+    value: name,
+    check: (draft) => (draft.trim() === "" ? "A graph has a name." : null),
+    onCommit: (draft) => draft.trim() === name || rename(draft.trim()),
+    onLeaving: true,
+  });
+  const leave = (write: boolean) => {
+    if (write && field.wrong === null) field.leave();
+    else field.discard();
+    onDone();
+  };
+  return (
+    <input
+      // biome-ignore lint/a11y/noAutofocus: it was asked for by a press at this place
+      autoFocus
+      className={style.name}
+      aria-label="Name of the graph"
+      value={field.text}
+      maxLength={200}
+      onFocus={(event) => event.currentTarget.select()}
+      onChange={(event) => field.change(event.currentTarget.value)}
+      onBlur={() => leave(true)}
+      onKeyDown={(event) => {
+        const key = keyOf(event);
+        if (key === "Enter" || key === "Escape") leave(key === "Enter");
+      }}
+    />
+  );
+}
+
 /** What the page is; where it can be called otherwise, by pressing its name. */
 function Here({ crumb: { label, rename } }: { crumb: Crumb }) {
   const [writing, setWriting] = useState(false);
   if (rename === undefined || typeof label !== "string") {
     return <h1 className={style.here}>{label}</h1>;
   }
-  const save = (text: string) => {
-    setWriting(false);
-    const name = text.trim();
-    if (name !== "" && name !== label) rename(name);
-  };
   if (!writing) {
     return (
       <h1 className={style.here}>
@@ -58,23 +91,7 @@ function Here({ crumb: { label, rename } }: { crumb: Crumb }) {
       </h1>
     );
   }
-  return (
-    <input
-      // biome-ignore lint/a11y/noAutofocus: it was asked for by a press at this place
-      autoFocus
-      className={style.name}
-      aria-label="Name of the graph"
-      defaultValue={label}
-      maxLength={200}
-      onFocus={(event) => event.currentTarget.select()}
-      onBlur={(event) => save(event.currentTarget.value)}
-      onKeyDown={(event) => {
-        const key = keyOf(event);
-        if (key === "Enter") save(event.currentTarget.value);
-        if (key === "Escape") setWriting(false);
-      }}
-    />
-  );
+  return <NameWriting name={label} rename={rename} onDone={() => setWriting(false)} />;
 }
 
 export function TopBar({ crumbs, status, actions, account, start, stop }: Props) {

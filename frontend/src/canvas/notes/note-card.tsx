@@ -4,6 +4,7 @@ import { IconTrash } from "@tabler/icons-react";
 import { type NodeProps, NodeResizer, NodeToolbar, Position } from "@xyflow/react";
 import { createContext, memo, use, useEffect, useRef } from "react";
 import { type NewNote, NOTE_COLORS, type Note } from "../../graph/edit/notes";
+import { useDraft } from "../../ui/drafts/use-draft";
 import { Tooltip } from "../../ui/floating/tooltip";
 import { keyOf } from "../../ui/keys";
 import { useChangeMark } from "../changes/change-marks";
@@ -22,7 +23,8 @@ export interface NoteEditing {
   /** The only thing that is chosen. */
   readonly alone: string | null;
   edit(key: string | null): void;
-  change(key: string, change: Partial<NewNote>): void;
+  /** Returns false when the note is gone. */
+  change(key: string, change: Partial<NewNote>): boolean;
   /** While its edges are dragged, and `null` when that ends. */
   resizing(note: Note | null): void;
   remove(key: string): void;
@@ -36,9 +38,14 @@ export function NoteField({ note, notes }: { note: Note; notes: NoteEditing }) {
     field.current?.focus({ preventScroll: true });
     field.current?.select();
   }, []);
+  const draft = useDraft({
+    of: note.key,
+    value: note.text,
+    onCommit: (text) => notes.change(note.key, { text }),
+    onLeaving: true,
+  });
   const done = () => {
-    const text = field.current?.value ?? note.text;
-    if (text !== note.text) notes.change(note.key, { text });
+    draft.leave();
     notes.edit(null);
   };
   return (
@@ -50,6 +57,7 @@ export function NoteField({ note, notes }: { note: Note; notes: NoteEditing }) {
         defaultValue={note.text}
         maxLength={5_000}
         rows={note.kind === "frame" ? 1 : undefined}
+        onInput={(event) => draft.change(event.currentTarget.value)}
         onBlur={done}
         onKeyDown={(event) => {
           event.stopPropagation();

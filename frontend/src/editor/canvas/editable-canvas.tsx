@@ -112,10 +112,10 @@ function useNoteEditing(
   const [only, ...others] = context.selection;
   const alone = only !== undefined && others.length === 0 ? only : null;
   const { doc, openOverlay: open, select, mayEdit } = context;
-  const change = useStableCallback<Parameters<NoteEditing["change"]>, void>((key, change) => {
+  const change = useStableCallback<Parameters<NoteEditing["change"]>, boolean>((key, change) => {
     const { text } = change;
     const linked = text === undefined ? {} : { text: withLinkIds(text, context.graph.actions) };
-    changeNote(doc, key, { ...change, ...linked, ...boxIn(change, toDocument) });
+    return changeNote(doc, key, { ...change, ...linked, ...boxIn(change, toDocument) });
   });
   return useMemo<NoteEditing | null>(() => {
     if (!mayEdit) return null;

@@ -21,25 +21,26 @@ export { asOneEdit, undoOf } from "./document-writes";
 export * from "./parameters";
 export * from "./relations";
 
-export function setGraphName(doc: Y.Doc, name: string): void {
+/** A graph is never gone for its own page: these answer true. */
+export function setGraphName(doc: Y.Doc, name: string): true {
   asOneEdit(doc, () => {
     writeKey(doc, "meta", "name", name);
     eraseKeys(doc, "meta", "x/graph_name");
   });
+  return true;
 }
 
 /** Calls the action of a document of the library otherwise, and so the document. */
-export function renameDocument(doc: Y.Doc, key: Key, name: string): void {
-  asOneEdit(doc, () => {
-    if (rename(doc, key, name)) setGraphName(doc, name);
-  });
+export function renameDocument(doc: Y.Doc, key: Key, name: string): boolean {
+  return asOneEdit(doc, () => rename(doc, key, name) && setGraphName(doc, name));
 }
 
-export function setGraphDescription(doc: Y.Doc, description: string): void {
+export function setGraphDescription(doc: Y.Doc, description: string): true {
   asOneEdit(doc, () => {
     writeKey(doc, "meta", "description", description);
     eraseKeys(doc, "meta", "x/graph_description");
   });
+  return true;
 }
 
 /** Says where what follows is drawn; down is what documents mean that say nothing. */

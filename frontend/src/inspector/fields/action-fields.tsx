@@ -12,7 +12,7 @@ interface Props {
 
 interface NameProps extends Props {
   description?: ReactNode;
-  onRename: (name: string) => void;
+  onRename: (name: string) => boolean;
 }
 
 export function NameField({ action, description, onRename }: NameProps) {

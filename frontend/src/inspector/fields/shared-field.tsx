@@ -2,6 +2,7 @@
 import { type FocusEvent, type ReactNode, use, useEffect, useRef } from "react";
 import { onePerId, PersonSign } from "../../people/people";
 import { useEditors, usePersonColors, useRoom } from "../../sync/use-room";
+import { DraftOwnerContext } from "../../ui/drafts/use-draft";
 import { ProblemsContext, toldAt } from "./field-problems";
 import { ProblemNote } from "./problem-note";
 import style from "./shared-field.module.css";
@@ -41,7 +42,7 @@ export function SharedField({ of, field, children }: Props) {
       onFocus={come}
       onBlur={() => leave.current()}
     >
-      {children}
+      <DraftOwnerContext value={of}>{children}</DraftOwnerContext>
       <Writers id={id} />
       {told.map((each) => (
         <ProblemNote key={each.id} told={each} />

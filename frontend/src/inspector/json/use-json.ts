@@ -1,8 +1,10 @@
 /** The JSON of a graph while it is read and while it is edited: newest text, draft, verdict. */
 import { useQuery } from "@tanstack/react-query";
-import { useEffect, useRef, useState, useSyncExternalStore } from "react";
+import { useEffect, useMemo, useRef, useState } from "react";
 import { graphMoment, type TextChanges, textChangesOf } from "../../api/documents/texts";
 import { errorText, Refusal } from "../../api/http";
+import { usePerson } from "../../api/use-person";
+import { textScope, useKeptText } from "../../ui/drafts/kept-texts";
 import type { JsonError } from "./json-editor";
 import { lineOf } from "./json-positions";
 
@@ -27,24 +29,17 @@ export type Verdict =
 
 const CHECKING: Verdict = { kind: "checking" };
 
-/** Drafts outlive the panel: whoever looks at something else in between finds the text again. */
-const drafts = new Map<string, Draft>();
-const listeners = new Set<() => void>();
-
-function keepDraft(graph: string, draft: Draft | null): void {
-  if (draft === null) drafts.delete(graph);
-  else drafts.set(graph, draft);
-  for (const listener of [...listeners]) listener();
+function readDraft(kept: string): Draft | null {
+  return kept === "" ? null : (JSON.parse(kept) as Draft);
 }
 
-function useDraft(graph: string): Draft | null {
-  return useSyncExternalStore(
-    (listener) => {
-      listeners.add(listener);
-      return () => listeners.delete(listener);
-    },
-    () => drafts.get(graph) ?? null,
-  );
+/** Drafts outlive the panel: whoever looks at something else in between finds the text again. */
+function useJsonDraft(graph: string) {
+  const { person } = usePerson();
+  const [kept, keep] = useKeptText(`${textScope(graph, person.id)}json`);
+  const draft = useMemo(() => readDraft(kept), [kept]);
+  const keepDraft = (next: Draft | null) => keep(next === null ? "" : JSON.stringify(next));
+  return [draft, keepDraft] as const;
 }
 
 function verdictOf(error: unknown, text: string): Verdict {
@@ -64,7 +59,7 @@ export function useJson(graph: string, seq: number) {
     gcTime: 30_000,
   });
   const newest = query.data;
-  const draft = useDraft(graph);
+  const [draft, keepDraft] = useJsonDraft(graph);
   const [verdict, setVerdict] = useState<Verdict>(CHECKING);
   // What was applied is shown until the server's text says it too.
   const [applied, setApplied] = useState<JsonSnapshot | null>(null);
@@ -98,12 +93,12 @@ export function useJson(graph: string, seq: number) {
     edit(next: string) {
       const from = draft?.base ?? newest;
       if (from === undefined) return;
-      keepDraft(graph, next === from.text ? null : { text: next, base: from });
+      keepDraft(next === from.text ? null : { text: next, base: from });
     },
-    discard: () => keepDraft(graph, null),
+    discard: () => keepDraft(null),
     done() {
       if (draft) setApplied({ text: draft.text, seq: newest?.seq ?? draft.base.seq });
-      keepDraft(graph, null);
+      keepDraft(null);
     },
   };
 }

@@ -52,10 +52,9 @@ export function NumberField({
           check={(draft) => complaint(field, draft)}
           onCommit={(draft) => {
             const result = typed("number", draft);
-            if ("ok" in result)
-              setParameter(doc, action.key, side, parameter.path, (now) =>
-                withValue(now, result.ok),
-              );
+            if (!("ok" in result)) return false;
+            const write = (now: string) => withValue(now, result.ok);
+            return setParameter(doc, action.key, side, parameter.path, write);
           }}
         />
       </div>

@@ -12,6 +12,7 @@ import { nameSuggestions } from "../../graph/parameters/names";
 import { pathFrom, taken } from "../../graph/parameters/paths";
 import { fresh, GROUPS, TYPES } from "../../graph/parameters/values";
 import { pathWords } from "../../graph/value-text";
+import { usePendingText } from "../../ui/drafts/use-draft";
 import { SectionCounts } from "../fields/section-counts";
 import { SharedField } from "../fields/shared-field";
 import style from "../inspector.module.css";
@@ -36,6 +37,7 @@ function Suggestion({ name, why }: { name: string; why: string | undefined }) {
 function AddParameter({ action, side, onDone }: AddProps) {
   const { doc, graph } = useEditorContext();
   const [name, setName] = useState("");
+  usePendingText(name, null);
   const suggestions = nameSuggestions(graph, action, side);
   const [type, setType] = useState<string>("string");
   const path = pathFrom(name);

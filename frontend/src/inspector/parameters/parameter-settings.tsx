@@ -1,5 +1,5 @@
 /** What a parameter is, apart from its value: name, type, allowed values, required, locked. */
-import { Autocomplete, Button, Group, Switch } from "@mantine/core";
+import { Button, Group, Switch } from "@mantine/core";
 import { IconTrash } from "@tabler/icons-react";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import type { ParameterSide } from "../../graph/document-keys";
@@ -16,7 +16,7 @@ import {
   withType,
 } from "../../graph/parameters/values";
 import { pathWords } from "../../graph/value-text";
-import { DraftInput } from "../../ui/draft-input";
+import { DraftChoice, DraftInput } from "../../ui/draft-input";
 import style from "../inspector.module.css";
 
 interface Props {
@@ -33,9 +33,6 @@ export function ParameterSettings({ owner, side, parameter, others, onClose }: P
   const name = pathWords(parameter.path);
   const write = (change: (now: string) => string) =>
     setParameter(doc, owner, side, parameter.path, change);
-  const retype = (type: string) => {
-    if (type.trim() !== "" && type !== field.type) write((now) => withType(now, type.trim()));
-  };
   return (
     <section className={style.adding} aria-label={`What the parameter ${name} is`}>
       <DraftInput
@@ -45,14 +42,11 @@ export function ParameterSettings({ owner, side, parameter, others, onClose }: P
         check={(draft) => taken(others, pathFrom(draft))}
         onCommit={(draft) => renameParameter(doc, owner, side, parameter.path, pathFrom(draft))}
       />
-      <Autocomplete
-        key={field.type}
+      <DraftChoice
         label="Type"
-        size="sm"
-        data={[...TYPES]}
-        defaultValue={field.type ?? ""}
-        onBlur={(event) => retype(event.currentTarget.value)}
-        onOptionSubmit={retype}
+        data={TYPES}
+        value={field.type ?? ""}
+        onCommit={(type) => type.trim() === "" || write((now) => withType(now, type.trim()))}
       />
       {field.native !== null && (
         <DraftInput
@@ -64,12 +58,12 @@ export function ParameterSettings({ owner, side, parameter, others, onClose }: P
             const result = withAllowed(parameter.text, draft);
             return "wrong" in result ? result.wrong : null;
           }}
-          onCommit={(draft) => {
+          onCommit={(draft) =>
             write((now) => {
               const result = withAllowed(now, draft);
               return "ok" in result && result.ok !== null ? result.ok : now;
-            });
-          }}
+            })
+          }
         />
       )}
       <Switch

@@ -29,7 +29,7 @@ interface ValueProps {
   parameter: Parameter;
   /** In the field, at its end. */
   end?: ReactNode;
-  write: (change: (now: string) => string) => void;
+  write: (change: (now: string) => string) => boolean;
 }
 
 function isJson(draft: string): string | null {
@@ -97,7 +97,7 @@ function TypedValue(props: ValueProps & { native: NonNullable<ParameterValue["na
       check={(draft) => complaint(field, draft)}
       onCommit={(draft) => {
         const result = typed(native, draft);
-        if ("ok" in result) write((now) => withValue(now, result.ok));
+        return "ok" in result && write((now) => withValue(now, result.ok));
       }}
       rightSectionWidth={clearable && end ? 60 : 32}
       rightSection={

@@ -10,6 +10,7 @@ import { errorText } from "../../api/http";
 import { CoursesAt } from "../../courses/courses-told";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import { useThrottledLink } from "../../sync/use-room";
+import { usePendingText } from "../../ui/drafts/use-draft";
 import style from "./versions.module.css";
 
 const LABEL_LIMIT = 200; // letters
@@ -35,6 +36,7 @@ function Fields({ onPublished, onClose }: FieldsProps) {
   const client = useQueryClient();
   const [label, setLabel] = useState("");
   const [note, setNote] = useState("");
+  usePendingText(note, null);
   const [busy, setBusy] = useState(false);
   const [refused, setRefused] = useState("");
   const obstacle = useObstacle();

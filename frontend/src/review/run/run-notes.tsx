@@ -3,9 +3,9 @@ import { ActionIcon, Button, TagsInput, Textarea } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconPin, IconPinFilled } from "@tabler/icons-react";
 import { useQueryClient } from "@tanstack/react-query";
-import { useEffect, useState } from "react";
 import { errorText } from "../../api/http";
 import { type RunMarks, setMarks, useLabels, useMarks } from "../../api/review";
+import { useDraft } from "../../ui/drafts/use-draft";
 import style from "./run-notes.module.css";
 
 /** The marks of a run and a way to change them, shown at once and taken back if refused. */
@@ -47,11 +47,15 @@ export function PinRun({ runner, run }: { runner: string | undefined; run: strin
 export function RunNotes({ runner, run }: { runner: string | undefined; run: string }) {
   const { marks, change } = useEditedMarks(runner, run);
   const known = useLabels(runner).data ?? [];
-  const [draft, setDraft] = useState<string | null>(null);
   const saved = marks?.note ?? "";
-  useEffect(() => {
-    if (draft === saved) setDraft(null);
-  }, [draft, saved]);
+  const field = useDraft({
+    value: saved,
+    onCommit(note) {
+      void change({ note });
+      return true;
+    },
+    onLeaving: true,
+  });
   return (
     <section className={style.notes} aria-label="Notes">
       <TagsInput
@@ -72,14 +76,12 @@ export function RunNotes({ runner, run }: { runner: string | undefined; run: str
         minRows={2}
         maxLength={4000}
         disabled={marks === undefined}
-        value={draft ?? saved}
-        onChange={(event) => setDraft(event.currentTarget.value)}
-        onBlur={() => {
-          if (draft !== null && draft !== saved) void change({ note: draft });
-        }}
+        value={field.text}
+        onChange={(event) => field.change(event.currentTarget.value)}
+        onBlur={field.leave}
       />
-      {draft !== null && draft !== saved && (
-        <Button size="compact-sm" onClick={() => void change({ note: draft })}>
+      {field.text !== saved && (
+        <Button size="compact-sm" onClick={field.leave}>
           Save note
         </Button>
       )}
