@@ -17,11 +17,9 @@ from table import Table, seconds
 from action_assistant.editor.catalogue.graph_checks import GraphChecks
 from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.catalogue.people import People
-from action_assistant.editor.catalogue.versions import Versions
 from action_assistant.editor.history import told_changes
 from action_assistant.editor.history.blame import Blame
 from action_assistant.editor.history.change_index import ChangeIndex
-from action_assistant.editor.history.grafts import Grafts
 from action_assistant.editor.history.graph_history import GraphHistory
 from action_assistant.editor.history.since_when import AskingSince, CourseSearch
 from action_assistant.editor.log.graph_events import UPDATED, fold, graph_stream
@@ -78,39 +76,30 @@ async def _asked(past: _Past) -> list[float]:
     """What the index and what is made of it answer."""
     journal, workers, changes, keys, dice = past
     await _spread(journal)
-    people, rooms = await People.known(journal), Rooms(journal)
     index = ChangeIndex(journal, workers.graphs)
-    reader = GraphReader(journal, rooms, workers.graphs)
-    versions = Versions(journal, reader, GraphChecks(journal, rooms, reader))
-    history = GraphHistory(journal, people, versions, index, workers.graphs)
-    blame = Blame(index, people, Grafts(journal, index, people))
+    history, blame = GraphHistory(index), Blame(index)
 
     async def moment() -> None:
-        found = await index.at(GRAPH, dice.randrange(1, changes))
-        await workers.graphs(told_changes.document, found)
+        await index.value(told_changes.document_at, GRAPH, dice.randrange(1, changes))
 
     async def compare() -> None:
         first, last = sorted(dice.sample(range(1, changes), 2))
-        then, later = await index.at(GRAPH, first), await index.at(GRAPH, last)
-        await workers.graphs(told_changes.differing, (first, then), (last, later))
+        await index.text(told_changes.differing, GRAPH, first, last)
 
     async def steps() -> None:
         at = dice.randrange(1, changes - 500)
         await blame.changes(GRAPH, at, at + 500, 5000)
 
-    try:
-        return [
-            await _median(lambda: index.upto(GRAPH, changes - 1), 1),
-            await _median(lambda: index.upto(GRAPH), 1),
-            await _median(lambda: history.of(GRAPH, limit=50, before=None)),
-            await _median(moment),
-            await _median(compare),
-            await _median(steps),
-            await _median(lambda: blame.of(GRAPH, keys[0], changes)),
-            await _median(lambda: blame.of_field(GRAPH, keys[0], "in/speed", changes)),
-        ]
-    finally:
-        await rooms.close()
+    return [
+        await _median(lambda: index.upto(GRAPH, changes - 1), 1),
+        await _median(lambda: index.upto(GRAPH), 1),
+        await _median(lambda: history.of(GRAPH, limit=50, before=None)),
+        await _median(moment),
+        await _median(compare),
+        await _median(steps),
+        await _median(lambda: blame.of(GRAPH, keys[0], changes)),
+        await _median(lambda: blame.of_field(GRAPH, keys[0], "in/speed", changes)),
+    ]
 
 
 async def _searched(past: _Past) -> list[float]:
@@ -120,7 +109,7 @@ async def _searched(past: _Past) -> list[float]:
     index = ChangeIndex(journal, workers.graphs)
     reader = GraphReader(journal, rooms, workers.graphs)
     checks = GraphChecks(journal, rooms, reader)
-    search = CourseSearch(index, people, checks, workers.graphs)
+    search = CourseSearch(index, people, checks)
 
     asked = AskingSince(1, {"behaviours": {}}, changes)
     try:

@@ -13,7 +13,6 @@ from action_assistant.editor.history.change_index import ChangeIndex
 from action_assistant.editor.history.drafts.draft_merges import DraftMerges
 from action_assistant.editor.history.drafts.drafts import Drafts
 from action_assistant.editor.history.going_back import GoingBack
-from action_assistant.editor.history.grafts import Grafts
 from action_assistant.editor.history.graph_history import GraphHistory
 from action_assistant.editor.history.since_when import CourseSearch
 from action_assistant.editor.rooms.colours import PersonColours
@@ -65,29 +64,15 @@ class EditorServices:
     def _remember(self) -> None:
         """What looks back, and what works on other graphs than those that everybody has open."""
         journal, people, workers = self.journal, self.people, self.workers
-        self.history = GraphHistory(
-            journal, people, self.versions, self.change_index, workers.graphs
-        )
+        self.history = GraphHistory(self.change_index)
         self.going_back = GoingBack(
             journal, self.rooms, self.graph_reader, self.change_index, workers.graphs
         )
-        self.course_search = CourseSearch(
-            self.change_index, people, self.graph_checks, workers.graphs
-        )
-        self.grafts = Grafts(journal, self.change_index, people)
-        self.blame = Blame(self.change_index, people, self.grafts)
-        self.drafts = Drafts(
-            journal, self.graph_reader, self.catalogue, people, self.change_index, workers.graphs
-        )
+        self.course_search = CourseSearch(self.change_index, people, self.graph_checks)
+        self.blame = Blame(self.change_index)
+        self.drafts = Drafts(journal, self.graph_reader, self.catalogue, people, self.change_index)
         self.draft_merges = DraftMerges(
-            journal,
-            self.rooms,
-            self.drafts,
-            self.change_index,
-            self.grafts,
-            people,
-            self.graph_checks,
-            workers.graphs,
+            journal, self.rooms, self.drafts, self.change_index, people, self.graph_checks
         )
 
 

@@ -56,6 +56,10 @@ class Database(Protocol):
         """What people may read: without a password."""
 
     @property
+    def address(self) -> str:
+        """The URL by which another process of this machine reads the same database, password and all."""
+
+    @property
     def is_local(self) -> bool:
         """Whether a commit waits for a disk of this machine, and for nothing else."""
 

@@ -7,7 +7,7 @@ from typing import TypeVar
 from sqlalchemy import Connection, make_url
 from sqlalchemy.exc import ArgumentError
 
-from action_assistant.errors import CannotStart
+from action_assistant.errors import CannotStart, Unavailable
 from action_assistant.journal.database import Before, Branch, Database, cause_of, no_copy
 from action_assistant.journal.migrate import recognize, upgrade_to
 
@@ -46,14 +46,24 @@ def ask_once(url: str, question: Callable[[Connection], T]) -> T:
     """An answer as of one moment, for which nothing is made or changed. To be called where no loop runs.
     Raises CannotStart."""
     database = database_of(url)
-
-    async def ask() -> T:
-        try:
-            return await database.at_one_moment(question)
-        finally:
-            await database.close()
-
     try:
-        return asyncio.run(ask())
+        return asyncio.run(_asked_once(database, question))
     except database.faults as error:
         raise CannotStart(f"{database.name} cannot be read: {cause_of(error)}.") from error
+
+
+def ask_from_worker(url: str, question: Callable[[Connection], T]) -> T:
+    """Answer a question in a worker process, from the database that another process writes, as of one
+    moment. Raises Unavailable."""
+    database = database_of(url)
+    try:
+        return asyncio.run(_asked_once(database, question))
+    except database.faults as error:
+        raise Unavailable(f"The journal cannot be read: {cause_of(error)}.") from error
+
+
+async def _asked_once(database: Database, question: Callable[[Connection], T]) -> T:
+    try:
+        return await database.at_one_moment(question)
+    finally:
+        await database.close()

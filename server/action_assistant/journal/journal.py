@@ -246,6 +246,15 @@ class Journal(JournalReader):
         """What the writer has done."""
         return self._writer.metrics
 
+    async def ask(self, question: Callable[[Connection], T]) -> T:
+        """Answer a question about stored data, on a thread of this process. Raises Unavailable."""
+        return await self._ask(question)
+
+    @property
+    def address(self) -> str:
+        """The URL by which a worker reads the database. It may hold a password: not to be shown or logged."""
+        return self._database.address
+
     @property
     def database_name(self) -> str:
         """What people may read: without a password."""

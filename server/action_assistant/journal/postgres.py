@@ -144,6 +144,7 @@ class Postgres:
     def __init__(self, url: URL) -> None:
         self._url: Final = url.set(drivername="postgresql+asyncpg")
         self.name: Final = f"The database {url.set(username=None, password=None, query={})}"
+        self.address: Final = url.set(drivername="postgresql").render_as_string(hide_password=False)
         self._me = f"action-assistant {os.getpid()} {secrets.token_hex(8)}"
         self._key = 0
         self._readers = self._engine(

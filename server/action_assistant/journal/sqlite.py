@@ -144,6 +144,7 @@ class Sqlite:
         self._engine = _reading(self._path, driver)
         self._threads = ThreadPoolExecutor(_READERS, thread_name_prefix=f"{self._path.name} reader")
         self.name: Final = f"The database {path}"
+        self.address: Final = f"sqlite:///{self._path.absolute()}"
 
     def open(self, branch: Branch, before: Before = no_copy) -> SqliteSession:
         """Lock the file for this process, since two writers of one log would tear it; migrate."""

@@ -3,6 +3,8 @@
 import itertools
 import random
 from collections import defaultdict
+from contextlib import suppress
+from typing import Any
 
 import anyio
 import pytest
@@ -10,11 +12,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from sqlalchemy import delete
 
+from action_assistant.editor.history import index_queries
 from action_assistant.editor.history.change_index import ChangeIndex
 from action_assistant.editor.history.key_changes import LoggedChange, owner_of, unpacked
 from action_assistant.editor.history.told_changes import maps_of, state_of
 from action_assistant.editor.log.graph_events import graph_stream
 from action_assistant.editor.rooms.open_rooms import Rooms
+from action_assistant.errors import Unavailable
 from action_assistant.journal.events import Draft
 from action_assistant.journal.journal import Journal
 from action_assistant.schema.editor_tables import key_change, key_change_head
@@ -36,7 +40,7 @@ async def test_the_state_at_any_moment_is_what_the_log_replays(
     index = ChangeIndex(journal)
     assert await index.upto(GRAPH) == len(held)
     for n, maps in enumerate(held):
-        assert _seen(await index.at(GRAPH, n + 1)) == plain(maps), n + 1
+        assert _seen(await index.value(index_queries.at, GRAPH, n + 1)) == plain(maps), n + 1
 
 
 @pytest.mark.parametrize("seed", range(examples(12) // 2))
@@ -49,11 +53,11 @@ async def test_changes_between_two_moments_lead_from_one_to_the_other(
     dice = random.Random(seed)
     for _ in range(20):
         first, last = sorted(dice.choices(range(1, len(held) + 1), k=2))
-        between = await index.between(GRAPH, first, last, limit=_ALL)
-        then = state_of(await index.at(GRAPH, first))
+        between = await index.value(index_queries.between, GRAPH, first, last, _ALL)
+        then = state_of(await index.value(index_queries.at, GRAPH, first))
         assert plain(maps_of(then | state_of(between))) == plain(held[last - 1])
         back = {change.place: change.before for change in reversed(between)}
-        now = state_of(await index.at(GRAPH, last))
+        now = state_of(await index.value(index_queries.at, GRAPH, last))
         assert plain(maps_of(now | back)) == plain(held[first - 1])
 
 
@@ -75,7 +79,7 @@ async def test_who_set_a_value_is_who_a_search_of_the_whole_log_finds(
     await index.upto(GRAPH)
     found = {
         change.place: (change.seq, change.author, unpacked(change.after))
-        for change in await index.at(GRAPH, len(held))
+        for change in await index.value(index_queries.at, GRAPH, len(held))
     }
     assert found == {place: who for place, who in sought.items() if who[2] is not None}
 
@@ -84,18 +88,52 @@ async def test_who_set_a_value_is_who_a_search_of_the_whole_log_finds(
 async def test_however_often_it_is_brought_up_it_holds_the_same(
     journal: Journal, rooms: Rooms, seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("action_assistant.editor.history.change_index._EVENTS", 1 + seed % 7)
+    monkeypatch.setattr("action_assistant.editor.history.index_queries._EVENTS", 1 + seed % 7)
     held = await edited(rooms, seed, 40)
     index, dice = ChangeIndex(journal), random.Random(seed)
     for upto in sorted(dice.sample(range(1, len(held) + 1), k=5)):
         assert await index.upto(GRAPH, upto) >= upto
     await index.upto(GRAPH)
-    pieces = await index.between(GRAPH, 0, len(held), limit=_ALL)
+    pieces = await index.value(index_queries.between, GRAPH, 0, len(held), _ALL)
     await journal.derive(lambda connection: connection.execute(delete(key_change)))
     await journal.derive(lambda connection: connection.execute(delete(key_change_head)))
     monkeypatch.undo()
     await index.upto(GRAPH)
-    assert pieces == await index.between(GRAPH, 0, len(held), limit=_ALL)
+    assert pieces == await index.value(index_queries.between, GRAPH, 0, len(held), _ALL)
+
+
+@pytest.mark.parametrize("seed", range(examples(8) // 2))
+async def test_killed_between_two_slices_it_is_made_as_if_it_had_not_been(
+    journal: Journal, rooms: Rooms, seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("action_assistant.editor.history.change_index.ROWS", 3)
+    held = await edited(rooms, seed, 30)
+    dice, derive = random.Random(seed), journal.derive
+
+    async def dies(work: Any) -> Any:
+        nonlocal left
+        left -= 1
+        if left < 0:
+            raise Unavailable("killed")
+        return await derive(work)
+
+    for _ in range(3):
+        left = dice.randrange(8)
+        with monkeypatch.context() as patch:
+            patch.setattr(journal, "derive", dies)
+            with suppress(Unavailable):
+                await ChangeIndex(journal).upto(GRAPH)
+        index = ChangeIndex(journal)
+        reached = await index.head(GRAPH)
+        since = await index.value(index_queries.latest_since, GRAPH, 1)
+        assert max(since.values(), default=0) <= reached
+    pieces = []
+    for _ in range(2):
+        assert await index.upto(GRAPH) == len(held)
+        pieces.append(await index.value(index_queries.between, GRAPH, 0, len(held), _ALL))
+        await index._forget(GRAPH)
+        assert not await index.value(index_queries.between, GRAPH, 0, len(held), _ALL)
+    assert pieces[0] == pieces[1]
 
 
 async def test_a_document_kept_by_another_version_is_made_again(
@@ -107,7 +145,7 @@ async def test_a_document_kept_by_another_version_is_made_again(
     strange = key_change_head.update().values(document=b"what is this")
     await journal.derive(lambda connection: connection.execute(strange))
     assert await index.upto(GRAPH) == len(held)
-    assert _seen(await index.at(GRAPH, len(held))) == plain(held[-1])
+    assert _seen(await index.value(index_queries.at, GRAPH, len(held))) == plain(held[-1])
 
 
 async def test_where_the_log_is_damaged_it_ends(journal: Journal, rooms: Rooms) -> None:
@@ -118,7 +156,7 @@ async def test_where_the_log_is_damaged_it_ends(journal: Journal, rooms: Rooms) 
     index = ChangeIndex(journal)
     assert await index.upto(GRAPH) == len(held)
     assert await index.upto(GRAPH) == len(held)
-    assert _seen(await index.at(GRAPH, len(held) + 1)) == plain(held[-1])
+    assert _seen(await index.value(index_queries.at, GRAPH, len(held) + 1)) == plain(held[-1])
 
 
 async def test_it_is_kept_up_while_nobody_asks(
@@ -130,7 +168,7 @@ async def test_it_is_kept_up_while_nobody_asks(
         held = await edited(rooms, 3, 30)
         found: dict[bool, int] = defaultdict(int)
         while not found[True]:
-            found[len(await index.at(GRAPH, len(held))) > 0] += 1
+            found[len(await index.value(index_queries.at, GRAPH, len(held))) > 0] += 1
             assert found[False] < 5000
 
 
@@ -153,7 +191,7 @@ async def test_what_is_being_edited_is_left_until_it_rests(
     index = ChangeIndex(journal)
 
     async def indexed() -> int:
-        return (await index._head(GRAPH))[0]
+        return await index.head(GRAPH)
 
     with monkeypatch.context() as patch:
         patch.setattr(anyio, "sleep", sleep)

@@ -6,6 +6,7 @@ import pytest
 
 from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.documents.document import Maps, maps_of, new_aid
+from action_assistant.editor.history import index_queries
 from action_assistant.editor.history.change_index import ChangeIndex
 from action_assistant.editor.history.going_back import EditsOfOne, GoingBack
 from action_assistant.editor.interchange.changes import difference
@@ -67,7 +68,7 @@ async def test_taking_back_touches_nothing_that_others_set_last(
     held = await edited(rooms, seed, 40)
     index = ChangeIndex(journal)
     await index.upto(GRAPH)
-    last = await index.at(GRAPH, len(held))
+    last = await index.value(index_queries.at, GRAPH, len(held))
     edits = EditsOfOne("ada", 2, len(held))
     try:
         await going_back.revert(GRAPH, "mari", edits)

@@ -7,6 +7,7 @@ import pytest
 
 from action_assistant.editor.documents.document import read_maps
 from action_assistant.editor.documents.values import ROOTS, ends_of
+from action_assistant.editor.history import index_queries
 from action_assistant.editor.history.change_index import ChangeIndex
 from action_assistant.editor.history.key_changes import LoggedChange, owner_of
 from action_assistant.editor.history.told_changes import Changes, Stretch, differing, names, told
@@ -35,8 +36,8 @@ async def test_what_one_person_did_alone_is_the_difference_of_the_whole_graphs(
     index = ChangeIndex(journal)
     await index.upto(GRAPH)
     first = random.Random(seed).randrange(2, len(held))
-    changes = await index.between(GRAPH, first - 1, len(held), limit=_ALL)
-    base = await index.at(GRAPH, first - 1, of=_touched(changes))
+    changes = await index.value(index_queries.between, GRAPH, first - 1, len(held), _ALL)
+    base = await index.value(index_queries.at, GRAPH, first - 1, of=_touched(changes))
     (found,) = told(base, changes, [Stretch("ada", first, len(held))])
     before, after = read_maps(held[first - 2]), read_maps(held[-1])
     sought = difference((0, before), (0, after))
@@ -71,8 +72,8 @@ async def test_of_people_who_edit_at_once_each_is_told_their_own(
     held = await edited(rooms, seed, 40)
     index = ChangeIndex(journal)
     await index.upto(GRAPH)
-    changes = await index.between(GRAPH, 1, len(held), limit=_ALL)
-    base = await index.at(GRAPH, 1)
+    changes = await index.value(index_queries.between, GRAPH, 1, len(held), _ALL)
+    base = await index.value(index_queries.at, GRAPH, 1)
     found = told(base, changes, [Stretch(who, 2, len(held)) for who in PEOPLE])
     for who, mine in zip(PEOPLE, found, strict=True):
         touched = {owner_of(c.root, c.key) for c in changes if c.author == who}
@@ -86,8 +87,10 @@ async def test_a_long_sitting_is_told_in_part(journal: Journal, rooms: Rooms) ->
     held = await edited(rooms, 4, 400)
     index = ChangeIndex(journal)
     await index.upto(GRAPH)
-    changes = await index.between(GRAPH, 1, len(held), limit=_ALL)
-    (found,) = told(await index.at(GRAPH, 1), changes, [Stretch("ada", 2, len(held))])
+    changes = await index.value(index_queries.between, GRAPH, 1, len(held), _ALL)
+    (found,) = told(
+        await index.value(index_queries.at, GRAPH, 1), changes, [Stretch("ada", 2, len(held))]
+    )
     assert len(found.actions) == 30
     assert found.more > 0
 
@@ -100,7 +103,7 @@ async def test_two_moments_differ_as_the_graphs_of_their_replay_do(
     index = ChangeIndex(journal)
     await index.upto(GRAPH)
     first, last = sorted(random.Random(seed).sample(range(1, len(held) + 1), 2))
-    found = differing((first, await index.at(GRAPH, first)), (last, await index.at(GRAPH, last)))
+    found = await index.text(differing, GRAPH, first, last)
     sought = difference((first, read_maps(held[first - 1])), (last, read_maps(held[last - 1])))
     assert found == msgspec.json.encode(sought)
 
@@ -113,8 +116,8 @@ async def test_names_are_all_that_actions_had_from_a_moment_on(
     index = ChangeIndex(journal)
     await index.upto(GRAPH)
     first = random.Random(seed).randrange(1, len(held))
-    later = await index.between(GRAPH, first, len(held), limit=_ALL)
-    own, uses = names([*await index.at(GRAPH, first), *later])
+    later = await index.value(index_queries.between, GRAPH, first, len(held), _ALL)
+    own, uses = names([*await index.value(index_queries.at, GRAPH, first), *later])
     graphs = [read_maps(maps) for maps in held[first - 1 :]]
     real = {each.name for graph in graphs for each in graph.actions if not each.missing}
     assert own == graphs[-1].name

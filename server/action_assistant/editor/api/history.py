@@ -12,7 +12,6 @@ from action_assistant.editor.history import told_changes
 from action_assistant.editor.history.blame import DocumentStep, FieldBlame, FieldValue
 from action_assistant.editor.history.going_back import EditsOfOne, GoneBack
 from action_assistant.editor.history.graph_history import HistoryEntry
-from action_assistant.editor.history.key_changes import LoggedChange
 from action_assistant.editor.history.since_when import AskingSince, SinceWhen
 from action_assistant.editor.log.graph_events import graph_stream
 from action_assistant.editor.services import EditorServices, EditorState
@@ -46,10 +45,8 @@ class PastDocument(msgspec.Struct, frozen=True):
     comments: dict[str, Any]
 
 
-async def _moment(
-    services: EditorServices, graph: str, seq: int | None, place: str
-) -> tuple[int, list[LoggedChange]]:
-    """A change of a graph, without `seq` the newest, and the changes that left it as it was then.
+async def _moment(services: EditorServices, graph: str, seq: int | None, place: str) -> int:
+    """Return a change of a graph that the index has: without `seq` the newest.
 
     Raises Conflict with the place of `seq` where there is no such change.
     """
@@ -59,7 +56,7 @@ async def _moment(
         raise Conflict(
             f"This graph has the changes 1 to {upto}; there is no {at}.", where={"path": place}
         )
-    return at, await services.change_index.at(graph, at)
+    return at
 
 
 def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
@@ -80,7 +77,9 @@ def _looking(app_state: EditorState) -> list[ControllerRouterHandler]:
     ) -> list[HistoryEntry]:
         services = app_state.services
         await services.catalogue.require(graph_id)
-        return await services.history.of(graph_id, limit=limit, before=before)
+        found = await services.history.of(graph_id, limit=limit, before=before)
+        entries: list[HistoryEntry] = encoded(found)
+        return entries
 
     @get(
         "/api/graphs/{graph_id:str}/document",
@@ -91,8 +90,8 @@ def _looking(app_state: EditorState) -> list[ControllerRouterHandler]:
     async def get_document(graph_id: str, at: Seq) -> Response[bytes]:
         services = app_state.services
         await services.catalogue.require(graph_id)
-        _, found = await _moment(services, graph_id, at, "/at")
-        text = await services.workers.graphs(told_changes.document, found)
+        moment = await _moment(services, graph_id, at, "/at")
+        text = await services.change_index.value(told_changes.document_at, graph_id, moment)
         return Response(text, media_type="application/json")
 
     @get(
@@ -110,7 +109,9 @@ def _looking(app_state: EditorState) -> list[ControllerRouterHandler]:
         services = app_state.services
         await services.catalogue.require(graph_id)
         newest = await services.journal.newest(graph_stream(graph_id))
-        return await services.blame.changes(graph_id, after, min(upto, newest), limit)
+        found = await services.blame.changes(graph_id, after, min(upto, newest), limit)
+        steps: list[DocumentStep] = encoded(found)
+        return steps
 
     @get(
         "/api/graphs/{graph_id:str}/diff",
@@ -127,7 +128,7 @@ def _looking(app_state: EditorState) -> list[ControllerRouterHandler]:
         then = await _moment(services, graph_id, before, "/from")
         later = await _moment(services, graph_id, after, "/to")
         found: Difference = encoded(
-            await services.workers.graphs(told_changes.differing, then, later)
+            await services.change_index.text(told_changes.differing, graph_id, then, later)
         )
         return found
 
@@ -143,7 +144,8 @@ def _blaming(app_state: EditorState) -> list[ControllerRouterHandler]:
     async def get_blame(graph_id: str, of: str, at: Seq | None = None) -> list[FieldBlame]:
         services = app_state.services
         await services.catalogue.require(graph_id)
-        return await services.blame.of(graph_id, of, at)
+        fields: list[FieldBlame] = encoded(await services.blame.of(graph_id, of, at))
+        return fields
 
     @get(
         "/api/graphs/{graph_id:str}/blame/values",
@@ -155,7 +157,8 @@ def _blaming(app_state: EditorState) -> list[ControllerRouterHandler]:
     ) -> list[FieldValue]:
         services = app_state.services
         await services.catalogue.require(graph_id)
-        return await services.blame.of_field(graph_id, of, field, at)
+        values: list[FieldValue] = encoded(await services.blame.of_field(graph_id, of, field, at))
+        return values
 
     @post(
         "/api/graphs/{graph_id:str}/since",

@@ -225,7 +225,7 @@ class GraphChecks:
         while level:
             below: list[tuple[str, Iterable[str]]] = []
             for graph, names in level:
-                for name in names:
+                for name in self.names.of_graphs(names):
                     if name != graph and self.names.is_hidden(name):
                         hidden.add(name)
                     if name == graph or name in found or not self.names.graph(name):

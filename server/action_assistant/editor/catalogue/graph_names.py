@@ -6,7 +6,7 @@ See docs/decisions/070-one-truth-for-sub-graphs.md.
 import asyncio
 from bisect import insort
 from collections import Counter
-from collections.abc import AsyncIterator, Awaitable, Callable, Collection
+from collections.abc import AsyncIterator, Awaitable, Callable, Collection, Iterable
 from contextlib import asynccontextmanager
 from typing import Any, Final
 
@@ -70,6 +70,12 @@ class GraphNames:
             return None
         graph = found[0][1]
         return NamedGraph(graph, self._seqs[graph])
+
+    def of_graphs(self, names: Iterable[str]) -> list[str]:
+        """Return those of these names that a graph has: the few that have to be looked at, of as many as a
+        graph has actions."""
+        graphs = self._graphs
+        return [name for name in names if name in graphs]
 
     def is_ambiguous(self, name: str) -> bool:
         """Whether several graphs have the name."""

@@ -1,6 +1,8 @@
 """Who acted here, under the name they last gave."""
 
-from sqlalchemy import select
+from collections.abc import Callable
+
+from sqlalchemy import Connection, select
 
 from action_assistant.editor.log.graph_events import (
     EXAMPLES,
@@ -52,3 +54,11 @@ class People:
     def everyone(self) -> list[PersonRef]:
         """All of them, by name."""
         return sorted((PersonRef(*item) for item in self._names.items()), key=lambda p: p.name)
+
+
+def stored_people(connection: Connection) -> Callable[[str], PersonRef]:
+    """Return who the author of an event is, by the names that are stored. For workers."""
+    person = editor_tables.person.c
+    rows = connection.execute(select(person.id, person.name))
+    names = {row.id: row.name for row in rows}
+    return lambda author: PersonRef(author, names.get(author) or _OURS.get(author, ""))

@@ -4,7 +4,7 @@ from datetime import datetime
 from typing import Any, Final
 
 import msgspec
-from sqlalchemy import Row, select
+from sqlalchemy import Connection, Row, Select, select
 
 from action_assistant.editor.catalogue.graph_checks import GraphChecks
 from action_assistant.editor.catalogue.graph_reader import GraphReader
@@ -153,10 +153,6 @@ class Versions:
         """The versions of a graph, newest first, without their UMRF."""
         return [_view(row) for row in await self._rows(graph)]
 
-    async def by_event(self, graph: str) -> dict[int, VersionView]:
-        """The versions of a graph, by the seq of the event that published them."""
-        return {row.event_seq: _view(row) for row in await self._rows(graph)}
-
     async def _pinned(self, part: contents.ReleasedPart) -> h.PinnedSubgraph:
         version = editor_tables.version.c
         same = (version.graph == part.graph, version.digest == part.digest)
@@ -170,11 +166,21 @@ class Versions:
         return PinnedGraph(**fields, current_digest=await self._checks.digest(pinned.name))
 
     async def _rows(self, graph: str, seq: int | None = None) -> list[Row[Any]]:
-        version = editor_tables.version.c
-        chosen = select(editor_tables.version).where(version.graph == graph)
+        chosen = _of_graph(graph)
         if seq is not None:
-            chosen = chosen.where(version.seq == seq)
-        return await self._journal.query(chosen.order_by(version.event_seq.desc()))
+            chosen = chosen.where(editor_tables.version.c.seq == seq)
+        return await self._journal.query(chosen)
+
+
+def versions_by_event(connection: Connection, graph: str) -> dict[int, VersionView]:
+    """Return the versions of a graph, by the seq of the event that published them. For workers."""
+    return {row.event_seq: _view(row) for row in connection.execute(_of_graph(graph))}
+
+
+def _of_graph(graph: str) -> Select[Any]:
+    version = editor_tables.version.c
+    chosen = select(editor_tables.version).where(version.graph == graph)
+    return chosen.order_by(version.event_seq.desc())
 
 
 def _within_limits(label: str, note: str) -> tuple[str, str]:

@@ -5,11 +5,19 @@ from datetime import datetime
 from typing import Any, Final
 
 import msgspec
+from sqlalchemy import Connection
 
-from action_assistant.editor.catalogue.people import People
+from action_assistant.editor.catalogue.people import stored_people
 from action_assistant.editor.documents.values import Root
+from action_assistant.editor.history import index_queries
 from action_assistant.editor.history.change_index import ChangeIndex
-from action_assistant.editor.history.grafts import Grafts, MergedBy
+from action_assistant.editor.history.grafts import (
+    MergedBy,
+    bring_up,
+    grafts_of,
+    merged_by,
+    originals,
+)
 from action_assistant.editor.history.key_changes import LoggedChange, unpacked
 from action_assistant.editor.history.places import field_of
 from action_assistant.editor.log.document_events import when
@@ -53,66 +61,80 @@ class DocumentStep(msgspec.Struct, frozen=True):
 
 
 class Blame:
-    """Asks the index who did what."""
+    """Asks the index who did what; the answers are JSON that a worker wrote."""
 
-    def __init__(self, index: ChangeIndex, people: People, grafts: Grafts) -> None:
+    def __init__(self, index: ChangeIndex) -> None:
         self._index = index
-        self._people = people
-        self._grafts = grafts
 
-    async def of(self, graph: str, owner: str, seq: int | None) -> list[FieldBlame]:
-        """Every field of an action, arrow or note that has a value after the change `seq`, by field.
+    async def of(self, graph: str, owner: str, seq: int | None) -> bytes:
+        """Return every field of an action, arrow or note that has a value after the change `seq`, by field:
+        `FieldBlame`s. Raises NotFound, Unavailable."""
+        upto = await bring_up(self._index, graph, seq)
+        return await self._index.text(fields_of, graph, owner, upto if seq is None else seq)
 
-        Raises NotFound, Unavailable.
-        """
-        upto = await self._index.upto(graph, seq)
-        found = await self._index.at(graph, upto if seq is None else seq, of={owner})
-        if not found:
-            raise NotFound(f"There is nothing {owner!r} in this graph at that moment.")
-        told = [
-            FieldBlame(**msgspec.structs.asdict(value), field=field_of(change.root, change.key))
-            for change, value in zip(found, await self._values(graph, found), strict=True)
-        ]
-        return sorted(told, key=lambda each: each.field)
+    async def of_field(self, graph: str, owner: str, field: str, seq: int | None) -> bytes:
+        """Return all values that a field has had, the newest first; what one person typed in one go is one:
+        `FieldValue`s. Raises Unavailable."""
+        upto = await bring_up(self._index, graph, seq)
+        at = upto if seq is None else seq
+        return await self._index.text(values_of, graph, owner, field, at)
 
-    async def of_field(
-        self, graph: str, owner: str, field: str, seq: int | None
-    ) -> list[FieldValue]:
-        """All values that a field has had, the newest first; what one person typed in one go is one.
-
-        Raises Unavailable.
-        """
-        upto = await self._index.upto(graph, seq)
-        changes: list[LoggedChange] = []
-        for root, key in keys_of(owner, field):
-            changes += await self._index.of_key(graph, root, key, upto if seq is None else seq)
-        alone = (await self._grafts.of(graph)).keys()
-        shown = in_one_go(changes, alone)[::-1][:_MOST]
-        return await self._values(graph, shown)
-
-    async def changes(self, graph: str, after: int, upto: int, limit: int) -> list[DocumentStep]:
-        """The newest changes of keys with `after < seq <= upto`, in order of time. Raises Unavailable."""
+    async def changes(self, graph: str, after: int, upto: int, limit: int) -> bytes:
+        """Return the newest changes of keys with `after < seq <= upto`, in order of time: `DocumentStep`s.
+        Raises Unavailable."""
         await self._index.upto(graph, upto)
-        found = await self._index.between(graph, after, upto, limit=limit)
-        return [
-            DocumentStep(c.seq, c.author, c.root, c.key, unpacked(c.before), unpacked(c.after))
-            for c in found
-        ]
+        return await self._index.text(steps, graph, after, upto, limit)
 
-    async def _values(self, graph: str, changes: Sequence[LoggedChange]) -> list[FieldValue]:
-        """What people gave, whoever merged it."""
-        originals = await self._grafts.originals(graph, changes)
-        return [
-            FieldValue(
-                unpacked(change.after),
-                unpacked(change.before),
-                self._people.person(original.change.author),
-                when(original.change.at),
-                change.seq,
-                self._grafts.merged_by(change, original),
-            )
-            for change, original in zip(changes, originals, strict=True)
-        ]
+
+def fields_of(connection: Connection, graph: str, owner: str, at: int) -> list[FieldBlame]:
+    """Who gave each field of an owner its value. Raises NotFound."""
+    found = index_queries.at(connection, graph, at, {owner})
+    if not found:
+        raise NotFound(f"There is nothing {owner!r} in this graph at that moment.")
+    told = [
+        FieldBlame(**msgspec.structs.asdict(value), field=field_of(change.root, change.key))
+        for change, value in zip(found, _values(connection, graph, found), strict=True)
+    ]
+    return sorted(told, key=lambda each: each.field)
+
+
+def values_of(
+    connection: Connection, graph: str, owner: str, field: str, at: int
+) -> list[FieldValue]:
+    """All values of a field up to a change."""
+    changes: list[LoggedChange] = []
+    for root, key in keys_of(owner, field):
+        changes += index_queries.of_key(connection, graph, root, key, at)
+    alone = grafts_of(connection, graph).keys()
+    return _values(connection, graph, in_one_go(changes, alone)[::-1][:_MOST])
+
+
+def steps(
+    connection: Connection, graph: str, after: int, upto: int, limit: int
+) -> list[DocumentStep]:
+    """Changes of keys, in order of time."""
+    return [
+        DocumentStep(c.seq, c.author, c.root, c.key, unpacked(c.before), unpacked(c.after))
+        for c in index_queries.between(connection, graph, after, upto, limit)
+    ]
+
+
+def _values(
+    connection: Connection, graph: str, changes: Sequence[LoggedChange]
+) -> list[FieldValue]:
+    """What people gave, whoever merged it."""
+    person = stored_people(connection)
+    return [
+        FieldValue(
+            unpacked(change.after),
+            unpacked(change.before),
+            person(original.change.author),
+            when(original.change.at),
+            change.seq,
+            merged_by(change, original, person),
+        )
+        for change, original in zip(changes, originals(connection, graph, changes), strict=True)
+    ]
 
 
 def keys_of(owner: str, field: str) -> Sequence[tuple[Root, str]]:

@@ -1,39 +1,39 @@
-"""The index of key changes: brought up to the log when somebody asks and now and then; its queries."""
+"""The index of key changes: brought up to the log when somebody asks and now and then, and asked in workers.
+
+Nothing here reads or makes what grows with a graph: a worker reads the log and the index from the database itself,
+and hands back rows that are stored slice by slice (decision 108).
+"""
 
 import logging
 from collections import defaultdict
-from collections.abc import AsyncIterator, Collection, Iterable
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
-from typing import Any, Final
+from functools import partial
+from typing import Any, Concatenate, Final, ParamSpec, TypeVar
 
 import anyio
-from sqlalchemy import ColumnElement, Connection, Row, Select, and_, delete, func, insert, select
+import msgspec
+from sqlalchemy import Connection, delete, func, insert, select, tuple_
 
-from action_assistant.editor.documents.values import Root
-from action_assistant.editor.history.key_changes import (
-    LoggedChange,
-    ObservedEvents,
-    Place,
-    observed,
-    owner_of,
-)
+from action_assistant.editor.history.index_queries import COLUMNS, IndexGrowth, growth
 from action_assistant.editor.log.graph_events import graph_of, graph_stream
 from action_assistant.errors import Refused
-from action_assistant.journal.events import Event
+from action_assistant.journal.databases import ask_from_worker
 from action_assistant.journal.journal import Journal
 from action_assistant.schema.editor_tables import editor_head, key_change, key_change_head
 from action_assistant.web.workers.lanes import RunInWorker, run_here
 
 log: Final = logging.getLogger(__name__)
 
-_EVENTS: Final = 1000  # looked at in one go
-_BYTES: Final = 4 << 20  # of them
-_OWNERS: Final = 400  # that one question names
+P = ParamSpec("P")
+T = TypeVar("T")
+
 _PERIOD: Final = 20.0  # seconds between two looks at what is behind
 _FAR: Final = 5_000  # events behind, from which on it is not left for later
+#: Rows that one transaction stores or deletes: it takes some milliseconds, for which others wait.
+ROWS: Final = 200
 
-_c = key_change.c
-_CHANGE: Final = select(_c.seq, _c.author, _c.at, _c.root, _c.key, _c.before, _c.after)
+_c, _head = key_change.c, key_change_head.c
 
 
 class ChangeIndex:
@@ -45,22 +45,42 @@ class ChangeIndex:
         self._catching_up: defaultdict[str, anyio.Lock] = defaultdict(anyio.Lock)
 
     async def upto(self, graph: str, seq: int | None = None) -> int:
-        """Bring the index of a graph up to a change, or to its newest; where it ends then, which is
+        """Bring the index of a graph up to a change, or to its newest; return where it ends then, which is
         earlier only where the log is damaged. Raises Unavailable."""
         wanted = await self._journal.newest(graph_stream(graph)) if seq is None else seq
         async with self._catching_up[graph]:
-            done, document = await self._head(graph)
-            while done < wanted and (events := await self._some_events(graph, done)):
-                found = await self._run_in_worker(observed, document, events)
-                if found is None:  # made by another version of ours
+            done = await self.head(graph)
+            while done < wanted and (found := await self.value(growth, graph, ROWS)) is not None:
+                if found.unreadable:
                     await self._forget(graph)
-                    done, document = 0, b""
+                    done = 0
                     continue
                 await self._keep(graph, found)
-                done, document = found.seq, found.document
+                done = found.seq
                 if found.damaged:
                     break
             return done
+
+    async def head(self, graph: str) -> int:
+        """Return the last change of a graph that is in the index, 0 where there is none."""
+        rows = await self._journal.query(select(_head.seq).where(_head.graph == graph))
+        return rows[0].seq if rows else 0
+
+    async def value(
+        self, question: Callable[Concatenate[Connection, P], T], *args: P.args, **kw: P.kwargs
+    ) -> T:
+        """Return what a question finds in the database, as of one moment, asked in a worker. It is to be
+        small: the loop reads it. Raises what the question raises, Unavailable, TooMany."""
+        bound: Callable[..., T] = partial(question, **kw) if kw else question
+        if self._run_in_worker is run_here:
+            return await self._journal.ask(lambda connection: bound(connection, *args))
+        return await self._run_in_worker(_answered, self._journal.address, bound, args)
+
+    async def text(
+        self, question: Callable[Concatenate[Connection, P], Any], *args: P.args, **kw: P.kwargs
+    ) -> bytes:
+        """Return what a question finds as JSON that the worker wrote. Raises as `value`."""
+        return await self.value(_as_json, partial(question, **kw) if kw else question, args)
 
     @asynccontextmanager
     async def kept_up(self) -> AsyncIterator[None]:
@@ -70,51 +90,6 @@ class ChangeIndex:
             tasks.start_soon(self._keep_up)
             yield
             tasks.cancel_scope.cancel()
-
-    # --- what it knows ---------------------------------------------------------------------------
-
-    async def between(
-        self, graph: str, after: int, upto: int, *, limit: int, by: str | None = None
-    ) -> list[LoggedChange]:
-        """The newest changes with `after < seq <= upto`, in order of time; `by` one person."""
-        chosen = _CHANGE.where(_c.graph == graph, _c.seq > after, _c.seq <= upto)
-        if by is not None:
-            chosen = chosen.where(_c.author == by)
-        newest_first = chosen.order_by(_c.seq.desc(), _c.root, _c.key).limit(limit)
-        return _changes(await self._journal.query(newest_first))[::-1]
-
-    async def at(
-        self, graph: str, seq: int, *, of: Collection[str] | None = None
-    ) -> list[LoggedChange]:
-        """The change that gave each key the value that it has after the change `seq`: of everything, or
-        of some owners."""
-        if of is None:
-            return _changes(
-                await self._journal.query(_last(graph, seq).where(_c.after.is_not(None)))
-            )
-        return [each for each in await self.latest(graph, seq, of=of) if each.after is not None]
-
-    async def latest(self, graph: str, seq: int, *, of: Collection[str]) -> list[LoggedChange]:
-        """The last change of each key of some owners up to the change `seq`, also of keys that are gone."""
-        owners = sorted(of)
-        found: list[LoggedChange] = []
-        for start in range(0, len(owners), _OWNERS):
-            some = _c.owner.in_(owners[start : start + _OWNERS])
-            found += _changes(await self._journal.query(_last(graph, seq, some)))
-        return found
-
-    async def latest_since(self, graph: str, seq: int) -> dict[Place, int]:
-        """The last change of each key that the change `seq` or a later one changed."""
-        newest = select(_c.root, _c.key, func.max(_c.seq).label("seq"))
-        chosen = newest.where(_c.graph == graph, _c.seq >= seq).group_by(_c.root, _c.key)
-        return {(row.root, row.key): row.seq for row in await self._journal.query(chosen)}
-
-    async def of_key(self, graph: str, root: Root, key: str, upto: int) -> list[LoggedChange]:
-        """All changes of one key, in order of time."""
-        same = (_c.graph == graph, _c.root == root, _c.key == key, _c.seq <= upto)
-        return _changes(await self._journal.query(_CHANGE.where(*same).order_by(_c.seq)))
-
-    # --- bringing it up ----------------------------------------------------------------------------
 
     async def _keep_up(self) -> None:
         seen: dict[str, int] = {}
@@ -138,8 +113,8 @@ class ChangeIndex:
     async def _behind(self) -> dict[str, tuple[int, int]]:
         """Graphs whose newest events are not in the index: which the newest is, and how many there are."""
         stream, newest = editor_head.c.stream, editor_head.c.seq
-        indexed = func.coalesce(key_change_head.c.seq, 0)
-        same = stream == graph_stream("") + key_change_head.c.graph
+        indexed = func.coalesce(_head.seq, 0)
+        same = stream == graph_stream("") + _head.graph
         joined = editor_head.outerjoin(key_change_head, same)
         chosen = select(stream, newest, (newest - indexed).label("more")).select_from(joined)
         chosen = chosen.where(newest > indexed, stream.startswith("graph/"))
@@ -151,64 +126,52 @@ class ChangeIndex:
         found = {graph_of(row.stream): (row.seq, row.more) for row in rows}
         return {graph: numbers for graph, numbers in found.items() if graph is not None}
 
-    async def _head(self, graph: str) -> tuple[int, bytes]:
-        head = key_change_head.c
-        rows = await self._journal.query(select(head.seq, head.document).where(head.graph == graph))
-        return (rows[0].seq, rows[0].document) if rows else (0, b"")
-
-    async def _some_events(self, graph: str, after: int) -> list[Event]:
-        events = await self._journal.read(graph_stream(graph), after=after, limit=_EVENTS)
-        size = 0
-        for n, event in enumerate(events):
-            size += len(event.body)
-            if size > _BYTES:
-                return events[: n + 1]
-        return events
-
-    async def _keep(self, graph: str, found: ObservedEvents) -> None:
-        rows = [_row(graph, change) for change in found.changes]
+    async def _keep(self, graph: str, found: IndexGrowth) -> None:
+        """Store rows slice by slice, so that others' commits come between, and the head last: rows after the
+        head count as not there."""
+        if found.leftovers:
+            await self._delete_after(graph, found.after)
+        for each in found.slices:
+            await self._journal.derive(partial(_insert, each))
         head = {"graph": graph, "seq": found.seq, "document": found.document}
 
         def keep(connection: Connection) -> None:
-            if rows:
-                connection.execute(insert(key_change), rows)
             _drop_head(connection, graph)
             connection.execute(insert(key_change_head), [head])
 
         await self._journal.derive(keep)
 
     async def _forget(self, graph: str) -> None:
-        def forget(connection: Connection) -> None:
-            connection.execute(delete(key_change).where(_c.graph == graph))
-            _drop_head(connection, graph)
+        """Start anew. Without a head no row counts, so they are deleted after it."""
+        await self._journal.derive(partial(_drop_head, graph=graph))
+        await self._delete_after(graph, 0)
 
-        await self._journal.derive(forget)
+    async def _delete_after(self, graph: str, seq: int) -> None:
+        while await self._journal.derive(partial(_delete_some, graph=graph, after=seq)):
+            pass
+
+
+def _answered(url: str, question: Callable[..., T], args: tuple[Any, ...]) -> T:
+    """Ask in a worker."""
+    return ask_from_worker(url, lambda connection: question(connection, *args))
+
+
+def _as_json(connection: Connection, question: Callable[..., Any], args: tuple[Any, ...]) -> bytes:
+    return msgspec.json.encode(question(connection, *args))
+
+
+def _insert(rows: bytes, connection: Connection) -> None:
+    values = [dict(zip(COLUMNS, row, strict=True)) for row in msgspec.msgpack.decode(rows)]
+    connection.execute(insert(key_change), values)
 
 
 def _drop_head(connection: Connection, graph: str) -> None:
-    connection.execute(delete(key_change_head).where(key_change_head.c.graph == graph))
+    connection.execute(delete(key_change_head).where(_head.graph == graph))
 
 
-def _row(graph: str, change: LoggedChange) -> dict[str, Any]:
-    return {"graph": graph, "owner": owner_of(change.root, change.key)} | change._asdict()
-
-
-def _changes(rows: Iterable[Row[Any]]) -> list[LoggedChange]:
-    return [LoggedChange._make(row) for row in rows]
-
-
-def _last(graph: str, seq: int, *also: ColumnElement[bool]) -> Select[Any]:
-    """The last change of each key up to a change."""
-    newest = (
-        select(_c.root, _c.key, func.max(_c.seq).label("seq"))
-        .where(_c.graph == graph, _c.seq <= seq, *also)
-        .group_by(_c.root, _c.key)
-        .subquery()
-    )
-    same = and_(
-        _c.graph == graph,
-        _c.root == newest.c.root,
-        _c.key == newest.c.key,
-        _c.seq == newest.c.seq,
-    )
-    return _CHANGE.select_from(key_change.join(newest, same))
+def _delete_some(connection: Connection, graph: str, after: int) -> bool:
+    """Delete some of the rows after a change; return whether any were left to be deleted."""
+    keys = (_c.seq, _c.root, _c.key)
+    some = select(*keys).where(_c.graph == graph, _c.seq > after).limit(ROWS)
+    done = connection.execute(delete(key_change).where(_c.graph == graph, tuple_(*keys).in_(some)))
+    return done.rowcount > 0

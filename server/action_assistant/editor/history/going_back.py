@@ -7,12 +7,11 @@ import msgspec
 from action_assistant.editor.catalogue import server_edits
 from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.history.change_index import ChangeIndex
-from action_assistant.editor.history.key_changes import owner_of
-from action_assistant.editor.history.reverting import as_it_was, reverting
+from action_assistant.editor.history.reverting import one_as_it_was, reverting_edits
 from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.editor.rooms.room import Room
-from action_assistant.errors import BadInput, Conflict, NotFound, TooLarge
+from action_assistant.errors import BadInput, Conflict, NotFound
 from action_assistant.journal.journal import Journal
 from action_assistant.web.workers.lanes import RunInWorker, run_here
 
@@ -71,12 +70,9 @@ class GoingBack:
                 f"This graph has the changes 1 to {upto}; there is no {seq}.",
                 where={"path": "/seq"},
             )
-        then = await self._index.at(graph, seq)
-        if not owner or all(owner_of(*change.place) != owner for change in then):
-            raise NotFound(f"There was nothing {owner!r} in this graph after its change {seq}.")
         async with self._rooms.enter(h.graph_stream(graph)) as room:
             before, state = room.seq, await _state(room)
-            update = await self._run_in_worker(as_it_was, state, then, owner)
+            update = await self._index.value(one_as_it_was, graph, state, seq, owner)
             now = await room.submit(update, author)
         return await self._said(graph, author, before, seq, now)
 
@@ -88,18 +84,14 @@ class GoingBack:
                 "What a graph began with cannot be taken back, and nothing ends before it begins.",
                 where={"path": "/from_seq"},
             )
-        upto = await self._index.upto(graph)
-        changes = await self._index.between(
-            graph, first - 1, min(last, upto), limit=_MOST + 1, by=edits.author
-        )
-        if not changes:
-            raise NotFound("This person changed nothing then.")
-        if len(changes) > _MOST:
-            raise TooLarge("That is too much to take back at once; go back to the moment before.")
         async with self._rooms.enter(h.graph_stream(graph)) as room:
             before, state = room.seq, await _state(room)
-            latest = await self._index.latest_since(graph, first)
-            found = await self._run_in_worker(reverting, state, changes, latest)
+            upto = await self._index.upto(graph)  # with whatever that state holds
+            found = await self._index.value(
+                reverting_edits, graph, state, edits.author, first, min(last, upto), _MOST
+            )
+            if found is None:
+                raise NotFound("This person changed nothing then.")
             now = await room.submit(found.update, author)
         if now > before:
             body = h.GraphReverted(edits.author, first, last, now)

@@ -1,21 +1,20 @@
 """Where changes come from that entered a graph from another one: by a merge, or with the making of a draft.
 
 Such a change is the merger's edit in the log of the graph, and somebody else's in the log of the other.
-Whoever asks who set a value is told the latter.
+Whoever asks who set a value is told the latter. Questions over a connection: for workers.
 """
 
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from datetime import datetime
 
 import msgspec
-from sqlalchemy import select
+from sqlalchemy import Connection, select
 
-from action_assistant.editor.catalogue.people import People
+from action_assistant.editor.history import index_queries
 from action_assistant.editor.history.change_index import ChangeIndex
 from action_assistant.editor.history.key_changes import LoggedChange, Place, owner_of
 from action_assistant.editor.log import graph_events as h
-from action_assistant.journal.journal import Journal
 from action_assistant.schema.editor_tables import editor_event
 from action_assistant.web.auth.keys import PersonRef
 
@@ -50,70 +49,88 @@ class MergedBy(msgspec.Struct, frozen=True):
     at: datetime
 
 
-class Grafts:
-    """Follows changes to who made them."""
+async def bring_up(index: ChangeIndex, graph: str, seq: int | None = None) -> int:
+    """Bring the index of a graph up to a change, or to its newest, and those of all graphs from which
+    something came into it; return where the first ends then. Raises Unavailable."""
+    done = await index.upto(graph, seq)
+    asked = {(graph, done)}
+    waiting = list(await index.value(sources, graph))
+    while waiting:
+        source, upto = waiting.pop()
+        if (source, upto) not in asked:
+            asked.add((source, upto))
+            await index.upto(source, upto)
+            waiting += await index.value(sources, source)
+    return done
 
-    def __init__(self, journal: Journal, index: ChangeIndex, people: People) -> None:
-        self._journal = journal
-        self._index = index
-        self._people = people
 
-    async def of(self, graph: str) -> dict[int, Graft]:
-        """By the change with which something came."""
-        event = editor_event.c
-        rows = await self._journal.query(
-            select(event.kind, event.body).where(
-                event.stream == h.about_stream(graph), event.kind.in_([h.DRAFTED, h.MERGED])
-            )
+def sources(connection: Connection, graph: str) -> list[tuple[str, int]]:
+    """Return the graphs from which something came, each with its change that was the last then."""
+    return sorted({(graft.source, graft.upto) for graft in grafts_of(connection, graph).values()})
+
+
+def grafts_of(connection: Connection, graph: str) -> dict[int, Graft]:
+    """Return what came into a graph, by the change with which it came."""
+    event = editor_event.c
+    rows = connection.execute(
+        select(event.kind, event.body).where(
+            event.stream == h.about_stream(graph), event.kind.in_([h.DRAFTED, h.MERGED])
         )
-        found: dict[int, Graft] = {}
-        for row in rows:
-            if row.kind == h.DRAFTED:
-                made = msgspec.json.decode(row.body, type=h.GraphDrafted)
-                found[1] = Graft(1, made.origin, made.seq)
-            else:
-                merged = msgspec.json.decode(row.body, type=h.GraphMerged)
-                if merged.seq:
-                    found[merged.seq] = Graft(merged.seq, merged.source, merged.upto, merged.name)
-        return found
+    )
+    found: dict[int, Graft] = {}
+    for row in rows:
+        if row.kind == h.DRAFTED:
+            made = msgspec.json.decode(row.body, type=h.GraphDrafted)
+            found[1] = Graft(1, made.origin, made.seq)
+        else:
+            merged = msgspec.json.decode(row.body, type=h.GraphMerged)
+            if merged.seq:
+                found[merged.seq] = Graft(merged.seq, merged.source, merged.upto, merged.name)
+    return found
 
-    async def originals(self, graph: str, changes: Sequence[LoggedChange]) -> list[Original]:
-        """Each change as somebody made it, wherever that was. Raises Unavailable."""
-        grafts = await self.of(graph)
-        found = [Original(change) for change in changes]
-        by_graft: dict[int, list[int]] = defaultdict(list)
-        for n, change in enumerate(changes):
-            if change.seq in grafts:
-                by_graft[change.seq].append(n)
-        for seq, numbers in by_graft.items():
-            graft = grafts[seq]
-            there = await self._there(graft, [changes[n] for n in numbers])
-            known = [n for n in numbers if changes[n].place in there]
-            sources = [there[changes[n].place] for n in known]
-            deeper = await self.originals(graft.source, sources)
-            for n, source, original in zip(known, sources, deeper, strict=True):
-                found[n] = Original(original.change, graft, source.seq)
-        return found
 
-    async def _there(
-        self, graft: Graft, changes: Iterable[LoggedChange]
-    ) -> dict[Place, LoggedChange]:
-        """The changes that made the same of the same keys in the other graph, as it was then."""
-        await self._index.upto(graft.source, graft.upto)
-        wanted = {change.place: change.after for change in changes}
-        owners: Collection[str] = {owner_of(*place) for place in wanted}
-        last = await self._index.latest(graft.source, graft.upto, of=owners)
-        return {
-            change.place: change
-            for change in last
-            if change.place in wanted and change.after == wanted[change.place]
-        }
+def originals(
+    connection: Connection, graph: str, changes: Sequence[LoggedChange]
+) -> list[Original]:
+    """Return each change as somebody made it, wherever that was. The indexes of all sources are to reach
+    as far as `bring_up` brings them."""
+    grafts = grafts_of(connection, graph)
+    found = [Original(change) for change in changes]
+    by_graft: dict[int, list[int]] = defaultdict(list)
+    for n, change in enumerate(changes):
+        if change.seq in grafts:
+            by_graft[change.seq].append(n)
+    for seq, numbers in by_graft.items():
+        graft = grafts[seq]
+        there = _there(connection, graft, [changes[n] for n in numbers])
+        known = [n for n in numbers if changes[n].place in there]
+        made = [there[changes[n].place] for n in known]
+        deeper = originals(connection, graft.source, made)
+        for n, source, original in zip(known, made, deeper, strict=True):
+            found[n] = Original(original.change, graft, source.seq)
+    return found
 
-    def merged_by(self, change: LoggedChange, original: Original) -> MergedBy | None:
-        """How a change of a graph came there; None of one that was made there, or that a draft began
-        with."""
-        via = original.via
-        if via is None or via.name is None:
-            return None
-        by = self._people.person(change.author)
-        return MergedBy(via.source, original.seq, via.name, by, h.when(change.at))
+
+def _there(
+    connection: Connection, graft: Graft, changes: Iterable[LoggedChange]
+) -> dict[Place, LoggedChange]:
+    """The changes that made the same of the same keys in the other graph, as it was then."""
+    wanted = {change.place: change.after for change in changes}
+    owners = {owner_of(*place) for place in wanted}
+    return {
+        change.place: change
+        for change in index_queries.latest(connection, graft.source, graft.upto, owners)
+        if change.place in wanted and change.after == wanted[change.place]
+    }
+
+
+def merged_by(
+    change: LoggedChange, original: Original, person: Callable[[str], PersonRef]
+) -> MergedBy | None:
+    """Return how a change of a graph came there; None of one that was made there, or that a draft began
+    with. `person`: who the author of an event is."""
+    via = original.via
+    if via is None or via.name is None:
+        return None
+    by = person(change.author)
+    return MergedBy(via.source, original.seq, via.name, by, h.when(change.at))

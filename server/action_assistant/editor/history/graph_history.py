@@ -1,24 +1,23 @@
 """The history of a graph: events of its two streams by sitting, with what each sitting changed."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from typing import Any, Final, TypeAlias
 
 import msgspec
-from sqlalchemy import Row, select
+from sqlalchemy import Connection, Row, select
 
-from action_assistant.editor.catalogue.people import People
-from action_assistant.editor.catalogue.versions import Versions, VersionView
+from action_assistant.editor.catalogue.people import stored_people
+from action_assistant.editor.catalogue.versions import VersionView, versions_by_event
 from action_assistant.editor.documents.values import ends_of
+from action_assistant.editor.history import index_queries
 from action_assistant.editor.history.change_index import ChangeIndex
 from action_assistant.editor.history.key_changes import LoggedChange, owner_of
 from action_assistant.editor.history.sittings import Kind, Sitting, Step, sittings
 from action_assistant.editor.history.told_changes import Changes, Stretch, told
 from action_assistant.editor.log import graph_events as h
-from action_assistant.journal.journal import Journal
 from action_assistant.schema import editor_tables
 from action_assistant.web.auth.keys import PersonRef
-from action_assistant.web.workers.lanes import RunInWorker, run_here
 
 _EVENTS: Final = (2_000, 10_000)  # that one answer looks at, if the fewer are not enough
 _CHANGES: Final = 20_000  # of keys that one answer tells of
@@ -91,136 +90,167 @@ class HistoryEntry(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True
 
 
 class GraphHistory:
-    """Tells the past of graphs."""
+    """Tells the past of graphs, as JSON that a worker wrote."""
 
-    def __init__(
-        self,
-        journal: Journal,
-        people: People,
-        versions: Versions,
-        index: ChangeIndex,
-        run_in_worker: RunInWorker = run_here,
-    ) -> None:
-        self._journal = journal
-        self._people = people
-        self._versions = versions
+    def __init__(self, index: ChangeIndex) -> None:
         self._index = index
-        self._run_in_worker = run_in_worker
 
-    async def of(self, graph: str, *, limit: int, before: int | None) -> list[HistoryEntry]:
-        """Up to `limit` entries, newest first; with `before` only what was before that change."""
-        versions = await self._versions.by_event(graph)
-        special = await self._special(graph)
-        shown = (await self._sittings(graph, special, limit, before))[::-1][:limit]
-        changes = await self._changes(graph, shown)
-        return [
-            self._entry(sitting, special, versions, changes.get((sitting.author, sitting.seq)))
-            for sitting in shown
-        ]
+    async def of(self, graph: str, *, limit: int, before: int | None) -> bytes:
+        """Return up to `limit` entries, newest first; with `before` only what was before that change:
+        `HistoryEntry`s. Raises Unavailable."""
+        if last := await self._index.value(last_edit_of, graph, limit, before):
+            await self._index.upto(graph, last)
+        return await self._index.text(history_of, graph, limit, before)
 
-    async def _sittings(
-        self, graph: str, special: Mapping[int, _Special], limit: int, before: int | None
-    ) -> list[Sitting]:
-        """More than `limit`, or all that the last events make: the first of them may be a part of one."""
-        for most in _EVENTS:
-            rows = await self._rows(graph, before, most)
-            found = sittings(step for row in reversed(rows) if (step := _step(row, special)))
-            if len(found) > limit or len(rows) < most:
-                break
-        return found
 
-    def _entry(
-        self,
-        sitting: Sitting,
-        special: Mapping[int, _Special],
-        versions: Mapping[int, VersionView],
-        changes: Changes | None,
-    ) -> HistoryEntry:
-        how = special.get(sitting.seq) if sitting.from_seq is not None else None
-        version = versions[sitting.told] if sitting.kind == "published" else None
-        return HistoryEntry(
-            kind=sitting.kind,
-            author=self._people.person(sitting.author),
-            at=sitting.at,
-            until=sitting.until,
-            seq=sitting.seq if version is None else version.seq,
-            from_seq=sitting.from_seq,
-            restored=how if isinstance(how, int) else None,
-            adapted=how if isinstance(how, TakenFrom) else None,
-            reverted=how if isinstance(how, Reverted) else None,
-            merged=how if isinstance(how, MergedIn) else None,
-            version=version,
-            changes=changes,
-        )
+def history_of(
+    connection: Connection, graph: str, limit: int, before: int | None
+) -> list[HistoryEntry]:
+    """The entries of a graph's history, newest first."""
+    person = stored_people(connection)
+    versions = versions_by_event(connection, graph)
+    special = _special(connection, graph, person)
+    shown = _shown(connection, graph, special, limit, before)
+    changes = _changes(connection, graph, shown)
+    return [
+        _entry(sitting, special, versions, changes.get((sitting.author, sitting.seq)), person)
+        for sitting in shown
+    ]
 
-    async def _changes(
-        self, graph: str, shown: Sequence[Sitting]
-    ) -> dict[tuple[str, int], Changes]:
-        """What each sitting changed, by its author and end."""
-        edits = [
-            Stretch(sitting.author, sitting.from_seq, sitting.seq)
-            for sitting in shown
-            if sitting.from_seq is not None and sitting.seq > 1
-        ]
-        if not edits:
-            return {}
-        last = max(each.last for each in edits)
-        first = max(min(each.first for each in edits), 2)
-        await self._index.upto(graph, last)
-        rows = await self._index.between(graph, first - 1, last, limit=_CHANGES + 1)
-        if len(rows) > _CHANGES:
-            first = rows[0].seq + 1  # of which not everything may be here
-            rows = [row for row in rows if row.seq >= first]
-        edits = [each for each in edits if each.first >= first]
-        base = await self._index.at(graph, first - 1, of=_touched(rows))
-        found = await self._run_in_worker(told, base, rows, edits)
-        return {(e.author, e.last): each for e, each in zip(edits, found, strict=True)}
 
-    async def _rows(self, graph: str, before: int | None, most: int) -> list[Row[Any]]:
-        event = editor_tables.editor_event.c
-        document = h.graph_stream(graph)
-        chosen = (
-            select(event.seq, event.kind, event.author, event.at)
-            .where(event.stream.in_([document, h.about_stream(graph)]))
-            .order_by(event.position.desc())
-            .limit(most)
-        )
-        if before is not None:
-            there = select(event.position).where(event.stream == document, event.seq == before)
-            chosen = chosen.where(event.position < there.scalar_subquery())
-        return await self._journal.query(chosen)
+def last_edit_of(connection: Connection, graph: str, limit: int, before: int | None) -> int:
+    """The last change that a history tells of, up to which it needs the index; 0 where there is none."""
+    special = _special(connection, graph, stored_people(connection))
+    edits = _edits(_shown(connection, graph, special, limit, before))
+    return max((each.last for each in edits), default=0)
 
-    async def _special(self, graph: str) -> dict[int, _Special]:
-        """Changes that went back to others, took over parameters, took something back or merged."""
-        event = editor_tables.editor_event.c
-        kinds = [h.RESTORED, h.ADAPTED, h.REVERTED, h.MERGED]
-        chosen = select(event.kind, event.body).where(
-            event.stream == h.about_stream(graph), event.kind.in_(kinds)
-        )
-        found: dict[
-            int, _Special
-        ] = {}  # merges that changed nothing are under 0, which is no change
-        for row in await self._journal.query(chosen):
-            match row.kind:
-                case h.RESTORED:
-                    restored = msgspec.json.decode(row.body, type=h.GraphRestored)
-                    found[restored.seq] = restored.restored
-                case h.ADAPTED:
-                    adapted = msgspec.json.decode(row.body, type=h.GraphAdapted)
-                    found[adapted.seq] = TakenFrom(adapted.source, adapted.at, adapted.name)
-                case h.MERGED:
-                    merged = msgspec.json.decode(row.body, type=h.GraphMerged)
-                    found[merged.seq] = self._merged(merged)
-                case _:
-                    back = msgspec.json.decode(row.body, type=h.GraphReverted)
-                    whose = self._people.person(back.author)
-                    found[back.seq] = Reverted(whose, back.from_seq, back.upto)
-        return found
 
-    def _merged(self, merged: h.GraphMerged) -> MergedIn:
-        authors = tuple(self._people.person(each) for each in merged.authors)
-        of = (merged.draft, merged.name, merged.source)
-        return MergedIn(*of, merged.from_seq, merged.upto, authors)
+def _shown(
+    connection: Connection,
+    graph: str,
+    special: Mapping[int, _Special],
+    limit: int,
+    before: int | None,
+) -> list[Sitting]:
+    return _sittings(connection, graph, special, limit, before)[::-1][:limit]
+
+
+def _edits(shown: Sequence[Sitting]) -> list[Stretch]:
+    """Those of the sittings that changed the document."""
+    return [
+        Stretch(sitting.author, sitting.from_seq, sitting.seq)
+        for sitting in shown
+        if sitting.from_seq is not None and sitting.seq > 1
+    ]
+
+
+def _sittings(
+    connection: Connection,
+    graph: str,
+    special: Mapping[int, _Special],
+    limit: int,
+    before: int | None,
+) -> list[Sitting]:
+    """More than `limit`, or all that the last events make: the first of them may be a part of one."""
+    for most in _EVENTS:
+        rows = _rows(connection, graph, before, most)
+        found = sittings(step for row in reversed(rows) if (step := _step(row, special)))
+        if len(found) > limit or len(rows) < most:
+            break
+    return found
+
+
+def _entry(
+    sitting: Sitting,
+    special: Mapping[int, _Special],
+    versions: Mapping[int, VersionView],
+    changes: Changes | None,
+    person: Callable[[str], PersonRef],
+) -> HistoryEntry:
+    how = special.get(sitting.seq) if sitting.from_seq is not None else None
+    version = versions[sitting.told] if sitting.kind == "published" else None
+    return HistoryEntry(
+        kind=sitting.kind,
+        author=person(sitting.author),
+        at=sitting.at,
+        until=sitting.until,
+        seq=sitting.seq if version is None else version.seq,
+        from_seq=sitting.from_seq,
+        restored=how if isinstance(how, int) else None,
+        adapted=how if isinstance(how, TakenFrom) else None,
+        reverted=how if isinstance(how, Reverted) else None,
+        merged=how if isinstance(how, MergedIn) else None,
+        version=version,
+        changes=changes,
+    )
+
+
+def _changes(
+    connection: Connection, graph: str, shown: Sequence[Sitting]
+) -> dict[tuple[str, int], Changes]:
+    """What each sitting changed, by its author and end."""
+    edits = _edits(shown)
+    if not edits:
+        return {}
+    last = max(each.last for each in edits)
+    first = max(min(each.first for each in edits), 2)
+    rows = index_queries.between(connection, graph, first - 1, last, _CHANGES + 1)
+    if len(rows) > _CHANGES:
+        first = rows[0].seq + 1  # of which not everything may be here
+        rows = [row for row in rows if row.seq >= first]
+    edits = [each for each in edits if each.first >= first]
+    base = index_queries.at(connection, graph, first - 1, _touched(rows))
+    found = told(base, rows, edits)
+    return {(e.author, e.last): each for e, each in zip(edits, found, strict=True)}
+
+
+def _rows(connection: Connection, graph: str, before: int | None, most: int) -> list[Row[Any]]:
+    event = editor_tables.editor_event.c
+    document = h.graph_stream(graph)
+    chosen = (
+        select(event.seq, event.kind, event.author, event.at)
+        .where(event.stream.in_([document, h.about_stream(graph)]))
+        .order_by(event.position.desc())
+        .limit(most)
+    )
+    if before is not None:
+        there = select(event.position).where(event.stream == document, event.seq == before)
+        chosen = chosen.where(event.position < there.scalar_subquery())
+    return list(connection.execute(chosen))
+
+
+def _special(
+    connection: Connection, graph: str, person: Callable[[str], PersonRef]
+) -> dict[int, _Special]:
+    """Changes that went back to others, took over parameters, took something back or merged. Merges that
+    changed nothing are under 0, which is no change."""
+    event = editor_tables.editor_event.c
+    kinds = [h.RESTORED, h.ADAPTED, h.REVERTED, h.MERGED]
+    chosen = select(event.kind, event.body).where(
+        event.stream == h.about_stream(graph), event.kind.in_(kinds)
+    )
+    found: dict[int, _Special] = {}
+    for row in connection.execute(chosen):
+        match row.kind:
+            case h.RESTORED:
+                restored = msgspec.json.decode(row.body, type=h.GraphRestored)
+                found[restored.seq] = restored.restored
+            case h.ADAPTED:
+                adapted = msgspec.json.decode(row.body, type=h.GraphAdapted)
+                found[adapted.seq] = TakenFrom(adapted.source, adapted.at, adapted.name)
+            case h.MERGED:
+                merged = msgspec.json.decode(row.body, type=h.GraphMerged)
+                found[merged.seq] = _merged(merged, person)
+            case _:
+                back = msgspec.json.decode(row.body, type=h.GraphReverted)
+                found[back.seq] = Reverted(person(back.author), back.from_seq, back.upto)
+    return found
+
+
+def _merged(merged: h.GraphMerged, person: Callable[[str], PersonRef]) -> MergedIn:
+    authors = tuple(person(each) for each in merged.authors)
+    of = (merged.draft, merged.name, merged.source)
+    return MergedIn(*of, merged.from_seq, merged.upto, authors)
 
 
 def _step(row: Row[Any], special: Mapping[int, _Special]) -> Step | None:

@@ -6,8 +6,10 @@ from typing import Final
 
 import msgspec
 from msgspec.structs import replace
+from sqlalchemy import Connection
 
 from action_assistant.editor.documents.contents import NOTHING_INSIDE, Inside, graphs_of
+from action_assistant.editor.history import index_queries
 from action_assistant.editor.history.key_changes import LoggedChange, owner_of
 from action_assistant.editor.history.told_changes import (
     Changes,
@@ -15,6 +17,7 @@ from action_assistant.editor.history.told_changes import (
     graph_of,
     shortened,
     state_of,
+    stretch_of,
 )
 from action_assistant.umrf.courses.expected import keyed, scripted_by_key, scripted_by_name
 from action_assistant.umrf.difference import difference
@@ -61,6 +64,22 @@ class Followed(msgspec.Struct, frozen=True):
     exact: bool
     looked: int
     partings: tuple[CourseParting, ...]
+
+
+def followed_between(
+    connection: Connection,
+    graph: str,
+    good: int,
+    bad: int,
+    limit: int,
+    script: Script,
+    named_at: int,
+    inside: Inside,
+) -> Followed:
+    """As `followed`, of a graph between two of its moments. Raises TooLarge."""
+    changes = stretch_of(connection, graph, good, bad, limit)
+    base = index_queries.at(connection, graph, good)
+    return followed(base, changes, script, named_at, inside=inside)
 
 
 def followed(

@@ -5,8 +5,10 @@ from typing import Any
 
 import msgspec
 from msgspec import UNSET
+from sqlalchemy import Connection
 
 from action_assistant.editor.documents.values import ends_of
+from action_assistant.editor.history import index_queries
 from action_assistant.editor.history.key_changes import (
     LoggedChange,
     Packed,
@@ -22,6 +24,7 @@ from action_assistant.editor.history.places import (
     proves,
 )
 from action_assistant.editor.interchange.changes import setting
+from action_assistant.errors import NotFound, TooLarge
 from action_assistant.umrf.model import ENTRY, EXIT
 
 
@@ -31,6 +34,27 @@ class TakenBack(msgspec.Struct, frozen=True):
 
     update: bytes
     left: tuple[str, ...]
+
+
+def reverting_edits(
+    connection: Connection, graph: str, state: bytes, author: str, first: int, last: int, limit: int
+) -> TakenBack | None:
+    """As `reverting`, of what a person changed from the change `first` to `last`; None where that is
+    nothing. Raises TooLarge."""
+    changes = index_queries.between(connection, graph, first - 1, last, limit + 1, author)
+    if len(changes) > limit:
+        raise TooLarge("That is too much to take back at once; go back to the moment before.")
+    if not changes:
+        return None
+    return reverting(state, changes, index_queries.latest_since(connection, graph, first))
+
+
+def one_as_it_was(connection: Connection, graph: str, state: bytes, seq: int, owner: str) -> bytes:
+    """As `as_it_was`, after the change `seq`. Raises NotFound."""
+    then = index_queries.at(connection, graph, seq)
+    if not owner or all(owner_of(*change.place) != owner for change in then):
+        raise NotFound(f"There was nothing {owner!r} in this graph after its change {seq}.")
+    return as_it_was(state, then, owner)
 
 
 def reverting(

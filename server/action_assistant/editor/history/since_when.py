@@ -1,7 +1,6 @@
 """Since when a graph goes another way: a question to the index, answered by simulating past moments."""
 
 from datetime import datetime
-from functools import partial
 from typing import Annotated, Any, Final
 
 import msgspec
@@ -9,13 +8,12 @@ import msgspec
 from action_assistant.editor.catalogue.graph_checks import GraphChecks
 from action_assistant.editor.catalogue.people import People
 from action_assistant.editor.history.change_index import ChangeIndex
-from action_assistant.editor.history.parting import followed
-from action_assistant.editor.history.told_changes import Changes, names
+from action_assistant.editor.history.parting import followed_between
+from action_assistant.editor.history.told_changes import Changes, names_between
 from action_assistant.editor.log.document_events import when
-from action_assistant.errors import BadInput, TooLarge
+from action_assistant.errors import BadInput
 from action_assistant.umrf.semantics import SCRIPT, script_from
 from action_assistant.web.auth.keys import PersonRef
-from action_assistant.web.workers.lanes import RunInWorker, run_here
 
 _MOST: Final = 200_000  # changes of keys between two moments
 
@@ -67,12 +65,10 @@ class CourseSearch:
         index: ChangeIndex,
         people: People,
         checks: GraphChecks,
-        run_in_worker: RunInWorker = run_here,
     ) -> None:
         self._checks = checks
         self._index = index
         self._people = people
-        self._run_in_worker = run_in_worker
 
     async def since(self, graph: str, asked: AskingSince) -> SinceWhen:
         """Where the course changes. Raises BadInput, TooLarge, Unavailable."""
@@ -89,13 +85,11 @@ class CourseSearch:
                 "lies between them.",
                 where={"path": "/good"},
             )
-        changes = await self._index.between(graph, asked.good, bad, limit=_MOST + 1)
-        if len(changes) > _MOST:
-            raise TooLarge("That is too long ago; name a later moment that was good.")
-        base = await self._index.at(graph, asked.good)
-        own, uses = await self._run_in_worker(names, [*base, *changes])
-        follow = partial(followed, inside=await self._checks.inside_of(own, uses))
-        found = await self._run_in_worker(follow, base, changes, script, named_at)
+        own, uses = await self._index.value(names_between, graph, asked.good, bad, _MOST)
+        inside = await self._checks.inside_of(own, uses)
+        found = await self._index.value(
+            followed_between, graph, asked.good, bad, _MOST, script, named_at, inside
+        )
         partings = tuple(
             CourseChange(
                 each.seq,

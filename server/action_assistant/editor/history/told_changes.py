@@ -4,9 +4,11 @@ from collections.abc import Iterable, Mapping, Sequence, Set
 from typing import Any, Final, TypeAlias
 
 import msgspec
+from sqlalchemy import Connection
 
 from action_assistant.editor.documents.document import Maps, read_maps
 from action_assistant.editor.documents.values import ROOTS, ends_of
+from action_assistant.editor.history import index_queries
 from action_assistant.editor.history.key_changes import (
     LoggedChange,
     Packed,
@@ -14,6 +16,7 @@ from action_assistant.editor.history.key_changes import (
     owner_of,
     unpacked,
 )
+from action_assistant.errors import TooLarge
 from action_assistant.umrf.difference import (
     ActionChange,
     Difference,
@@ -102,13 +105,36 @@ def graph_of(state: Mapping[Place, Packed]) -> Graph:
     return read_maps(maps_of(state))
 
 
-def differing(
-    before: tuple[int, Sequence[LoggedChange]], after: tuple[int, Sequence[LoggedChange]]
-) -> bytes:
-    """What differs between two moments, as JSON: each as its seq and the changes that left it."""
-    (then, earlier), (now, later) = before, after
-    was, is_now = graph_of(state_of(earlier)), graph_of(state_of(later))
-    return msgspec.json.encode(difference((then, was), (now, is_now)))
+def document_at(connection: Connection, graph: str, seq: int) -> bytes:
+    """Return the maps of the document as they were after the change `seq`, as JSON."""
+    return document(index_queries.at(connection, graph, seq))
+
+
+def differing(connection: Connection, graph: str, then: int, now: int) -> Difference:
+    """Return what differs between two moments."""
+    was, is_now = (
+        graph_of(state_of(index_queries.at(connection, graph, seq))) for seq in (then, now)
+    )
+    return difference((then, was), (now, is_now))
+
+
+def names_between(
+    connection: Connection, graph: str, after: int, upto: int, limit: int
+) -> tuple[str, tuple[str, ...]]:
+    """Return the name of a graph after the change `upto`, and all names of its actions since the change
+    `after`. Raises TooLarge where there are more changes between than `limit`."""
+    return names(stretch_of(connection, graph, after, upto, limit, whole=True))
+
+
+def stretch_of(
+    connection: Connection, graph: str, after: int, upto: int, limit: int, *, whole: bool = False
+) -> list[LoggedChange]:
+    """Return the changes between two moments, `whole`: after those that left the first one. Raises
+    TooLarge."""
+    found = index_queries.between(connection, graph, after, upto, limit + 1)
+    if len(found) > limit:
+        raise TooLarge("That is too long ago; name a later moment that was good.")
+    return [*index_queries.at(connection, graph, after), *found] if whole else found
 
 
 def names(changes: Iterable[LoggedChange]) -> tuple[str, tuple[str, ...]]:

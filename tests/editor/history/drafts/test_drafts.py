@@ -13,21 +13,20 @@ from action_assistant.editor.catalogue.catalogue import Catalogue
 from action_assistant.editor.catalogue.graph_checks import GraphChecks
 from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.catalogue.people import People
-from action_assistant.editor.catalogue.versions import Versions
 from action_assistant.editor.documents.document import Maps, maps_of
-from action_assistant.editor.history.blame import Blame, keys_of
+from action_assistant.editor.history.blame import Blame, FieldBlame, keys_of
 from action_assistant.editor.history.change_index import ChangeIndex
 from action_assistant.editor.history.drafts.draft_merges import (
     AskedMerge,
     DraftMerges,
     MergedDraft,
+    MergePreview,
     WantedMerge,
 )
 from action_assistant.editor.history.drafts.drafts import Drafts, DraftView, NewDraft
 from action_assistant.editor.history.drafts.told_merges import DraftSide
 from action_assistant.editor.history.going_back import EditsOfOne, GoingBack
-from action_assistant.editor.history.grafts import Grafts
-from action_assistant.editor.history.graph_history import GraphHistory
+from action_assistant.editor.history.graph_history import GraphHistory, HistoryEntry
 from action_assistant.editor.history.key_changes import owner_of
 from action_assistant.editor.history.places import exist
 from action_assistant.editor.interchange.changes import difference
@@ -50,14 +49,13 @@ class Editor:
         self.rooms = rooms
         reader = GraphReader(journal, rooms)
         index = ChangeIndex(journal)
-        grafts = Grafts(journal, index, people)
         checks = GraphChecks(journal, rooms, reader)
         self.catalogue = Catalogue(journal, rooms, reader, checks)
         self.drafts = Drafts(journal, reader, self.catalogue, people, index)
-        self.merges = DraftMerges(journal, rooms, self.drafts, index, grafts, people, checks)
-        self.blame = Blame(index, people, grafts)
+        self.merges = DraftMerges(journal, rooms, self.drafts, index, people, checks)
+        self.blame = Blame(index)
         self.going_back = GoingBack(journal, rooms, reader, index)
-        self.history = GraphHistory(journal, people, Versions(journal, reader, checks), index)
+        self.history = GraphHistory(index)
         self.origin = ""
         self.wrote: dict[tuple[str, str, bytes], set[str]] = defaultdict(set)
 
@@ -93,12 +91,25 @@ class Editor:
             state = await room.look(lambda replica, _: replica.doc.get_update())
             return await room.submit(difference(state, edit), who)
 
+    async def preview(self, draft: str, asked: AskedMerge) -> MergePreview:
+        """What a merge would do, as whoever asks over HTTP reads it."""
+        found = await self.merges.preview(draft, asked)
+        return msgspec.json.decode(msgspec.json.encode(found), type=MergePreview)
+
+    async def who_set(self, graph: str, owner: str, seq: int | None) -> list[FieldBlame]:
+        found = await self.blame.of(graph, owner, seq)
+        return msgspec.json.decode(found, type=list[FieldBlame])
+
+    async def past(self) -> list[HistoryEntry]:
+        found = await self.history.of(self.origin, limit=5, before=None)
+        return msgspec.json.decode(found, type=list[HistoryEntry])
+
     async def merge(
         self, draft: str, who: str, dice: random.Random, into: DraftSide = "origin"
     ) -> MergedDraft:
         """Somebody merges, with choices at random."""
         asked = AskedMerge(into)
-        found = await self.merges.preview(draft, asked)
+        found = await self.preview(draft, asked)
         sides: tuple[DraftSide, ...] = ("origin", "draft")
         choices = {conflict.place: dice.choice(sides) for conflict in found.conflicts}
         wanted = WantedMerge(found.seq, found.draft_seq, into, choices)
@@ -204,7 +215,7 @@ async def _blamed(editor: Editor, graph: str) -> None:
     maps = await editor.now(graph)
     owners = {owner_of(root, k) for root, fields in maps.items() for k in fields}  # type: ignore[arg-type]
     for owner in owners - {"entry", "exit"}:
-        for each in await editor.blame.of(graph, owner, None):
+        for each in await editor.who_set(graph, owner, None):
             value = msgspec.msgpack.encode(each.value)
             keys = keys_of(owner, each.field)
             authors = {who for place in keys for who in editor.wrote.get((*place, value), ())}
@@ -244,7 +255,7 @@ async def test_what_is_merged_either_way_is_the_same(editor: Editor, seed: int) 
     await editor.merge(made.id, "zoe", dice, "draft")
     assert _things(await editor.now(made.id)) == _things(await editor.now(editor.origin))
     view = await editor.drafts.get(made.id)
-    found = await editor.merges.preview(made.id, AskedMerge())
+    found = await editor.preview(made.id, AskedMerge())
     assert (view.behind, found.conflicts) == (0, ())
 
 
@@ -273,7 +284,7 @@ async def _conflicting(editor: Editor) -> DraftView:
 
 async def test_a_conflict_is_refused_until_it_has_a_choice(editor: Editor) -> None:
     made = await _conflicting(editor)
-    found = await editor.merges.preview(made.id, AskedMerge())
+    found = await editor.preview(made.id, AskedMerge())
     (conflict,) = found.conflicts
     assert (conflict.place, conflict.what) == (
         f"actions/{DOCK}|in/speed",
@@ -291,14 +302,12 @@ async def test_a_conflict_is_refused_until_it_has_a_choice(editor: Editor) -> No
     actions = (await editor.now(editor.origin))["actions"]
     assert (actions[f"{DOCK}|in/speed"], actions[CHARGE]) == ("2", "Charge")
     speed = next(
-        each
-        for each in await editor.blame.of(editor.origin, DOCK, None)
-        if each.field == "in/speed"
+        each for each in await editor.who_set(editor.origin, DOCK, None) if each.field == "in/speed"
     )
     assert (speed.author.id, speed.seq) == ("ben", merged.seq)
     assert speed.merged is not None
     assert (speed.merged.graph, speed.merged.by.id, speed.merged.seq) == (made.id, "zoe", 2)
-    entry = (await editor.history.of(editor.origin, limit=5, before=None))[0]
+    entry = (await editor.past())[0]
     assert entry.kind == "merged"
     assert entry.merged is not None
     assert [each.id for each in entry.merged.authors] == ["ben"]
@@ -314,17 +323,17 @@ async def test_a_conflict_in_which_nothing_changes_is_settled_too(editor: Editor
     assert await editor.merges.merge(made.id, "zoe", wanted) == MergedDraft(
         editor.origin, seq, changed=False
     )
-    assert (await editor.merges.preview(made.id, AskedMerge())).conflicts == ()
+    assert (await editor.preview(made.id, AskedMerge())).conflicts == ()
     assert (await editor.drafts.get(made.id)).state == "merged"
-    entry = (await editor.history.of(editor.origin, limit=5, before=None))[0]
+    entry = (await editor.past())[0]
     assert entry.kind == "edited"
-    (name,) = await editor.blame.of(editor.origin, DOCK, None)
+    (name,) = await editor.who_set(editor.origin, DOCK, None)
     assert (name.author.id, name.merged) == ("ada", None)
 
 
 async def test_a_merge_of_what_nobody_looked_at_is_refused(editor: Editor) -> None:
     made = await _conflicting(editor)
-    found = await editor.merges.preview(made.id, AskedMerge())
+    found = await editor.preview(made.id, AskedMerge())
     choices: dict[str, DraftSide] = {each.place: "draft" for each in found.conflicts}
     wanted = WantedMerge(found.seq, found.draft_seq, choices=choices)
     await editor.set(made.id, "ben", "actions", **{CHARGE: "Load"})
@@ -341,7 +350,7 @@ async def test_problems_that_would_come_with_a_merge_are_told(editor: Editor) ->
     await editor.set(editor.origin, "ada", "actions", **{DOCK: "Dock", f"{DOCK}__type": "sync"})
     made = await _draft(editor)
     await editor.set(made.id, "ben", "actions", **{CHARGE: "not a name"})
-    found = await editor.merges.preview(made.id, AskedMerge())
+    found = await editor.preview(made.id, AskedMerge())
     assert any("not a name" in problem.message for problem in found.problems)
     assert not any("Dock" in problem.message for problem in found.problems)
 
@@ -375,5 +384,5 @@ async def test_what_is_no_draft_is_not_found(editor: Editor) -> None:
     assert made.name == "Draft 1"
     await editor.catalogue.delete(editor.origin, "ada")
     with pytest.raises(NotFound):
-        await editor.merges.preview(made.id, AskedMerge())
+        await editor.preview(made.id, AskedMerge())
     assert (await editor.drafts.get(made.id)).ahead is None

@@ -1,32 +1,28 @@
 """Merges of drafts: what one would do, and doing it as an edit of the server's own."""
 
-from collections.abc import Mapping
-from typing import Final
-
 import msgspec
 
 from action_assistant.editor.catalogue.graph_checks import GraphChecks
 from action_assistant.editor.catalogue.people import People
+from action_assistant.editor.documents.contents import Inside
 from action_assistant.editor.history.change_index import ChangeIndex
 from action_assistant.editor.history.drafts.drafts import DraftPair, Drafts
 from action_assistant.editor.history.drafts.told_merges import (
     DraftConflict,
     DraftSide,
-    FoundMerge,
-    merging,
+    UnmadeChoices,
+    made_merge,
+    previewed,
 )
-from action_assistant.editor.history.grafts import Grafts
-from action_assistant.editor.history.key_changes import owner_of
+from action_assistant.editor.history.grafts import bring_up, grafts_of
 from action_assistant.editor.history.told_changes import Changes
 from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.rooms.open_rooms import Rooms
+from action_assistant.editor.workers import encoded
 from action_assistant.errors import Conflict
 from action_assistant.journal.journal import Journal
 from action_assistant.umrf.model import Problem
 from action_assistant.web.auth.keys import PersonRef
-from action_assistant.web.workers.lanes import RunInWorker, run_here
-
-_TOLD: Final = 50  # places of conflicts in a refusal
 
 
 class AskedMerge(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -83,36 +79,34 @@ class DraftMerges:
         rooms: Rooms,
         drafts: Drafts,
         index: ChangeIndex,
-        grafts: Grafts,
         people: People,
         checks: GraphChecks,
-        run_in_worker: RunInWorker = run_here,
     ) -> None:
         self._journal = journal
         self._rooms = rooms
         self._drafts = drafts
         self._index = index
-        self._grafts = grafts
         self._people = people
         self._checks = checks
-        self._run_in_worker = run_in_worker
 
     async def preview(self, draft: str, asked: AskedMerge) -> MergePreview:
         """What a merge would do now; nothing is stored. Raises NotFound, Unavailable."""
         pair = await self._drafts.pair(draft)
-        found = await self._found(pair, asked.into, asked.choices)
-        authors = await self._authors(pair, asked.into, found)
+        inside = await self._brought_up(pair, asked.into)
+        found = await self._index.value(
+            previewed, pair.base, pair.origin, pair.draft, asked.into, asked.choices, inside
+        )
         return MergePreview(
             into=asked.into,
             seq=pair.origin.seq,
             draft_seq=pair.draft.seq,
-            changes=found.changes,
-            conflicts=found.conflicts,
-            problems=found.problems,
-            umrf=found.umrf,
-            authors=tuple(self._people.person(each) for each in authors),
-            origin_did=found.did["origin"],
-            draft_did=found.did["draft"],
+            changes=encoded(found.changes),
+            conflicts=encoded(found.conflicts),
+            problems=encoded(found.problems),
+            umrf=encoded(found.umrf),
+            authors=tuple(self._people.person(each) for each in found.authors),
+            origin_did=encoded(found.origin_did),
+            draft_did=encoded(found.draft_did),
         )
 
     async def merge(self, draft: str, author: str, wanted: WantedMerge) -> MergedDraft:
@@ -123,19 +117,21 @@ class DraftMerges:
         async with self._rooms.enter(h.graph_stream(target)) as room:
             pair = await self._drafts.pair(draft)
             _require_moments(pair, wanted)
-            found = await self._found(pair, wanted.into, wanted.choices)
-            _require_choices(found, wanted.choices)
-            authors = await self._authors(pair, wanted.into, found)
+            inside = await self._brought_up(pair, wanted.into)
+            found = await self._index.value(
+                made_merge, pair.base, pair.origin, pair.draft, wanted.into, wanted.choices, inside
+            )
+            _require_choices(found.left)
             seen = wanted.seq if wanted.into == "origin" else wanted.draft_seq
             if room.seq != seen:
                 raise _moved_on(wanted.into)
             now = await room.submit(found.update, author)
         seq = await self._entered(target, seen, now, found.update)
         source = pair.draft if wanted.into == "origin" else pair.origin
-        if seq or found.conflicts:
+        if seq or found.any_conflicts:
             since = await self._since(pair, source.graph, target)
             body = h.GraphMerged(
-                draft, pair.row.draft_name, source.graph, since, source.seq, seq, authors
+                draft, pair.row.draft_name, source.graph, since, source.seq, seq, found.authors
             )
             await self._journal.append(h.about_stream(target), [h.draft(h.MERGED, author, body)])
         return MergedDraft(target, now, seq > 0)
@@ -145,33 +141,18 @@ class DraftMerges:
         events = await self._journal.read(h.graph_stream(graph), after=before, upto=now)
         return next((event.seq for event in events if event.body == update), 0)
 
-    async def _found(
-        self, pair: DraftPair, into: DraftSide, choices: Mapping[str, DraftSide]
-    ) -> FoundMerge:
+    async def _brought_up(self, pair: DraftPair, into: DraftSide) -> Inside:
+        """Bring the index up to the side that is brought in, for its authors; return the graphs inside of
+        either side."""
         sides = (pair.origin, pair.draft) if into == "origin" else (pair.draft, pair.origin)
-        inside = await self._checks.inside(*sides)
-        return await self._run_in_worker(
-            merging, pair.base, pair.origin, pair.draft, into, dict(choices), inside
-        )
-
-    async def _authors(
-        self, pair: DraftPair, into: DraftSide, found: FoundMerge
-    ) -> tuple[str, ...]:
-        """Whose changes the keys that are set hold, the last one first."""
-        source = pair.draft if into == "origin" else pair.origin
-        await self._index.upto(source.graph, source.seq)
-        owners = {owner_of(*place) for place in found.places}
-        last = await self._index.latest(source.graph, source.seq, of=owners)
-        wanted = [change for change in last if change.place in set(found.places)]
-        originals = await self._grafts.originals(source.graph, wanted)
-        newest = sorted(originals, key=lambda each: each.change.at, reverse=True)
-        return tuple(dict.fromkeys(each.change.author for each in newest))
+        await bring_up(self._index, sides[1].graph, sides[1].seq)
+        return await self._checks.inside(*sides)
 
     async def _since(self, pair: DraftPair, source: str, target: str) -> int:
         """The first change of one side that the other has not been given."""
         if pair.row.base_graph == source:
             return int(pair.row.base_seq) + 1
-        grafts = await self._grafts.of(source)
+        grafts = await self._index.value(grafts_of, source)
         merged = [graft.seq for graft in grafts.values() if graft.source == target]
         return max(merged, default=int(pair.row.drafted_seq)) + 1
 
@@ -183,16 +164,14 @@ def _require_moments(pair: DraftPair, wanted: WantedMerge) -> None:
         raise _moved_on("draft")
 
 
-def _require_choices(found: FoundMerge, choices: Mapping[str, DraftSide]) -> None:
+def _require_choices(left: UnmadeChoices | None) -> None:
     """Raises Conflict where something has no choice."""
-    left = [conflict for conflict in found.conflicts if conflict.place not in choices]
-    if left:
-        things = "one thing" if len(left) == 1 else f"{len(left)} things"
-        named = ", ".join(conflict.what for conflict in left[:3])
+    if left is not None:
+        things = "one thing" if left.count == 1 else f"{left.count} things"
         raise Conflict(
-            f"Both sides changed {things}, and it is not said whose counts: {named}"
-            f"{' and others' if len(left) > 3 else ''}.",
-            where={"places": [conflict.place for conflict in left[:_TOLD]]},
+            f"Both sides changed {things}, and it is not said whose counts: {', '.join(left.what)}"
+            f"{' and others' if left.count > len(left.what) else ''}.",
+            where={"places": list(left.places)},
         )
 
 

@@ -13,15 +13,13 @@ from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.catalogue.people import People
 from action_assistant.editor.documents.contents import GraphAtSeq
 from action_assistant.editor.history.change_index import ChangeIndex
-from action_assistant.editor.history.drafts.told_merges import apart, count
-from action_assistant.editor.history.key_changes import LoggedChange
+from action_assistant.editor.history.drafts.told_merges import DraftBase, apart_since
 from action_assistant.editor.log import graph_events as h
 from action_assistant.errors import BadInput, Conflict, NotFound
 from action_assistant.journal.journal import Journal
 from action_assistant.schema.editor_tables import editor_event
 from action_assistant.schema.editor_tables import graph as graph_table
 from action_assistant.web.auth.keys import PersonRef
-from action_assistant.web.workers.lanes import RunInWorker, run_here
 
 #: `merged`: it holds nothing that its origin has not been given.
 DraftState: TypeAlias = Literal["open", "proposed", "merged"]
@@ -94,7 +92,7 @@ class DraftPair(msgspec.Struct, frozen=True):
     """A draft and what it is one of, as they are, beside what they were when they were last one."""
 
     row: Any
-    base: list[LoggedChange]
+    base: DraftBase
     origin: GraphAtSeq
     draft: GraphAtSeq
 
@@ -109,14 +107,12 @@ class Drafts:
         catalogue: Catalogue,
         people: People,
         index: ChangeIndex,
-        run_in_worker: RunInWorker = run_here,
     ) -> None:
         self._journal = journal
         self._graph_reader = graph_reader
         self._catalogue = catalogue
         self._people = people
         self._index = index
-        self._run_in_worker = run_in_worker
         self._distances: OrderedDict[_Moments, tuple[int, int]] = OrderedDict()
 
     async def make(self, origin: str, author: str, new: NewDraft) -> DraftView:
@@ -151,7 +147,7 @@ class Drafts:
         await self._index.upto(row.base_graph, row.base_seq)
         return DraftPair(
             row,
-            await self._index.at(row.base_graph, row.base_seq),
+            DraftBase(row.base_graph, row.base_seq),
             await self._graph_reader.now(row.draft_of),
             await self._graph_reader.now(draft),
         )
@@ -253,8 +249,8 @@ class Drafts:
         known = self._distances.get(moments)
         if known is None:
             pair = await self.pair(row.id)
-            did = await self._run_in_worker(apart, pair.base, pair.origin, pair.draft)
-            known = self._distances[moments] = count(did["draft"]), count(did["origin"])
+            behind, ahead = await self._index.value(apart_since, pair.base, pair.origin, pair.draft)
+            known = self._distances[moments] = ahead, behind
             if len(self._distances) > _REMEMBERED:
                 self._distances.popitem(last=False)
         return *known, newest[0]

@@ -1,9 +1,10 @@
 """What a merge would do, told as differences that people know, and the update that does it. For workers."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any, Final, Literal, TypeAlias
 
 import msgspec
+from sqlalchemy import Connection
 
 from action_assistant.editor.documents.contents import (
     NOTHING_INSIDE,
@@ -14,7 +15,9 @@ from action_assistant.editor.documents.contents import (
 )
 from action_assistant.editor.documents.document import Maps, is_same, read_maps
 from action_assistant.editor.documents.values import ROOTS, ends_of, is_aid
+from action_assistant.editor.history import index_queries
 from action_assistant.editor.history.drafts.merging import Choices, FoundConflict, merged
+from action_assistant.editor.history.grafts import originals
 from action_assistant.editor.history.key_changes import LoggedChange, Place, owner_of
 from action_assistant.editor.history.places import by_owner, field_of
 from action_assistant.editor.history.told_changes import Changes, maps_of, shortened, state_of
@@ -36,6 +39,8 @@ from action_assistant.umrf.model import ENTRY, EXIT, Graph, Problem
 DraftSide: TypeAlias = Literal["origin", "draft"]
 
 _WORSE: Final = 50  # problems that are told
+_NAMED: Final = 3  # conflicts without a choice that a refusal names
+_TOLD: Final = 50  # of which it says the places
 
 
 class DraftConflict(msgspec.Struct, frozen=True, kw_only=True):
@@ -50,6 +55,31 @@ class DraftConflict(msgspec.Struct, frozen=True, kw_only=True):
     draft: Changes
 
 
+class DraftBase(msgspec.Struct, frozen=True):
+    """What both sides of a draft are compared with: the graph `graph` after its change `seq`."""
+
+    graph: str
+    seq: int
+
+
+class UnmadeChoices(msgspec.Struct, frozen=True):
+    """Conflicts that have no choice: how many, what the first are about, and where they are."""
+
+    count: int
+    what: tuple[str, ...]
+    places: tuple[str, ...]
+
+
+class MadeMerge(msgspec.Struct, frozen=True):
+    """A merge as it is stored: the update, and whose changes the keys that it sets hold, the last one
+    first. `any_conflicts`: whether something was to be chosen; `left`: what had no choice."""
+
+    update: bytes
+    authors: tuple[str, ...]
+    any_conflicts: bool
+    left: UnmadeChoices | None
+
+
 class FoundMerge(msgspec.Struct, frozen=True):
     """The update that merges, which is of use only when every conflict has a choice. `places`: the keys
     that it sets. `problems`: those that come with it. `did`: what each side did since they were one.
@@ -62,6 +92,99 @@ class FoundMerge(msgspec.Struct, frozen=True):
     problems: tuple[Problem, ...]
     did: dict[DraftSide, Changes]
     umrf: str
+
+
+def merging_since(
+    connection: Connection,
+    base: DraftBase,
+    origin: GraphAtSeq,
+    draft: GraphAtSeq,
+    into: DraftSide,
+    choices: Mapping[str, DraftSide],
+    inside: Inside,
+) -> FoundMerge:
+    """As `merging`, with what the index says of the base."""
+    was = index_queries.at(connection, base.graph, base.seq)
+    return merging(was, origin, draft, into, choices, inside)
+
+
+class WrittenPreview(msgspec.Struct, frozen=True):
+    """What a merge would do, each part as JSON; and whose changes it would bring in, the last one first."""
+
+    changes: bytes
+    conflicts: bytes
+    problems: bytes
+    umrf: bytes
+    origin_did: bytes
+    draft_did: bytes
+    authors: tuple[str, ...]
+
+
+def previewed(
+    connection: Connection,
+    base: DraftBase,
+    origin: GraphAtSeq,
+    draft: GraphAtSeq,
+    into: DraftSide,
+    choices: Mapping[str, DraftSide],
+    inside: Inside,
+) -> WrittenPreview:
+    """As `merging_since`, written for whoever looks at it."""
+    found = merging_since(connection, base, origin, draft, into, choices, inside)
+    source = draft if into == "origin" else origin
+    write_json = msgspec.json.encode
+    return WrittenPreview(
+        changes=write_json(found.changes),
+        conflicts=write_json(found.conflicts),
+        problems=write_json(found.problems),
+        umrf=write_json(found.umrf),
+        origin_did=write_json(found.did["origin"]),
+        draft_did=write_json(found.did["draft"]),
+        authors=authors_of(connection, source, found.places),
+    )
+
+
+def made_merge(
+    connection: Connection,
+    base: DraftBase,
+    origin: GraphAtSeq,
+    draft: GraphAtSeq,
+    into: DraftSide,
+    choices: Mapping[str, DraftSide],
+    inside: Inside,
+) -> MadeMerge:
+    """As `merging_since`, with what is needed to store it."""
+    found = merging_since(connection, base, origin, draft, into, choices, inside)
+    left = [conflict for conflict in found.conflicts if conflict.place not in choices]
+    unmade = UnmadeChoices(
+        len(left),
+        tuple(conflict.what for conflict in left[:_NAMED]),
+        tuple(conflict.place for conflict in left[:_TOLD]),
+    )
+    source = draft if into == "origin" else origin
+    authors = authors_of(connection, source, found.places)
+    return MadeMerge(found.update, authors, bool(found.conflicts), unmade if left else None)
+
+
+def authors_of(
+    connection: Connection, source: GraphAtSeq, places: Collection[Place]
+) -> tuple[str, ...]:
+    """Return whose changes these keys of a graph hold, the last one first."""
+    wanted = frozenset(places)
+    owners = {owner_of(*place) for place in wanted}
+    last = index_queries.latest(connection, source.graph, source.seq, owners)
+    changes = [change for change in last if change.place in wanted]
+    made = originals(connection, source.graph, changes)
+    newest = sorted(made, key=lambda each: each.change.at, reverse=True)
+    return tuple(dict.fromkeys(each.change.author for each in newest))
+
+
+def apart_since(
+    connection: Connection, base: DraftBase, origin: GraphAtSeq, draft: GraphAtSeq
+) -> tuple[int, int]:
+    """Return how many things the origin and the draft changed since they were one."""
+    did = apart(index_queries.at(connection, base.graph, base.seq), origin, draft)
+    return count(did["origin"]), count(did["draft"])
 
 
 def merging(

@@ -1,0 +1,151 @@
+"""Queries of the index of key changes, over a connection. Their results are as large as a graph: for workers."""
+
+from collections.abc import Collection, Iterable
+from typing import Any, Final
+
+import msgspec
+from sqlalchemy import ColumnElement, Connection, Row, Select, and_, func, literal, select
+
+from action_assistant.editor.documents.values import Root
+from action_assistant.editor.history.key_changes import LoggedChange, Place, observed, owner_of
+from action_assistant.editor.log.graph_events import graph_stream
+from action_assistant.journal.events import Event
+from action_assistant.schema.editor_tables import editor_event, key_change, key_change_head
+
+_EVENTS: Final = 1000  # observed in one go
+_BYTES: Final = 4 << 20  # of them
+_OWNERS: Final = 400  # that one question names
+
+_c = key_change.c
+_CHANGE: Final = select(_c.seq, _c.author, _c.at, _c.root, _c.key, _c.before, _c.after)
+#: The columns of a row in a slice, in the order of `LoggedChange` after the first two.
+COLUMNS: Final = ("graph", "owner", *LoggedChange._fields)
+
+
+class IndexGrowth(msgspec.Struct, frozen=True):
+    """What the index lacks: rows, as MessagePack by the slice, and the head that follows them.
+
+    `after`: the head before. `leftovers`: rows after it are stored, of an earlier attempt that did not
+    reach its end. `unreadable`: the document of the head is none of this version, so all starts anew.
+    """
+
+    after: int
+    seq: int
+    document: bytes
+    slices: tuple[bytes, ...]
+    damaged: bool = False
+    leftovers: bool = False
+    unreadable: bool = False
+
+
+def growth(connection: Connection, graph: str, slice_rows: int) -> IndexGrowth | None:
+    """Return what the next events of a graph add to its index; None where there are no more."""
+    seq, document = _head(connection, graph)
+    more = select(literal(1)).where(_c.graph == graph, _c.seq > seq).limit(1)
+    leftovers = connection.execute(more).first() is not None
+    events = _some_events(connection, graph, seq)
+    if not events:
+        return None
+    found = observed(document, events)
+    if found is None:
+        return IndexGrowth(seq, 0, b"", (), leftovers=leftovers, unreadable=True)
+    rows = [(graph, owner_of(each.root, each.key), *each) for each in found.changes]
+    slices = tuple(
+        msgspec.msgpack.encode(rows[start : start + slice_rows])
+        for start in range(0, len(rows), slice_rows)
+    )
+    return IndexGrowth(seq, found.seq, found.document, slices, found.damaged, leftovers)
+
+
+def between(
+    connection: Connection, graph: str, after: int, upto: int, limit: int, by: str | None = None
+) -> list[LoggedChange]:
+    """Return the newest changes with `after < seq <= upto`, in order of time; `by` one person."""
+    chosen = _CHANGE.where(_c.graph == graph, _c.seq > after, _c.seq <= upto)
+    if by is not None:
+        chosen = chosen.where(_c.author == by)
+    newest_first = chosen.order_by(_c.seq.desc(), _c.root, _c.key).limit(limit)
+    return _changes(connection, newest_first)[::-1]
+
+
+def at(
+    connection: Connection, graph: str, seq: int, of: Collection[str] | None = None
+) -> list[LoggedChange]:
+    """Return the change that gave each key the value that it has after the change `seq`: of everything, or
+    of some owners."""
+    if of is None:
+        return _changes(connection, _last(graph, seq).where(_c.after.is_not(None)))
+    return [each for each in latest(connection, graph, seq, of) if each.after is not None]
+
+
+def latest(connection: Connection, graph: str, seq: int, of: Collection[str]) -> list[LoggedChange]:
+    """Return the last change of each key of some owners up to the change `seq`, also of keys that are gone."""
+    owners = sorted(of)
+    found: list[LoggedChange] = []
+    for start in range(0, len(owners), _OWNERS):
+        some = _c.owner.in_(owners[start : start + _OWNERS])
+        found += _changes(connection, _last(graph, seq, some))
+    return found
+
+
+def latest_since(connection: Connection, graph: str, seq: int) -> dict[Place, int]:
+    """Return the last change of each key that the change `seq` or a later one changed."""
+    head, _ = _head(connection, graph)
+    newest = select(_c.root, _c.key, func.max(_c.seq).label("seq"))
+    chosen = newest.where(_c.graph == graph, _c.seq >= seq, _c.seq <= head)
+    rows = connection.execute(chosen.group_by(_c.root, _c.key))
+    return {(row.root, row.key): row.seq for row in rows}
+
+
+def of_key(
+    connection: Connection, graph: str, root: Root, key: str, upto: int
+) -> list[LoggedChange]:
+    """Return all changes of one key, in order of time."""
+    same = (_c.graph == graph, _c.root == root, _c.key == key, _c.seq <= upto)
+    return _changes(connection, _CHANGE.where(*same).order_by(_c.seq))
+
+
+def _head(connection: Connection, graph: str) -> tuple[int, bytes]:
+    head = key_change_head.c
+    row = connection.execute(select(head.seq, head.document).where(head.graph == graph)).first()
+    return (row.seq, row.document) if row is not None else (0, b"")
+
+
+def _some_events(connection: Connection, graph: str, after: int) -> list[Event]:
+    event = editor_event.c
+    chosen = (
+        select(*(event[name] for name in Event.__struct_fields__))
+        .where(event.stream == graph_stream(graph), event.seq > after)
+        .order_by(event.seq)
+        .limit(_EVENTS)
+    )
+    events: list[Event] = []
+    size = 0
+    for row in connection.execute(chosen):
+        events.append(Event(*row))
+        size += len(row.body)
+        if size > _BYTES:
+            break
+    return events
+
+
+def _changes(connection: Connection, chosen: Select[Any]) -> list[LoggedChange]:
+    rows: Iterable[Row[Any]] = connection.execute(chosen)
+    return [LoggedChange._make(row) for row in rows]
+
+
+def _last(graph: str, seq: int, *also: ColumnElement[bool]) -> Select[Any]:
+    """The last change of each key up to a change."""
+    newest = (
+        select(_c.root, _c.key, func.max(_c.seq).label("seq"))
+        .where(_c.graph == graph, _c.seq <= seq, *also)
+        .group_by(_c.root, _c.key)
+        .subquery()
+    )
+    same = and_(
+        _c.graph == graph,
+        _c.root == newest.c.root,
+        _c.key == newest.c.key,
+        _c.seq == newest.c.seq,
+    )
+    return _CHANGE.select_from(key_change.join(newest, same))

@@ -1,0 +1,356 @@
+"""No route and no background task handles on the editor's event loop what grows with a graph.
+
+Counted, not timed: the calls of Python functions on the loop's thread, the values in what workers are sent and send
+back, and the rows that this process reads, while the same thing is done with a small graph and with one twelve times
+as large. A document as bytes is one value, however long it is.
+"""
+
+import asyncio
+import json
+import pickletools
+import sys
+from collections import Counter
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from contextlib import asynccontextmanager, contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+import httpx
+import msgspec
+import pytest
+
+from action_assistant.editor.app import create_app
+from action_assistant.editor.history import change_index
+from action_assistant.journal.journal import Journal
+from action_assistant.settings import EditorSettings
+from action_assistant.web.workers import lanes
+from editor.process import BEARER
+from support.openapi import documents
+from support.product import TOKEN
+
+# The application is made within a loop here.
+pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")
+
+SMALL: Final = 20  # actions
+LARGE: Final = 240
+#: What may differ by chance: a task that happens to run meanwhile, another turn of a loop.
+SLACK: Final = 1_500
+#: The loop knows the names of a graph's actions, to find the graphs inside; a key or an arrow would be many times this.
+VALUES: Final = 5 * (LARGE - SMALL)
+
+
+class Work(msgspec.Struct):
+    """What was done. `calls`: on the loop's thread; `values`: in what workers were sent and sent back; `rows`: read
+    or written by this process in one statement, at most."""
+
+    calls: int = 0
+    values: int = 0
+    rows: int = 0
+
+
+def file_of(actions: int, name: str) -> bytes:
+    """A UMRF file: a chain of actions."""
+    names = [{"name": f"Act{n}", "instance_id": 0} for n in range(actions)]
+    made = [
+        {
+            **each,
+            "type": "sync",
+            # One stands for a graph that takes nothing.
+            "input_parameters": {"speed": {"pvf_type": "number", "pvf_value": n}} if n != 5 else {},
+            "parents": names[max(0, n - 1) : n],
+            "children": names[n + 1 : n + 2],
+        }
+        for n, each in enumerate(names)
+    ]
+    graph = {"graph_name": name, "actions": made}
+    ends = {"graph_entry": [names[0]], "graph_exit": [names[-1]]}
+    return json.dumps({**graph, **ends}).encode()
+
+
+class Served:
+    """An editor in this process, and what it does meanwhile."""
+
+    def __init__(self, http: httpx.AsyncClient) -> None:
+        self.http = http
+        self.work = Work()
+
+    async def ask(self, method: str, path: str, body: Any = None) -> Any:
+        content = body if isinstance(body, bytes) else json.dumps(body).encode()
+        answer = await self.http.request(method, path, content=None if body is None else content)
+        assert answer.is_success, (method, path, answer.status_code, answer.text[:500])
+        is_json = answer.headers.get("content-type", "").startswith("application/json")
+        return answer.json() if is_json and answer.content else None
+
+    async def bring(self, actions: int, name: str) -> str:
+        made: str = (await self.ask("POST", "/api/graphs", file_of(actions, name)))["id"]
+        return made
+
+    async def during(self, work: Callable[[], Awaitable[object]]) -> Work:
+        """Count what is done while something goes on."""
+        self.work = Work()
+
+        def count(_: object, event: str, __: object) -> None:
+            self.work.calls += event == "call"
+
+        sys.setprofile(count)
+        try:
+            await work()
+        finally:
+            sys.setprofile(None)
+        return self.work
+
+
+@asynccontextmanager
+async def lifespan(app: Any) -> AsyncIterator[None]:
+    """Start and end an application as its server does."""
+    heard: asyncio.Queue[dict[str, Any]] = asyncio.Queue()
+    said: asyncio.Queue[dict[str, Any]] = asyncio.Queue()
+    scope = {"type": "lifespan", "asgi": {"version": "3.0"}, "state": {}}
+    running = asyncio.create_task(app(scope, heard.get, said.put))
+    await heard.put({"type": "lifespan.startup"})
+    assert (await said.get())["type"] == "lifespan.startup.complete"
+    try:
+        yield
+    finally:
+        await heard.put({"type": "lifespan.shutdown"})
+        await said.get()
+        await running
+
+
+@pytest.fixture
+async def served(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Served]:
+    """An editor that counts, with real workers and a real database."""
+    monkeypatch.setenv("ACTION_ASSISTANT_TOKEN", TOKEN)
+    monkeypatch.setattr(change_index, "_PERIOD", 3600.0)  # nothing happens by itself
+    settings = EditorSettings(
+        data=tmp_path, database=f"sqlite:///{tmp_path / 'editor.db'}", port=8000, limits=False
+    )
+    app = create_app(settings)
+    transport = httpx.ASGITransport(app=app, client=("127.0.0.1", 5000))
+    async with (
+        lifespan(app),
+        httpx.AsyncClient(
+            transport=transport, base_url="http://127.0.0.1:8000", headers=BEARER, timeout=60
+        ) as http,
+    ):
+        editor = Served(http)
+        with counted(editor, monkeypatch):
+            yield editor
+
+
+@contextmanager
+def counted(editor: Served, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Count what goes to workers and comes back, and what the database is asked, in the work of an editor."""
+    done, asked, derived = lanes.Lane._done, Journal._ask, Journal.derive
+
+    async def _done(lane: lanes.Lane, request: bytes) -> bytes:
+        reply = await done(lane, request)
+        editor.work.values += sum(values_in(each) for each in (request, reply[1:]))
+        return reply
+
+    async def _ask(journal: Journal, question: Callable[[Any], Any]) -> Any:
+        found = await asked(journal, question)
+        if isinstance(found, list | tuple):
+            editor.work.rows = max(editor.work.rows, len(found))
+        return found
+
+    async def derive(journal: Journal, work: Callable[[Any], Any]) -> Any:
+        rows = Counter[str]()
+
+        def watched(connection: Any) -> Any:
+            execute = connection.execute
+
+            def executed(statement: Any, values: Any = None) -> Any:
+                result = execute(statement, values)
+                stored = len(values) if isinstance(values, list) else result.rowcount
+                rows["most"] = max(rows["most"], stored)
+                return result
+
+            with monkeypatch.context() as patch:
+                patch.setattr(connection, "execute", executed)
+                return work(connection)
+
+        found = await derived(journal, watched)
+        editor.work.rows = max(editor.work.rows, rows["most"])
+        return found
+
+    with monkeypatch.context() as patch:
+        patch.setattr(lanes.Lane, "_done", _done)
+        patch.setattr(Journal, "_ask", _ask)
+        patch.setattr(Journal, "derive", derive)
+        yield
+
+
+def values_in(pickled: bytes) -> int:
+    """How many values a pickle holds; a long text or many bytes are one."""
+    counting = sys.getprofile()
+    sys.setprofile(None)  # this work is the test's own
+    try:
+        return sum(1 for _ in pickletools.genops(pickled))
+    finally:
+        sys.setprofile(counting)
+
+
+#: What each operation that takes a graph is asked, by its id. `{g}`: the graph, `{d}`: a draft of it, `{v}`: a version,
+#: `{a}`: the key of one action. None: what is not asked here, and why.
+ASKED: Final[dict[str, tuple[str, str, Any] | None]] = {
+    "getGraph": ("GET", "/api/graphs/{g}", None),
+    "describeGraph": ("PATCH", "/api/graphs/{g}", {"description": "new"}),
+    "deleteGraph": None,  # the last thing that is done to a graph; below
+    "recoverGraph": ("POST", "/api/graphs/{g}/recover", None),
+    "getUmrf": ("GET", "/api/graphs/{g}/umrf?at=1", None),
+    "getProblems": ("GET", "/api/graphs/{g}/problems?seq=1", None),
+    "getRewriting": ("POST", "/api/graphs/{g}/rewriting?seq=1", b"file"),
+    "putUmrf": ("PUT", "/api/graphs/{g}/umrf?seq=1", b"file"),
+    "getHistory": ("GET", "/api/graphs/{g}/history", None),
+    "getDocument": ("GET", "/api/graphs/{g}/document?at=2", None),
+    "getChanges": ("GET", "/api/graphs/{g}/changes?after=0&upto=2", None),
+    "getDifference": ("GET", "/api/graphs/{g}/diff?from=1", None),
+    "getBlame": ("GET", "/api/graphs/{g}/blame?of={a}", None),
+    "getValues": ("GET", "/api/graphs/{g}/blame/values?of={a}&field=in/speed", None),
+    "getSince": ("POST", "/api/graphs/{g}/since", {"good": 1, "script": {"behaviours": {}}}),
+    "restoreGraph": ("POST", "/api/graphs/{g}/restore", {"seq": 1}),
+    "revertGraph": ("POST", "/api/graphs/{g}/revert", {"author": "owner", "from_seq": 2, "seq": 9}),
+    "listVersions": ("GET", "/api/graphs/{g}/versions", None),
+    "publishVersion": ("POST", "/api/graphs/{g}/versions", {"label": "one"}),
+    "getVersion": ("GET", "/api/versions/{v}", None),
+    "getSubgraphs": ("GET", "/api/graphs/{g}/subgraphs", None),
+    "downloadSubgraphs": ("GET", "/api/graphs/{g}/subgraphs.zip", None),
+    "getFlatGraph": ("GET", "/api/graphs/{g}/flat", None),
+    "makeFlatGraph": ("POST", "/api/graphs/{g}/flat", {"seq": 1, "name": "Flat{g}"}),
+    "rehearse": ("POST", "/api/graphs/{g}/rehearsal", {"script": {"behaviours": {}}}),
+    "lookAtExtraction": (
+        "POST",
+        "/api/graphs/{g}/extraction",
+        {"actions": ["{a}"], "name": "P{g}"},
+    ),
+    "makeSubGraph": (
+        "POST",
+        "/api/graphs/{g}/subgraphs",
+        {"actions": ["{a}"], "name": "Part{g}", "otherwise": True},
+    ),
+    "lookAtUnpacking": ("POST", "/api/graphs/{g}/unpacking", {"action": "{i}"}),
+    "listPackages": ("GET", "/api/graphs/{g}/packages", None),
+    "getPackage": ("GET", "/api/graphs/{g}/packages/{p}", None),
+    "downloadPackages": ("GET", "/api/graphs/{g}/packages.zip", None),
+    "listDrafts": ("GET", "/api/graphs/{g}/drafts", None),
+    "makeDraft": ("POST", "/api/graphs/{g}/drafts", {"name": "again"}),
+    "getDraft": ("GET", "/api/drafts/{d}", None),
+    "proposeDraft": ("POST", "/api/drafts/{d}/proposal", {}),
+    "answerProposal": ("POST", "/api/drafts/{d}/answers", {"yes": True, "seq": 1}),
+    "withdrawProposal": ("DELETE", "/api/drafts/{d}/proposal", None),
+    "previewMerge": ("POST", "/api/drafts/{d}/preview", {}),
+    "mergeDraft": None,  # needs the moments of both; below
+}
+
+
+class Named(msgspec.Struct):
+    """A graph with all that routes may ask about."""
+
+    actions: int
+    graph: str
+    draft: str
+    version: str
+    key: str
+    inner: str
+    package: str
+    me: str
+
+    def fill(self, wanted: tuple[str, str, Any]) -> tuple[str, str, Any]:
+        """A request with the names of this graph in it."""
+        method, path, body = wanted
+        names = {"{g}": self.graph, "{d}": self.draft, "{v}": self.version, "{a}": self.key}
+        names |= {"{i}": self.inner, "{p}": self.package, '"owner"': f'"{self.me}"'}
+        if body == b"file":
+            return method, _filled(path, names), file_of(self.actions, f"T{self.actions}")
+        text = None if body is None else _filled(json.dumps(body), names).encode()
+        return method, _filled(path, names), text
+
+
+def _filled(text: str, names: dict[str, str]) -> str:
+    for word, name in names.items():
+        text = text.replace(word, name)
+    return text
+
+
+async def prepared(served: Served, actions: int) -> Named:
+    """Bring a graph of this size, and everything that belongs to it, with a little past."""
+    graph = await served.bring(actions, f"T{actions}")
+    await served.ask("PATCH", f"/api/graphs/{graph}", {"description": "old"})
+    document = await served.ask("GET", f"/api/graphs/{graph}/document?at=2")
+    keys = {name: key for key, name in document["actions"].items() if "|" not in key}
+    draft = (await served.ask("POST", f"/api/graphs/{graph}/drafts", {"name": "d"}))["id"]
+    await served.ask("PATCH", f"/api/graphs/{draft}", {"description": "of the draft"})
+    version = (await served.ask("POST", f"/api/graphs/{graph}/versions", {"note": "n"}))["id"]
+    packages = (await served.ask("GET", f"/api/graphs/{graph}/packages"))["packages"]
+    history = await served.ask("GET", f"/api/graphs/{graph}/history")
+    edited = next(entry for entry in history if entry["kind"] == "edited")
+    return Named(
+        actions, graph, draft, version, keys["Act1"], keys["Act5"], packages[0]["package"],
+        edited["author"]["id"],
+    )  # fmt: skip
+
+
+async def test_no_route_works_on_the_loop_as_long_as_its_graph_is_large(served: Served) -> None:
+    await served.bring(3, "Act5")
+    small, large = [await prepared(served, actions) for actions in (SMALL, LARGE)]
+    grown: dict[str, tuple[Work, Work]] = {}
+
+    async def compare(name: str, of: Callable[[Named], tuple[str, str, Any]]) -> None:
+        found = [
+            await served.during(lambda: served.ask(*of(each)))  # noqa: B023
+            for each in (small, large)
+        ]
+        if not is_free(*found):
+            grown[name] = found[0], found[1]
+
+    for name, wanted in ASKED.items():
+        if wanted is not None:
+            await compare(name, lambda each: each.fill(wanted))  # noqa: B023
+    merges = {}
+    for each in (small, large):
+        seen = await served.ask("POST", f"/api/drafts/{each.draft}/preview", {})
+        moments = {"seq": seen["seq"], "draft_seq": seen["draft_seq"]}
+        choices = {conflict["place"]: "draft" for conflict in seen["conflicts"]}
+        merges[each.graph] = {**moments, "choices": choices}
+    await compare(
+        "mergeDraft", lambda each: ("POST", f"/api/drafts/{each.draft}/merge", merges[each.graph])
+    )
+    await compare("deleteGraph", lambda each: ("DELETE", f"/api/graphs/{each.graph}", None))
+    assert not grown, "\n".join(f"{name}: {of}" for name, of in grown.items())
+
+
+def is_free(small: Work, large: Work) -> bool:
+    """Whether twelve times as much was handled elsewhere."""
+    return (
+        large.calls <= small.calls + SLACK
+        and large.values <= small.values + VALUES
+        and large.rows <= max(small.rows, change_index.ROWS)
+    )
+
+
+async def test_the_index_of_an_imported_graph_is_made_elsewhere_and_stored_in_slices(
+    served: Served, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = []
+    for actions in (SMALL, LARGE):
+        graph = await served.bring(actions, f"T{actions}")
+        found.append(
+            await served.during(lambda: served.ask("GET", f"/api/graphs/{graph}/document?at=1"))  # noqa: B023
+        )
+    small, large = found
+    slices = LARGE * 30 // change_index.ROWS
+    assert large.rows <= change_index.ROWS
+    assert large.values <= small.values + VALUES
+    assert large.calls <= small.calls + SLACK * slices
+
+
+def test_every_route_that_takes_a_graph_is_asked(tmp_path: Path) -> None:
+    editor = documents(tmp_path)["editor"]
+    takes = {
+        operation["operationId"]
+        for path, item in editor["paths"].items()
+        for operation in item.values()
+        if any(word in path for word in ("{graph_id}", "{draft_id}", "{version_id}"))
+    }
+    assert takes == ASKED.keys()
