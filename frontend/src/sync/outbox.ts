@@ -43,6 +43,11 @@ export class Outbox {
     this.waiting.push({ edit, message: NOT_SENT });
   }
 
+  /** A message went out that carries a part of an edit; the last part follows. */
+  sentPart(): void {
+    this.sent += 1;
+  }
+
   /** A message went out that carries everything so far, or nothing. */
   sentAll(): void {
     this.sentSome(this.waiting.length);

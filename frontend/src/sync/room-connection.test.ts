@@ -2,6 +2,8 @@ import fc from "fast-check";
 import * as encoding from "lib0/encoding";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import type * as Y from "yjs";
+import { asOneEdit, undoOf } from "../graph/edit";
+import { eraseKeys, writeKey } from "../graph/edit/document-writes";
 import { FakeServer, statesSent } from "../testing/fake-server";
 import { connectRoom, type RefusalReason, type Room, roomUrl } from "./room-connection";
 
@@ -96,6 +98,47 @@ test("an update goes only after the room was given what it lacked, so that it ne
   expect(room.link().unsaved).toBe(2);
   server.accept();
   expect(keys(server.doc)).toEqual(["early", "later"]);
+  expect(server.doc.store.pendingStructs).toBeNull();
+});
+
+/** Two edits of more than a message may have: much that is added, and the same brought back by undo. */
+function changeMuch(doc: Y.Doc): void {
+  const undo = undoOf(doc);
+  const values = (value: string) => {
+    for (let n = 0; n < 3_000; n += 1) writeKey(doc, "actions", `${n}`, value.repeat(500));
+  };
+  asOneEdit(doc, () => values("a"));
+  asOneEdit(doc, () => {
+    for (let n = 0; n < 3_000; n += 1) eraseKeys(doc, "actions", `${n}`);
+  });
+  undo.undo();
+}
+
+test("what is larger than a message may be goes in pieces, and counts as stored after the last one", () => {
+  server.accept();
+  server.stalled = true;
+  changeMuch(room.doc);
+  expect(room.link().unsaved).toBe(3);
+  const sent = () => server.last.received.filter((data) => data[0] === 0 && data[1] === 2);
+  expect(sent().length).toBeGreaterThan(6);
+  expect(Math.max(...sent().map(({ length }) => length))).toBeLessThan(1 << 19);
+  server.stalled = false;
+  server.commit();
+  expect(room.link()).toMatchObject({ state: "live", unsaved: 0 });
+  expect(server.doc.getMap("actions").size).toBe(3_000);
+  write("next");
+  expect(room.link().unsaved).toBe(0);
+  expect(keys(server.doc)).toEqual(["next"]);
+});
+
+test("what is larger than a message may be goes in pieces after a time offline, too", () => {
+  server.accept();
+  server.last.end(1006);
+  changeMuch(room.doc);
+  vi.advanceTimersByTime(300);
+  server.accept();
+  expect(room.link()).toMatchObject({ state: "live", unsaved: 0 });
+  expect(server.doc.getMap("actions").size).toBe(3_000);
   expect(server.doc.store.pendingStructs).toBeNull();
 });
 

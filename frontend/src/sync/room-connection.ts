@@ -36,11 +36,12 @@ import type {
   RoomOptions,
   Socket,
 } from "./room";
+import { piecesOf } from "./split-update";
 
 export * from "./room";
 
-/** Above this, edits that wait travel one by one; a message may have 1 MiB. */
-const LARGE = 1 << 19;
+/** Above this, edits that wait travel one by one. */
+const LARGE = 1 << 18;
 
 type LinkChange = Partial<Omit<RoomLink, "why" | "readOnly">> & {
   why?: RefusalReason | undefined;
@@ -350,16 +351,26 @@ class Connection implements Room, SocketHandler {
   private give(state: Uint8Array): void {
     const whole = Y.encodeStateAsUpdate(this.doc, state);
     const edits = this.outbox.edits;
-    if (whole.length <= LARGE || edits.length === 0) {
+    if (whole.length <= LARGE) {
       this.outbox.sentAll();
       this.socket.send(messages.syncStep2(whole));
       return;
     }
+    // Where nothing waits, all that is large is what was deleted at any time, which the server has.
     this.outbox.sentSome(0);
     this.socket.send(messages.syncStep2(messages.EMPTY_UPDATE));
     edits.forEach(({ update }, n) => {
-      this.outbox.sentSome(n + 1);
-      this.socket.send(messages.updateMessage(update));
+      this.sendUpdate(update, () => this.outbox.sentSome(n + 1));
+    });
+  }
+
+  /** Sends an update, in pieces where one message could not hold it; `sent` counts the last of them. */
+  private sendUpdate(update: Uint8Array, sent: () => void): void {
+    const pieces = piecesOf(update);
+    pieces.forEach((piece, n) => {
+      if (n === pieces.length - 1) sent();
+      else this.outbox.sentPart();
+      this.socket.send(messages.updateMessage(piece));
     });
   }
 
@@ -377,8 +388,7 @@ class Connection implements Room, SocketHandler {
     }
     // Until the room asked for what it lacks, everything travels with that answer, in order.
     if (this.outbox.answered && this.socket.isOpen) {
-      this.outbox.sentAll();
-      this.socket.send(messages.updateMessage(update));
+      this.sendUpdate(update, () => this.outbox.sentAll());
     }
     this.say({ unsaved: this.outbox.unsaved });
   };

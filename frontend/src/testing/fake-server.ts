@@ -51,11 +51,17 @@ export class FakeSocket implements Socket {
   }
 }
 
+/** As rule R4 has it. */
+const MESSAGE_LIMIT = 1 << 20;
+
 export class FakeServer {
   readonly doc = new Y.Doc();
   seq = 0;
   /** While set, what comes in is taken but not committed: no broadcast, no ack. */
   stalled = false;
+  /** The close code with which an update is refused; null for one that is taken. */
+  refuses: (update: Uint8Array) => number | null = (update) =>
+    update.length > MESSAGE_LIMIT ? 1009 : null;
   /** Which history this is; empty for a server that does not say. */
   epoch: string;
   /** How many comparisons did not fit. */
@@ -111,6 +117,12 @@ export class FakeServer {
     const kind = decoding.readVarUint(decoder);
     const content = decoding.readVarUint8Array(decoder);
     if (kind !== sync.messageYjsSyncStep1) {
+      const code = this.refuses(content);
+      if (code !== null) {
+        socket.readyState = 3; // what it says later is not heard
+        queueMicrotask(() => socket.end(code));
+        return;
+      }
       this.log.push({ socket, update: content });
       if (!this.stalled) this.commit();
       return;
