@@ -10,9 +10,10 @@ import msgspec
 
 from action_assistant.errors import BadInput, NotUmrf, TooLarge
 from action_assistant.umrf.files import codec
+from action_assistant.umrf.run_size import MOST_BYTES
 
-#: Bytes of a body that carries a graph: 5,000 actions, the most that the editor takes, are 1.2 MB.
-MOST: Final = 2_000_000
+#: Bytes of a body that carries graphs: what their texts may have, and room for all else that a start says.
+MOST: Final = MOST_BYTES + 100_000
 
 SentGraph: TypeAlias = Annotated[
     msgspec.Raw,
@@ -36,8 +37,10 @@ def read_sent(umrf: bytes) -> tuple[bytes, codec.Reading]:
     Raises BadInput, NotUmrf with the place, TooLarge.
     """
     text = _text_of(umrf)
-    if len(text) > MOST:
-        raise TooLarge(f"A graph that is sent has at most {MOST // 1_000_000} MB.")
+    if len(text) > MOST_BYTES:
+        raise TooLarge(
+            f"A graph that is sent has at most {MOST_BYTES // 1_000_000} MB; this one has {len(text):,} bytes."
+        )
     try:
         return text, codec.read(text)
     except codec.Unreadable as wrong:

@@ -14,9 +14,7 @@ from action_assistant.runner.sent_graph import SentGraph, read_sent
 from action_assistant.umrf.digest import digest, tree_digest
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
-
-#: Graphs inside of one.
-MOST_INSIDE = 200
+from action_assistant.umrf.run_size import MOST_INSIDE
 
 
 class SentSubgraph(msgspec.Struct, frozen=True, kw_only=True):

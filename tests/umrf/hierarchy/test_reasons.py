@@ -272,3 +272,27 @@ def test_what_is_refused_would_go_otherwise(what: str, monkeypatch: pytest.Monke
 
     with pytest.raises(AssertionError):
         play()
+
+
+def test_what_doubles_with_each_level_is_counted_before_anything_is_made(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    levels = 16
+    doubling = {}
+    for n in range(levels):
+        graph = graph_of(f"entry>N{n + 1}", f"N{n + 1}>B", "B>exit")
+        doubling[f"N{n}"] = changed(
+            replace(graph, name=f"N{n}"), "B", name=f"N{n + 1}", instance_id=1
+        )
+    doubling[f"N{levels}"] = replace(ONE, name=f"N{levels}")
+    monkeypatch.setattr(flattening, "inlined", None)  # nothing is put together
+    monkeypatch.setattr(flattening, "level_courses", None)  # nor simulated
+    found = flattened(graph_of("entry>N0", "N0>exit"), doubling)
+    assert isinstance(found, Unflattenable)
+    assert [reason.message for reason in found.reasons] == [
+        "One graph would have 65,536 actions; 5,000 are the most."
+    ]
+    deep = {**doubling, "N16": replace(TWO, name="N16")}
+    found = flattened(graph_of("entry>N0", "N0>exit"), deep)
+    assert isinstance(found, Unflattenable)
+    assert "131,072" in found.reasons[0].message

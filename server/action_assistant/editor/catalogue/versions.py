@@ -10,12 +10,13 @@ from action_assistant.editor.catalogue.graph_checks import GraphChecks
 from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.documents import contents
 from action_assistant.editor.log import graph_events as h
-from action_assistant.errors import BadInput, NotFound
+from action_assistant.errors import BadInput, NotFound, TooLarge
 from action_assistant.journal.journal import Journal
 from action_assistant.random_ids import random_id
 from action_assistant.schema import editor_tables
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.json.embedded import UmrfGraph
+from action_assistant.umrf.run_size import MOST_ACTIONS, MOST_INSIDE, excess
 from action_assistant.web.auth.keys import PersonRef
 
 LABEL_LIMIT: Final = 200  # characters
@@ -96,7 +97,8 @@ class Versions:
         pinned as they are now.
 
         Without label and note it is the one that was published at that seq before, with the same graphs
-        inside, if there is one. Raises NotFound, Conflict, BadInput.
+        inside, if there is one. What is too large to be run is not published: a start would be refused. Raises
+        NotFound, Conflict, BadInput, TooLarge.
         """
         label, note = _within_limits(label, note)
         sight = await self._graph_reader.moment(graph, seq)
@@ -104,6 +106,7 @@ class Versions:
         stamp = codec.Stamp(graph=graph, version=made, run=None)
         inside = await self._checks.inside(sight)
         found = await self._graph_reader.ask(contents.released, sight, stamp, inside)
+        _require_runnable(found, inside)
         if not label and not note:
             for row in await self._rows(graph, sight.seq):
                 if (row.tree_digest or row.digest) == found.tree_digest:
@@ -181,6 +184,18 @@ def _of_graph(graph: str) -> Select[Any]:
     version = editor_tables.version.c
     chosen = select(editor_tables.version).where(version.graph == graph)
     return chosen.order_by(version.event_seq.desc())
+
+
+def _require_runnable(found: contents.Released, inside: contents.Inside) -> None:
+    """Raises TooLarge where the runner would refuse to start the version for its size."""
+    if inside.cut:
+        raise TooLarge(
+            "Not published: more is inside of the graph than can be run. At most "
+            f"{MOST_INSIDE} graphs are run inside of one, and {MOST_ACTIONS:,} actions together."
+        )
+    too_large = excess(found.size)
+    if too_large is not None:
+        raise TooLarge(f"Not published, since it could not be started: {too_large}")
 
 
 def _within_limits(label: str, note: str) -> tuple[str, str]:

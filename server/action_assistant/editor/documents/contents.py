@@ -20,6 +20,7 @@ from action_assistant.umrf.files import codec
 from action_assistant.umrf.json.text import parse_small
 from action_assistant.umrf.model import Action, Graph, Problem
 from action_assistant.umrf.problem_kinds import ToldCounts, told_counts
+from action_assistant.umrf.run_size import RunSize
 
 _REMEMBERED: Final = 32  # moments of graphs
 _ACTIONS: Final = 20_000  # of them together, besides the newest
@@ -212,12 +213,13 @@ class ReleasedPart(msgspec.Struct, frozen=True):
 
 
 class Released(msgspec.Struct, frozen=True):
-    """What a version is."""
+    """What a version is. `size`: of the graph together with those inside."""
 
     digest: str
     umrf: bytes
     tree_digest: str
     parts: tuple[ReleasedPart, ...]
+    size: RunSize
 
 
 def released(sight: GraphAtSeq, stamp: codec.Stamp, inside: Inside) -> Released:
@@ -226,7 +228,10 @@ def released(sight: GraphAtSeq, stamp: codec.Stamp, inside: Inside) -> Released:
     parts = tuple(_part(name, each) for name, each in inside.graphs)
     own = digest(graph)
     tree = tree_digest(own, ((each.name, each.digest) for each in parts))
-    return Released(own, _text(graph, stamp), tree, parts)
+    text = _text(graph, stamp)
+    texts = len(text) + sum(len(part.umrf) for part in parts)
+    actions = sum(len(each.actions) for each in (graph, *graphs_of(inside).values()))
+    return Released(own, text, tree, parts, RunSize(texts, actions, len(parts)))
 
 
 def _part(name: str, sight: GraphAtSeq) -> ReleasedPart:

@@ -11,13 +11,14 @@ from action_assistant.runner.links.port import SIMULATOR
 from action_assistant.runner.links.simulator import slowed
 from action_assistant.runner.runs.events import Override, RunSubgraph
 from action_assistant.runner.sent_graph import SentGraph, read_sent
-from action_assistant.runner.sent_subgraphs import SentSubgraph, read_inside, tree_of
+from action_assistant.runner.sent_subgraphs import Inner, SentSubgraph, read_inside, tree_of
 from action_assistant.umrf.check import STRUCTURAL, blocking, check
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.laps import Laps, laps
 from action_assistant.umrf.model import Graph, Problem
+from action_assistant.umrf.run_size import RunSize, excess
 from action_assistant.umrf.semantics import SCRIPT, Script, script_from
 
 T = TypeVar("T")
@@ -27,7 +28,6 @@ _WIRE_NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
 #: What the simulator may read: anything that can be printed, but no format directives.
 _PLAIN_NAME: Final = re.compile(r"[^%\x00-\x1f\x7f\u2028\u2029]{1,200}")
 _SHOWN: Final = 20  # problems in an answer
-_ACTIONS: Final = 5_000  # as in the editor
 _KEPT: Final = 40  # problems of a kind that somebody could be shown
 
 
@@ -102,7 +102,7 @@ def decoded(body: bytes, kind: type[T]) -> T:
 
 
 def admit(asked: StartRequest, facts: EngineFacts, *, approved: bool = True) -> Admitted:
-    """Check text, digest, names and problems. Raises BadInput, NotUmrf, Conflict. Before a graph is
+    """Check text, digest, size, names and problems. Raises BadInput, NotUmrf, TooLarge, Conflict. Before a graph is
     `approved` nobody needs to know its digest."""
     text, reading = read_sent(bytes(asked.umrf))
     stamp = codec.stamp_of(text)
@@ -114,6 +114,7 @@ def admit(asked: StartRequest, facts: EngineFacts, *, approved: bool = True) -> 
             where={"path": "/digest"},
         )
     subgraphs, inside = read_inside(asked.subgraphs, found, asked.tree_digest, approved=approved)
+    _check_size(text, reading.graph, subgraphs, inside)
     for graph in (reading.graph, *inside.values()):
         check_names(graph, simulated=asked.engine == SIMULATOR)
     found_in_it = check(reading.graph, None, facts, inside)
@@ -139,8 +140,6 @@ def prepared(
     admitted = admit(asked, facts, approved=approved)
     graph = admitted.graph
     inside = [action for each in admitted.inside.values() for action in each.actions]
-    if len(graph.actions) + len(inside) > _ACTIONS:
-        raise TooLarge(f"A graph that is started has at most {_ACTIONS:,} actions.")
     errors = [each for each in admitted.problems if each.severity == "error"]
     warnings = [each for each in admitted.problems if each.severity != "error"]
     return Prepared(
@@ -157,6 +156,15 @@ def prepared(
         inner=tuple(sorted({each.name for each in inside if not each.missing})),
         tree_digest=tree_of(admitted.digest, admitted.subgraphs),
     )
+
+
+def _check_size(text: bytes, graph: Graph, subgraphs: Sequence[RunSubgraph], inside: Inner) -> None:
+    """Refuse what the editor refuses to publish. Raises TooLarge."""
+    texts = len(text) + sum(len(each.umrf.encode()) for each in subgraphs)
+    actions = sum(len(each.actions) for each in (graph, *inside.values()))
+    too_large = excess(RunSize(texts, actions, len(inside)))
+    if too_large is not None:
+        raise TooLarge(too_large)
 
 
 def check_names(graph: Graph, *, simulated: bool) -> None:

@@ -36,13 +36,14 @@ from action_assistant.runner.robots.robot_events import (
     IndexWritten,
 )
 from action_assistant.runner.runs.events import Author
-from action_assistant.runner.sent_subgraphs import MOST_INSIDE, SentSubgraph, read_inside
+from action_assistant.runner.sent_subgraphs import SentSubgraph, read_inside
 from action_assistant.runner.start.admission import check_names, decoded
 from action_assistant.runner.start.subgraph_items import of_index
 from action_assistant.umrf.check import STRUCTURAL, blocking, check
 from action_assistant.umrf.facts import EngineFacts, facts_of
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
+from action_assistant.umrf.run_size import MOST_INSIDE
 from action_assistant.web.workers.lanes import RunInWorker
 
 #: Something that waits for a disk, done apart from the loop.

@@ -36,6 +36,7 @@ MOST: Final = 5_000
 #: Reasons that are told: they are the same wherever a graph stands, and may double with each level.
 REASONS: Final = 100
 DEEPEST: Final = 32
+_SAID: Final = 1_000_000_000  # actions: more are not counted out in a message
 
 
 class FlatOrigin(msgspec.Struct, frozen=True):
@@ -80,6 +81,11 @@ def flattened(
     whole = _Hierarchy(graphs, known)
     if not any(whole.is_sub(action) for action in graph.actions):
         return Flattened(graph, tuple(_plain(graph)))
+    actions = whole.actions_of(graph)
+    if actions > MOST:
+        said = f"{actions:,}" if actions <= _SAID else f"more than {_SAID:,}"
+        message = f"One graph would have {said} actions; {MOST:,} are the most."
+        return _unflattenable([FlatteningReason("too-large", message)])
     found = whole.level(graph, ())
     actors = {*whole.actors, *(action.actor for action in graph.actions)} - {""}
     if len(actors) > 1:
@@ -123,6 +129,24 @@ class _Hierarchy:
     def is_sub(self, action: Action) -> bool:
         """Whether an action is called like an indexed graph, and like no action."""
         return not action.missing and action.name in self.graphs and action.name not in self.known
+
+    def actions_of(self, graph: Graph) -> int:
+        """How many actions one graph would have: counted before anything is made, since that may double
+        with each level. What contains itself, or lies too deep, counts once and is refused elsewhere."""
+        counts: dict[str, int] = {}
+
+        def count(of: Graph, above: tuple[str, ...]) -> int:
+            return sum(one(action, above) for action in of.actions)
+
+        def one(action: Action, above: tuple[str, ...]) -> int:
+            name = action.name
+            if not self.is_sub(action) or name in above or len(above) > DEEPEST:
+                return 1
+            if name not in counts:
+                counts[name] = count(self.graphs[name], (*above, name))
+            return counts[name]
+
+        return count(graph, (graph.name,))
 
     def level(self, graph: Graph, above: tuple[str, ...]) -> _Found:
         """One graph and all that is in it. `above`: the graphs around it."""
