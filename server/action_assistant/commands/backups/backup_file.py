@@ -98,12 +98,12 @@ class Packer:
 
     def text(self, name: str, content: bytes) -> None:
         """Take in a file that is nowhere."""
-        self._zip.writestr(name, content)
+        self._write(name, content)
         self.files[name] = BackupPart(len(content), hashlib.sha256(content).hexdigest())
 
     def close(self, about: BackupManifest, target: Path, prove: Callable[[Path], None]) -> None:
         """Say what it is, have it proven, and put it into its place."""
-        self._zip.writestr(_ABOUT, msgspec.json.format(msgspec.json.encode(about)))
+        self._write(_ABOUT, msgspec.json.format(msgspec.json.encode(about)))
         self._zip.close()
         self._raw.flush()
         os.fsync(self._raw.fileno())
@@ -115,6 +115,12 @@ class Packer:
     def abandon(self) -> None:
         """Let go of the file."""
         self._raw.close()
+
+    def _write(self, name: str, content: bytes) -> None:
+        # By `open`, which gives an entry no time: `writestr` does, and a zip has none before 1980, where
+        # the clock may be. The backup says itself when it was made.
+        with self._zip.open(name, "w") as here:
+            here.write(content)
 
     def _take(self, name: str, path: Path) -> BackupPart:
         entry = zipfile.ZipInfo(name) if path.suffix == ".gz" else name  # the former: as it is
