@@ -2,23 +2,60 @@
 
 import argparse
 import asyncio
-from collections.abc import Awaitable, Callable
+import sqlite3
+import sys
+from collections.abc import Awaitable, Callable, Iterable, Sequence
+from datetime import UTC, datetime
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+from sqlalchemy import make_url
+from sqlalchemy.exc import DBAPIError
 
 from action_assistant import paths, settings
-from action_assistant.errors import CannotStart, Unavailable
+from action_assistant.errors import CannotStart, Refused, Unavailable
+from action_assistant.journal import foreign_schema, heads
 from action_assistant.journal.chain import Damage
 from action_assistant.journal.copies.before_upgrade import FOLDER
-from action_assistant.journal.database import Branch
-from action_assistant.journal.events import Fold
+from action_assistant.journal.database import Branch, cause_of
+from action_assistant.journal.events import Event, Fold
 from action_assistant.journal.journal import Journal
 from action_assistant.settings import settled
 
+if TYPE_CHECKING:
+    from action_assistant.commands import head_line
+
 
 def _add_verify(verify: argparse.ArgumentParser) -> None:
-    verify.epilog = "example: action-assistant verify --data ./data"
+    verify.epilog = (
+        "example: action-assistant verify --data ./data; "
+        "action-assistant verify --head --sign ~/heads.pem >> heads.txt; "
+        "action-assistant verify --against heads.txt --key ~/heads.pem"
+    )
     _where(verify)
+    verify.add_argument(
+        "--head",
+        action="store_true",
+        help="print one line to keep elsewhere, which shows later whether somebody has altered the logs "
+        "and made their chain anew",
+    )
+    verify.add_argument(
+        "--sign",
+        type=Path,
+        metavar="KEY",
+        help="sign that line by an ed25519 key (PEM) that is not in the data folder",
+    )
+    verify.add_argument(
+        "--against",
+        metavar="LINE",
+        help="compare the logs with such a line, or with each line of a file",
+    )
+    verify.add_argument(
+        "--key",
+        type=Path,
+        metavar="KEY",
+        help="with --against: the key, private or public (PEM), that has to have signed each line",
+    )
     verify.set_defaults(handler=_verify)
 
 
@@ -44,16 +81,125 @@ def _where(parser: argparse.ArgumentParser) -> None:
 
 
 def _verify(options: argparse.Namespace) -> int:
+    data = options.data.resolve()
+    makes_line = options.head or options.sign is not None
+    if makes_line and options.against is not None:
+        raise CannotStart("Make a line by --head, or compare with one by --against, and not both.")
+    if options.key is not None and options.against is None:
+        raise CannotStart("--key proves lines of --against; a new line is signed by --sign.")
+    from action_assistant.commands import head_line  # loads what signs, which takes a while
+
+    signing = None if options.sign is None else head_line.signing_key(options.sign, data)
+    proving = None if options.key is None else head_line.proving_key(options.key, data)
+    given = [head_line.read(line, proving) for line in _lines(options.against)]
+    now: dict[Branch, heads.LogHead] = {}
+    journals = _journals(options)
+    strange = {each.branch: _strange(each) for each in journals}
+    for branch, sentences in strange.items():
+        for sentence in sentences:
+            _say(f"{branch}: {sentence}", makes_line)
+
     async def look(branch: Branch, journal: Journal) -> bool:
         events = await journal.position()
         damages = await journal.verify()
         for damage in damages:
-            print(f"{branch}: {_sentence(damage)}")
-        if not damages:
-            print(f"{branch}: {events} events, all of them sound")
-        return not damages
+            _say(f"{branch}: {_sentence(damage)}", makes_line)
+        if damages or strange[branch]:
+            return False
+        _say(f"{branch}: {events} events, all of them sound", makes_line)
+        if makes_line:
+            now[branch] = await _head(journal, branch, events, data)
+        outcomes = [await _is_as_then(journal, branch, line, events, data) for line in given]
+        return all(outcomes)
 
-    return _for_each(options, look)
+    code = _for_each(data, journals, look)
+    for line in given:
+        for branch in line.heads.keys() - strange.keys():
+            print(f"{branch}: the line of {line.time} speaks of it, and it is not there")
+            code = 1
+    if makes_line and code == 0:
+        at = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+        print(head_line.written(at, now, signing))
+    return code
+
+
+def _say(sentence: str, is_aside: bool) -> None:
+    """Print a sentence; beside a line that somebody keeps it is none of the output."""
+    print(sentence, file=sys.stderr if is_aside else sys.stdout)
+
+
+def _lines(given: str | None) -> list[str]:
+    """Return the lines of --against: one, or those of a file. Raises CannotStart."""
+    if given is None:
+        return []
+    if "action-assistant-heads" in given:
+        return [given]
+    try:
+        lines = [line for line in Path(given).read_text().splitlines() if line.strip()]
+    except (OSError, ValueError) as error:
+        raise CannotStart(
+            f"{given} is neither a line of `verify --head` nor a file of them."
+        ) from error
+    if not lines:
+        raise CannotStart(f"{given} holds no line of `verify --head`.")
+    return lines
+
+
+def _strange(journal: "_KnownJournal") -> list[str]:
+    """Return what stands in the schema of a journal that is not ours, in words. A database on a server may
+    hold what is others'."""
+    if not journal.url.startswith("sqlite:"):
+        return []
+    path = Path(make_url(journal.url).database or "")
+    try:
+        return foreign_schema.look(path, journal.branch).sentences()
+    except sqlite3.Error as error:
+        return [f"its schema cannot be read: {error}"]
+
+
+async def _head(journal: Journal, branch: Branch, position: int, data: Path) -> heads.LogHead:
+    """Return where a log ended at a position. Raises OSError, Refused."""
+    from action_assistant.runner.archives import archive_file
+
+    folder = settings.keep(data).folder
+
+    def kept(place: str) -> Iterable[Event]:
+        path = folder / place
+        if not path.resolve().is_relative_to(folder):
+            raise OSError(f"{place} leads out of {folder}")
+        return archive_file.read(path)
+
+    return await heads.head_at(journal, branch, position, kept)
+
+
+async def _is_as_then(
+    journal: Journal, branch: Branch, line: "head_line.HeadLine", events: int, data: Path
+) -> bool:
+    """Say whether a log still begins as a line tells."""
+    then = line.heads.get(branch)
+    if then is None:
+        print(f"{branch}: the line of {line.time} does not speak of it")
+        return True
+    if then.position > events:
+        print(
+            f"{branch}: it had {then.position} events at {line.time}, and has {events}: the others were "
+            "removed, or an older backup was restored"
+        )
+        return False
+    try:
+        found = await _head(journal, branch, then.position, data)
+    except (OSError, Refused) as error:
+        why = error.detail if isinstance(error, Refused) else str(error)
+        print(f"{branch}: cannot be compared with the line of {line.time}: {why}")
+        return False
+    if found.digest != then.digest:
+        print(
+            f"{branch}: is NOT what it was at {line.time}: one of its first {then.position} events was "
+            "altered since, and the chain was made anew"
+        )
+        return False
+    print(f"{branch}: its first {then.position} events are those of {line.time}")
+    return True
 
 
 def _rebuild(options: argparse.Namespace) -> int:
@@ -61,27 +207,42 @@ def _rebuild(options: argparse.Namespace) -> int:
         print(f"{branch}: tables made again from {await journal.rebuild()} events")
         return True
 
-    return _for_each(options, again)
+    return _for_each(options.data.resolve(), _journals(options), again)
 
 
-def _for_each(
-    options: argparse.Namespace, handler: Callable[[Branch, Journal], Awaitable[bool]]
-) -> int:
-    """Do it to every journal that there is; 1 unless all went well. Raises CannotStart."""
+class _KnownJournal(NamedTuple):
+    """One journal of a data folder, and how its events become tables."""
+
+    branch: Branch
+    url: str
+    fold: Fold
+
+
+def _journals(options: argparse.Namespace) -> list[_KnownJournal]:
+    """Return every journal that there is. Raises CannotStart where there is none."""
     from action_assistant.editor.log import database_location
     from action_assistant.editor.log.graph_events import fold as editor_fold
     from action_assistant.runner.projection import fold as runner_fold
 
     data = options.data.resolve()
     settled(data)
-    found: list[tuple[Branch, str, Fold]] = []
+    found: list[_KnownJournal] = []
     url = database_location.journal_of(data, options.database)
     if url is not None:
-        found.append(("editor", url, editor_fold))
+        found.append(_KnownJournal("editor", url, editor_fold))
     if (data / "runner.db").is_file():
-        found.append(("runner", f"sqlite:///{data / 'runner.db'}", runner_fold))
+        found.append(_KnownJournal("runner", f"sqlite:///{data / 'runner.db'}", runner_fold))
     if not found:
         raise CannotStart(f"There is no journal in {data}.")
+    return found
+
+
+def _for_each(
+    data: Path,
+    journals: Sequence[_KnownJournal],
+    handler: Callable[[Branch, Journal], Awaitable[bool]],
+) -> int:
+    """Do it to every journal; 1 unless all went well. Raises CannotStart."""
 
     async def one(branch: Branch, url: str, fold: Fold) -> bool:
         journal = await Journal.open(url, branch=branch, fold=fold, copies=data / FOLDER)
@@ -93,7 +254,14 @@ def _for_each(
         finally:
             await journal.close()
 
-    outcomes = [asyncio.run(one(*each)) for each in found]
+    outcomes = []
+    for each in journals:
+        try:
+            outcomes.append(asyncio.run(one(*each)))
+        except DBAPIError as error:
+            raise CannotStart(
+                f"Cannot open the journal of the {each.branch}: {cause_of(error)}."
+            ) from error
     return 0 if all(outcomes) else 1
 
 

@@ -136,6 +136,8 @@ def _tell(done: FinishedBackup, data: Path, off_site: OffSite | None) -> int:
     for path in left_out(data):
         if path != Path(made.file):
             print(f"left out, since it is not this program's: {path}", file=sys.stderr)
+    for each in done.strangers:
+        print(f"left out, since it is not this program's: {each}", file=sys.stderr)
     for each in made.missing:
         print(f"missing: {each}")
     if off_site is not None and off_site.why is not None:

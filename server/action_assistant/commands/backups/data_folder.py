@@ -14,12 +14,13 @@ from typing import Any, Final
 
 import msgspec
 from sqlalchemy import Row, Select, select
+from sqlalchemy.exc import DBAPIError
 
 from action_assistant.commands.backups.progress import Progress
 from action_assistant.errors import CannotStart
 from action_assistant.journal.copies import backup_state, before_upgrade
 from action_assistant.journal.copies.copying import sentence
-from action_assistant.journal.database import Branch
+from action_assistant.journal.database import Branch, cause_of
 from action_assistant.journal.databases import database_of
 from action_assistant.journal.events import Fold
 from action_assistant.journal.journal import Journal
@@ -205,8 +206,8 @@ def workshop(parent: Path, prefix: str) -> Iterator[Path]:
                 yield Path(folder)
             finally:
                 os.close(held)
-    except (OSError, sqlite3.Error) as error:
-        text = error.strerror if isinstance(error, OSError) else str(error)
+    except (OSError, sqlite3.Error, DBAPIError) as error:
+        text = error.strerror if isinstance(error, OSError) else cause_of(error)
         raise CannotStart(f"Cannot work in {parent}: {text}.") from error
 
 

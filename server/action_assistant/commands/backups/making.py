@@ -35,6 +35,7 @@ from action_assistant.errors import CannotStart
 from action_assistant.journal.copies.backup_state import BackupMade
 from action_assistant.journal.database import Branch
 from action_assistant.journal.databases import ask_once, database_of
+from action_assistant.journal.foreign_schema import remove_strangers
 from action_assistant.schema.editor_tables import invitation
 from action_assistant.version import VERSION
 from action_assistant.web.auth.keys import TOKEN_FILE
@@ -50,11 +51,13 @@ _ROOM: Final = 64 << 20  # bytes that have to be left on the disk
 
 
 class FinishedBackup(msgspec.Struct, frozen=True):
-    """What was made, and what stands in it."""
+    """What was made, and what stands in it. `strangers`: what journals have in their schema that is not this
+    program's, and was left out."""
 
     made: BackupMade
     journals: Mapping[Branch, JournalCopy]
     files: Mapping[str, BackupPart]
+    strangers: tuple[str, ...] = ()
 
 
 def make_backup(
@@ -64,10 +67,13 @@ def make_backup(
     begun, at, sources = time.monotonic(), time.time(), _sources(data, database)
     _check_room(data, sources, target.parent)
     with workshop(target.parent, WORK) as folder:
-        events = {
-            branch: _copied(source, branch, folder / f"{branch}.db", progress)
-            for branch, source in sources.items()
-        }
+        events: dict[Branch, int] = {}
+        strangers: list[str] = []
+        for branch, source in sources.items():
+            path = folder / f"{branch}.db"
+            _copy(source, branch, path, progress)
+            strangers += (f"{branch}: {each}" for each in remove_strangers(path, branch))
+            events[branch] = checked(path, branch, progress)
         packer = Packer(folder, progress)
         try:
             journals = {
@@ -96,7 +102,7 @@ def make_backup(
         missing=missing,
         proven=True,
     )
-    return FinishedBackup(made, journals, packer.files)
+    return FinishedBackup(made, journals, packer.files, tuple(strangers))
 
 
 def _sources(data: Path, database: str | None) -> dict[Branch, str]:
@@ -157,8 +163,8 @@ def _read_back(part: Path, progress: Progress) -> None:
         package.close()
 
 
-def _copied(source: str, branch: Branch, target: Path, progress: Progress) -> int:
-    """A journal as it is at one moment, in a SQLite file; its events, all of which are sound."""
+def _copy(source: str, branch: Branch, target: Path, progress: Progress) -> None:
+    """Copy a journal as it is at one moment into a SQLite file."""
     from action_assistant.journal.copies.copying import copy
 
     target.touch(mode=0o600)
@@ -172,7 +178,6 @@ def _copied(source: str, branch: Branch, target: Path, progress: Progress) -> in
             fold=fold_of(branch),
             tell=lambda count: progress.tell(f"{branch}: {count} events read"),
         )
-    return checked(target, branch, progress)
 
 
 def _fill(packer: Packer, data: Path, folder: Path, progress: Progress) -> tuple[str, ...]:

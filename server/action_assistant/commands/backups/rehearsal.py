@@ -22,6 +22,7 @@ from action_assistant.errors import CannotStart, Refused
 from action_assistant.journal.copies import backup_state
 from action_assistant.journal.copies.backup_state import BackupRehearsed
 from action_assistant.journal.database import Branch
+from action_assistant.journal.foreign_schema import remove_strangers
 from action_assistant.journal.journal import Journal
 from action_assistant.schema import editor_tables, runner_tables
 from action_assistant.web.auth.keys import TOKEN_FILE
@@ -119,6 +120,10 @@ def _look(source: Path, folder: Path, found: Findings, progress: Progress) -> No
     }
     for branch, held in about.journals.items():
         path = folder / f"{branch}.db"
+        found.wrong += [
+            f"{branch}: this program has not made {each}; `restore` drops it."
+            for each in remove_strangers(path, branch)
+        ]
         events = checked(path, branch, progress, expected=held.events)
         found.looked_at.append(f"{branch}: {events} events, all of them sound")
         asyncio.run(_opened(path, branch, looks[branch], found, progress))

@@ -38,6 +38,7 @@ from action_assistant.commands.backups.progress import Progress
 from action_assistant.errors import CannotStart
 from action_assistant.journal.database import Branch
 from action_assistant.journal.databases import ask_once, database_of
+from action_assistant.journal.foreign_schema import remove_strangers
 from action_assistant.private_files import opener, sync
 from action_assistant.schema.editor_tables import editor_event
 from action_assistant.web.auth.keys import TOKEN_FILE
@@ -80,13 +81,17 @@ def restore(options: argparse.Namespace) -> int:
                 locks.callback(os.close, _locked(data, branch))
             sweep(data, _WORK)
             package.unpack(folder, progress)
+            dropped: list[str] = []
             for branch, held in about.journals.items():
                 path = folder / f"{branch}.db"
+                dropped += (f"{branch}: {each}" for each in remove_strangers(path, branch))
                 checked(path, branch, progress, expected=held.events, anew=True)
             aside, kept = _put(folder, data, url, about, progress)
     finally:
         package.close()
     progress.end()
+    for each in dropped:
+        print(f"dropped, since this program has not made it: {each}")
     _tell(about, url, data, aside, kept)
     return 0
 

@@ -1,0 +1,80 @@
+"""Where each stream of a log ended at an earlier moment, and one digest of all of that.
+
+Whoever can write into a database can alter an event and make the chain anew from there: the log is then
+sound in itself. It has other heads, which a digest that is kept elsewhere shows.
+"""
+
+import hashlib
+from collections.abc import Callable, Iterable
+from typing import Final
+
+import msgspec
+from sqlalchemy import and_, func, select
+
+from action_assistant.journal.chain import NOTHING, Head, link
+from action_assistant.journal.database import Branch
+from action_assistant.journal.events import Event
+from action_assistant.journal.reader import JournalReader
+from action_assistant.journal.removal import STREAM, StreamRemoved
+from action_assistant.schema.editor_tables import editor_event
+
+_event: Final = editor_event.c
+
+#: Reads the events of a stream that was taken out, from the file that it is kept as. Raises OSError, Refused.
+ReadKept = Callable[[str], Iterable[Event]]
+
+
+class LogHead(msgspec.Struct, frozen=True):
+    """Where a log ended: its last position, and the digest of all heads, in hex."""
+
+    position: int
+    digest: str
+
+
+async def head_at(
+    journal: JournalReader, branch: Branch, position: int, read_kept: ReadKept
+) -> LogHead:
+    """Return where a log ended at a position. Raises OSError, Refused."""
+    return LogHead(
+        position, digest_of(branch, position, await heads_at(journal, position, read_kept))
+    )
+
+
+async def heads_at(journal: JournalReader, position: int, read_kept: ReadKept) -> dict[str, Head]:
+    """Return the head of each stream after the event at this position, whatever came since. Streams that
+    were taken out since are read where they are kept. Raises OSError, Refused, Unavailable."""
+    last = (
+        select(_event.stream, func.max(_event.seq).label("seq"))
+        .where(_event.position <= position)
+        .group_by(_event.stream)
+        .subquery()
+    )
+    ends = select(_event.stream, _event.seq, _event.chain).join(
+        last, and_(_event.stream == last.c.stream, _event.seq == last.c.seq)
+    )
+    heads = {row.stream: Head(row.seq, bytes(row.chain)) for row in await journal.query(ends)}
+    said = select(_event.position, _event.body).where(
+        _event.stream == STREAM, _event.kind == StreamRemoved.kind
+    )
+    for row in await journal.query(said.order_by(_event.position)):
+        removed = msgspec.json.decode(row.body, type=StreamRemoved)
+        end = removed.end if row.position <= position else _end(read_kept(removed.kept), position)
+        if end.seq > heads.get(removed.stream, NOTHING).seq:
+            heads[removed.stream] = end
+    return heads
+
+
+def digest_of(branch: Branch, position: int, heads: dict[str, Head]) -> str:
+    """Return the SHA-256 of all heads, in hex."""
+    parts = sorted((stream, head.seq, head.chain) for stream, head in heads.items())
+    return hashlib.sha256(msgspec.msgpack.encode((branch, position, parts))).hexdigest()
+
+
+def _end(events: Iterable[Event], position: int) -> Head:
+    """Return the head of a stream after a position."""
+    head = NOTHING
+    for event in events:
+        if event.position > position:
+            break
+        head = Head(event.seq, link(head.chain, event))
+    return head
