@@ -71,7 +71,7 @@ def test_a_sound_graph_has_no_problems() -> None:
 @pytest.mark.parametrize(
     ("value", "code", "severity"),
     [
-        (file(A, B, graph_name=""), "graph-name-empty", "warning"),
+        (file(A, B, graph_name=""), "graph-name-empty", "error"),
         (file(A, B, graph_name=5), "value-type", "error"),
         (file(A, B, graph_description=[]), "value-type", "error"),
         (file(A | {"name": ""}, B, entry=[]), "name-empty", "error"),

@@ -9,9 +9,13 @@ from action_assistant.umrf.checks.flow import check_flow
 from action_assistant.umrf.checks.places import Subject
 from action_assistant.umrf.checks.scenarios import check_scenarios
 from action_assistant.umrf.checks.structure import check_structure
-from action_assistant.umrf.checks.subgraphs import CERTAIN, Resolution, check_subgraphs
+from action_assistant.umrf.checks.subgraphs import (
+    CERTAIN,
+    Resolution,
+    check_subgraphs,
+)
 from action_assistant.umrf.checks.values import check_static, check_values
-from action_assistant.umrf.codes import REFUSED, STRUCTURAL, rank
+from action_assistant.umrf.codes import FINAL, REFUSED, STRUCTURAL, rank
 from action_assistant.umrf.facts import PINNED, EngineFacts
 from action_assistant.umrf.files.codec import ActionReading, Reading
 from action_assistant.umrf.files.origins import placed
@@ -26,6 +30,7 @@ __all__ = [
     "check_action",
     "check_reading",
     "check_written",
+    "is_final",
     "refused_by_parser",
 ]
 
@@ -107,13 +112,18 @@ def refused_by_parser(reading: Reading) -> list[Problem]:
 
 
 def blocking(problems: Collection[Problem], *, overridden: Collection[str] = ()) -> list[Problem]:
-    """The errors that forbid a start; structural ones whatever is overridden."""
+    """The errors that forbid a start; those that are final whatever is overridden."""
     return [
         problem
         for problem in problems
-        if problem.severity == "error"
-        and (problem.code in STRUCTURAL or problem.code not in overridden)
+        if problem.severity == "error" and (is_final(problem) or problem.code not in overridden)
     ]
+
+
+def is_final(problem: Problem) -> bool:
+    """Whether nobody can override this error: its code is final, or that of what it is about inside."""
+    inner = problem.inside.code if problem.inside is not None else problem.code
+    return problem.severity == "error" and not FINAL.isdisjoint({problem.code, inner})
 
 
 def _check_actors(subject: Subject) -> None:

@@ -10,9 +10,9 @@ import msgspec
 from action_assistant.umrf.model import Problem, Severity
 
 #: `unreadable`: no graph at all; `refused`: the engine's parser refuses the text; `structural`: its
-#: parser takes it, its start does not; `hazard`: of docs/umrf-and-the-engine.md 3; `other`: the
+#: parser takes it, its start does not; `unsendable`: no robot is sent it; `hazard`: of docs/umrf-and-the-engine.md 3; `other`: the
 #: rest.
-Kind: TypeAlias = Literal["unreadable", "refused", "structural", "hazard", "other"]
+Kind: TypeAlias = Literal["unreadable", "refused", "structural", "unsendable", "hazard", "other"]
 
 
 class Code(msgspec.Struct, frozen=True):
@@ -78,6 +78,18 @@ CODES: Final[dict[str, Code]] = {
     "H6": Code(
         "structural", _ERROR, "two actions with one full name, or one called like an end",
         "the start throws, and a broken graph stays in the engine", ("renumber",),
+    ),
+    # What is sent to no robot
+    "graph-name": Code(
+        "unsendable", _ERROR, "control characters, `%`, or more than 200 characters in the graph's name",
+        "nothing is sent: no log or file can carry the name, and the engine dies of `%` when it logs an error about it",
+    ),
+    "graph-name-empty": Code(
+        "unsendable", _ERROR, "an empty `graph_name`", "nothing is sent: nobody could tell in a log or a Stop which graph is meant",
+    ),
+    "action-name": Code(
+        "unsendable", _ERROR, "control characters, `%`, or more than 200 characters in an action's name",
+        "as for the name of a graph",
     ),
     # Hazards
     "H1": Code(
@@ -149,8 +161,6 @@ CODES: Final[dict[str, Code]] = {
         "the engine refuses to start the graph",
     ),
     # The rest
-    "graph-name": Code("other", _ERROR, "control characters in the graph's name", "no topic, file or log can carry it"),
-    "graph-name-empty": Code("other", _WARNING, "an empty `graph_name`", "nobody can tell the graph from others"),
     "instance-id-cut": Code("other", _WARNING, "a number with decimals", "the engine cuts them"),
     "name-class": Code("other", _WARNING, "a name that no C++ class can have", "no action package can have it; a sub-graph may"),
     "name-reserved": Code("other", _WARNING, "`graph_entry` or `graph_exit` with another number than 0", "the engine never runs the action, and leaves it out of what it prints"),
@@ -181,6 +191,10 @@ REFUSED: Final = frozenset(name for name, code in CODES.items() if code.kind == 
 #: Codes that block every engine and cannot be overridden.
 STRUCTURAL: Final[frozenset[str]] = REFUSED | {
     name for name, code in CODES.items() if code.kind == "structural"
+}
+#: Codes of errors that nobody can override: those, and what no robot is sent.
+FINAL: Final[frozenset[str]] = STRUCTURAL | {
+    name for name, code in CODES.items() if code.kind == "unsendable"
 }
 
 #: Of what is possible, what comes first: it kills or blocks the engine, it cannot be stopped, it never

@@ -4,16 +4,29 @@ from typing import Any
 
 import msgspec
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from action_assistant.errors import BadInput, Conflict, NotUmrf, TooLarge
 from action_assistant.runner.runs.events import Override
 from action_assistant.runner.sent_graph import MOST, counted
-from action_assistant.runner.start.admission import admit, prepared, read_request
+from action_assistant.runner.sent_subgraphs import SentSubgraph
+from action_assistant.runner.start.admission import (
+    StartRequest,
+    admit,
+    prepared,
+    read_request,
+)
+from action_assistant.umrf.check import check, check_reading
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.facts import PINNED, SIMULATED
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph, Relation
 from runner.harness import GO_ON, order, sequence
+from strategies import graphs
+from support.doses import examples
+from support.recordings import CORPUS, NO_CORPUS
+from umrf.drawn import busy_graphs
 
 
 def one_sided(name: str = "lopsided") -> Graph:
@@ -68,12 +81,118 @@ def test_certain_harm_blocks_until_a_person_says_why_it_does_not_matter() -> Non
         admit(msgspec.structs.replace(asked, override=other), PINNED)
 
 
-@pytest.mark.parametrize("name", ["a b", "größe", "x" * 65, "1st", "a/b"])
-def test_names_for_robots_are_stricter_than_for_the_simulator(name: str) -> None:
-    asked = order(sequence(name))
-    assert admit(asked, SIMULATED).graph.name == name
-    with pytest.raises(Conflict, match="not safe"):
-        admit(msgspec.structs.replace(asked, engine="David"), PINNED)
+@pytest.mark.parametrize(
+    "name",
+    [
+        "Pick and place",
+        "pick-and-place",
+        "läuft",
+        "a.b",
+        "x" * 65,
+        "1st",
+        "a/b",
+        "日本語",
+        'it\'s "on"',
+    ],
+)
+def test_a_graph_goes_to_robots_under_any_name_that_engines_take(name: str) -> None:
+    asked = msgspec.structs.replace(order(sequence(name)), engine="David")
+    assert admit(asked, PINNED).graph.name == name
+    assert prepared(asked, PINNED, "run1").name == name
+
+
+BAD_NAMES = ["", "100%", "%n", "a\nb", "a\x00", "x" * 201, "a\u2028b", "\x9f"]
+
+
+@pytest.mark.parametrize("name", BAD_NAMES)
+@pytest.mark.parametrize("engine", ["simulator", "David"])
+def test_a_name_that_no_robot_is_sent_is_a_problem_of_the_check_that_nobody_overrides(
+    name: str, engine: str
+) -> None:
+    asked = msgspec.structs.replace(order(sequence(name)), engine=engine)
+    (told,) = [each.code for each in check(sequence(name)) if each.severity == "error"]
+    override = Override((told,), "because")
+    with pytest.raises(Conflict, match="cannot be overridden") as refused:
+        admit(msgspec.structs.replace(asked, override=override), PINNED)
+    where: Any = refused.value.where
+    assert [each["code"] for each in where["problems"]] == [told]
+
+
+def with_inner(inner: Graph) -> StartRequest:
+    """A start of a graph whose first action is this graph."""
+    outer = sequence("outer")
+    first = msgspec.structs.replace(outer.actions[0], name=inner.name)
+    outer = msgspec.structs.replace(outer, actions=(first, *outer.actions[1:]))
+    text = msgspec.Raw(codec.write(inner).encode())
+    sent = SentSubgraph(name=inner.name, digest=digest(inner), umrf=text)
+    return msgspec.structs.replace(order(outer), subgraphs=(sent,))
+
+
+def test_what_nobody_overrides_is_final_inside_of_a_sub_graph_too() -> None:
+    good = sequence("inner")
+    assert admit(with_inner(good), PINNED).inside.keys() == {"inner"}
+    odd = msgspec.structs.replace(good.actions[0], name="50%")
+    bad = msgspec.structs.replace(good, actions=(odd, *good.actions[1:]))
+    override = Override(("subgraph",), "because")
+    with pytest.raises(Conflict, match="cannot be overridden"):
+        admit(msgspec.structs.replace(with_inner(bad), override=override), PINNED)
+
+
+NAMES = st.one_of(st.text(max_size=4), st.sampled_from(["A", "A", "Pick and place", *BAD_NAMES]))
+
+
+@st.composite
+def named_graphs(draw: st.DrawFn) -> Graph:
+    """Graphs of all kinds, some with names that are not sent."""
+    graph = draw(st.one_of(graphs(), busy_graphs(), busy_graphs()))
+    if draw(st.booleans()):
+        return graph
+    actions = tuple(
+        msgspec.structs.replace(each, name=draw(NAMES)) if draw(st.booleans()) else each
+        for each in graph.actions
+    )
+    return msgspec.structs.replace(graph, name=draw(NAMES), actions=actions)
+
+
+def refusal_of(text: str, engine: str) -> set[str] | None:
+    """The codes for which a start of this text is refused; None where it is admitted."""
+    stamp = digest(codec.read(text).graph)
+    body = {"version": "v", "digest": stamp, "umrf": text, "engine": engine, "request_id": "r"}
+    facts = SIMULATED if engine == "simulator" else PINNED
+    try:
+        prepared(read_request(msgspec.json.encode(body)), facts, "run1")
+    except Conflict as refused:
+        found: Any = (refused.where or {})["problems"]
+        return {each["code"] for each in found}
+    return None
+
+
+def errors_of(text: str) -> set[str] | None:
+    found = {each.code for each in check_reading(codec.read(text)) if each.severity == "error"}
+    return found or None
+
+
+@given(named_graphs(), st.sampled_from(["simulator", "David"]))
+@settings(max_examples=examples(150), deadline=None, suppress_health_check=list(HealthCheck))
+def test_a_start_refuses_of_a_graph_what_the_check_calls_an_error_and_nothing_else(
+    graph: Graph, engine: str
+) -> None:
+    """A start may show fewer of many errors."""
+    text = codec.write(graph)
+    refused, errors = refusal_of(text, engine), errors_of(text)
+    assert (refused is None) == (errors is None), (refused, errors)
+    assert (refused or set()) <= (errors or set())
+
+
+@pytest.mark.skipif(not CORPUS.is_dir(), reason=NO_CORPUS)
+def test_a_start_refuses_of_real_files_what_the_check_calls_an_error() -> None:
+    for path in sorted(CORPUS.rglob("*.json")):
+        try:
+            text = path.read_bytes().decode()
+            codec.read(text)
+        except (UnicodeDecodeError, codec.Unreadable):
+            continue
+        assert (refusal_of(text, "David") is None) == (errors_of(text) is None), path.name
 
 
 def test_a_script_is_for_the_simulator_and_never_instant() -> None:

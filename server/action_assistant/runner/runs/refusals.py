@@ -53,7 +53,7 @@ class StartLog:
         if self._over or _OF_OTHERS.fullmatch(text):
             return False
         if not self._next:
-            self._next = text == f"{RECEIVED_START}{self._graph}"
+            self._next = text == f"{RECEIVED_START}{self._graph}".strip()
             return False
         self._over = True
         followed = text.startswith(_RECEIVED) or text == _ANOTHER_LIFE

@@ -12,7 +12,7 @@ from action_assistant.runner.links.simulator import slowed
 from action_assistant.runner.runs.events import Override, RunSubgraph
 from action_assistant.runner.sent_graph import SentGraph, read_sent
 from action_assistant.runner.sent_subgraphs import Inner, SentSubgraph, read_inside, tree_of
-from action_assistant.umrf.check import STRUCTURAL, blocking, check
+from action_assistant.umrf.check import blocking, check, is_final
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.files import codec
@@ -23,10 +23,6 @@ from action_assistant.umrf.semantics import SCRIPT, Script, script_from
 
 T = TypeVar("T")
 
-#: What robots may read: the engine puts names into format strings and file names.
-_WIRE_NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
-#: What the simulator may read: anything that can be printed, but no format directives.
-_PLAIN_NAME: Final = re.compile(r"[^%\x00-\x1f\x7f\u2028\u2029]{1,200}")
 _SHOWN: Final = 20  # problems in an answer
 _KEPT: Final = 40  # problems of a kind that somebody could be shown
 
@@ -102,7 +98,8 @@ def decoded(body: bytes, kind: type[T]) -> T:
 
 
 def admit(asked: StartRequest, facts: EngineFacts, *, approved: bool = True) -> Admitted:
-    """Check text, digest, size, names and problems. Raises BadInput, NotUmrf, TooLarge, Conflict. Before a graph is
+    """Check text, digest, size and problems. What is refused of the graph itself, but for its size, is a
+    problem that the check tells everywhere else, too. Raises BadInput, NotUmrf, TooLarge, Conflict. Before a graph is
     `approved` nobody needs to know its digest."""
     text, reading = read_sent(bytes(asked.umrf))
     stamp = codec.stamp_of(text)
@@ -115,8 +112,6 @@ def admit(asked: StartRequest, facts: EngineFacts, *, approved: bool = True) -> 
         )
     subgraphs, inside = read_inside(asked.subgraphs, found, asked.tree_digest, approved=approved)
     _check_size(text, reading.graph, subgraphs, inside)
-    for graph in (reading.graph, *inside.values()):
-        check_names(graph, simulated=asked.engine == SIMULATOR)
     found_in_it = check(reading.graph, None, facts, inside)
     problems = [*reading.problems, *reading.placed(found_in_it)]
     _check_problems(problems, asked.override)
@@ -167,26 +162,6 @@ def _check_size(text: bytes, graph: Graph, subgraphs: Sequence[RunSubgraph], ins
         raise TooLarge(too_large)
 
 
-def check_names(graph: Graph, *, simulated: bool) -> None:
-    """Refuse names of the graph and its actions that no engine, or not even the simulator, may read.
-    Raises Conflict."""
-    allowed = _PLAIN_NAME if simulated else _WIRE_NAME
-    names = [("graph", graph.name)]
-    names += [("action", action.name) for action in graph.actions if not action.missing]
-    for what, name in names:
-        if not allowed.fullmatch(name):
-            rule = (
-                "without % and control characters"
-                if simulated
-                else "a letter, then letters, digits and _, 64 at most"
-            )
-            raise Conflict(
-                f"The {what} name {name[:80]!r} is not safe to send to an engine; allowed is: "
-                f"{rule}.",
-                where={"path": "/umrf/graph_name" if what == "graph" else "/umrf/actions"},
-            )
-
-
 def _check_problems(problems: Sequence[Problem], override: Override | None) -> None:
     if override is not None and not override.reason.strip():
         raise BadInput("Say why the problems do not matter.", where={"path": "/override/reason"})
@@ -194,7 +169,7 @@ def _check_problems(problems: Sequence[Problem], override: Override | None) -> N
     left = blocking(list(problems), overridden=codes)
     if not left:
         return
-    never = sorted({problem.code for problem in left} & STRUCTURAL)
+    never = sorted({problem.code for problem in left if is_final(problem)})
     first = left[0]
     more = f" (and {len(left) - 1} more)" if len(left) > 1 else ""
     rule = (

@@ -37,9 +37,9 @@ from action_assistant.runner.robots.robot_events import (
 )
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.sent_subgraphs import SentSubgraph, read_inside
-from action_assistant.runner.start.admission import check_names, decoded
+from action_assistant.runner.start.admission import decoded
 from action_assistant.runner.start.subgraph_items import of_index
-from action_assistant.umrf.check import STRUCTURAL, blocking, check
+from action_assistant.umrf.check import blocking, check, is_final
 from action_assistant.umrf.facts import EngineFacts, facts_of
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
@@ -135,9 +135,8 @@ def _require_sound(
     place: int, graph: Graph, inside: Mapping[str, Graph], facts: EngineFacts
 ) -> None:
     """Nothing gets into an index that an engine must not read. Raises Conflict."""
-    check_names(graph, simulated=False)
     wrong = blocking(check(graph, None, facts, inside))
-    never = [each for each in wrong if each.code in STRUCTURAL]
+    never = [each for each in wrong if is_final(each)]
     if never:
         raise Conflict(
             f"{graph.name} cannot be written: {never[0].message}",

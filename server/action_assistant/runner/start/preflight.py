@@ -18,7 +18,7 @@ from action_assistant.runner.robots.engine import EngineIndex
 from action_assistant.runner.robots.foreign_graphs import foreign_graphs
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start.admission import Admitted, Prepared
-from action_assistant.umrf.check import STRUCTURAL, check
+from action_assistant.umrf.check import check, is_final
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph, Problem
@@ -110,7 +110,7 @@ def of_refusal(code: str, refused: Refused) -> Item:
         verdict="blocked",
         text=refused.detail,
         codes=codes,
-        overridable=bool(codes) and not STRUCTURAL & set(codes),
+        overridable=bool(codes) and not any(map(is_final, problems)),
         problems=problems,
     )
 

@@ -123,7 +123,7 @@ def check_loading(
             if outcome not in reports.get(action.key, ()):
                 continue
             listed = subject.outgoing.get(action.key, [])
-            if any(r.conditions.answer(outcome) != "ignore" for r in listed):
+            if any(r.conditions.answer(outcome) != "ignore" for r in listed) or len(found) > _ENDS:
                 continue
             if beside := together.at_end(action.key, outcome) - runs_at_once:
                 found.append((action, outcome, beside))
@@ -148,7 +148,7 @@ def check_endless(subject: Subject, reports: _Reports, together: Together) -> No
     if "H12" not in subject.facts.hazards or not lively:
         return
     found: list[tuple[Relation, list[Precondition], set[Key]]] = []
-    for relation in subject.incoming.get(EXIT, []):
+    for relation in subject.incoming.get(EXIT, [])[:_ENDS]:
         left: set[Key] = set()
         outcomes: list[Precondition] = []
         for outcome in PRECONDITIONS:

@@ -16,7 +16,9 @@ _TEXTS: Final = {"name", "type", "actor", "description", "graph_name", "graph_de
 _LISTS: Final = {"parents", "children", "graph_entry", "graph_exit", "actions"}
 _OBJECTS: Final = {"input_parameters", "output_parameters"}
 _CLASS: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
-_CONTROL: Final = re.compile(r"[\x00-\x1f\x7f]")
+_CONTROL: Final = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]")
+#: Characters of a name of a graph or an action.
+MAX_NAME: Final = 200
 #: Characters of a wrong text that are quoted.
 _SHOWN: Final = 80
 TYPES: Final = ("sync", "async", "spontaneous")
@@ -28,16 +30,11 @@ def check_structure(subject: Subject) -> None:
     for field, text in graph.extra:
         _check_known(subject, field, parse_small(text), f"/{field}", None)
     if not graph.name:
-        subject.report(
-            "graph-name-empty", "warning", "The graph has no name; nobody can tell it from others."
-        )
-    elif _CONTROL.search(graph.name):
-        subject.report(
-            "graph-name",
-            "error",
-            "The name of the graph contains control characters.",
-            member="/graph_name",
-        )
+        message = "The graph has no name: nobody can tell it from others, so no robot is sent it."
+        subject.report("graph-name-empty", "error", message)
+    elif why := _unsendable(graph.name):
+        message = f"The name of the graph {why}"
+        subject.report("graph-name", "error", message, member="/graph_name")
     for action in subject.real:
         _check_action(subject, action)
     _check_doubles(subject)
@@ -88,6 +85,9 @@ def _check_action(subject: Subject, action: Action) -> None:
         _check_known(subject, field, value, f"/{field}", action)
         if field == "instance_id" and (found := _check_number(value)):
             subject.report(*found, action=action, member="/instance_id")
+    if why := _unsendable(action.name):
+        message = f"The name of the action {why}"
+        subject.report("action-name", "error", message, action=action, member="/name")
     if not action.name and "name" not in extra:
         message = "The action has no name; the engine refuses the graph."
         subject.report("name-empty", "error", message, action=action, member="/name")
@@ -119,6 +119,18 @@ def _check_action(subject: Subject, action: Action) -> None:
     ):
         if field not in extra:
             _check_parameters(subject, action, field, parameters)
+
+
+def _unsendable(name: str) -> str | None:
+    """Why no robot is sent this name, as the end of a sentence. Blanks, letters of any script and other
+    characters are sent as they are: the engine takes them."""
+    if _CONTROL.search(name):
+        return "contains a control character, which no log or file can carry."
+    if "%" in name:
+        return "contains %: the engine logs errors about it as formats, and dies of that with every running graph."
+    if len(name) > MAX_NAME:
+        return f"has {len(name):,} characters; {MAX_NAME} can be sent."
+    return None
 
 
 def _check_reserved(subject: Subject, action: Action) -> None:

@@ -15,7 +15,7 @@ from action_assistant.umrf.checks.places import Subject, more
 from action_assistant.umrf.checks.scenarios import check_scenarios, halted
 from action_assistant.umrf.checks.structure import check_structure
 from action_assistant.umrf.checks.values import check_signature, check_values
-from action_assistant.umrf.codes import rank
+from action_assistant.umrf.codes import FINAL, rank
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.model import (
     EXIT,
@@ -255,6 +255,7 @@ def _findings(inside: Subject) -> tuple[_Finding, ...]:
     """The worst of it: errors, else of each kind of what reaches out the first."""
     problems = sorted(inside.problems, key=rank)
     errors = [each for each in problems if each.severity == "error"]
+    errors.sort(key=lambda each: each.code not in FINAL)  # what nobody can override is always told
     if errors:
         told, left = errors[:_ERRORS], len(errors) - _ERRORS
         return (

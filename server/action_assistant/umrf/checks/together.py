@@ -75,7 +75,7 @@ class Together:
         if outcome not in self._reports.get(key, ()):
             return set()
         if not self.known:
-            return self._runs - {key}
+            return (self._runs & self.place.keys()) - {key}
         mask = self._when(key, outcome) | self._started(key, outcome)
         for other in waited:
             mask &= self._beside(other)

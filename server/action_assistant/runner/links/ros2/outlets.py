@@ -123,7 +123,9 @@ class Outlets:
 
         def leaving() -> UmrfGraphStart:
             leaves()
-            self._untaken = _Untaken(robot, run, f"{RECEIVED_START}{message.umrf_graph_name}")
+            self._untaken = _Untaken(
+                robot, run, f"{RECEIVED_START}{message.umrf_graph_name}".strip()
+            )
             return message
 
         async with self._start_turn:

@@ -11,7 +11,14 @@ import msgspec
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import Command, Feedback
 
-_GRAPH: Final = re.compile(r"[Gg]raph:? '?([^\s']+)")
+#: A name may have blanks and quotes in it, so that the engine's own words around it say where it ends.
+_GRAPH: Final = re.compile(
+    r"[Gg]raph: (?P<last>.+)"
+    r"|[Gg]raph '(?P<told>.+)' (?:finished\.|stopped\.|paused\.|resumed\.|modified\.|\.\.\.)$"
+    r"|[Gg]raph '(?P<quoted>.+?)'(?=$|[\s.,:])"
+    r"|[Gg]raph (?P<word>[^\s']+)",
+    re.MULTILINE,
+)
 
 
 class Endpoint(msgspec.Struct, frozen=True):
@@ -45,7 +52,7 @@ class LogLine(msgspec.Struct, frozen=True):
     def graph(self) -> str | None:
         """The name of the graph that it is about, if it says one."""
         found = _GRAPH.search(self.text.strip())
-        return found[1] if found else None
+        return found[found.lastgroup or 0] if found else None
 
 
 RosValue: TypeAlias = Feedback | OverheardCommand | LogLine
