@@ -99,6 +99,10 @@ function useStrandedEditsDialog() {
   return {
     any: choice !== null,
     edits: choice?.stranded.edits ?? 0,
+    cause:
+      choice?.stranded.refused === undefined
+        ? "since a backup was restored"
+        : "since the server did not take it",
     waits: choice !== null && later,
     open: !later,
     putOff: useCallback(() => setLater(true), []),
@@ -135,7 +139,7 @@ export function RoomNotices() {
             }
           >
             {choosing.edits === 1 ? "1 edit waits" : `${choosing.edits} edits wait`} for your
-            decision, since a backup was restored.
+            decision, {choosing.cause}.
           </Say>
         )}
         <Others />

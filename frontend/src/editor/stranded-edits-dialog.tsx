@@ -1,8 +1,9 @@
-/** What to do about edits that wait on a history which the server has left: take, drop, or save. */
+/** What to do about edits that the server does not take as they are: take some, drop, or save them. */
 import { Button, Checkbox, Group, Modal, Text } from "@mantine/core";
 import { useMemo, useState } from "react";
 import { type ChangedField, changesOf, type GraphChange, onlyChanges } from "../graph/changes";
 import { mapsOf } from "../graph/document-keys";
+import type { StrandedEdits } from "../sync/replaced-history";
 import {
   type StrandedEditsChoice,
   useGraph,
@@ -77,6 +78,17 @@ function Item({ change, taken, onTake }: ItemProps) {
   );
 }
 
+function causeOf({ refused }: StrandedEdits, what: string, when: string): string {
+  if (refused === undefined) {
+    return `A backup was restored on the server. ${what} that you made here (the last at ${when}) were not stored before that.`;
+  }
+  const why =
+    refused === "full"
+      ? "This graph is full: it may have 5,000 actions and 32 MiB."
+      : "The server refused a change.";
+  return `${why} Not stored: ${what} that you made here (the last at ${when}). Everything else of yours is.`;
+}
+
 interface BodyProps {
   choice: StrandedEditsChoice;
   by: string;
@@ -104,9 +116,8 @@ function Body({ choice, by, onLater }: BodyProps) {
   return (
     <>
       <Text>
-        A backup was restored on the server. {changes(all.length)} that you made here (the last at{" "}
-        {when}) were not stored before that. Behind this dialog is the graph as it is now. Which of
-        them shall be made in it?
+        {causeOf(stranded, changes(all.length), when)} Behind this dialog is the graph as it is now.
+        Which of them shall be made in it?
       </Text>
       <Group mt="xs" gap="xs" className={style.marks ?? ""}>
         <Button size="compact-sm" onClick={() => setLeft(new Set())}>
@@ -217,7 +228,11 @@ export function StrandedEditsDialog({
     <Modal
       opened={choice !== null && open}
       onClose={onLater}
-      title="Your changes and a restored backup"
+      title={
+        choice?.stranded.refused === undefined
+          ? "Your changes and a restored backup"
+          : "Your changes that were not stored"
+      }
       closeButtonProps={{ "aria-label": "Decide later" }}
       size="lg"
       centered

@@ -1,6 +1,7 @@
+import fc from "fast-check";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import * as Y from "yjs";
-import { addAction, rename } from "../graph/edit";
+import { addAction, rename, setField } from "../graph/edit";
 import { graphNow } from "../graph/edit/document-writes";
 import { FakeEditStore } from "../testing/fake-device";
 import { FakeServer } from "../testing/fake-server";
@@ -305,4 +306,147 @@ test("a device that keeps nothing loses no choice while the page is open", async
   expect(stranded?.before.actions.get(kept)).toBe("Look");
   if (stranded) await connection.apply(stranded, stranded.difference).catch(() => undefined);
   expect(names(server.doc)).toEqual(["Peek"]);
+});
+
+// -- what the server refuses ------------------------------------------------------------------
+
+/** Lets in whoever comes, until all is quiet. */
+async function comeAndGo(): Promise<void> {
+  for (let n = 0; n < 40; n += 1) {
+    if (server.last.readyState === 0) server.accept();
+    await settle();
+  }
+}
+
+/** Refuses every update in which this text stands. */
+function refuse(text: string, code: number): void {
+  server.refuses = (update) => (new TextDecoder().decode(update).includes(text) ? code : null);
+}
+
+const refusals = [
+  [1007, "not-accepted"],
+  [1009, "not-accepted"],
+  [4413, "full"],
+] as const;
+
+test.each(refusals)(
+  "after %i everything else is stored, and what was refused is laid aside",
+  async (code, refused) => {
+    const connection = await come();
+    await arrive();
+    refuse("Cursed", code);
+    server.last.end(1006); // several edits go at once
+    addAction(docOf(connection), { name: "First" });
+    const cursed = addAction(docOf(connection), { name: "Cursed" });
+    setField(docOf(connection), cursed, "description", "builds on it");
+    addAction(docOf(connection), { name: "Second" });
+    await vi.advanceTimersByTimeAsync(400);
+    await comeAndGo();
+    expect(names(server.doc)).toEqual(["First", "Second"]);
+    expect(link(connection)).toMatchObject({ state: "live", unsaved: 0 });
+    const [stranded, ...more] = connection.now().stranded;
+    expect(more).toEqual([]);
+    expect(stranded).toMatchObject({ refused, edits: 2 });
+    expect(stranded?.difference.actions.get(cursed)).toBe("Cursed");
+    expect(stranded?.difference.actions.get(`${cursed}|description`)).toBe("builds on it");
+    addAction(docOf(connection), { name: "Third" });
+    await settle();
+    expect(names(server.doc)).toEqual(["First", "Second", "Third"]);
+    expect(device.waiting).toBe(2);
+  },
+);
+
+test("an edit that is refused alone is laid aside at once, and the next ones are stored", async () => {
+  const connection = await come();
+  await arrive();
+  refuse("Cursed", 1009);
+  for (const name of ["First", "Cursed", "Second", "Cursed too", "Third"]) {
+    addAction(docOf(connection), { name });
+    await comeAndGo();
+  }
+  expect(names(server.doc)).toEqual(["First", "Second", "Third"]);
+  expect(connection.now().stranded.map(({ edits }) => edits)).toEqual([1, 1]);
+});
+
+test("what was refused can be made once the server takes it; until then it stays where it is", async () => {
+  const connection = await come();
+  await arrive();
+  refuse("Cursed", 4413);
+  addAction(docOf(connection), { name: "Cursed" });
+  await comeAndGo();
+  const [stranded] = connection.now().stranded;
+  if (stranded === undefined) throw new Error("nothing waits");
+  const failed = connection.apply(stranded, stranded.difference).catch((error: Error) => error);
+  await comeAndGo();
+  expect(await failed).toBeInstanceOf(Error);
+  expect(connection.now().stranded).toEqual([stranded]);
+  expect(link(connection)).toMatchObject({ state: "live", unsaved: 0 });
+  server.refuses = () => null;
+  await connection.apply(stranded, stranded.difference);
+  expect(names(server.doc)).toEqual(["Cursed"]);
+  expect(connection.now().stranded).toEqual([]);
+  expect(device.waiting).toBe(0);
+});
+
+test("after a reload what was refused is shown, and does not block either", async () => {
+  const first = await come();
+  await arrive();
+  refuse("Cursed", 1009);
+  server.last.end(1006);
+  for (const name of ["First", "Cursed", "Second"]) addAction(docOf(first), { name });
+  await settle();
+  first.leave(); // before anything was sent
+  const second = await come();
+  await comeAndGo();
+  expect(names(server.doc)).toEqual(["First", "Second"]);
+  expect(second.now().stranded).toMatchObject([{ refused: "not-accepted", edits: 1 }]);
+  second.leave();
+  await settle();
+  const third = await come();
+  await comeAndGo();
+  expect(third.now().stranded).toMatchObject([{ refused: "not-accepted", edits: 1 }]);
+  addAction(docOf(third), { name: "Third" });
+  await comeAndGo();
+  expect(names(server.doc)).toEqual(["First", "Second", "Third"]);
+});
+
+test("a message that is no edit and is refused each time is not sent for ever", async () => {
+  const connection = await come();
+  await arrive();
+  for (let n = 0; n < 3; n += 1) {
+    server.last.end(1007);
+    await comeAndGo();
+    expect(link(connection).state).toBe("live");
+  }
+  server.last.end(1007);
+  await comeAndGo();
+  expect(link(connection)).toMatchObject({ state: "refused", why: "not-accepted" });
+});
+
+test("whatever is refused among many edits, by many, all the rest is stored and nothing is lost", async () => {
+  const edits = fc.array(fc.tuple(fc.boolean(), fc.boolean()), { minLength: 1, maxLength: 6 });
+  await fc.assert(
+    fc.asyncProperty(edits, async (script) => {
+      server = new FakeServer("one");
+      device = new FakeEditStore();
+      refuse("Cursed", 1009);
+      const connection = await come();
+      await arrive();
+      for (const [n, [isCursed, waits]] of script.entries()) {
+        addAction(docOf(connection), { name: `${isCursed ? "Cursed" : "Good"} ${n}` });
+        if (waits) await comeAndGo();
+      }
+      await comeAndGo();
+      const made = script.map(([isCursed], n) => `${isCursed ? "Cursed" : "Good"} ${n}`);
+      expect(names(server.doc)).toEqual(made.filter((name) => name.startsWith("Good")));
+      const aside = connection
+        .now()
+        .stranded.flatMap(({ difference }) =>
+          [...difference.actions.values()].filter((value) => `${value}`.startsWith("Cursed")),
+        );
+      expect(aside.sort()).toEqual(made.filter((name) => name.startsWith("Cursed")));
+      connection.leave();
+    }),
+    { numRuns: 25 },
+  );
 });

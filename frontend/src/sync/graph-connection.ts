@@ -3,7 +3,8 @@
  *
  * A room whose history the server has left is followed by one that shows what the server has now;
  * edits that wait on the old one are laid aside for the person to decide about, never merged. A page
- * that shows something else than the server, or whose client id is somebody else's, begins anew too.
+ * that shows something else than the server, or whose client id is somebody else's, begins anew too,
+ * and so does one of whose edits the server has refused: everything else of its person is stored.
  * Works without React.
  */
 
@@ -15,12 +16,15 @@ import {
   idOf,
   newEpoch,
   type StoredCopy,
+  type UnsavedEdit,
 } from "./indexed-db";
 import { type ClosableRoom, type OpenRoom, openRoom } from "./open-room";
 import {
   applyDifference,
   type DocumentDifference,
+  fitsWhole,
   type StrandedEdits,
+  strandedEditsIn,
   strandedEditsOf,
 } from "./replaced-history";
 import type { RefusalReason, Room, RoomLink } from "./room";
@@ -31,7 +35,7 @@ export type ConnectionNotice = "went-back" | "differed";
 
 export interface GraphConnectionState {
   readonly open: OpenRoom;
-  /** Edits on histories that the server has left, the oldest first. */
+  /** Edits that the server does not take as they are, the oldest first. */
   readonly stranded: readonly StrandedEdits[];
   readonly notice: ConnectionNotice | null;
 }
@@ -73,6 +77,11 @@ export class GraphConnection {
   private looked = false;
   private differences = 0;
   private left = false;
+  /** The edit that is made to see whether the server takes it; what it is made from is kept elsewhere. */
+  private trial: UnsavedEdit | null = null;
+  /** Rooms with edits that are being made anew. */
+  private readonly refusedRooms = new Set<Room>();
+  private makingAnew: Promise<void> = Promise.resolve();
 
   constructor(options: GraphConnectionOptions) {
     this.options = options;
@@ -94,10 +103,8 @@ export class GraphConnection {
    * old edits are where they were.
    */
   async apply(stranded: StrandedEdits, difference: DocumentDifference): Promise<number> {
-    const { room, doc } = this.opened;
-    await room.settled(untilRefused(room));
-    const changed = applyDifference(doc, difference);
-    await room.settled(untilRefused(room));
+    await this.makingAnew;
+    const changed = await this.make(difference);
     await this.drop(stranded);
     return changed;
   }
@@ -119,7 +126,8 @@ export class GraphConnection {
 
   /** Whether closing the page now would lose edits. */
   wouldLose(): boolean {
-    return isAtRisk(this.opened.room) || this.asides.some((aside) => !aside.isKept());
+    const rooms = [this.opened.room, ...this.refusedRooms];
+    return rooms.some(isAtRisk) || this.asides.some((aside) => !aside.isKept());
   }
 
   /** Where nothing else has the edits that wait, the room stays open until they are stored. */
@@ -186,6 +194,10 @@ export class GraphConnection {
         this.follower(newEpoch(room.histories().theirs));
         void room.forget();
         break;
+      case "not-accepted":
+      case "full":
+        if (!this.goOn(why)) return;
+        break;
       default:
         return; // the person can do something about it, and this room goes on then
     }
@@ -197,6 +209,91 @@ export class GraphConnection {
     const { keep } = this.options;
     this.opened = this.enter(keep && { ...keep, epoch });
     old.leave();
+  }
+
+  /**
+   * Opens the next room after a refusal. The edits that waited are made anew there, each by itself, so
+   * that only what is refused by itself is laid aside. False when that has been of no use before.
+   */
+  private goOn(why: "not-accepted" | "full"): boolean {
+    const { room } = this.opened;
+    const { trial } = this;
+    const waiting = room.waiting().filter((edit) => edit !== trial);
+    if (room.waiting().length === 0) {
+      this.differences += 1;
+      if (this.differences > MOST_DIFFERENCES) return false;
+    }
+    this.follower(newEpoch(room.histories().theirs));
+    if (waiting.length === 0) {
+      void room.forget();
+      return true;
+    }
+    this.refusedRooms.add(room);
+    const isKnown = waiting.length === 1 && trial === null;
+    this.makingAnew = this.makingAnew.then(async () => {
+      if (trial !== null) await room.forget([trial]);
+      const left = isKnown ? waiting : await this.makeAnew(room, waiting);
+      this.refusedRooms.delete(room);
+      if (left.length > 0) this.layAside(room, left, why);
+      else if (!this.left) await room.forget();
+    });
+    return true;
+  }
+
+  /** Makes each of these edits in the newest room. Answers those that are not taken. */
+  private async makeAnew(room: Room, edits: readonly UnsavedEdit[]): Promise<UnsavedEdit[]> {
+    const left: UnsavedEdit[] = [];
+    for (const edit of edits) {
+      const { difference } = strandedEditsIn(room.doc, [edit]);
+      // What builds on something that was refused waits with it.
+      const stored = await this.make(difference, fitsWhole).then(
+        (changed) => changed !== null,
+        () => false,
+      );
+      if (this.left) return [];
+      if (stored) await room.forget([edit]);
+      else left.push(edit);
+    }
+    return left;
+  }
+
+  private layAside(
+    room: Room,
+    edits: readonly UnsavedEdit[],
+    refused: "not-accepted" | "full",
+  ): void {
+    const aside: StrandedEpoch = {
+      epoch: room.histories().here,
+      stranded: { ...strandedEditsIn(room.doc, edits), refused },
+      isKept: () => room.link().kept === true,
+      forget: () => room.forget(),
+    };
+    this.asides = [...this.asides, aside];
+    this.say();
+  }
+
+  /** Makes these changes as one edit, unless they do not fit, and waits until it is stored. Rejects
+   * when it is refused. Answers how many keys changed. */
+  private async make(difference: DocumentDifference): Promise<number>;
+  private async make(
+    difference: DocumentDifference,
+    fits: typeof fitsWhole,
+  ): Promise<number | null>;
+  private async make(
+    difference: DocumentDifference,
+    fits: typeof fitsWhole = () => true,
+  ): Promise<number | null> {
+    const { room, doc } = this.opened;
+    await room.settled(untilRefused(room));
+    if (!fits(doc, difference)) return null;
+    const changed = applyDifference(doc, difference);
+    this.trial = changed > 0 ? (room.waiting().at(-1) ?? null) : null;
+    try {
+      await room.settled(untilRefused(room));
+    } finally {
+      this.trial = null;
+    }
+    return changed;
   }
 
   /** The same history under another client id: the same changes, without asking. */
@@ -216,10 +313,11 @@ export class GraphConnection {
     const here = this.opened.room.histories().here;
     const all = await device.read(keep).catch(() => []); // a device that keeps nothing
     if (this.left) return;
-    const known = new Set([here, ...this.asides.map(({ epoch }) => epoch)]);
+    const busy = [...this.refusedRooms].map((room) => room.histories().here);
+    const known = new Set([here, ...busy, ...this.asides.map(({ epoch }) => epoch)]);
     const found = all
       .filter(({ epoch, waiting }) => !known.has(epoch) && waiting.length > 0)
-      .map((kept) => asideOf(device, keep, kept));
+      .map((kept) => asideOf(device, keep, kept, here));
     if (found.length === 0) return;
     this.asides = [...found, ...this.asides];
     this.say();
@@ -232,11 +330,18 @@ export class GraphConnection {
   }
 }
 
-function asideOf(device: EditStore, keep: PersistenceOptions, kept: StoredCopy): StrandedEpoch {
+/** `here`: the history that is shown now. Where the server calls both the same, it refused the edits. */
+function asideOf(
+  device: EditStore,
+  keep: PersistenceOptions,
+  kept: StoredCopy,
+  here: string,
+): StrandedEpoch {
   const { epoch, waiting } = kept;
+  const refused = epochName(epoch) === epochName(here) ? "not-accepted" : null;
   return {
     epoch,
-    stranded: strandedEditsOf(kept),
+    stranded: { ...strandedEditsOf(kept), ...(refused && { refused }) },
     isKept: () => true,
     forget: () => device.forget(keep, epoch, waiting.map(idOf)),
   };

@@ -69,6 +69,11 @@ export class Outbox {
     return done.map(({ edit }) => edit);
   }
 
+  /** Lets go of these of the edits that wait. */
+  drop(edits: readonly UnsavedEdit[]): void {
+    this.waiting = this.waiting.filter(({ edit }) => !edits.includes(edit));
+  }
+
   /** Lets go of what waits. */
   clear(): void {
     this.waiting = [];

@@ -149,6 +149,15 @@ export class Persistence {
     this.opened = false;
   }
 
+  /** Forgets these of the edits that wait. */
+  async drop(edits: readonly UnsavedEdit[]): Promise<void> {
+    const isGone = (edit: UnsavedEdit) => edits.includes(edit);
+    this.waits = this.waits.filter((edit) => !isGone(edit));
+    while (this.writing !== null) await this.writing;
+    this.waits = this.waits.filter((edit) => !isGone(edit)); // also after a write that failed
+    if (this.opened) await this.device.forget(this.owner, this.epoch, edits.map(idOf));
+  }
+
   /** Writes what is left to write. */
   close(): void {
     this.closed = true;

@@ -28,8 +28,10 @@ export type DocumentDifference = { readonly [R in Root]: ReadonlyMap<string, unk
 /** What an edit replaced: values by key, `undefined` where there was none. */
 export type ReplacedEntries = readonly (readonly [root: Root, key: string, value: unknown])[];
 
-/** Edits that wait, on a history that is no more the server's. */
+/** Edits that wait and that the server does not take as they are. */
 export interface StrandedEdits {
+  /** What the server refused; absent where it has another history now, from a backup. */
+  readonly refused?: "not-accepted" | "full";
   readonly edits: number;
   /** When the last of them was made, in milliseconds since 1970. */
   readonly at: number;
@@ -175,21 +177,13 @@ export function differenceOf(before: Y.Doc, after: Y.Doc): DocumentDifference {
  * out, since nobody would see it. Answers how many keys changed.
  */
 export function applyDifference(doc: Y.Doc, difference: DocumentDifference): number {
-  const actions = rootOf(doc, "actions");
-  const lives = (aid: string) =>
-    difference.actions.has(aid) ? difference.actions.get(aid) !== undefined : actions.has(aid);
-  const isEnd = (key: string) => key === ENTRY || key === EXIT || lives(key);
-  const fits = (root: Root, { head, rest }: { head: string; rest: string }) => {
-    if (root === "actions") return rest === "" || lives(head);
-    const ends = root === "relations" ? endsOf(head) : null;
-    return ends === null || (isEnd(ends.parent) && isEnd(ends.child));
-  };
+  const fits = fitting(doc, difference);
   let changed = 0;
   asOneEdit(doc, () => {
     for (const root of ROOTS) {
       const map = rootOf(doc, root);
       for (const [key, value] of difference[root]) {
-        if (value !== undefined && !fits(root, splitKey(key))) continue;
+        if (!fits(root, key, value)) continue;
         if (value === undefined ? !map.has(key) : isEqual(map.get(key), value)) continue;
         if (value === undefined) map.delete(key);
         else map.set(key, value);
@@ -198,6 +192,29 @@ export function applyDifference(doc: Y.Doc, difference: DocumentDifference): num
     }
   });
   return changed;
+}
+
+/** Whether nothing of these changes belongs to an action that is not there. */
+export function fitsWhole(doc: Y.Doc, difference: DocumentDifference): boolean {
+  const fits = fitting(doc, difference);
+  return ROOTS.every((root) =>
+    [...difference[root]].every(([key, value]) => fits(root, key, value)),
+  );
+}
+
+type Fits = (root: Root, key: string, value: unknown) => boolean;
+
+function fitting(doc: Y.Doc, difference: DocumentDifference): Fits {
+  const actions = rootOf(doc, "actions");
+  const lives = (aid: string) =>
+    difference.actions.has(aid) ? difference.actions.get(aid) !== undefined : actions.has(aid);
+  const isEnd = (key: string) => key === ENTRY || key === EXIT || lives(key);
+  const belongs = (root: Root, { head, rest }: { head: string; rest: string }) => {
+    if (root === "actions") return rest === "" || lives(head);
+    const ends = root === "relations" ? endsOf(head) : null;
+    return ends === null || (isEnd(ends.parent) && isEnd(ends.child));
+  };
+  return (root, key, value) => value === undefined || belongs(root, splitKey(key));
 }
 
 function mutable(): { readonly [R in Root]: Map<string, unknown> } {

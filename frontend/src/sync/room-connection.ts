@@ -17,7 +17,7 @@ import { Awareness, removeAwarenessStates } from "y-protocols/awareness";
 import * as sync from "y-protocols/sync";
 import * as Y from "yjs";
 import { FingerprintCheck } from "./fingerprint";
-import { browserStore, epochName, madeNow, type StoredCopy } from "./indexed-db";
+import { browserStore, epochName, madeNow, type StoredCopy, type UnsavedEdit } from "./indexed-db";
 import * as messages from "./messages";
 import { Outbox } from "./outbox";
 import { Persistence } from "./persistence";
@@ -144,15 +144,21 @@ class Connection implements Room, SocketHandler {
     return { here: this.persistence?.epoch ?? this.epoch, theirs: this.told };
   }
 
+  waiting(): readonly UnsavedEdit[] {
+    return this.outbox.edits;
+  }
+
   stranded(): StrandedEdits | null {
     const { edits } = this.outbox;
     return edits.length === 0 ? null : strandedEditsIn(this.doc, edits);
   }
 
-  async forget(): Promise<void> {
-    await this.persistence?.forget(this.outbox.edits);
-    this.outbox.clear();
-    this.say({ unsaved: 0 });
+  async forget(edits: readonly UnsavedEdit[] = this.outbox.edits): Promise<void> {
+    const rest = this.outbox.edits.filter((edit) => !edits.includes(edit));
+    if (rest.length === 0) await this.persistence?.forget(this.outbox.edits);
+    else await this.persistence?.drop(edits);
+    this.outbox.drop(edits);
+    this.say({ unsaved: this.outbox.unsaved });
   }
 
   private say(change: LinkChange): void {

@@ -3,7 +3,7 @@
 import type { Awareness } from "y-protocols/awareness";
 import type * as Y from "yjs";
 import { serverPath } from "../api/page-url";
-import type { CopyOwner, EditStore } from "./indexed-db";
+import type { CopyOwner, EditStore, UnsavedEdit } from "./indexed-db";
 import type { StrandedEdits } from "./replaced-history";
 
 /** Why a room does not let this page in, or let it go. */
@@ -47,10 +47,15 @@ export interface Room {
   reconnect(): void;
   /** Which history is kept here, and which one the server named last; empty when none is known. */
   histories(): { readonly here: string; readonly theirs: string };
+  /** The edits that are not durable, in the order in which they were made. */
+  waiting(): readonly UnsavedEdit[];
   /** The edits that are not durable, as values; null when there are none. */
   stranded(): StrandedEdits | null;
-  /** Forgets the edits that wait, and what is kept here of this history unless another page's wait too. */
-  forget(): Promise<void>;
+  /**
+   * Forgets these of the edits that wait, all of them unless it is said which; with the last of them what
+   * is kept here of this history, unless another page's wait too.
+   */
+  forget(edits?: readonly UnsavedEdit[]): Promise<void>;
   /** Leaves the room. Edits that were not stored stay in `doc`, and on the device if there is one. */
   close(): void;
 }

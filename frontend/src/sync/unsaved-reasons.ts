@@ -39,7 +39,7 @@ const refusals: Readonly<Record<RefusalReason, string>> = {
   "other-epoch": "The server went back to an older state of this graph, from a backup perhaps.",
   "other-client": "This page is opened anew.",
   differs: "This page showed something else than the server has and is opened anew.",
-  full: "This graph is full: it may have 5,000 actions and 32 MiB. Take back what you added last, then try again.",
+  full: "This graph is full: it may have 5,000 actions and 32 MiB. What you added last is put aside.",
   "not-accepted": "The server refused a change.",
   restarting: "The server restarts.",
   "too-slow": "The connection is too slow.",
