@@ -10,6 +10,8 @@ from action_assistant.runner.emulator.messages import EngineTraits, index_of
 from action_assistant.runner.runs.events import Override
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.visits import Visit
+from action_assistant.runner.sent_subgraphs import SentSubgraph
+from action_assistant.umrf.digest import digest
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import ENTRY, ENTRY_CONDITIONS, EXIT, Conditions, Graph, Relation
 from action_assistant.umrf.semantics import NodeStateEvent, script_from
@@ -152,6 +154,17 @@ def _inside(graph: str, name: str) -> tuple[str, str]:
     return around or graph, node
 
 
+def _sent_inside(graph: Graph) -> tuple[SentSubgraph, ...]:
+    names = {each.name for each in graph.actions}
+    return tuple(
+        SentSubgraph(
+            name=each.name, digest=digest(each), umrf=msgspec.Raw(codec.write(each).encode())
+        )
+        for each in INSIDE
+        if each.name in names
+    )
+
+
 OVERRIDDEN = ("quiet", "others", "actions", "actors", "H5", "H8", "unknown-action", "subgraphs")
 
 
@@ -162,7 +175,7 @@ async def _started(place: Place, graph: Graph) -> str:
     for _ in range(20):
         try:
             override = Override(codes=OVERRIDDEN, reason="it is a test")
-            return await place.start(graph, override=override)
+            return await place.start(graph, override=override, subgraphs=_sent_inside(graph))
         except Refused:
             await anyio.sleep(1)
     raise AssertionError("it could not be started")

@@ -60,7 +60,7 @@ def graphs(draw: st.DrawFn) -> Graph:
     results=st.lists(st.sampled_from(["on_true", "on_false", "on_error"]), min_size=5, max_size=5),
     times=st.lists(st.sampled_from([0.1, 0.3, 0.7, 1.1]), min_size=5, max_size=5),
 )
-def test_an_action_that_is_said_to_run_once_runs_once(
+def test_an_action_runs_no_more_often_than_its_arrows_are_said_to_allow(
     graph: Graph, results: list[str], times: list[float]
 ) -> None:
     script = {
@@ -82,6 +82,25 @@ def test_an_action_that_is_said_to_run_once_runs_once(
             begun[trace.node] += trace.state == "RUNNING"
     sure = set(told.once) - (set(told.barring_errors) if failed else set())
     assert all(begun[name] <= 1 for name in sure), (sure, begun)
+    for child, parent, besides in (*told.needs, *laps(graph, inside=True).needs):
+        assert begun[child] <= begun[parent] + besides, (child, parent, begun)
+
+
+def test_a_parent_that_outcomes_are_passed_on_past_is_not_needed() -> None:
+    first, second, third = (Action(key=key, name=key.upper()) for key in "abc")
+    past = Conditions(on_true="bypass", on_false="run")
+    entry = Relation(parent=ENTRY, child="a", conditions=ENTRY_CONDITIONS)
+    go = Conditions(on_true="run", on_false="ignore")
+    for arrow, needed in ((go, ("C_0", "B_0", 0)), (past, ("B_0", "A_0", 0))):
+        loop = (
+            entry,
+            Relation(parent="a", child="b", conditions=arrow),
+            Relation(parent="b", child="c", conditions=go),
+            Relation(parent="c", child="a", conditions=go, required=False),
+        )
+        needs = laps(Graph(name="g", actions=(first, second, third), relations=loop)).needs
+        assert needed in needs
+        assert (("C_0", "B_0", 0) in needs) == (arrow is go)
 
 
 def test_a_line_and_a_join_run_once_and_a_loop_does_not() -> None:

@@ -5,7 +5,7 @@ import { memo, use, useRef } from "react";
 import type { Action } from "../graph/model";
 import { cardRows } from "../graph/parameters/card-rows";
 import { durationText } from "../status/durations";
-import type { Progress } from "../status/progress";
+import { type Progress, visitsText } from "../status/progress";
 import { StateLabel } from "../status/state-label";
 import { useInStep } from "../status/use-in-step";
 import { colorOfName } from "../ui/name-colors";
@@ -37,7 +37,8 @@ export function CardState({ progress }: { progress: Progress }) {
   const took = durationText(progress);
   if (progress.since !== null) parts.push(stopwatch(now - progress.since));
   else if (took !== null) parts.push(took);
-  if (progress.visits > 1) parts.push(`${progress.visits}×`);
+  const often = visitsText(progress);
+  if (often !== "") parts.push(often);
   const more = parts.join(" · ");
   return (
     <div className={style.state} title={progress.inferred ? "Inferred, not seen" : undefined}>

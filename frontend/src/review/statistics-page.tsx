@@ -117,7 +117,7 @@ function Actions({ actions }: { actions: readonly ActionStatistics[] }) {
               <th scope="row">
                 <ActionWay action={action} />
               </th>
-              <td className={style.number}>{action.visits}</td>
+              <td className={style.number}>{visitCount(action)}</td>
               <td>
                 <ResultBar action={action} />
               </td>
@@ -133,6 +133,11 @@ function Actions({ actions }: { actions: readonly ActionStatistics[] }) {
       </table>
     </div>
   );
+}
+
+/** Robots are not seen at every moment, so that visits may have been missed. */
+function visitCount({ visits, at_least }: ActionStatistics): string {
+  return at_least ? `at least ${visits}` : String(visits);
 }
 
 function failures(action: ActionStatistics): number {
@@ -174,7 +179,7 @@ function Found({ found }: { found: Statistics }) {
                   <b>
                     <ActionWay action={action} />
                   </b>{" "}
-                  {failures(action)} of {action.visits} visits
+                  {failures(action)} of {visitCount(action)} visits
                 </li>
               ))}
             </ul>

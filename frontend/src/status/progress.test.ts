@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import type { ActionRun, Run } from "../api/runs";
-import { progressByAid, progressOf, runEndText, runLabel } from "./progress";
+import { progressByAid, progressOf, runEndText, runLabel, visitsText } from "./progress";
 import { isInRun, progressInside } from "./progress-inside";
 
 const run: Run = {
@@ -55,6 +55,14 @@ test.each(["RUNNING", "PAUSE_REQUESTED", "PAUSED", "STOPPING"])(
     });
   },
 );
+
+test("visits that may have been missed are counted as at least so many", () => {
+  const loop: ActionRun = { ...going, older: 3, count: 7, at_least: true };
+  expect(visitsText(progressOf(loop, run, false))).toBe("≥ 7×");
+  expect(visitsText(progressOf({ ...going, at_least: true }, run, false))).toBe("≥ 1×");
+  expect(visitsText(progressOf({ ...going, older: 3 }, run, false))).toBe("4×");
+  expect(visitsText(progressOf(going, run, false))).toBe("");
+});
 
 const going: ActionRun = { aid: "a", state: "RUNNING", visits: [visit], older: 0, messages: [] };
 

@@ -16,7 +16,10 @@ export interface Progress {
   /** How long it took at most, ms, where its ends were not seen exactly (Infinity: its code may go on
    * still); null where they were. */
   atMost: number | null;
+  /** How often it ran, as far as is known. */
   visits: number;
+  /** It may have run more often: an engine is not seen at every moment. */
+  atLeast?: boolean;
   inferred: boolean;
   /** The values with which the last visit ran, as the engine reported them: JSON texts by flat name. */
   inputs?: Readonly<Record<string, string>>;
@@ -107,11 +110,18 @@ export function progressOf(action: ActionRun, run: Run, unsure: boolean): Progre
     word,
     since: until === null && !over ? from : null,
     ...(last ? visitDuration(last) : { took: null, atMost: null }),
-    visits: action.visits.length,
+    visits: action.count ?? action.older + action.visits.length,
+    ...(action.at_least ? { atLeast: true } : {}),
     inferred: last?.how === "inferred",
     ...(last?.inputs ? { inputs: last.inputs } : {}),
     message: action.messages.at(-1)?.text ?? null,
   };
+}
+
+/** How often an action ran; "" where it ran once for certain, or was not seen to run. */
+export function visitsText({ visits, atLeast }: Pick<Progress, "visits" | "atLeast">): string {
+  if (atLeast) return visits > 0 ? `≥ ${visits}×` : "";
+  return visits > 1 ? `${visits}×` : "";
 }
 
 /** What was said of an action last, while nothing about it or its run changed. */

@@ -7,25 +7,29 @@ between; an engine counts nothing.
 """
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 import msgspec
 
-from action_assistant.umrf.model import ENTRY, PRECONDITIONS, Graph, Key, Relation
+from action_assistant.umrf.model import ENTRY, PRECONDITIONS, Graph, Key, Precondition, Relation
 
 
 class Laps(msgspec.Struct, frozen=True, omit_defaults=True):
     """`once`: full names of actions that run at most once. `barring_errors`: of those, the ones of
     which that is true only until an action fails, since a failure is passed on past a join. `stops`:
-    the graph itself stops or pauses actions, or runs them over and over; then nothing is `once`."""
+    the graph itself stops or pauses actions, or runs them over and over; then nothing is `once`.
+    `needs`: of actions that may run again, those that only one other one sets going (action, the other
+    one, how many times the entry does so besides); of a graph inside, which may be begun again as a
+    whole, of all actions."""
 
     once: tuple[str, ...] = ()
     barring_errors: tuple[str, ...] = ()
     stops: bool = False
+    needs: tuple[tuple[str, str, int], ...] = ()
 
 
-def laps(graph: Graph) -> Laps:
-    """What the arrows of a graph rule out. Total."""
+def laps(graph: Graph, *, inside: bool = False) -> Laps:
+    """What the arrows of a graph rule out. `inside`: it runs inside of another one. Total."""
     if _stops(graph):
         return Laps(stops=True)
     known = _walked(graph)
@@ -35,7 +39,41 @@ def laps(graph: Graph) -> Laps:
         for each in graph.actions
         if each.key in known and names[each.full_name] == 1
     }
-    return Laps(tuple(once), tuple(name for name, joined in once.items() if joined))
+    barring = tuple(name for name, joined in once.items() if joined)
+    return Laps(tuple(once), barring, needs=tuple(_needs(graph, () if inside else once, names)))
+
+
+def _needs(
+    graph: Graph, once: Collection[str], names: Mapping[str, int]
+) -> Iterator[tuple[str, str, int]]:
+    """Each run of such an action was set going by a run of its one parent, or by the entry. An outcome
+    that is passed on past the parent sets it going without that, so there must be none."""
+    called = {each.key: each.full_name for each in graph.actions if names[each.full_name] == 1}
+    arriving: dict[Key, list[Relation]] = {}
+    for arrow in graph.relations:
+        arriving.setdefault(arrow.child, []).append(arrow)
+    for child, name in called.items():
+        running = [each for each in arriving.get(child, []) if _runs(each)]
+        parents = {each.parent for each in running} - {ENTRY}
+        if name in once or len(parents) != 1 or parents == {child}:
+            continue
+        (parent,) = parents
+        passed_on = {
+            outcome
+            for each in arriving.get(parent, [])
+            for outcome in PRECONDITIONS
+            if each.parent != ENTRY and each.conditions.answer(outcome) == "bypass"
+        }
+        runs = {outcome for each in running if each.parent == parent for outcome in _runs(each)}
+        if parent in called and passed_on.isdisjoint(runs):
+            yield name, called[parent], sum(each.parent == ENTRY for each in running)
+
+
+def _runs(arrow: Relation) -> list[Precondition]:
+    """The outcomes for which an arrow runs its child."""
+    if arrow.parent == ENTRY:
+        return ["on_true"]
+    return [each for each in PRECONDITIONS if arrow.conditions.answer(each) == "run"]
 
 
 def _stops(graph: Graph) -> bool:

@@ -27,7 +27,8 @@ export interface RunnerApi {
     };
     /**
      * ActionShown
-     * @description One action of a run. `older` visits are not listed.
+     * @description One action of a run. `older` visits are not listed. It ran `count` times; `at_least`: or more
+     *     often, since visits of it may have been missed.
      */
     ActionShown: {
         aid: string | null;
@@ -35,13 +36,18 @@ export interface RunnerApi {
         visits: RunnerApi["VisitShown"][];
         older: number;
         messages: RunnerApi["MessageShown"][];
+        /** @default 0 */
+        count?: number;
+        /** @default false */
+        at_least?: boolean;
     };
     /**
      * ActionStatistics
      * @description One action over all these runs. `levels`: the actions that it is inside of, outermost first, and
      *     `name` its own there; `action` as the engine of its newest run told it. Durations are seconds over `timed` visits, those that have ended,
      *     and stand where they are known exactly; `spans` has all of them between their bounds. `unknown`
-     *     counts visits whose result is not known.
+     *     counts visits whose result is not known. `at_least`: there may have been more `visits`, which nobody
+     *     saw.
      */
     ActionStatistics: {
         action: string;
@@ -50,6 +56,7 @@ export interface RunnerApi {
         aid: string | null;
         runs: number;
         visits: number;
+        at_least: boolean;
         results: {
             [key: string]: number;
         };

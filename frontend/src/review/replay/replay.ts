@@ -15,6 +15,7 @@ function changed(action: ActionRun, frame: ActionFrame): ActionRun {
     older: Math.max(action.older, frame.first - kept.length),
     visits: [...kept, ...(frame.visits ?? [])],
     messages: frame.messages ? [...action.messages, ...frame.messages] : action.messages,
+    ...(action.at_least ? { at_least: true } : {}),
   };
 }
 
@@ -36,7 +37,8 @@ export function runAfter(run: Run, frame: Frame): Run {
 export function runBefore(run: Run): Run {
   const actions: Record<string, ActionRun> = {};
   for (const [name, action] of Object.entries(run.actions ?? {})) {
-    if (action.aid !== null) actions[name] = { ...BLANK, aid: action.aid };
+    const missed = action.at_least ? { at_least: true } : {};
+    if (action.aid !== null) actions[name] = { ...BLANK, aid: action.aid, ...missed };
   }
   return {
     ...run,

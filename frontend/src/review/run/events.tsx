@@ -63,7 +63,9 @@ export function eventLines(
     action.visits.forEach((visit, i) => {
       const from = visitBegin(visit);
       const until = visitEnd(visit);
-      const again = i > 0 ? `again (${i + 1}.)` : "";
+      const number = action.older + i + 1;
+      const often = action.at_least ? ", or more often" : "";
+      const again = number > 1 ? `again (${number}.)${often}` : "";
       if (from !== null)
         all.push({ at: from, tone: "run", ...who, text: `runs ${again}`.trim(), order: depth });
       if (until !== null) {

@@ -46,7 +46,10 @@ function ActionRows({ run, name, action }: VisitRowsProps) {
     return (
       <tr key={`${visit.from} ${visit.not_before}`}>
         <td>{name}</td>
-        <td>{action.older + i + 1}</td>
+        <td>
+          {action.at_least && "≥ "}
+          {action.older + i + 1}
+        </td>
         <td>
           {word}
           {visit.how === "inferred" && " (inferred)"}

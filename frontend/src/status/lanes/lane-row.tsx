@@ -5,7 +5,7 @@ import { colorOfName } from "../../ui/name-colors";
 import { stopwatch, useNow } from "../../ui/times";
 import { durationText } from "../durations";
 import { wayWords } from "../level-words";
-import type { Progress, Tone } from "../progress";
+import { type Progress, type Tone, visitsText } from "../progress";
 import { StateLabel, toneColor } from "../state-label";
 import { shareOf, type TimeAxis } from "./axis";
 import { type Bar, barOf } from "./bars";
@@ -137,7 +137,7 @@ function LaneState({ progress }: { progress: Progress }) {
     return <Since progress={progress} since={progress.since} />;
   }
   const took = durationText(progress);
-  const often = progress.visits > 1 ? `${progress.visits}×` : "";
+  const often = visitsText(progress);
   const more = [took, often].filter(Boolean).join(" · ");
   return (
     <StateLabel

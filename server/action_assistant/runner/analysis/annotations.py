@@ -15,6 +15,7 @@ from sqlalchemy.dialects.sqlite import insert as upsert
 from action_assistant.journal.events import Draft, Event
 from action_assistant.runner.analysis.cause_texts import words
 from action_assistant.runner.analysis.causes import causes
+from action_assistant.runner.runs.counts import VisitCount, visit_counts
 from action_assistant.runner.runs.durations import Took, of_run, of_visit, took_us
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.run import Run
@@ -27,7 +28,9 @@ from action_assistant.umrf.model import Graph
 _PREFIX: Final = "about/"
 _WORDS: Final = 8_000  # characters of messages that a search looks through
 #: Raise it when a run adds up to something else than before: older sums are made again.
-FIGURES: Final = 3
+FIGURES: Final = 4
+#: Beside the results of an action in the table: its visits are a lower bound.
+AT_LEAST: Final = "at_least"
 _TOOK: Final = 100  # durations kept per action and run
 
 Label = Annotated[str, msgspec.Meta(min_length=1, max_length=60, pattern=r"^\S(.*\S)?$")]
@@ -52,12 +55,14 @@ class Marked(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class ActionSum(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """One action of a run that is over. `results` counts results that are known; `spans` has how long
+    """One action of a run that is over. It was visited `visits` times; `at_least`: or more often.
+    `results` counts results that are known; `inferred` the visits that nobody saw; `spans` has how long
     visits took that have ended, the newest hundred at most. `took` is of older versions: microseconds
     that they took at least."""
 
     aid: str | None = None
     visits: int = 0
+    at_least: bool = False
     results: dict[str, int] = {}
     inferred: int = 0
     took: tuple[int, ...] = ()
@@ -117,11 +122,12 @@ def sum_of(run: Run, graph: Graph | None, at: int) -> SummedUp:
         (message.text for action in run.actions.values() for message in action.messages),
     )
     told = "\n".join(dict.fromkeys(text for text in said if text))[:_WORDS]
-    actions = {name: _sum(each) for name, each in run.actions.items()}
+    counts = visit_counts(run)
+    actions = {name: _sum(each, counts[name]) for name, each in run.actions.items()}
     return SummedUp(at, actions, told, cause, of_run(run), FIGURES)
 
 
-def _sum(action: ActionRun) -> ActionSum:
+def _sum(action: ActionRun, count: VisitCount) -> ActionSum:
     results: dict[str, int] = {}
     for visit in action.visits:
         if visit.result is not None:
@@ -129,9 +135,10 @@ def _sum(action: ActionRun) -> ActionSum:
     spans = [took for visit in action.visits if (took := of_visit(visit)) is not None]
     return ActionSum(
         aid=action.aid,
-        visits=action.older + len(action.visits),
+        visits=count.least,
+        at_least=count.at_least,
         results=results,
-        inferred=sum(visit.how == "inferred" for visit in action.visits),
+        inferred=sum(visit.how == "inferred" for visit in action.visits) + count.least - count.seen,
         spans=tuple(spans[-_TOOK:]),
     )
 
@@ -171,7 +178,7 @@ def _put_sum(run: str, summed: SummedUp) -> Sequence[Executable]:
             "action": name,
             "aid": each.aid,
             "visits": each.visits,
-            "results": each.results,
+            "results": each.results | ({AT_LEAST: 1} if each.at_least else {}),
             "inferred": each.inferred,
             "took": [[each.least, each.most] for each in _spans(each)],
         }

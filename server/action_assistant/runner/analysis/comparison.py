@@ -10,6 +10,7 @@ from action_assistant.runner.analysis.cause_texts import words
 from action_assistant.runner.analysis.causes import OPERATOR, Cause, Silence, causes, operator
 from action_assistant.runner.analysis.levels import INTO, LevelPlace, places_of
 from action_assistant.runner.runs import views
+from action_assistant.runner.runs.counts import visit_counts
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.visits import ActionRun, Visit
 from action_assistant.umrf.difference import ActionChange, Difference, difference
@@ -21,8 +22,8 @@ _MOST: Final = 2_000  # steps in an answer
 _SLOWER: Final = 1.5  # times as long
 _NOTABLE_US: Final = 500_000  # and this much longer
 
-#: How the two visits of one step relate. `unknown`: a result is not known. `end`: one has ended, and of
-#: the other no end was seen.
+#: How the two visits of one step relate. `unknown`: a result is not known, or the other visit may have
+#: been missed. `end`: one has ended, and of the other no end was seen.
 Relation: TypeAlias = Literal["same", "result", "only_a", "only_b", "unknown", "end"]
 
 
@@ -95,7 +96,7 @@ def compare(a: Run, b: Run, sent_a: SentTree, sent_b: SentTree) -> RunComparison
     graph_a, identities = aligned(_graph(sent_a.umrf), graph_b)
     graph = difference((0, graph_a), (0, graph_b))
     twins = _pairs(a, b, identities)
-    begun = sorted(_steps(a, b, twins), key=lambda step: _begun(step, a, b))
+    begun = sorted(_steps(a, b, twins, Missed(a, b)), key=lambda step: _begun(step, a, b))
     steps = _own_first(_inner_first(begun))
     parts = (step for step in steps if _parts(step))
     parting = next((_parting(step, a, b, twins) for step in parts), None)
@@ -177,7 +178,36 @@ def _changed_inside(a: Mapping[str, str], b: Mapping[str, str]) -> list[str]:
     return sorted(name for name in a.keys() | b.keys() if a.get(name) != b.get(name))
 
 
-def _steps(a: Run, b: Run, twins: Sequence["_Twins"]) -> Iterator[ComparedVisit]:
+class Missed:
+    """Of which actions of either run visits may have been missed: then nobody knows which visits of
+    theirs belong together, and one that is not seen may have been there."""
+
+    def __init__(self, a: Run, b: Run) -> None:
+        self._a, self._b = _MissedIn(a), _MissedIn(b)
+
+    def relation(self, pair: "_Twins", seen: Relation) -> Relation:
+        """How two visits relate, as far as that is known."""
+        in_a = self._a.may_miss(pair.a, pair.place)
+        in_b = self._b.may_miss(pair.b, pair.place)
+        unsure = (
+            (seen == "only_a" and in_b)
+            or (seen == "only_b" and in_a)
+            or (seen == "result" and (in_a or in_b))
+        )
+        return "unknown" if unsure else seen
+
+
+class _MissedIn:
+    def __init__(self, run: Run) -> None:
+        self._names = {name for name, count in visit_counts(run).items() if count.at_least}
+        self._by_looks = any(each.by for each in run.actions.values())
+
+    def may_miss(self, name: str | None, place: LevelPlace) -> bool:
+        """Whether visits of it may be missing; the whole of a graph inside may have been missed."""
+        return name in self._names if name is not None else bool(place.levels) and self._by_looks
+
+
+def _steps(a: Run, b: Run, twins: Sequence["_Twins"], missed: Missed) -> Iterator[ComparedVisit]:
     for pair in twins:
         left, right = pair.of(a, b)
         visits_a, visits_b = _visits(left), _visits(right)
@@ -191,7 +221,7 @@ def _steps(a: Run, b: Run, twins: Sequence["_Twins"]) -> Iterator[ComparedVisit]
                 visit=number,
                 a=views.visit(one) if one else None,
                 b=views.visit(other) if other else None,
-                relation=_relation(one, other),
+                relation=missed.relation(pair, _relation(one, other)),
                 slower=_slower(one, other),
             )
 
@@ -465,7 +495,7 @@ def _verdict(a: Run, b: Run, steps: list[ComparedVisit], parting: Parting | None
             "their results are not known."
         )
     if any(step.relation == "unknown" for step in steps):
-        return "No difference was seen, but some results are not known."
+        return "No difference was seen, but some results are not known, or some visits may have been missed."
     return "Every visit ended the same."
 
 

@@ -12,6 +12,7 @@ from action_assistant.journal.events import Event
 from action_assistant.runner.analysis.keyframes import fold
 from action_assistant.runner.links.observations import NodeResult, NodeState, Snapshot
 from action_assistant.runner.runs import views
+from action_assistant.runner.runs.counts import VisitCount, visit_counts
 from action_assistant.runner.runs.durations import of_visit
 from action_assistant.runner.runs.events import Observed
 from action_assistant.runner.runs.run import Run
@@ -31,6 +32,7 @@ _COLUMNS: Final = (
     "how",
     "seconds_least",
     "seconds_most",
+    "missed",
 )
 _ANY: Final = b'{"type":"object"}'
 #: Of foxglove.Log, so that its panel shows what actions and engines say.
@@ -72,10 +74,12 @@ def lines(run: str, events: Iterable[Event]) -> Iterator[bytes]:
 
 def intervals(run: Run) -> bytes:
     """CSV: a line per visit, in the order they began. Empty where nothing is known, so is `seconds`
-    where only its bounds are, which follow at the end."""
+    where only its bounds are, which follow at the end. `missed` says of the visits of an action that
+    have no line: none, or how many there were at least ("0 or more")."""
     text = io.StringIO()
     sheet = csv.writer(text)
     sheet.writerow(_COLUMNS)
+    missed = {name: _missed(each) for name, each in visit_counts(run).items()}
     rows = [
         (visit.start, name, number, visit)
         for name, action in run.actions.items()
@@ -89,8 +93,12 @@ def intervals(run: Run) -> bytes:
         moments = (visit.start, visit.until, visit.not_before, visit.not_after)
         shown = ("" if each is None else views.time(each).isoformat() for each in moments)
         told = [_cell(name), number, *shown, _figure(seconds), visit.result or "", visit.how]
-        sheet.writerow([*told, *map(_figure, bounds)])
+        sheet.writerow([*told, *map(_figure, bounds), missed[name]])
     return text.getvalue().encode()
+
+
+def _missed(count: VisitCount) -> str:
+    return f"{count.least - count.seen} or more" if count.at_least else "none"
 
 
 def _figure(seconds: float | None) -> str:
@@ -103,7 +111,8 @@ def _cell(text: str) -> str:
 
 def mcap(events: Iterable[Event]) -> bytes:
     """MCAP with JSON messages: `/run` (state), `/actions/NAME` (state and result, when they were shown),
-    `/visits/NAME` (a visit that has ended, between its bounds, when that was known), `/log`."""
+    `/visits/NAME` (a visit that has ended, between its bounds, when that was known; `at_least`: others may have been
+    missed, so that `visit` is a lower bound), `/log`."""
     out = io.BytesIO()
     writer = Writer(out, compression=CompressionType.NONE)
     writer.start(profile="", library=f"temoto-action-assistant {VERSION}")
@@ -141,6 +150,7 @@ class _Track:
         self._said(before, after)
 
     def _ended(self, at: int, before: Run | None, after: Run) -> None:
+        counts: dict[str, VisitCount] = {}
         for name, action in after.actions.items():
             was = before.actions.get(name) if before is not None else None
             if was is action:
@@ -149,7 +159,9 @@ class _Track:
             for number, visit in enumerate(action.visits, action.older + 1):
                 if visit.until is not None and visit not in known:
                     shown = msgspec.to_builtins(views.visit(visit))
-                    body = {"visit": number, **shown, "took": of_visit(visit)}
+                    counts = counts or visit_counts(after)
+                    missed = counts[name].at_least
+                    body = {"visit": number, **shown, "took": of_visit(visit), "at_least": missed}
                     self._write("visit", f"/visits/{name}", at, body)
 
     def _seen(self, item: object) -> None:

@@ -6,6 +6,7 @@ from typing import Any, Final
 import msgspec
 from sqlalchemy import Row, Select, select, union_all
 
+from action_assistant.runner.analysis.annotations import AT_LEAST
 from action_assistant.runner.analysis.levels import LevelPlace, places
 from action_assistant.runner.runs.durations import Took, at_rank, took_us
 from action_assistant.runner.runs.run import Result, State
@@ -40,7 +41,8 @@ class ActionStatistics(msgspec.Struct, frozen=True, kw_only=True):
     """One action over all these runs. `levels`: the actions that it is inside of, outermost first, and
     `name` its own there; `action` as the engine of its newest run told it. Durations are seconds over `timed` visits, those that have ended,
     and stand where they are known exactly; `spans` has all of them between their bounds. `unknown`
-    counts visits whose result is not known."""
+    counts visits whose result is not known. `at_least`: there may have been more `visits`, which nobody
+    saw."""
 
     action: str
     levels: tuple[str, ...]
@@ -48,6 +50,7 @@ class ActionStatistics(msgspec.Struct, frozen=True, kw_only=True):
     aid: str | None
     runs: int
     visits: int
+    at_least: bool = False
     results: dict[str, int]
     unknown: int
     inferred: int
@@ -173,6 +176,7 @@ def _action(place: LevelPlace, rows: Sequence[Row[Any]]) -> ActionStatistics:
         aid=next((row.aid for row in rows if row.aid), None),
         runs=sum(row.visits > 0 for row in rows),
         visits=visits,
+        at_least=any(row.results.get(AT_LEAST) for row in rows),
         results=results,
         unknown=visits - sum(results.values()),
         inferred=sum(row.inferred for row in rows),
@@ -212,7 +216,7 @@ def _never_taken(
         outcomes = _outcomes(arrow)
         if not outcomes or any(parent.results.get(each) for each in outcomes):
             continue
-        if parent.unknown == 0:
+        if parent.unknown == 0 and not parent.at_least:
             found.append(NeverTaken(parent.action, names[arrow.child], outcomes))
         elif not _must_have_been(arrow, graph, actions.get(names[arrow.child])):
             untold += 1

@@ -80,6 +80,7 @@ class Requested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     group: str | None = None  # shared by runs that one request has started together
     like: str | None = None  # the robot whose engine the simulator played
     laps: Laps | None = None  # None: found in `umrf`
+    inner_laps: dict[str, Laps] = {}  # of the graphs inside, by name
     behaviours: bool = False  # whether the simulator had Python behaviours
     subgraphs: tuple[RunSubgraph, ...] = ()  # all graphs inside, by value
     tree_digest: str | None = None  # of the graph together with them; None: nobody told

@@ -90,6 +90,8 @@ def begin(event: Requested) -> Run:
             name: ActionRun(aid=aid, once=name in once, joined=name in joined)
             for name, aid in event.actions.items()
         },
+        inner=event.inner_laps,
+        needs=known.needs,
         stoppable=known.stops,
     )
 

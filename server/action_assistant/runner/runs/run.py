@@ -8,6 +8,7 @@ from action_assistant.runner.links.engine_process import EngineProcess
 from action_assistant.runner.links.observations import ACTIVE, TERMINAL
 from action_assistant.runner.runs.events import AtRest, Author, End, Overridden, Override
 from action_assistant.runner.runs.visits import ActionRun, Message
+from action_assistant.umrf.laps import Laps
 
 State: TypeAlias = Literal[
     "requested",
@@ -81,6 +82,8 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     graph_state: str | None = None
     parts: dict[str, str] = {}  # running sub-graphs of this run, and their states
     actions: dict[str, ActionRun] = {}
+    inner: dict[str, Laps] = {}  # which actions of graphs inside run once, by the graphs' own names
+    needs: tuple[tuple[str, str, int], ...] = ()  # as `Laps.needs`
     looked: dict[str, int] = {}  # asking for the newest answer that showed a graph to be as here
     reshaped: bool = False  # what its arrows rule out may have happened nevertheless
     failed: bool = False  # an action has, or may have in a sub-graph

@@ -8,6 +8,7 @@ import msgspec
 from msgspec.structs import replace
 from sqlalchemy import Row
 
+from action_assistant.runner.runs.counts import VisitCount, visit_counts
 from action_assistant.runner.runs.durations import Took, of_run
 from action_assistant.runner.runs.events import AtRest, Author, Overridden, Override
 from action_assistant.runner.runs.run import Desired, Result, Run, State
@@ -44,14 +45,17 @@ class MessageShown(msgspec.Struct, frozen=True):
     text: str
 
 
-class ActionShown(msgspec.Struct, frozen=True):
-    """One action of a run. `older` visits are not listed."""
+class ActionShown(msgspec.Struct, frozen=True, omit_defaults=True):
+    """One action of a run. `older` visits are not listed. It ran `count` times; `at_least`: or more
+    often, since visits of it may have been missed."""
 
     aid: str | None
     state: str
     visits: list[VisitShown]
     older: int
     messages: list[MessageShown]
+    count: int = 0
+    at_least: bool = False
 
 
 class AlarmShown(msgspec.Struct, frozen=True):
@@ -169,22 +173,22 @@ class Memo:
     few change between two looks."""
 
     def __init__(self) -> None:
-        self._known: dict[str, tuple[ActionRun, int, ActionShown]] = {}
+        self._known: dict[str, tuple[ActionRun, int, VisitCount, ActionShown]] = {}
 
-    def action(self, name: str, action: ActionRun, most: int) -> ActionShown:
+    def action(self, name: str, action: ActionRun, most: int, count: VisitCount) -> ActionShown:
         """An action with its newest visits."""
         known = self._known.get(name)
-        if known is not None and known[0] is action and known[1] == most:
-            return known[2]
-        found = _action(action, most)
-        self._known[name] = action, most, found
+        if known is not None and known[0] is action and known[1:3] == (most, count):
+            return known[3]
+        found = _action(action, most, count)
+        self._known[name] = action, most, count, found
         return found
 
     def work_out(self, run: Run, at_once: int) -> Iterator[None]:
         """Know all that `shown` will ask for, so many actions at a time."""
-        most = _most(run, _LIVE)
+        most, counts = _most(run, _LIVE), visit_counts(run)
         for number, (name, action) in enumerate(run.actions.items(), 1):
-            self.action(name, action, most)
+            self.action(name, action, most, counts[name])
             if number % at_once == 0:
                 yield
 
@@ -352,15 +356,19 @@ def _most(run: Run, visits: int) -> int:
 
 
 def _actions(run: Run, visits: int, memo: Memo | None = None) -> dict[str, ActionShown]:
-    memo, most = memo or Memo(), _most(run, visits)
-    return {name: memo.action(name, action, most) for name, action in run.actions.items()}
+    memo, most, counts = memo or Memo(), _most(run, visits), visit_counts(run)
+    return {
+        name: memo.action(name, action, most, counts[name]) for name, action in run.actions.items()
+    }
 
 
-def _action(action: ActionRun, most: int) -> ActionShown:
+def _action(action: ActionRun, most: int, count: VisitCount) -> ActionShown:
     visits = [visit(each) for each in action.visits[-most:]]
     messages = [MessageShown(time(each.at), each.text) for each in action.messages]
     older = action.older + len(action.visits) - len(visits)
-    return ActionShown(action.aid, action.state, visits, older, messages)
+    return ActionShown(
+        action.aid, action.state, visits, older, messages, count.least, count.at_least
+    )
 
 
 def _log(run: Run, most: int) -> list[MessageShown]:

@@ -77,6 +77,7 @@ class Prepared(msgspec.Struct, frozen=True, kw_only=True):
     script: str
     digest: str
     laps: Laps
+    inner_laps: dict[str, Laps]
     problems: tuple[Problem, ...] = ()
     subgraphs: tuple[RunSubgraph, ...] = ()
     inner: tuple[str, ...] = ()
@@ -146,6 +147,7 @@ def prepared(
         script=admitted.script_text,
         digest=admitted.digest,
         laps=laps(graph),
+        inner_laps={name: laps(each, inside=True) for name, each in admitted.inside.items()},
         problems=(*errors[:_KEPT], *warnings[:_KEPT]),
         subgraphs=admitted.subgraphs,
         inner=tuple(sorted({each.name for each in inside if not each.missing})),

@@ -53,6 +53,7 @@ def booked(
         like=asked.like,
         behaviours=asked.behaviours,
         laps=ready.laps,
+        inner_laps=ready.inner_laps,
         subgraphs=ready.subgraphs,
         tree_digest=ready.tree_digest if asked.subgraphs or asked.tree_digest else None,
     )

@@ -1,0 +1,105 @@
+"""How often each action of a run ran, as far as that is known. Pure.
+
+An engine counts nothing: what it shows is a state at some moment, and an action that runs again between
+two looks is seen once. So a number of visits is a lower bound, except where transitions were seen, or
+where the graph rules out that the action runs more than once. Arrows force some of what was missed: an
+action that only one other one sets going ran no more often than that.
+
+See docs/decisions/099-visits-that-were-missed.md.
+"""
+
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping
+
+import msgspec
+
+from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runs.visits import ActionRun
+from action_assistant.umrf.laps import Laps
+
+
+class VisitCount(msgspec.Struct, frozen=True):
+    """It ran `least` times; `at_least`: or more often. `seen` of these visits are known one by one."""
+
+    least: int
+    at_least: bool
+    seen: int
+
+
+def visit_counts(run: Run) -> dict[str, VisitCount]:
+    """The count of each action of a run."""
+    seen = {name: each.older + len(each.visits) for name, each in run.actions.items()}
+    exact = {name for name, each in run.actions.items() if _is_exact(run, name, each)}
+    inside = tuple(_inside(run)) if run.inner else ()
+    for name, around, laps in inside:  # outer ones first
+        node = name.rpartition("/")[2]
+        if around in exact and node in laps.once and node not in laps.barring_errors:
+            exact.add(name)
+    needs = () if run.reshaped else (*run.needs, *_needs_inside(inside))
+    least = _forced(seen, needs) if needs else seen
+    return {
+        name: VisitCount(least[name], name not in exact, number) for name, number in seen.items()
+    }
+
+
+def _is_exact(run: Run, name: str, action: ActionRun) -> bool:
+    """Whether none of its visits can have been missed."""
+    if action.by == "" and action.visits:
+        return True  # told by transitions
+    if "/" in name:
+        return False
+    if not action.visits and action.state == "UNINITIALIZED":
+        return True  # no action of a graph goes back to that
+    return action.once and not run.reshaped and not (action.joined and run.failed)
+
+
+def _inside(run: Run) -> Iterator[tuple[str, str, Laps]]:
+    """The actions of graphs inside, outer ones first: the name, the action around it, and what the
+    arrows of its graph rule out."""
+    inside: dict[str, list[str]] = {}
+    for name in run.actions:
+        part, mark, node = name.rpartition("/")
+        if mark:
+            inside.setdefault(part, []).append(node)
+    known = deque((run.graph_name, name, name) for name in run.actions if "/" not in name)
+    while known and inside:
+        above, node, name = known.popleft()
+        graph, _, number = node.rpartition("_")
+        part = f"{above}__{graph}__{number}"
+        for each in inside.pop(part, ()):
+            key = f"{part}/{each}"
+            if graph in run.inner:
+                yield key, name, run.inner[graph]
+            known.append((part, each, key))
+
+
+def _needs_inside(inside: Iterable[tuple[str, str, Laps]]) -> Iterator[tuple[str, str, int]]:
+    """What actions of graphs inside need: their parents, and the action around them. How often the
+    entry of a graph inside sets one going besides, nobody knows."""
+    needs: dict[str, Mapping[str, str]] = {}
+    for name, around, laps in inside:
+        part, _, node = name.rpartition("/")
+        alone = needs.get(part)
+        if alone is None:
+            alone = {child: parent for child, parent, besides in laps.needs if not besides}
+            needs[part] = alone
+        if node in laps.once and node not in laps.barring_errors:
+            yield name, around, 0
+        if node in alone:
+            yield name, f"{part}/{alone[node]}", 0
+
+
+def _forced(seen: Mapping[str, int], needs: Iterable[tuple[str, str, int]]) -> dict[str, int]:
+    """The numbers of visits that the arrows force, besides those that were seen."""
+    least = dict(seen)
+    parents: dict[str, list[tuple[str, int]]] = {}
+    for child, parent, besides in needs:
+        parents.setdefault(child, []).append((parent, besides))
+    raised = list(parents)
+    while raised:
+        child = raised.pop()
+        for parent, besides in parents.get(child, ()):
+            if parent in least and least[parent] < least.get(child, 0) - besides:
+                least[parent] = least[child] - besides
+                raised.append(parent)
+    return least
