@@ -17,6 +17,7 @@ ARGUMENTS = {
     "arguments": ("", "more arguments of the command, as in a shell: see its --help"),
     "engine": ("", "the name of an engine to start beside it (temoto_action_engine_ros2); none"),
     "actions": ("", "the folder of that engine's action packages"),
+    "indexing_rate": ("0", "seconds between its readings of that folder; 0: once, at its start"),
 }
 
 
@@ -48,16 +49,18 @@ def _processes(context: LaunchContext) -> list[LaunchDescriptionEntity]:
     )
     if not asked["engine"]:
         return [runner]
-    return [runner, _engine(asked["engine"], asked["actions"])]
+    return [runner, _engine(asked["engine"], asked["actions"], asked["indexing_rate"])]
 
 
-def _engine(name: str, actions: str) -> ExecuteProcess:
+def _engine(name: str, actions: str, indexing_rate: str) -> ExecuteProcess:
+    """An engine that reads its folder again while it runs may die of being asked meanwhile."""
     return ExecuteProcess(
         name="engine",
         cmd=[
             ExecutableInPackage("action_engine_node", "temoto_action_engine_ros2"),
             *("--actor-name", name),
             *(["--actions-path", actions] if actions else []),
+            *("--indexing-rate", indexing_rate),
         ],
         output="screen",
         sigterm_timeout="20",

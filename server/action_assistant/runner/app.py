@@ -111,7 +111,7 @@ async def _executing(
             _kept(reach),
             ExecutionService.opened(
                 archive_store,
-                Robots(reach=reach, recordings=recordings),
+                Robots(reach=reach, recordings=recordings, indexing=services.index_folders),
                 clock_us=utc_us,
                 run_in_worker=workers.starts,
                 simulator=Simulators(),

@@ -90,6 +90,7 @@ CODES: Final[Mapping[str, Severity]] = {
     "robot-deaf": "error",
     "engine-odd": "error",
     "engine-unregistered": "warning",
+    "engine-indexing": "warning",
     # looking itself
     "check-failed": "error",
     "check-unfinished": "warning",

@@ -13,7 +13,12 @@ from action_assistant import paths as places
 from action_assistant import settings
 from action_assistant.commands.doctor.examination import examine
 from action_assistant.commands.doctor.installation import Installation
-from action_assistant.commands.doctor.ros_checks import ROBOTS_S, look_here, robots_answer
+from action_assistant.commands.doctor.ros_checks import (
+    ROBOTS_S,
+    engines_index_once,
+    look_here,
+    robots_answer,
+)
 from action_assistant.commands.processes import port_number
 from action_assistant.errors import CannotStart
 from action_assistant.safe_text import one_line
@@ -88,7 +93,7 @@ def _looked_at(place: Installation, only: str | None) -> Iterator[Diagnostic]:
     if only != "machine":
         if sys.stderr.isatty():
             print("Asking robots, which takes some seconds …", file=sys.stderr)
-        yield from examine(place, [robots_answer], ROBOTS_S)
+        yield from examine(place, [robots_answer, engines_index_once], ROBOTS_S)
 
 
 def _tell(each: Diagnostic) -> None:

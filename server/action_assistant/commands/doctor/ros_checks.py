@@ -4,7 +4,7 @@ import os
 import sqlite3
 import subprocess
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -22,6 +22,8 @@ from action_assistant.runner.links.ros2.checkup import look
 from action_assistant.runner.runs import queries
 from action_assistant.system.diagnostics import Diagnostic, found
 
+#: The program of the real engine.
+_NODE: Final = "action_engine_node"
 _PATIENCE_S: Final = 45.0
 #: Seconds that it takes at most.
 ROBOTS_S: Final = _PATIENCE_S + 5
@@ -41,6 +43,44 @@ def robots_answer(place: Installation) -> Iterator[Diagnostic]:
             "Do as the sentence says; until then robots are reached as far as it says.",
         )
     yield from _asked(interpreter, place)
+
+
+def engines_index_once(place: Installation) -> Iterator[Diagnostic]:
+    """The engines of registered robots that run on this computer: an engine that indexes while it runs may
+    die of each get and start that comes meanwhile (H15)."""
+    names = {each.name for each in _registered(place.data)}
+    for pid, words in _engines() if names else ():
+        name = _said(words, "--actor-name")
+        if name in names and _said(words, "--indexing-rate") != "0":
+            yield found(
+                "engine-indexing",
+                name,
+                f"Its engine (process {pid}) reads its folder again and again while it runs. It may die of "
+                "being asked meanwhile, with every running graph (H15).",
+                "Start it with --indexing-rate 0, and again after a change of its folder. Only where graphs "
+                "are written into its index while it runs (--index-folder) does it need another rate.",
+            )
+
+
+def _engines() -> Iterator[tuple[int, list[str]]]:
+    """The engine nodes on this computer, by process id, with their command lines."""
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            words = (folder / "cmdline").read_bytes().decode(errors="replace").split("\0")
+        except OSError:
+            continue  # it has ended
+        if any(Path(word).name == _NODE for word in words[:2]):
+            yield int(folder.name), words
+
+
+def _said(words: Sequence[str], option: str) -> str:
+    """The value of an option in a command line, in either spelling; empty without it."""
+    for word, following in zip(words, [*words[1:], ""], strict=True):
+        if word == option:
+            return following
+        if word.startswith(f"{option}="):
+            return word.removeprefix(f"{option}=")
+    return ""
 
 
 def look_here(place: Installation) -> list[Diagnostic]:

@@ -42,6 +42,11 @@ _AROUND_S: Final = 1.0
 _AFTERWARDS_S: Final = 30.0
 _GET_S: Final = 1.0
 _SHARE: Final = 20  # at most one part in so many of the time goes into asking an idle engine
+#: An engine that indexes while it runs may die of each get and start that comes meanwhile (H15), so that it
+#: is asked this much more rarely, and not at all for `_INDEXES_S` after its folder was written: twice what
+#: the node takes from one indexing to the next, unless it is told otherwise, and some.
+_RARELY: Final = 6
+_INDEXES_S: Final = 5.0
 _FRESH_S: Final = 60.0  # for so long an engine that came back is called restarted
 
 T = TypeVar("T")
@@ -63,7 +68,8 @@ class KnownEngine:
 
     `changed` is called whenever people would see something else; `foreign` for each command of
     somebody else; `became` when the engine is in another state than before; `shows` for all graphs
-    that an answer or feedback shows.
+    that an answer or feedback shows. `indexes`: the runner writes into the folder that it indexes, so that
+    it does so while it runs.
     """
 
     def __init__(
@@ -78,6 +84,7 @@ class KnownEngine:
         foreign: "Callable[[KnownEngine, ForeignCommand], None]" = lambda _, __: None,
         shows: "Callable[[KnownEngine, tuple[Snapshot, ...]], None]" = lambda _, __: None,
         recordings: Recordings | None = None,
+        indexes: bool = False,
     ) -> None:
         self.registration = registration
         self.facts = facts
@@ -94,6 +101,8 @@ class KnownEngine:
         self._foreign = foreign
         self._shows = shows
         self._recordings = recordings
+        self._rarely = _RARELY if indexes else 1
+        self._indexing_until = 0.0
         self._look = anyio.Event()
         self._tried_at = -_IDLE_S
         self._restarted: float | None = None
@@ -209,13 +218,14 @@ class KnownEngine:
         """Every ten seconds, more rarely when answers are dear, at once when there is news."""
         while True:
             pace = _CLOSE_S if anyio.current_time() < self._close_until else _IDLE_S
-            rest = max(pace, _SHARE * (self.took_ms or 0) / 1000)
+            rest = max(pace * self._rarely, _SHARE * (self.took_ms or 0) / 1000)
             due = self._tried_at + rest - anyio.current_time()
             if due > 0:
                 with anyio.move_on_after(due) as waited:
                     await self._look.wait()
                 if waited.cancelled_caught:
                     continue  # somebody else may have asked meanwhile
+            await self.indexed()
             self._look = anyio.Event()
             try:
                 with anyio.fail_after(_GET_S):
@@ -232,6 +242,16 @@ class KnownEngine:
         if anyio.current_time() >= self._close_until:
             self._look.set()
         self._close_until = anyio.current_time() + _AFTERWARDS_S
+
+    def let_index(self) -> None:
+        """What it indexes was just written: ask it again when it has read that, and not before. Gets that
+        a run or a Stop needs go on."""
+        self._indexing_until = anyio.current_time() + _INDEXES_S
+        self._look.set()
+
+    async def indexed(self) -> None:
+        """Wait until the engine has read what was written last."""
+        await anyio.sleep_until(self._indexing_until)
 
     def _hear(self, report: Report) -> None:
         if isinstance(report, Feedback):

@@ -105,15 +105,18 @@ class RegistryContext(msgspec.Struct, frozen=True):
 
 class Robots:
     """The registry. `reach` makes links, or says why there are none; `links` are there already.
-    `recordings` keep what engines say, where they are kept."""
+    `recordings` keep what engines say, where they are kept. `indexing`: the robots into whose index folder
+    the runner writes."""
 
     def __init__(
         self,
         links: Mapping[str, Link] | None = None,
         reach: Reach | str | None = None,
         recordings: Recordings | None = None,
+        indexing: Collection[str] = (),
     ) -> None:
         self.recordings: Final = recordings
+        self._indexing: Final = frozenset(indexing)
         self._given: Final = dict(links or {})
         self._reach: Final = reach if reach is not None else "No link to robots was made."
         self._registered: dict[str, Registration] = {}
@@ -196,6 +199,7 @@ class Robots:
             foreign=self._note_command,
             shows=ground.shows,
             recordings=self.recordings,
+            indexes=name in self._indexing,
         )
         self._engines[name] = engine
         scope = self._scopes[name] = anyio.CancelScope()

@@ -210,8 +210,8 @@ class IndexWriter:
             done = ", ".join(each.path for each in outcome.written)
             rest = f"Written before that: {done}." if done else "Nothing was written."
             raise Unavailable(f"{outcome.failed} {rest}", where={"folder": shown_path(str(folder))})
-        if (engine := self._robots.link(robot)) is not None:
-            engine.look_closely()
+        if outcome.written and (engine := self._robots.link(robot)) is not None:
+            engine.let_index()
         return IndexWriteAnswer(
             folder=shown_path(str(folder)),
             written=tuple(each for each in outcome.written if not each.kept),

@@ -303,8 +303,9 @@ class StartChecks:
         return [] if item is None else [item]
 
     async def _view(self, robot: KnownEngine) -> EngineView:
-        """The engine as it answers a get sent now, on the path that would confirm a stop. Raises
-        NoAnswer."""
+        """The engine as it answers a get sent now, on the path that would confirm a stop; once it has read
+        what was just written for it. Raises NoAnswer."""
+        await robot.indexed()
         name, began = robot.registration.name, anyio.current_time()
         going = frozenset(self._going(name))  # what is taken back later on is in nobody's hand yet
         answer: Answer
