@@ -7,6 +7,7 @@ import { useState } from "react";
 import { Link } from "wouter";
 import { answerProposal, type GraphDraft, useDrafts } from "../api/documents/drafts";
 import { authorName, deleteGraph, refreshGraphs } from "../api/graphs";
+import { usePerson } from "../api/use-person";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { lazyPart } from "../ui/parts/lazy-part";
 import { OverlayBoundary } from "../ui/parts/part-boundary";
@@ -27,8 +28,10 @@ interface DraftRowProps {
 function ProposalOf({ draft, onMerge }: DraftRowProps) {
   const { mayEdit } = useEditorContext();
   const { busy, wrong, step } = useDraftStep();
+  const { person } = usePerson();
   const { proposal } = draft;
   if (!proposal) return null;
+  const mine = proposal.author.id === person.id;
   const say = (yes: boolean) =>
     void step(() => answerProposal(draft.id, { yes, seq: draft.seq, note: "" }));
   return (
@@ -42,10 +45,18 @@ function ProposalOf({ draft, onMerge }: DraftRowProps) {
         Proposed by <bdi>{authorName(proposal.author)}</bdi>: {answersWords(proposal, draft.seq)}
       </p>
       {mayEdit && (
+        <p className={style.quiet}>
+          {mine
+            ? "You have proposed it: a second person has to answer."
+            : "One link that is opened in two browsers may be one person."}
+        </p>
+      )}
+      {mayEdit && (
         <div className={style.steps}>
           <Button
             size="compact-sm"
             loading={busy}
+            disabled={mine}
             leftSection={<IconCheck size={14} aria-hidden />}
             onClick={() => say(true)}
           >
@@ -54,6 +65,7 @@ function ProposalOf({ draft, onMerge }: DraftRowProps) {
           <Button
             size="compact-sm"
             loading={busy}
+            disabled={mine}
             leftSection={<IconX size={14} aria-hidden />}
             onClick={() => say(false)}
           >

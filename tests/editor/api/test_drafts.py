@@ -1,11 +1,15 @@
 """Drafts over HTTP: made, listed under their graph, looked at, merged, and refused in words."""
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import httpx
+import pytest
 
 from editor.api.test_history import PAIR
+from support.product import TOKEN
 
 
 def _draft(http: httpx.Client, graph: str, **new: object) -> dict[str, Any]:
@@ -82,15 +86,63 @@ def test_a_draft_takes_over_what_its_graph_has_meanwhile(http: httpx.Client) -> 
     assert http.get(f"/api/drafts/{draft}").json()["behind"] == 0
 
 
-def test_a_proposal_is_made_answered_and_taken_back(http: httpx.Client) -> None:
+@contextmanager
+def browser(http: httpx.Client, name: str) -> Iterator[httpx.Client]:
+    """A browser in which somebody has signed in."""
+    url = str(http.base_url).rstrip("/")
+    with httpx.Client(base_url=url, headers={"origin": url}, trust_env=False) as made:
+        assert made.post("/api/session", json={"token": TOKEN, "name": name}).is_success
+        yield made
+
+
+def test_a_proposal_is_made_answered_by_a_second_person_and_taken_back(http: httpx.Client) -> None:
     draft = _draft(http, _imported(http))["id"]
     proposed = http.post(f"/api/drafts/{draft}/proposal", json={"note": "please"}).json()
     assert (proposed["state"], proposed["proposal"]["note"]) == ("proposed", "please")
     said = {"yes": True, "seq": 1, "note": "fine"}
-    answered = http.post(f"/api/drafts/{draft}/answers", json=said).json()
+    with browser(http, "Ben") as ben:
+        answered = ben.post(f"/api/drafts/{draft}/answers", json=said).json()
     assert [each["yes"] for each in answered["proposal"]["answers"]] == [True]
     assert http.delete(f"/api/drafts/{draft}/proposal").json()["state"] == "open"
     assert http.post(f"/api/drafts/{draft}/answers", json=said).status_code == 409
+
+
+@pytest.mark.parametrize("yes", [True, False])
+def test_ones_own_answer_to_a_proposal_does_not_count(http: httpx.Client, yes: bool) -> None:
+    draft = _draft(http, _imported(http))["id"]
+    said = {"yes": yes, "seq": 1}
+    with browser(http, "Ann") as ann:
+        ann.post(f"/api/drafts/{draft}/proposal", json={})
+        refused = ann.post(f"/api/drafts/{draft}/answers", json=said)
+        assert (refused.status_code, refused.json()["where"]) == (409, {"path": "/yes"})
+        # The same browser under another name is no second person.
+        assert ann.delete("/api/session").is_success
+        again = ann.post("/api/session", json={"token": TOKEN, "name": "Eve"}).json()
+        assert again["person"]["name"] == "Eve"
+        refused = ann.post(f"/api/drafts/{draft}/answers", json=said)
+        assert (refused.status_code, refused.json()["where"]) == (409, {"path": "/yes"})
+        assert "in your browser" in refused.json()["detail"]
+    assert "answers" not in http.get(f"/api/drafts/{draft}").json()["proposal"]
+
+
+@pytest.mark.parametrize(
+    ("seq", "status"), [(-5, 400), (0, 400), (1, 409), (3, 400), (999_999, 400), (2**63, 400)]
+)
+def test_an_answer_is_to_the_change_that_is_there_and_to_no_other(
+    http: httpx.Client, seq: int, status: int
+) -> None:
+    draft = _draft(http, _imported(http))["id"]
+    http.post(f"/api/drafts/{draft}/proposal", json={})
+    http.patch(f"/api/graphs/{draft}", json={"description": "changed since"})
+    with browser(http, "Ben") as ben:
+        refused = ben.post(f"/api/drafts/{draft}/answers", json={"yes": True, "seq": seq})
+        assert refused.status_code == status, refused.text
+        assert refused.json()["where"]["path"] == "/seq"
+        assert "answers" not in http.get(f"/api/drafts/{draft}").json()["proposal"]
+        assert ben.post(f"/api/drafts/{draft}/answers", json={"yes": True, "seq": 2}).is_success
+    http.patch(f"/api/graphs/{draft}", json={"description": "and again"})
+    (answer,) = http.get(f"/api/drafts/{draft}").json()["proposal"]["answers"]
+    assert answer["seq"] == 2
 
 
 def test_what_is_no_draft_is_not_found(http: httpx.Client) -> None:

@@ -1,8 +1,11 @@
 """A robot that demands a second person takes only what somebody else has said yes to."""
 
+import json
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from pathlib import Path
 
+import httpx
 import msgspec
 import pytest
 from hypothesis import given
@@ -19,8 +22,10 @@ from action_assistant.runner.start.approvals import (
     Approvals,
 )
 from action_assistant.umrf.facts import BadProfile, facts_of
+from action_assistant.web.auth.caller import Caller, asked_by
 from runner.harness import ANN, BEN, Harness, clock_us, order, sequence, until, virtual
 from runner.registered_robots import NEVER, Open, change, fleet, group, verdicts
+from support.product import TOKEN, running
 
 CARL = Author("carl", "Carl")
 
@@ -138,3 +143,65 @@ def test_a_profile_demands_it_or_not(value: object) -> None:
     with pytest.raises(BadProfile) as wrong:
         facts_of({"second_person": value})
     assert wrong.value.path == "/second_person"
+
+
+@virtual
+async def test_a_yes_from_the_same_browser_under_another_name_is_no_second_person() -> None:
+    david, graph = Open(NEVER), sequence()
+
+    def asks(author: Author, device: str) -> None:
+        asked_by(Caller(author.id, device=device))
+
+    async with careful(Harness(), david) as control:
+        asked = order(graph, engine="David")
+        asks(BEN, "tablet")
+        await control.approvals.give(yes(asked.digest), BEN)
+        asks(ANN, "tablet")
+        with pytest.raises(Conflict, match="came from the browser that you use"):
+            await control.start(asked, ANN)
+        (look,) = await control.look(group(graph, "David"), "ann")
+        assert verdicts(look)["approved"] == "blocked"
+        assert david.starts == []
+        asks(ANN, "desk")
+        assert (await control.start(asked, ANN)).fresh
+        control.stop_all(ANN)
+        await until(lambda: not control.open)
+
+
+def test_a_browser_is_known_again_by_both_processes_after_somebody_has_signed_out(
+    tmp_path: Path,
+) -> None:
+    graph = json.loads(bytes(order(sequence()).umrf))
+    with running(tmp_path / "data") as product, httpx.Client(trust_env=False) as browser:
+        browser.headers["origin"] = product.url
+        program = {"authorization": f"Bearer {TOKEN}"}
+        robot = {"name": "David", "domain": 180, "profile": {"second_person": True}}
+        made = httpx.post(
+            f"{product.runner_url}/api/robots", json=robot, headers=program, trust_env=False
+        )
+        assert made.is_success, made.text
+
+        def signed_in(name: str) -> None:
+            answer = browser.post(f"{product.url}/api/session", json={"token": TOKEN, "name": name})
+            assert answer.is_success, answer.text
+
+        def approved(digest: str = "") -> tuple[str, dict[str, str]]:
+            asked = {"umrf": graph, "engines": ["David"]}
+            answer = browser.post(f"{product.runner_url}/api/preflight", json=asked)
+            assert answer.is_success, answer.text
+            (look,) = answer.json()
+            return look["tree_digest"], next(i for i in look["items"] if i["code"] == "approved")
+
+        signed_in("Ben")
+        digest, item = approved()
+        assert browser.post(
+            f"{product.runner_url}/api/approvals", json={"digest": digest}
+        ).is_success
+        assert browser.delete(f"{product.url}/api/session").is_success
+        signed_in("Ann")
+        _, item = approved()
+        assert item["verdict"] == "blocked"
+        assert "the yes of Ben came from the browser that you use" in item["text"]
+        browser.cookies.clear()
+        signed_in("Carl")
+        assert approved()[1]["verdict"] == "passed"

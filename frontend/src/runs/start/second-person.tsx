@@ -28,7 +28,11 @@ function Said({ given, me, label }: { given: readonly Approval[]; me: string; la
           Said yes to {label}: <bdi>{others.map(({ author }) => author.name).join(", ")}</bdi>.{" "}
         </>
       )}
-      {mine && `You said yes to ${label}: somebody else may start it.`}
+      {mine && `You said yes to ${label}: somebody else may start it.`}{" "}
+      <span className={style.doubt}>
+        A second person needs a browser of their own. One link that is opened in two browsers may be
+        one person: that cannot be told here.
+      </span>
     </Text>
   );
 }

@@ -122,10 +122,12 @@ class GraphMerged(msgspec.Struct, frozen=True):
 
 
 class DraftProposed(msgspec.Struct, frozen=True):
-    """Somebody would like the draft, as it was after its change `seq`, to be merged."""
+    """Somebody would like the draft, as it was after its change `seq`, to be merged. `device`: their
+    browser, "" where that is not known."""
 
     note: str
     seq: int
+    device: str = ""
 
 
 class DraftAnswered(msgspec.Struct, frozen=True):

@@ -18,6 +18,7 @@ from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.history import RunnerJournal
 from action_assistant.runner.start.preflight import Item
 from action_assistant.umrf.facts import SECOND_PERSON
+from action_assistant.web.auth import caller
 
 #: The stream of all of them.
 STREAM: Final = "approvals"
@@ -26,7 +27,8 @@ _DIGEST: Final = frozenset("0123456789abcdef")
 
 
 class ApprovalGiven(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """Somebody said yes to the graph with this digest. `graph` and `version` say where they saw it."""
+    """Somebody said yes to the graph with this digest. `graph` and `version` say where they saw it;
+    `device` is their browser, "" where that is not known."""
 
     kind: ClassVar[str] = "approval.given.v1"
 
@@ -36,6 +38,7 @@ class ApprovalGiven(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=Tru
     graph: str | None = None
     version: str = ""
     note: str = ""
+    device: str = ""
 
 
 class ApprovalRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -71,6 +74,7 @@ class Approvals:
             graph=asked.graph,
             version=asked.version,
             note=asked.note.strip(),
+            device=caller.device(),
         )
         draft = Draft(given.kind, author.id, msgspec.json.encode(given))
         await self._journal.append(STREAM, [draft])
@@ -88,16 +92,21 @@ class Approvals:
         return tuple(self._by_digest.get(digest, ()))
 
     async def item(self, robot: Registration, digest: str, starter: str) -> Item | None:
-        """Whether somebody else than the starter, by id, has said yes; None where the robot does not
-        ask."""
+        """Whether somebody else than the starter, by id, has said yes, with another browser than the one
+        that asks for the start; None where the robot does not ask."""
         if robot.profile.get(SECOND_PERSON) is not True:
             return None
-        others = [each.author for each in await self.of(digest) if each.author.id != starter]
+        named = [each for each in await self.of(digest) if each.author.id != starter]
+        here = caller.device()
+        others = [each.author for each in named if not here or each.device != here]
         if not others:
-            text = (
-                f"{robot.name} takes only what a second person has said yes to, and nobody else has "
-                "said yes to exactly this graph."
+            why = (
+                "nobody else has said yes to exactly this graph: the yes of "
+                f"{named[0].author.name or 'somebody'} came from the browser that you use"
+                if named
+                else "nobody else has said yes to exactly this graph"
             )
+            text = f"{robot.name} takes only what a second person has said yes to, and {why}."
             return Item(code="approved", verdict="blocked", text=text)
         names = ", ".join(dict.fromkeys(each.name or "somebody" for each in others[:3]))
         return Item(

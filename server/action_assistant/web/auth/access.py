@@ -58,10 +58,21 @@ def cookie_name(page_port: int) -> str:
     return f"aa_{page_port}"
 
 
+def device_cookie_name(page_port: int) -> str:
+    """The cookie by which a browser is known again after somebody has signed out there."""
+    return f"aa_{page_port}_device"
+
+
 def person_of(connection: ASGIConnection[Any, Any, Any, Any]) -> Person:
     """Who is asking. Every route behind the door may call this."""
     person: Person = connection.scope["state"]["person"]
     return person
+
+
+def device_of(connection: ASGIConnection[Any, Any, Any, Any]) -> str:
+    """The id of the browser; "" of one that has none yet."""
+    device: str = connection.scope["state"].get("device", "")
+    return device
 
 
 def session_of(connection: ASGIConnection[Any, Any, Any, Any]) -> Session | None:
@@ -144,6 +155,7 @@ class Access:
         self._keys = keys
         self._addresses = addresses
         self._cookie = cookie_name(page_port)
+        self._device_cookie = device_cookie_name(page_port)
         self._is_open = is_open
         self._policy = policy
         self._revoked = revoked
@@ -167,7 +179,7 @@ class Access:
         asked = receive if scope["type"] == ScopeType.HTTP else None
         if known is not None:
             scope["state"].get(KNOWN, _nobody)(known.id)
-        asked_by(None if known is None else Caller(known.id, asked))
+        asked_by(None if known is None else Caller(known.id, asked, scope["state"]["device"]))
         if preflight:
             await _answer(send, 204, [(b"cache-control", b"no-store")], b"")
             return
@@ -242,6 +254,7 @@ class Access:
     ) -> None:
         state = scope.setdefault("state", {})
         path = scope["path"]
+        state["device"] = self._device(headers)
         scheme, _, token = headers.get("authorization", "").partition(" ")
         if scheme.lower() == "bearer" and self._keys.opens(token.strip()):
             state["person"] = self._local
@@ -271,6 +284,11 @@ class Access:
         """All whose seal is ours: there may be one for each path that this server has had."""
         tried = map(self._keys.session, cookies.values(headers.get("cookie", ""), self._cookie))
         return [each for each in tried if each is not None]
+
+    def _device(self, headers: dict[str, str]) -> str:
+        """Return the id of the browser, by the first cookie whose seal is ours."""
+        given = cookies.values(headers.get("cookie", ""), self._device_cookie)
+        return next(filter(None, map(self._keys.device, given)), "")
 
     def _lasting(self, genuine: list[Session]) -> Session | None:
         """The first one that lasts, else the first."""

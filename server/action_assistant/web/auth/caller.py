@@ -15,10 +15,12 @@ if TYPE_CHECKING:
 
 
 class Caller(NamedTuple):
-    """Who waits for what is being done now. What is done for nobody may end."""
+    """Who waits for what is being done now. What is done for nobody may end. `device`: the browser that
+    they ask with, whoever is signed in there; "" where that is not known."""
 
     person: str
     receive: "Receive | None" = None  # a socket's messages are not ours to read
+    device: str = ""
 
     async def gone(self) -> None:
         """Wait until they have gone. Only after the request was read."""
@@ -37,6 +39,12 @@ def caller() -> Caller | None:
     return _CALLER.get()
 
 
+def device() -> str:
+    """Return the browser of whoever asked for what this task does; "" where that is not known."""
+    asking = _CALLER.get()
+    return "" if asking is None else asking.device
+
+
 def asked_by(asking: Caller | None) -> None:
     """What this task does from here on is asked for by them."""
     _CALLER.set(asking)
@@ -45,7 +53,7 @@ def asked_by(asking: Caller | None) -> None:
 def done_for_person() -> None:
     """From here on this task goes on also when the connection ends that it was begun for."""
     asking = _CALLER.get()
-    _CALLER.set(None if asking is None else Caller(asking.person))
+    _CALLER.set(None if asking is None else asking._replace(receive=None))
 
 
 @contextmanager

@@ -167,6 +167,21 @@ class Keys:
         payload = _text(msgspec.json.encode(fields))
         return f"{payload}.{_text(self._sign(payload))}"
 
+    def new_device(self) -> str:
+        """Return the cookie by which a browser is known again, whoever signs in there."""
+        made = random_id()
+        return f"{made}.{self._device_seal(made)}"
+
+    def device(self, cookie: str) -> str:
+        """Return the id of the browser behind such a cookie; "" when we did not seal it."""
+        found, _, seal = cookie.partition(".")
+        return (
+            found if hmac.compare_digest(self._device_seal(found).encode(), seal.encode()) else ""
+        )
+
+    def _device_seal(self, device: str) -> str:
+        return _text(self._sign(f"device\0{device}"))
+
     def session(self, cookie: str) -> Session | None:
         """The session behind a cookie, expired or not; None when we did not seal it."""
         payload, _, signature = cookie.partition(".")

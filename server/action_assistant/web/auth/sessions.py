@@ -14,6 +14,8 @@ from action_assistant.errors import BadInput, TooMany, Unauthenticated, Unavaila
 from action_assistant.web.auth.access import (
     Needs,
     cookie_name,
+    device_cookie_name,
+    device_of,
     known_person,
     live_session,
     session_of,
@@ -30,6 +32,7 @@ _BODY: Final = 10_000  # bytes; strangers send it
 _NAME: Final = 60  # characters
 _TRIES_AT_ONCE: Final = 60  # of one address: a class may sit behind one
 _TRIES_PER_MINUTE: Final = 30  # after that
+_DEVICE_SECONDS: Final = 400 * 24 * 3600  # browsers keep none for longer
 _Asking = Request[Any, Any, Any]
 
 
@@ -94,6 +97,7 @@ class Sessions:
     ) -> None:
         self._keys = keys
         self._cookie = cookie_name(page_port)
+        self._device = device_cookie_name(page_port)
         self._reception = reception
         self._addresses = addresses
         self._pace = RateLimit(_TRIES_AT_ONCE, _TRIES_PER_MINUTE) if limits else None
@@ -139,7 +143,26 @@ class Sessions:
             secure=secure,
             path=path,
         )
-        return Response(_signed_in(session), status_code=200, cookies=[cookie])
+        return Response(
+            _signed_in(session), status_code=200, cookies=[cookie, *self._device_cookie(request)]
+        )
+
+    def _device_cookie(self, request: _Asking) -> list[Cookie]:
+        """The cookie by which this browser is known again, also after somebody has signed out; none where it
+        has one."""
+        if device_of(request):
+            return []
+        secure, path = self._jar(request)
+        made = Cookie(
+            key=self._device,
+            value=self._keys.new_device(),
+            max_age=_DEVICE_SECONDS,
+            httponly=True,
+            samesite="strict",
+            secure=secure,
+            path=path,
+        )
+        return [made]
 
     def farewell(self, request: _Asking, unwritten: Unavailable | None = None) -> Response[None]:
         """No cookie any more. `unwritten`: why other processes may not know of it."""

@@ -19,6 +19,7 @@ from action_assistant.errors import BadInput, Conflict, NotFound
 from action_assistant.journal.journal import Journal
 from action_assistant.schema.editor_tables import editor_event
 from action_assistant.schema.editor_tables import graph as graph_table
+from action_assistant.web.auth import caller
 from action_assistant.web.auth.keys import PersonRef
 
 #: `merged`: it holds nothing that its origin has not been given.
@@ -158,48 +159,76 @@ class Drafts:
         """Say that a draft is ready to be merged."""
         await self._row(draft)
         seq = (await self._graph_reader.now(draft)).seq
-        proposed = h.draft(h.PROPOSED, author, h.DraftProposed(note.strip(), seq))
+        body = h.DraftProposed(note.strip(), seq, caller.device())
+        proposed = h.draft(h.PROPOSED, author, body)
         await self._journal.append(h.about_stream(draft), [proposed])
         return await self.get(draft)
 
     async def withdraw(self, draft: str, author: str) -> DraftView:
         """Take a proposal back. Raises Conflict where there is none."""
-        await self._proposed(draft)
+        if (await self._proposal(await self._row(draft)))[0] is None:
+            raise Conflict("This draft is not proposed.")
         await self._journal.append(h.about_stream(draft), [h.draft(h.WITHDRAWN, author)])
         return await self.get(draft)
 
     async def answer(self, draft: str, author: str, body: h.DraftAnswered) -> DraftView:
-        """Say yes or no to a proposal. Raises Conflict where there is none."""
-        await self._proposed(draft)
+        """Say yes or no to a proposal of somebody else, having seen the draft as it is. Raises BadInput,
+        Conflict."""
+        row = await self._row(draft)
+        proposal, device = await self._proposal(row)
+        if proposal is None:
+            raise Conflict("This draft is not proposed.")
+        here = caller.device()
+        if proposal.author.id == author or (here and device == here):
+            who = "You have" if proposal.author.id == author else "Somebody has, in your browser,"
+            raise Conflict(
+                f"{who} proposed this draft: a second person has to answer. The proposal can be "
+                "withdrawn.",
+                where={"path": "/yes"},
+            )
+        newest = await self._journal.newest(h.graph_stream(draft))
+        if not 1 <= body.seq <= newest:
+            raise BadInput(
+                f"The draft has no change {body.seq}; its last one is {newest}.",
+                where={"path": "/seq"},
+            )
+        if body.seq < newest:
+            raise Conflict(
+                f"The draft was changed since change {body.seq}; its last one is {newest}. Look at it "
+                "again before you answer.",
+                where={"path": "/seq", "seq": newest},
+            )
         await self._journal.append(h.about_stream(draft), [h.draft(h.ANSWERED, author, body)])
         return await self.get(draft)
 
-    async def _proposed(self, draft: str) -> None:
-        if await self._proposal(await self._row(draft)) is None:
-            raise Conflict("This draft is not proposed.")
-
-    async def _proposal(self, row: Row[Any]) -> DraftProposal | None:
-        """The proposal that is open."""
+    async def _proposal(self, row: Row[Any]) -> tuple[DraftProposal | None, str]:
+        """The proposal that is open, and the browser that it came from. Earlier versions stored answers to
+        one's own proposal, and to changes that were not there: those do not count."""
         found: DraftProposal | None = None
+        device = ""
         answers: dict[str, DraftAnswer] = {}
+        newest = await self._journal.newest(h.graph_stream(row.id))
         for event in await self._about(row):
             author, at = self._people.person(event.author), h.when(event.at)
             match event.kind:
                 case h.PROPOSED:
                     proposed = msgspec.json.decode(event.body, type=h.DraftProposed)
                     found = DraftProposal(author, at, proposed.note, proposed.seq)
-                    answers = {}
-                case h.ANSWERED:
+                    device, answers = proposed.device, {}
+                case h.ANSWERED if found is not None and event.author != found.author.id:
                     said = msgspec.json.decode(event.body, type=h.DraftAnswered)
                     answers.pop(event.author, None)
-                    answers[event.author] = DraftAnswer(author, at, said.yes, said.note, said.seq)
+                    if 1 <= said.seq <= newest:
+                        answers[event.author] = DraftAnswer(
+                            author, at, said.yes, said.note, said.seq
+                        )
                 case h.MERGED if _ends_proposal(event, row):
                     found = None
                 case h.WITHDRAWN:
                     found = None
         if found is None:
-            return None
-        return msgspec.structs.replace(found, answers=tuple(answers.values()))
+            return None, ""
+        return msgspec.structs.replace(found, answers=tuple(answers.values())), device
 
     async def _about(self, row: Row[Any]) -> Sequence[Row[Any]]:
         """What was said of a draft, and what was merged, in order of time."""
@@ -218,7 +247,7 @@ class Drafts:
         draft: GraphView = await self._catalogue.get(row.id)
         (origin,) = await self._rows(graph_table.c.id == row.draft_of)
         ahead, behind, origin_seq = await self._distance(row, origin)
-        proposal = await self._proposal(row)
+        proposal, _ = await self._proposal(row)
         merged = row.merged_seq == draft.seq
         return DraftView(
             id=row.id,
