@@ -13,6 +13,11 @@ const vendors: { name: string; test: RegExp; tags?: "$initial"[] }[] = [
   { name: "react", test: /node_modules\/(react|react-dom|scheduler|use-sync-external-store)\// },
   { name: "canvas", test: /node_modules\/(@xyflow|d3-|classcat|zustand)/ },
   { name: "sync", test: /node_modules\/(yjs|y-protocols|lib0)\// },
+  // STOP needs nothing but this and React: see `app/stop-main.ts`.
+  {
+    name: "stop",
+    test: /src\/(app\/stop-main|runs\/stop\/(stop-|visual-|outside-)|api\/(live\/|http|page-url|roles|run-stop|session)|graph\/(equal|ids)|status\/help-link|ui\/(keys|times|tokens|watched|hooks\/use-root-mark))/,
+  },
   // What every page loads comes in one piece: it is smaller than in many, and asked for once.
   { name: "ui", test: /node_modules\//, tags: ["$initial"] },
   { name: "page", test: /src\/(?!offline\/(service-worker|requests))/, tags: ["$initial"] },
@@ -28,6 +33,45 @@ const PUBLIC = resolve(import.meta.dirname, "public");
 /** Fonts of scripts that few graphs are written in are kept when they are first shown. */
 const SELDOM = /-(cyrillic|greek|vietnamese|latin)(-ext)?-wght.*woff2$/;
 const OFTEN = /-latin-wght.*woff2$/;
+
+/** The page around STOP is an entry of its own, so that a part of it that does not come takes no STOP away. */
+const PAGE = "src/app/main.tsx";
+
+/** Names the file of the page around STOP in index.html, and what has to be there before it runs. */
+function pageScript(): Plugin {
+  return {
+    name: "page-script",
+    apply: "build",
+    enforce: "post",
+    generateBundle(_, bundle) {
+      const html = bundle["index.html"];
+      const chunks = Object.values(bundle).filter((part) => part.type === "chunk");
+      const entry = chunks.find((chunk) => chunk.facadeModuleId?.endsWith(PAGE));
+      if (html?.type !== "asset" || entry === undefined) throw new Error(`no page, or no ${PAGE}`);
+      // What is imported comes first, so that its styles give way to those of its importer.
+      const needed = new Set<string>();
+      const styles = new Set<string>();
+      const add = (name: string) => {
+        const chunk = bundle[name];
+        if (chunk?.type !== "chunk" || needed.has(name)) return;
+        for (const next of chunk.imports) add(next);
+        needed.add(name);
+        for (const style of chunk.viteMetadata?.importedCss ?? []) styles.add(style);
+      };
+      add(entry.fileName);
+      const text = String(html.source);
+      const links = [...needed, ...styles]
+        .filter((name) => !text.includes(name))
+        .map((name) => {
+          const rel = styles.has(name) ? "stylesheet" : "modulepreload";
+          return `<link rel="${rel}" crossorigin href="./${name}">`;
+        });
+      html.source = text
+        .replace(/ src="[^"]*main\.tsx"( vite-ignore)?/, ` crossorigin src="./${entry.fileName}"`)
+        .replace("</head>", `${links.join("")}</head>`);
+    },
+  };
+}
 
 /** Names this version of the page in it, and tells the service worker of what it consists. */
 function pageVersion(): Plugin {
@@ -59,7 +103,7 @@ function pageVersion(): Plugin {
 }
 
 export default defineConfig({
-  plugins: [react(), pageVersion()],
+  plugins: [react(), pageScript(), pageVersion()],
   // The server writes the path at which a proxy shows the page into index.html.
   base: "./",
   resolve: { alias: substitutes },
@@ -74,6 +118,7 @@ export default defineConfig({
       treeshake: { manualPureFunctions: ["createContext", "forwardRef", "memo"] },
       input: {
         index: resolve(import.meta.dirname, "index.html"),
+        page: resolve(import.meta.dirname, PAGE),
         "service-worker": resolve(import.meta.dirname, "src/offline/service-worker.ts"),
       },
       output: {

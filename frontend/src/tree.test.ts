@@ -131,6 +131,11 @@ test("what only tests need is imported by tests only", () => {
   expect(wrong).toEqual([]);
 });
 
+test("nothing is put where the browser lets nobody press STOP: above every layer, or as the whole screen", () => {
+  const above = /\.(showModal|showPopover|requestFullscreen)\(|\bpopover=/;
+  expect(modules.filter((file) => above.test(textOf(file)))).toEqual([]);
+});
+
 /** An alarm, not a limit to split by: a function with more statements needs a reason. */
 const MOST_STATEMENTS = 60;
 const MOST_STATEMENTS_OF_A_STORY = 90; // a test in a browser: what people do, step after step

@@ -4,16 +4,19 @@ import {
   type ReactNode,
   useCallback,
   useEffect,
+  useLayoutEffect,
   useMemo,
   useState,
   useSyncExternalStore,
 } from "react";
 import { errorText, isOutcomeUnknown, Refusal } from "../api/http";
+import { pageLink } from "../api/live/page-link";
 import {
   type Credential,
   credentialIn,
   currentPerson,
   type InvitationPreview,
+  identityOf,
   openSession,
   type Person,
   readInvitation,
@@ -179,6 +182,11 @@ export function SignInGate({ children }: { children: ReactNode }) {
     if (gate.at !== "inside" || gate.offline) return;
     rememberPerson(gate.person);
     void SignInBar.preload(); // when it is needed, the server may not answer
+  }, [gate]);
+  // What is drawn may fail and go; the link stays, so nothing is undone when this does.
+  useLayoutEffect(() => {
+    if (gate.at === "inside") pageLink.enter(identityOf(gate.person), gate.visit);
+    else if (gate.at !== "knocking") pageLink.leave();
   }, [gate]);
   const hold = useMemo(
     () =>

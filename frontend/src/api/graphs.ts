@@ -4,7 +4,6 @@ import { useEffect } from "react";
 import { fetchJson, fetchText } from "./http";
 import type { EditorApi } from "./schema/editor";
 
-export type Config = EditorApi["Config"];
 /** `people`: who is in it now. */
 export type GraphSummary = EditorApi["GraphView"];
 export type VersionAuthor = EditorApi["PersonRef"];
@@ -18,7 +17,6 @@ export type Problems = EditorApi["Problems"];
 export type GraphDifference = EditorApi["Difference"];
 
 export const queryKeys = {
-  config: ["config"] as const,
   graphs: ["graphs"] as const,
   deleted: ["deleted graphs"] as const,
   actions: ["actions"] as const,
@@ -27,16 +25,6 @@ export const queryKeys = {
   versions: (id: string) => ["graphs", id, "versions"] as const,
   version: (id: string) => ["versions", id] as const,
 };
-
-export function useConfig() {
-  return useQuery({
-    queryKey: queryKeys.config,
-    queryFn: ({ signal }) => fetchJson<Config>("/api/config", { signal }),
-    staleTime: Number.POSITIVE_INFINITY,
-    // Without it there is no way to the runner, nor for Stop.
-    refetchInterval: (query) => (query.state.status === "error" ? 5_000 : false),
-  });
-}
 
 export function useGraphs() {
   return useQuery({

@@ -1,7 +1,8 @@
 /** What the runner tells of past runs: marks, comparisons, statistics, files. */
 import { useQuery } from "@tanstack/react-query";
 import { fetchAnswer, fetchJson, type RequestOptions } from "./http";
-import { getRun, type Run } from "./runs";
+import { getRun } from "./run-stop";
+import type { Run } from "./runs";
 import type { RunnerApi } from "./schema/runner";
 
 export type RunMarks = RunnerApi["RunMarks"];

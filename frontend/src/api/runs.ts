@@ -1,6 +1,7 @@
 /** Runs as the runner tells them. */
 import { useQuery } from "@tanstack/react-query";
 import { fetchJson } from "./http";
+import { getRun } from "./run-stop";
 import type { RunnerApi } from "./schema/runner";
 
 /** Who asked for something, and from where: `address` is missing for the runner's own computer. */
@@ -41,27 +42,6 @@ export function currentAlarm(run: Run): Run["alarms"][number] | undefined {
   const begun = Object.values(run.actions ?? {}).map(({ visits }) => visits.at(-1)?.from ?? "");
   const newest = Math.max(0, ...begun.map((at) => Date.parse(at) || 0));
   return run.alarms.findLast(({ code, at }) => code !== "stalled" || Date.parse(at) >= newest);
-}
-
-/** A lost run has not: nobody has seen it at rest yet. */
-export function hasEnded(run: Run): boolean {
-  return run.ended_at !== null;
-}
-
-/** States of an action whose code was seen to go on. */
-export const MOVES: ReadonlySet<string> = new Set([
-  "RUNNING",
-  "STOPPING",
-  "PAUSE_REQUESTED",
-  "PAUSED",
-]);
-
-/** Whether a person's word can end the run, since no answer of its engine can. */
-export function needsRestConfirmation(run: Run): boolean {
-  if (hasEnded(run) || run.simulated || run.started_at === null) return false;
-  if (run.state === "lost" || run.unknown_since !== null) return true;
-  const moves = Object.values(run.actions ?? {}).some((action) => MOVES.has(action.state));
-  return Boolean(run.unconfirmed) && !moves;
 }
 
 /** Says that somebody has seen the run at rest, and how. */
@@ -134,16 +114,6 @@ export function findStart(
   return fetchJson(path, { timeoutMs: patience, ...(signal ? { signal } : {}) });
 }
 
-/** Asks to stop one run, or all of them. */
-export function postStop(runner: string, run: string | "all", stop: string): Promise<unknown> {
-  const path = run === "all" ? "/api/stop" : `/api/runs/${encodeURIComponent(run)}/stop`;
-  return fetchJson(`${runner}${path}`, {
-    method: "POST",
-    body: { stop_id: stop },
-    timeoutMs: 3_000,
-  });
-}
-
 /** Pauses a run, or lets it go on. */
 export function pauseOrResume(runner: string, run: string, way: "pause" | "resume"): Promise<Run> {
   return fetchJson(`${runner}/api/runs/${encodeURIComponent(run)}/${way}`, {
@@ -172,10 +142,6 @@ export function useRuns(runner: string | undefined, graph?: string) {
     queryFn: ({ signal }) => fetchJson<Run[]>(`${runner}/api/runs?limit=200${filter}`, { signal }),
     enabled: runner !== undefined,
   });
-}
-
-export function getRun(runner: string, id: string, signal?: AbortSignal): Promise<Run> {
-  return fetchJson(`${runner}/api/runs/${encodeURIComponent(id)}`, signal ? { signal } : {});
 }
 
 /** The newest run of a graph, whole; null when it never ran. */

@@ -57,6 +57,11 @@ function isPerson(kept: unknown): kept is Person {
   return typeof id === "string" && typeof name === "string" && String(role) in ROLE_WORDS;
 }
 
+/** Whom the runner takes somebody for. */
+export function identityOf({ id, role, name }: Person): string {
+  return `${id} ${role} ${name}`;
+}
+
 /** Null: from now on nobody is shown anything here without a server. */
 export function rememberPerson(person: Person | null): void {
   if (person === null) localStorage.removeItem(PERSON_KEY);

@@ -1,17 +1,15 @@
 /** The page: theme, data, session, routes. */
 import { MantineProvider } from "@mantine/core";
 import { QueryClient, QueryClientProvider } from "@tanstack/react-query";
-import { type ReactNode, useEffect, useState, useSyncExternalStore } from "react";
+import { useEffect, useState, useSyncExternalStore } from "react";
 import { Route, Router, Switch } from "wouter";
 import { SignInGate } from "../account/sign-in-gate";
 import { Refusal } from "../api/http";
-import { LiveProvider } from "../api/live/use-live";
 import { basePath } from "../api/page-url";
-import { usePerson } from "../api/use-person";
 import { actionDrag } from "../canvas/action-drag";
 import { NewVersionNotice } from "../offline/new-version-notice";
 import { UnansweredStartNotice } from "../runs/start/unanswered-start-notice";
-import { StopNotice } from "../runs/stop/stop-notice";
+import { RestQuestion } from "../runs/stop/rest-question";
 import { LiveRegion } from "../ui/announcer";
 import { lazyPart } from "../ui/parts/lazy-part";
 import { OverlayBoundary } from "../ui/parts/part-boundary";
@@ -48,16 +46,6 @@ const client = new QueryClient({
     mutations: { networkMode: NOW },
   },
 });
-
-/** The runner hears of a new name by a new socket. */
-function LiveConnection({ children }: { children: ReactNode }) {
-  const { person, visit } = usePerson();
-  return (
-    <LiveProvider who={`${visit} ${person.id} ${person.role} ${person.name}`}>
-      {children}
-    </LiveProvider>
-  );
-}
 
 const Messages = lazyPart(() => import("../ui/parts/messages").then((part) => part.Messages));
 const ImportReviewDialog = lazyPart(() =>
@@ -143,17 +131,15 @@ export function App() {
       <QueryClientProvider client={client}>
         <Router base={basePath}>
           <SignInGate>
-            <LiveConnection>
-              <DropFiles>
-                <Screens />
-                <ImportReview />
-                <StopNotice />
-                <UnansweredStartNotice />
-                <DragPreview carrier={actionDrag} />
-                <NewVersionNotice />
-                <LiveRegion />
-              </DropFiles>
-            </LiveConnection>
+            <DropFiles>
+              <Screens />
+              <ImportReview />
+              <RestQuestion />
+              <UnansweredStartNotice />
+              <DragPreview carrier={actionDrag} />
+              <NewVersionNotice />
+              <LiveRegion />
+            </DropFiles>
           </SignInGate>
         </Router>
       </QueryClientProvider>

@@ -1,13 +1,14 @@
-/** Entry of the page. */
+/** Entry of the page around STOP, which has its own (`stop-main.ts`). */
 import "@fontsource-variable/inter/index.css";
 import "@fontsource-variable/jetbrains-mono/index.css";
 import "@mantine/core/styles.css";
 import "@mantine/notifications/styles.css";
-import "../ui/tokens.css";
 import "../ui/base.css";
 import { StrictMode } from "react";
 import { createRoot } from "react-dom/client";
+import { errorText } from "../api/http";
 import { keepPage } from "../offline/page-version";
+import { pageError } from "../runs/stop/stop-surroundings";
 import { App } from "./app";
 import { preloadAt, preloadWhenIdle } from "./lazy-screens";
 
@@ -15,7 +16,11 @@ void preloadAt(location.pathname).then(preloadWhenIdle).then(keepPage);
 
 const root = document.getElementById("root");
 if (root === null) throw new Error("index.html has no #root");
-createRoot(root).render(
+const onUncaughtError = (error: unknown) => {
+  pageError.set(errorText(error) || "An error without words.");
+  reportError(error);
+};
+createRoot(root, { onUncaughtError }).render(
   <StrictMode>
     <App />
   </StrictMode>,

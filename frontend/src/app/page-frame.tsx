@@ -1,12 +1,12 @@
-/** What every screen has: the bar with STOP on top, the screen below. */
+/** What every screen has: the bar on top, with room for STOP, and the screen below. */
 import { Button } from "@mantine/core";
 import { IconBolt, IconHistory, IconRobot, IconShare } from "@tabler/icons-react";
-import { memo, type ReactNode, useState } from "react";
+import { memo, type ReactNode, useLayoutEffect, useState } from "react";
 import { Link } from "wouter";
 import { AccountMenu } from "../account/account-menu";
 import { useMay } from "../api/use-person";
 import { MovesNowLine } from "../runs/moves-now-line";
-import { StopButton } from "../runs/stop/stop-button";
+import { graphOnScreen } from "../runs/stop/stop-surroundings";
 import { useStableCallback } from "../ui/hooks/use-stable-callback";
 import { lazyPart } from "../ui/parts/lazy-part";
 import { OverlayBoundary } from "../ui/parts/part-boundary";
@@ -67,6 +67,10 @@ const Way = memo(function Way({ to, icon: Icon, name, tight, beside }: WayProps)
 
 export function PageBar({ crumbs, status, actions, start, graph, at }: Props) {
   const mayShare = useMay("share");
+  useLayoutEffect(() => {
+    graphOnScreen.set(graph ?? null);
+    return () => graphOnScreen.set(null);
+  }, [graph]);
   // Null until it was asked for: from then on it stays, and gives the focus back when it closes.
   const [sharing, setSharing] = useState<boolean | null>(null);
   const share = useStableCallback(() => setSharing(true));
@@ -111,7 +115,6 @@ export function PageBar({ crumbs, status, actions, start, graph, at }: Props) {
       }
       account={<Account onShare={mayShare ? share : null} onLeave={leave} />}
       start={start}
-      stop={<StopButton {...(graph === undefined ? {} : { graph })} />}
     />
   );
 }

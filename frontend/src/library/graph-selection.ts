@@ -1,6 +1,7 @@
 /** Which graphs a list shows, and in which order. Pure. */
 import type { GraphSummary } from "../api/graphs";
-import { hasEnded, type Run } from "../api/runs";
+import { hasEnded } from "../api/run-stop";
+import type { Run } from "../api/runs";
 
 export const ORDERS = {
   changed: "Last changed",

@@ -23,7 +23,8 @@ import {
   queryOf,
   type RunFilter,
 } from "../api/review";
-import { hasEnded, type Run, runPlace } from "../api/runs";
+import { hasEnded } from "../api/run-stop";
+import { type Run, runPlace } from "../api/runs";
 import { boundsText } from "../status/durations";
 import { useRunStatus } from "../status/run-status";
 import { StateLabel } from "../status/state-label";

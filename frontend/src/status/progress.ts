@@ -1,5 +1,6 @@
 /** What can be said of an action of a run, and of the run, in one word and one tone. */
-import { type ActionRun, MOVES, type Run, type Visit } from "../api/runs";
+import { MOVES } from "../api/run-stop";
+import type { ActionRun, Run, Visit } from "../api/runs";
 import { clock } from "../ui/times";
 
 export type Tone = "idle" | "run" | "true" | "false" | "error" | "stopped" | "done" | "unknown";

@@ -1,4 +1,4 @@
-/** The bar on top of every page: where one is, what one may do, and STOP at its right end. */
+/** The bar on top of every page: where one is, what one may do, and room for STOP at its right end. */
 
 import { Fragment, type ReactNode, useState } from "react";
 import { Link, useRouter } from "wouter";
@@ -23,7 +23,6 @@ interface Props {
   /** Beside STOP. */
   start?: ReactNode;
   account: ReactNode;
-  stop: ReactNode;
 }
 
 export function Logo() {
@@ -94,7 +93,7 @@ function Here({ crumb: { label, rename } }: { crumb: Crumb }) {
   return <NameWriting name={label} rename={rename} onDone={() => setWriting(false)} />;
 }
 
-export function TopBar({ crumbs, status, actions, account, start, stop }: Props) {
+export function TopBar({ crumbs, status, actions, account, start }: Props) {
   return (
     <header className={style.bar}>
       <button type="button" className={style.skip} onClick={toContent}>
@@ -127,7 +126,6 @@ export function TopBar({ crumbs, status, actions, account, start, stop }: Props)
       <div className={style.actions}>{actions}</div>
       <div className={style.account}>{account}</div>
       {start && <div className={style.actions}>{start}</div>}
-      <div className={style.stop}>{stop}</div>
     </header>
   );
 }

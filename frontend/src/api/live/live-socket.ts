@@ -2,7 +2,8 @@
 import { newAid } from "../../graph/ids";
 import { errorText, isFinal } from "../http";
 import type { Robot } from "../robots";
-import { getRun, postStop, type Run } from "../runs";
+import { getRun, postStop } from "../run-stop";
+import type { Run } from "../runs";
 import type { RunnerApi } from "../schema/runner";
 import { sessionEnd } from "../session-end";
 import { isUrgentChange, withKeptParts } from "./kept-run";

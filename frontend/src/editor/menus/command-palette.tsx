@@ -1,12 +1,14 @@
 /** The command palette: every edit action with its shortcut, and every place to go to. */
 import { IconRouteSquare2, IconSquareRounded } from "@tabler/icons-react";
-import { useLayoutEffect, useMemo, useRef } from "react";
+import { type KeyboardEvent, useLayoutEffect, useMemo, useRef } from "react";
+import { createPortal } from "react-dom";
 import { useLocation } from "wouter";
 import { useGraphs } from "../../api/graphs";
 import { EDIT_ACTIONS } from "../../edit-actions/all";
 import { isEnabled, labelOf } from "../../edit-actions/edit-action";
 import type { EditorContext } from "../../edit-actions/editor-context";
 import { FirstShortcut } from "../../edit-actions/keys/shortcut-keys";
+import { keyOf } from "../../ui/keys";
 import { colorOfName } from "../../ui/name-colors";
 import { matching, type Option, PickList } from "../../ui/pick-list";
 import style from "./command-palette.module.css";
@@ -59,7 +61,7 @@ export function CommandPalette({
   const shown = useRef<HTMLDialogElement>(null);
   useLayoutEffect(() => {
     const dialog = shown.current;
-    dialog?.showModal();
+    dialog?.show();
     return () => dialog?.close(); // gives the focus back
   }, []);
   const graphs = useGraphs().data;
@@ -97,23 +99,35 @@ export function CommandPalette({
       setTimeout(() => EDIT_ACTIONS.find(({ name }) => name === key)?.run(context), 0);
     }
   };
-  return (
-    // The browser's own dialog: one types at once, so it cannot wait for a library.
-    <dialog
-      ref={shown}
-      className={style.palette}
-      aria-label="Commands"
-      onCancel={onClose}
-      onPointerDown={(event) => event.target === event.currentTarget && onClose()}
-    >
-      <PickList
-        label="Find a command, an action or a graph"
-        placeholder="What do you want to do, or where to go?"
-        find={(search) => matching(options, search).slice(0, MOST)}
-        onPick={onPick}
-        none="Nothing is called so."
-        take="do it"
-      />
-    </dialog>
+  const onKeyDown = (event: KeyboardEvent) => {
+    const key = keyOf(event);
+    if (key === "Escape") onClose();
+    else if (key !== "Tab") return; // there is one field, and the keyboard stays in it
+    event.preventDefault();
+    event.stopPropagation();
+  };
+  // The browser's own dialog: one types at once, so it cannot wait for a library. Never a modal one: that
+  // would let nobody press what is outside of it, and STOP is.
+  return createPortal(
+    <>
+      <div className={style.backdrop} onPointerDown={onClose} />
+      <dialog
+        ref={shown}
+        className={style.palette}
+        aria-label="Commands"
+        aria-modal
+        onKeyDown={onKeyDown}
+      >
+        <PickList
+          label="Find a command, an action or a graph"
+          placeholder="What do you want to do, or where to go?"
+          find={(search) => matching(options, search).slice(0, MOST)}
+          onPick={onPick}
+          none="Nothing is called so."
+          take="do it"
+        />
+      </dialog>
+    </>,
+    document.body,
   );
 }

@@ -5,7 +5,8 @@ import { graphMoment } from "../../api/documents/texts";
 import { publish, type Version } from "../../api/graphs";
 import { fetchText } from "../../api/http";
 import { type InjectedFault, recordedScriptFor, recordedScriptOf, umrfUrl } from "../../api/review";
-import { getRun, type Inside, type Run, startRun } from "../../api/runs";
+import { getRun } from "../../api/run-stop";
+import { type Inside, type Run, startRun } from "../../api/runs";
 import { memberText } from "../../graph/json-members";
 
 export type RepeatedVersion = "same" | "newest";

@@ -2,7 +2,8 @@
 import { Button } from "@mantine/core";
 import { IconEye } from "@tabler/icons-react";
 import { useState } from "react";
-import { needsRestConfirmation, type Run } from "../../api/runs";
+import { needsRestConfirmation } from "../../api/run-stop";
+import type { Run } from "../../api/runs";
 import { useMay } from "../../api/use-person";
 import { lazyPart } from "../../ui/parts/lazy-part";
 import { OverlayBoundary } from "../../ui/parts/part-boundary";

@@ -1,31 +1,11 @@
 /** STOP: one, always at the same place, never disabled; STOP ALL by keys from anywhere. */
-import { IconSquareFilled } from "@tabler/icons-react";
-import { useEffect } from "react";
-import type { LiveLink, LiveSocket } from "../../api/live/live-socket";
+import { useSyncExternalStore } from "react";
+import type { LiveLink } from "../../api/live/live-socket";
 import { foreignGraphs, openRuns, unheardRobots } from "../../api/live/open-runs";
 import { useLive } from "../../api/live/use-live";
 import type { Run } from "../../api/runs";
-import { isStopKey } from "../../ui/keys";
 import style from "./stop-button.module.css";
-
-interface Props {
-  /** The graph on screen: its run is the one that Stop means, if it goes. */
-  graph?: string;
-}
-
-/** Also while somebody types, in dialogs and menus: nothing is asked before a Stop. */
-function useStopKey(live: LiveSocket | null): void {
-  useEffect(() => {
-    const onKey = (event: KeyboardEvent) => {
-      if (!isStopKey(event) || event.repeat) return;
-      event.preventDefault();
-      event.stopImmediatePropagation();
-      live?.stop("all");
-    };
-    window.addEventListener("keydown", onKey, { capture: true });
-    return () => window.removeEventListener("keydown", onKey, { capture: true });
-  }, [live]);
-}
+import { drawnStop, graphOnScreen } from "./stop-surroundings";
 
 /** `unknown`: how many robots do not say what they run. */
 export function stopButtonText(link: LiveLink, count: number, unknown = 0): string {
@@ -47,31 +27,37 @@ export function runToStop(here: readonly Run[]): { id: string; words: string } |
   return { id: group, words: `the ${here.length} runs of ${first.graph_name}` };
 }
 
+const keepButton = (button: HTMLElement | null) => drawnStop.set(button);
+
 const SOFT = "A software stop: no replacement for the emergency stop.";
 
-export function StopButton({ graph }: Props) {
+export function StopButton() {
   const { live, now } = useLive();
-  useStopKey(live);
+  const graph = useSyncExternalStore(graphOnScreen.subscribe, graphOnScreen.now);
   const open = openRuns(now);
-  const here = graph === undefined ? [] : open.filter((run) => run.graph === graph);
+  const here = graph === null ? [] : open.filter((run) => run.graph === graph);
   const meant = runToStop(here);
   const all = open.length + foreignGraphs(now).length;
   const calm = now.link === "live" && all === 0;
   const target = meant?.words ?? "everything that runs";
   const beside = meant !== null && all > here.length;
+  // One text in each element: what a translation wraps is then replaced whole.
   return (
     <span className={style.both} data-beside={beside || undefined}>
       <button
+        ref={keepButton}
         type="button"
         className={style.stop}
         data-calm={calm || undefined}
         onClick={() => live?.stop(meant?.id ?? "all")}
         title={`Stop ${target}.\n${SOFT}`}
       >
-        <span className="visually-hidden">Stop {target}. Software stop, no emergency stop</span>
-        <IconSquareFilled size={13} aria-hidden style={{ flex: "none" }} />
+        <span className={style.read}>{`Stop ${target}. Software stop, no emergency stop`}</span>
+        <svg viewBox="0 0 13 13" width={13} height={13} aria-hidden style={{ flex: "none" }}>
+          <rect x="1.5" y="1.5" width="10" height="10" rx="1.5" fill="currentColor" />
+        </svg>
         <span className={style.word} aria-hidden>
-          STOP{meant || all === 0 ? "" : " ALL"}
+          {`STOP${meant || all === 0 ? "" : " ALL"}`}
         </span>
         <span className={style.count} aria-hidden>
           {stopButtonText(now.link, meant ? here.length : all, unheardRobots(now).length)}
@@ -84,10 +70,10 @@ export function StopButton({ graph }: Props) {
           onClick={() => live?.stop("all")}
           title={`Stop everything that runs (Ctrl+.).\n${SOFT}`}
         >
-          <span className="visually-hidden">
+          <span className={style.read}>
             Stop everything that runs, everywhere. Software stop, no emergency stop
           </span>
-          <span aria-hidden>ALL {all}</span>
+          <span aria-hidden>{`ALL ${all}`}</span>
         </button>
       )}
     </span>

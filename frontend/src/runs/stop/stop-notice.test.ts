@@ -1,6 +1,7 @@
 import { expect, test } from "vitest";
 import type { LiveState, StopRequest } from "../../api/live/live-socket";
-import { needsRestConfirmation, type Run } from "../../api/runs";
+import { needsRestConfirmation } from "../../api/run-stop";
+import type { Run } from "../../api/runs";
 import { runToStop, stopButtonText } from "./stop-button";
 import {
   headOf,

@@ -1,17 +1,16 @@
 /** What became of a Stop, in words, until it is proven. */
-import { CloseButton } from "@mantine/core";
-import { IconAlertOctagon } from "@tabler/icons-react";
-import { useState } from "react";
+import { useState, useSyncExternalStore } from "react";
 import type { LiveState, StopRequest } from "../../api/live/live-socket";
 import { foreignGraphs, openRuns, unheardRobots } from "../../api/live/open-runs";
 import { useLive } from "../../api/live/use-live";
 import type { Robot } from "../../api/robots";
-import { needsRestConfirmation, type Run } from "../../api/runs";
+import { needsRestConfirmation } from "../../api/run-stop";
+import type { Run } from "../../api/runs";
 import { HelpLink } from "../../status/help-link";
 import { useRootMark } from "../../ui/hooks/use-root-mark";
 import { clock, duration, useNow } from "../../ui/times";
-import { ConfirmRestButton } from "./confirm-rest-button";
 import style from "./stop-notice.module.css";
+import { askedRun, mayAnswer } from "./stop-surroundings";
 
 const LOUD = 2_500; // ms without proof until the notice shouts
 const HEARD = 1_200; // ms within which the runner answers a Stop, if it does
@@ -189,8 +188,22 @@ function useAside(notice: StopNoticeText, asked: string) {
   };
 }
 
+function Cross() {
+  return (
+    <svg viewBox="0 0 16 16" width={14} height={14} aria-hidden>
+      <path
+        d="M3 3 13 13 M13 3 3 13"
+        stroke="currentColor"
+        strokeWidth="1.8"
+        strokeLinecap="round"
+      />
+    </svg>
+  );
+}
+
 export function StopNotice() {
   const { now } = useLive();
+  const canAnswer = useSyncExternalStore(mayAnswer.subscribe, mayAnswer.now);
   const [dismissed, setDismissed] = useState("");
   const last = now.stops.at(-1);
   const watching = last !== undefined && last.id !== dismissed;
@@ -209,14 +222,26 @@ export function StopNotice() {
   if (aside.is) {
     return (
       <button type="button" className={style.aside} onClick={aside.bringBack} title={notice.text}>
-        <IconAlertOctagon size={15} aria-hidden /> {headOf(notice)}
+        <svg viewBox="0 0 16 16" width={15} height={15} aria-hidden>
+          <path
+            d="M5 1.5h6L14.5 5v6L11 14.5H5L1.5 11V5Z M8 4.5v4 M8 11v.5"
+            fill="none"
+            stroke="currentColor"
+            strokeWidth="1.6"
+            strokeLinecap="round"
+          />
+        </svg>
+        <span>{headOf(notice)}</span>
       </button>
     );
   }
   const silent =
-    notice.tone === "loud" && now.link !== "down"
+    canAnswer && notice.tone === "loud" && now.link !== "down"
       ? openRuns(now).filter(needsRestConfirmation)
       : [];
+  const hide = notice.stays
+    ? { label: "Put aside", run: aside.put }
+    : { label: "Hide", run: () => setDismissed(last?.id ?? "") };
   return (
     <div
       className={style.notice}
@@ -224,32 +249,41 @@ export function StopNotice() {
       role={notice.tone === "loud" ? "alert" : "status"}
     >
       <span>
-        {notice.text}
+        <span>{notice.text}</span>
         {notice.since !== undefined && (
           <span aria-hidden className={style.since}>
             {` ${notice.since}`}
           </span>
         )}
         {notice.tone === "loud" && (
-          <>
-            {" "}
+          <span className={style.help}>
             <HelpLink place="operators-guide.html#stop-unconfirmed" words="What to do" />
-          </>
+          </span>
         )}
       </span>
       {silent.length > 0 && (
         <span className={style.looked}>
           {silent.slice(0, MOST_SILENT).map((run) => (
-            <ConfirmRestButton key={run.id} run={run} loud named={silent.length > 1} />
+            <button
+              key={run.id}
+              type="button"
+              className={style.look}
+              onClick={() => askedRun.set(run.id)}
+            >
+              {silent.length > 1 ? `I looked at ${run.engine} …` : "I looked …"}
+            </button>
           ))}
         </span>
       )}
-      {notice.stays && (
-        <CloseButton size="sm" aria-label="Put aside" title="Put aside" onClick={aside.put} />
-      )}
-      {!notice.stays && (
-        <CloseButton size="sm" aria-label="Hide" onClick={() => setDismissed(last?.id ?? "")} />
-      )}
+      <button
+        type="button"
+        className={style.hide}
+        aria-label={hide.label}
+        title={hide.label}
+        onClick={hide.run}
+      >
+        <Cross />
+      </button>
     </div>
   );
 }

@@ -1,0 +1,88 @@
+/**
+ * The page's one link to the runner: found and kept while somebody is signed in. It belongs to the page
+ * and to no component, so that no error while something is drawn takes the way of Stop.
+ */
+import { errorText, fetchJson } from "../http";
+import type { EditorApi } from "../schema/editor";
+import { LiveSocket } from "./live-socket";
+
+export interface PageLinkState {
+  live: LiveSocket | null;
+  /** The runner's address, once the editor has told it. */
+  runner: string | undefined;
+  /** Why the page does not know where the runner is; "" when it does, or has not asked yet. */
+  lost: string;
+  /** Whether somebody is signed in, as far as this page knows: only then STOP is there. */
+  signedIn: boolean;
+}
+
+const AGAIN = 5_000; // ms between two questions for the runner's address, at most
+
+class PageLink {
+  #state: PageLinkState = { live: null, runner: undefined, lost: "", signedIn: false };
+  readonly #listeners = new Set<() => void>();
+  /** Who speaks on the open socket: the runner knows it by the session it was opened with. */
+  #who = "";
+  #visit = 0;
+  #asking = false;
+
+  now = (): PageLinkState => this.#state;
+
+  subscribe = (listener: () => void): (() => void) => {
+    this.#listeners.add(listener);
+    return () => this.#listeners.delete(listener);
+  };
+
+  /**
+   * Says who is signed in. `visit` counts how often somebody signed in since the page was opened: a new
+   * name or visit dials anew, since the socket is known by the old one.
+   */
+  enter(who: string, visit: number): void {
+    const known = this.#state.signedIn && this.#who === who && visit <= this.#visit;
+    this.#who = who;
+    this.#visit = Math.max(visit, this.#visit);
+    if (!this.#state.signedIn) this.#set({ signedIn: true });
+    if (this.#state.live !== null) {
+      if (!known) this.#state.live.redial();
+    } else if (this.#state.runner !== undefined) this.#open(this.#state.runner);
+    else void this.#find();
+  }
+
+  /** Says that nobody is signed in any more. */
+  leave(): void {
+    if (!this.#state.signedIn) return;
+    this.#state.live?.close();
+    this.#set({ live: null, signedIn: false });
+  }
+
+  #open(runner: string): void {
+    const live = new LiveSocket(runner);
+    live.open();
+    this.#set({ live, runner, lost: "" });
+  }
+
+  /** Asks until the editor has told where the runner is: without that there is no way for Stop. */
+  async #find(): Promise<void> {
+    if (this.#asking) return;
+    this.#asking = true;
+    for (let wait = 500; this.#state.signedIn; wait = Math.min(AGAIN, 2 * wait)) {
+      try {
+        const { runner_url } = await fetchJson<EditorApi["Config"]>("/api/config");
+        if (this.#state.signedIn) this.#open(runner_url);
+        else this.#set({ runner: runner_url });
+        break;
+      } catch (error) {
+        this.#set({ lost: errorText(error) });
+      }
+      await new Promise((done) => setTimeout(done, wait));
+    }
+    this.#asking = false;
+  }
+
+  #set(part: Partial<PageLinkState>): void {
+    this.#state = { ...this.#state, ...part };
+    for (const listener of [...this.#listeners]) listener();
+  }
+}
+
+export const pageLink = new PageLink();

@@ -1,0 +1,38 @@
+/** What Stop needs of runs: whether one goes on, its newest state, and the request. STOP loads this and no list. */
+import { fetchJson } from "./http";
+import type { Run } from "./runs";
+
+/** A lost run has not: nobody has seen it at rest yet. */
+export function hasEnded(run: Run): boolean {
+  return run.ended_at !== null;
+}
+
+/** States of an action whose code was seen to go on. */
+export const MOVES: ReadonlySet<string> = new Set([
+  "RUNNING",
+  "STOPPING",
+  "PAUSE_REQUESTED",
+  "PAUSED",
+]);
+
+/** Whether a person's word can end the run, since no answer of its engine can. */
+export function needsRestConfirmation(run: Run): boolean {
+  if (hasEnded(run) || run.simulated || run.started_at === null) return false;
+  if (run.state === "lost" || run.unknown_since !== null) return true;
+  const moves = Object.values(run.actions ?? {}).some((action) => MOVES.has(action.state));
+  return Boolean(run.unconfirmed) && !moves;
+}
+
+/** Asks to stop one run, or all of them. */
+export function postStop(runner: string, run: string | "all", stop: string): Promise<unknown> {
+  const path = run === "all" ? "/api/stop" : `/api/runs/${encodeURIComponent(run)}/stop`;
+  return fetchJson(`${runner}${path}`, {
+    method: "POST",
+    body: { stop_id: stop },
+    timeoutMs: 3_000,
+  });
+}
+
+export function getRun(runner: string, id: string, signal?: AbortSignal): Promise<Run> {
+  return fetchJson(`${runner}/api/runs/${encodeURIComponent(id)}`, signal ? { signal } : {});
+}

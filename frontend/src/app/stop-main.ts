@@ -1,0 +1,27 @@
+/** First entry of the page: STOP, before and apart from everything else. */
+import "../ui/tokens.css";
+import { pageLink } from "../api/live/page-link";
+import { credentialIn, identityOf, rememberedPerson } from "../api/session";
+import { outliveOutsideChanges } from "../runs/stop/outside-changes";
+import { mountStop } from "../runs/stop/stop-root";
+import { changedFromOutside, pageError } from "../runs/stop/stop-surroundings";
+
+outliveOutsideChanges(() => changedFromOutside.set(true));
+const place = document.getElementById("stop");
+if (place === null) throw new Error("index.html has no #stop");
+mountStop(place);
+
+// Who was here last is here still, as far as anybody knows: the page says otherwise once it has asked. A
+// link in the address signs somebody in first.
+const person = rememberedPerson();
+if (person !== null && credentialIn(location.hash) === null) pageLink.enter(identityOf(person), 1);
+
+/** Whether the page has drawn anything: it takes away what index.html has in its place. */
+const isDrawn = () => document.querySelector("#root > .unloaded") === null;
+
+document.getElementById("page-script")?.addEventListener("error", () => {
+  pageError.set("Its parts did not arrive: the server does not answer, or it was updated.");
+});
+window.addEventListener("error", ({ message }) => {
+  if (!isDrawn()) pageError.set(message);
+});

@@ -1,0 +1,35 @@
+/** Asks a person at the robot whether it rests, when the notice beside STOP is pressed, which draws no dialog. */
+import { useEffect, useSyncExternalStore } from "react";
+import { useLive } from "../../api/live/use-live";
+import { needsRestConfirmation } from "../../api/run-stop";
+import { useMay } from "../../api/use-person";
+import { lazyPart } from "../../ui/parts/lazy-part";
+import { OverlayBoundary } from "../../ui/parts/part-boundary";
+import { askedRun, mayAnswer } from "./stop-surroundings";
+
+const ConfirmRestDialog = lazyPart(() =>
+  import("./confirm-rest-dialog").then((part) => part.ConfirmRestDialog),
+);
+
+export function RestQuestion() {
+  const may = useMay("operate");
+  const { now } = useLive();
+  const asked = useSyncExternalStore(askedRun.subscribe, askedRun.now);
+  useEffect(() => {
+    mayAnswer.set(may);
+    return () => mayAnswer.set(false);
+  }, [may]);
+  const run = asked === null ? undefined : now.runs.get(asked);
+  const over = run === undefined || !needsRestConfirmation(run);
+  // What somebody says is about the robot that they looked at: another run is asked about anew.
+  useEffect(() => {
+    if (over) askedRun.set(null);
+  }, [over]);
+  return (
+    <OverlayBoundary>
+      {!over && (
+        <ConfirmRestDialog key={run.id} run={run} opened onClose={() => askedRun.set(null)} />
+      )}
+    </OverlayBoundary>
+  );
+}
