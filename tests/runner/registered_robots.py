@@ -19,6 +19,7 @@ from action_assistant.runner.links.port import (
     Link,
     Registration,
     Report,
+    Sighting,
     Standing,
 )
 from action_assistant.runner.robots.registry import Robots
@@ -93,11 +94,16 @@ class RegisteredRobots:
         self.robots = robots
         self.facts: dict[str, EngineFacts] = {}
         self.sight: tuple[Candidate, ...] = ()
+        self.left_s = 0.0
 
     def link(self, registration: Registration, facts: EngineFacts) -> Link:
         """The robot of that name."""
         self.facts[registration.name] = facts
         return self.robots[registration.name]
+
+    async def sighting(self) -> Sighting:
+        """Whatever is in sight."""
+        return Sighting(self.sight, self.left_s)
 
     async def candidates(self) -> tuple[Candidate, ...]:
         """Whatever is in sight."""

@@ -1,11 +1,10 @@
 /** What `action-assistant doctor` finds here, when somebody asks for it. */
 import { Button, Loader } from "@mantine/core";
 import { IconStethoscope } from "@tabler/icons-react";
-import { useState } from "react";
 import { errorText } from "../api/http";
 import { useNow } from "../ui/times";
 import style from "./administration.module.css";
-import { type Finding, useFindings } from "./status";
+import { type Finding, type LastExamination, span, useExamination } from "./status";
 
 const SIGNS = {
   error: { sign: "✗", word: "Wrong" },
@@ -43,52 +42,55 @@ function summary(found: readonly Finding[]): string {
   return notes === 0 ? `${said}.` : `${said}, ${notes} may matter.`;
 }
 
-function Looking() {
-  const [began] = useState(() => Date.now());
-  const seconds = Math.max(0, Math.floor((useNow() - began) / 1000));
+function Looking({ last, seconds }: { last: LastExamination | undefined; seconds: number }) {
+  const usual =
+    last?.took_s == null ? "about ten" : `${Math.max(1, Math.round(last.took_s))} last time`;
   return (
     <p className={style.looking} role="status">
-      <Loader size="xs" /> Looking at disks, databases, ports, the clock and ROS 2, for {seconds} s.
-      It takes about ten.
+      <Loader size="xs" /> Looking at disks, databases, ports, the clock and ROS 2, for{" "}
+      {Math.floor(seconds)} s. It takes {usual}.
     </p>
   );
 }
 
 export function Findings() {
-  const { data, error, isFetching, refetch } = useFindings();
+  const { last, heardAt, error, look } = useExamination();
+  const now = useNow();
+  const found = last?.found;
+  const running = last?.running_s ?? null;
   const sorted = ORDER.flatMap(
-    (severity) => data?.filter((each) => each.severity === severity) ?? [],
+    (severity) => found?.filter((each) => each.severity === severity) ?? [],
   );
   return (
     <section className={style.card} aria-label="Doctor">
       <div className={style.cardHead}>
         <h3>Doctor</h3>
-        {data && !isFetching && (
+        {found != null && last?.age_s != null && (
           <span className={style.version} role="status">
-            {summary(data)}
+            {summary(found)} Looked at {span(last.age_s * 1000 + Math.max(0, now - heardAt))} ago.
           </span>
         )}
         <Button
           leftSection={<IconStethoscope size={16} aria-hidden />}
-          onClick={() => void refetch()}
-          disabled={isFetching}
+          onClick={() => look()}
+          disabled={running !== null}
           ml="auto"
         >
-          {data === undefined ? "Look for faults" : "Look again"}
+          {found == null ? "Look for faults" : "Look again"}
         </Button>
       </div>
-      {isFetching && <Looking />}
-      {error && !isFetching && (
+      {running !== null && <Looking last={last} seconds={running} />}
+      {running === null && (error !== null || last?.failed != null) && (
         <p className={style.refused} role="alert">
-          {errorText(error)}
+          {error === null ? last?.failed : errorText(error)}
         </p>
       )}
-      {data === undefined && !isFetching && !error && (
+      {found == null && running === null && !error && (
         <p className={style.version}>
           The same as <code>action-assistant doctor</code> on the computer of the editor.
         </p>
       )}
-      {data !== undefined && (
+      {found != null && (
         <ul className={style.findings}>
           {sorted.map((each) => (
             <Found key={`${each.code} ${each.where} ${each.message}`} {...each} />

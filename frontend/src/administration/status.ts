@@ -1,5 +1,5 @@
 /** How both processes are, and what `doctor` finds: for owners. */
-import { useQuery } from "@tanstack/react-query";
+import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
 import { fetchJson } from "../api/http";
 import type { EditorApi } from "../api/schema/editor";
 
@@ -22,14 +22,36 @@ export function useStatus(name: string, at: string | undefined) {
   });
 }
 
-/** Not before somebody asks: it takes seconds, and starts programs. */
-export function useFindings() {
-  return useQuery({
-    queryKey: ["doctor"],
-    queryFn: ({ signal }) => fetchJson<Finding[]>("/api/doctor", { signal, timeoutMs: 120_000 }),
-    enabled: false,
+export type LastExamination = EditorApi["LastExamination"];
+
+const LAST = ["doctor", "last"];
+
+const examined = (look: boolean, signal?: AbortSignal) =>
+  fetchJson<LastExamination>(`/api/doctor/last${look ? "?look=true" : ""}`, {
+    ...(signal && { signal }),
+    timeoutMs: 10_000,
+  });
+
+/** What the last look found, at once; while another look goes on, how long it has been. A look takes seconds and
+ * starts programs, so it is begun only when somebody asks. */
+export function useExamination() {
+  const client = useQueryClient();
+  const query = useQuery({
+    queryKey: LAST,
+    queryFn: ({ signal }) => examined(false, signal),
+    refetchInterval: ({ state }) => (state.data?.running_s == null ? false : 1_000),
     retry: false,
   });
+  const look = useMutation({
+    mutationFn: () => examined(true),
+    onSuccess: (begun) => client.setQueryData(LAST, begun),
+  });
+  return {
+    last: query.data,
+    heardAt: query.dataUpdatedAt,
+    error: query.error ?? look.error,
+    look: look.mutate,
+  };
 }
 
 const UNITS = ["bytes", "kB", "MB", "GB", "TB"] as const;

@@ -36,12 +36,14 @@ export function useRosReach(runner: string | undefined) {
   });
 }
 
+/** Engines in sight. While discovery goes on it is asked again soon, and says for how long others may still come. */
 export function useFoundEngines(runner: string | undefined, on: boolean) {
   return useQuery({
     queryKey: ["robots", "candidates"],
-    queryFn: ({ signal }) => fetchJson<FoundEngine[]>(`${runner}/api/candidates`, { signal }),
+    queryFn: ({ signal }) =>
+      fetchJson<RunnerApi["Sighting"]>(`${runner}/api/candidates/now`, { signal }),
     enabled: on && runner !== undefined,
-    refetchInterval: 5_000,
+    refetchInterval: ({ state }) => ((state.data?.left_s ?? 0) > 0 ? 500 : 5_000),
   });
 }
 

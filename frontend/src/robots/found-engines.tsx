@@ -20,13 +20,21 @@ function words(candidate: FoundEngine): string {
 
 export function FoundEngines({ may, on, onTake }: Props) {
   const { runner } = useLive();
-  const found = useFoundEngines(runner, on).data ?? [];
-  if (found.length === 0) return null;
+  const { data } = useFoundEngines(runner, on);
+  const found = data?.engines ?? [];
+  const looking = (data?.left_s ?? 0) > 0;
+  if (found.length === 0 && !looking) return null;
   return (
     <section className={style.section} aria-label="In sight, not registered">
       <h3 className={style.title}>
         <IconRadar2 size={16} aria-hidden /> In sight, not registered
       </h3>
+      {looking && (
+        <p className={style.quiet} role="status">
+          Looking for engines; others may still come into sight for {Math.ceil(data?.left_s ?? 0)}{" "}
+          s.
+        </p>
+      )}
       <ul className={style.list}>
         {found.map((each) => (
           <li key={`${each.domain} ${each.get_service}`} className={style.line}>

@@ -10,6 +10,7 @@ from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import (
     Candidate,
     Registration,
+    Sighting,
 )
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.robots.robot_events import Commanded, EngineBecame
@@ -147,8 +148,11 @@ async def test_candidates_are_those_that_nobody_registered() -> None:
         Harness().journal, Robots(reach=reach), clock_us=clock_us, run_in_worker=at_once
     ) as control:
         assert await control.robots.candidates() == (seen, other)
+        reach.left_s = 2.5
+        assert await control.robots.sighting() == Sighting((seen, other), 2.5)
         await control.register(Registration(name="David"), ANN)
         assert await control.robots.candidates() == (other,)
+        assert (await control.robots.sighting()).engines == (other,)
 
 
 @virtual

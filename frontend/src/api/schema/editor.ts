@@ -822,6 +822,19 @@ export interface EditorApi {
         build: EditorApi["ActionBuilt"] | null;
     };
     /**
+     * LastExamination
+     * @description What `doctor` found last. `age_s`: how many seconds ago it had looked, and `took_s` for how long; both null,
+     *     as `found`, before it has looked at all. `running_s`: for how many seconds it has been looking again, null
+     *     where it is not. `failed`: why the last look came to nothing; what was found before it stays.
+     */
+    LastExamination: {
+        found: EditorApi["Diagnostic"][] | null;
+        age_s: number | null;
+        took_s: number | null;
+        running_s: number | null;
+        failed: string | null;
+    };
+    /**
      * LeftOut
      * @description The description and unknown fields of an action that was a sub-graph, or of the sub-graph:
      *     nothing has them now.

@@ -1418,6 +1418,15 @@ export interface RunnerApi {
         proof: string;
     };
     /**
+     * Sighting
+     * @description Engines that are seen at this moment. `left_s`: seconds for which others may still come into sight,
+     *     since discovery goes on; 0 where all that answer are seen.
+     */
+    Sighting: {
+        engines: RunnerApi["Candidate"][];
+        left_s: number;
+    };
+    /**
      * Spans
      * @description Durations of an action, each between its bounds.
      */

@@ -11,7 +11,7 @@ import msgspec
 
 from action_assistant import paths as places
 from action_assistant import settings
-from action_assistant.commands.doctor.examination import examine
+from action_assistant.commands.doctor.examination import Check, examine
 from action_assistant.commands.doctor.installation import Installation
 from action_assistant.commands.doctor.ros_checks import (
     ROBOTS_S,
@@ -88,12 +88,14 @@ def _doctor(options: argparse.Namespace) -> int:
 
 
 def _looked_at(place: Installation, only: str | None) -> Iterator[Diagnostic]:
+    # Robots are asked from the start: that waits for the network, the rest for disks.
+    asked: list[Check] = [] if only == "machine" else [robots_answer, engines_index_once]
+    robots = examine(place, asked, ROBOTS_S)
     if only != "ros":
         yield from examine(place)
-    if only != "machine":
-        if sys.stderr.isatty():
-            print("Asking robots, which takes some seconds …", file=sys.stderr)
-        yield from examine(place, [robots_answer, engines_index_once], ROBOTS_S)
+    if only != "machine" and sys.stderr.isatty():
+        print("Asking robots, which takes some seconds …", file=sys.stderr)
+    yield from robots
 
 
 def _tell(each: Diagnostic) -> None:

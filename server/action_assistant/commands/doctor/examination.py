@@ -53,12 +53,11 @@ def diagnose(place: Installation) -> list[Diagnostic]:
 def examine(
     place: Installation, checks: Iterable[Check] = CHECKS, seconds: float = PATIENCE_S
 ) -> Iterator[Diagnostic]:
-    """Everything that was looked at, in the order of the checks, which run side by side: some of them
-    wait for what does not answer."""
+    """Begin to look at everything, and return what was found in the order of the checks, which run side by
+    side: some of them wait for what does not answer."""
     until = time.monotonic() + seconds
     looks = [_Look(check, place) for check in checks]
-    for look in looks:
-        yield from look.seen(until)
+    return (each for look in looks for each in look.seen(until))
 
 
 class _Look(threading.Thread):

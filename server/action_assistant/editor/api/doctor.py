@@ -10,7 +10,7 @@ import msgspec
 from litestar import get
 from litestar.types import ControllerRouterHandler
 
-from action_assistant.errors import Unavailable
+from action_assistant.errors import Refused, Unavailable
 from action_assistant.journal.health.shared_check import SharedCheck
 from action_assistant.settings import EditorSettings
 from action_assistant.system.diagnostics import Diagnostic
@@ -21,13 +21,22 @@ _FRESH_S: Final = 5.0
 _NICE: Final = 10
 
 
+class LastExamination(msgspec.Struct, frozen=True):
+    """What `doctor` found last. `age_s`: how many seconds ago it had looked, and `took_s` for how long; both null,
+    as `found`, before it has looked at all. `running_s`: for how many seconds it has been looking again, null
+    where it is not. `failed`: why the last look came to nothing; what was found before it stays."""
+
+    found: tuple[Diagnostic, ...] | None
+    age_s: float | None
+    took_s: float | None
+    running_s: float | None
+    failed: str | None
+
+
 def routes(settings: EditorSettings) -> list[ControllerRouterHandler]:
     """The route. However many ask, it is looked once at a time."""
 
-    async def look() -> list[Diagnostic]:
-        return await _examined(settings)
-
-    examination = SharedCheck(look, patience=_PATIENCE_S, fresh=_FRESH_S)
+    examination = SharedCheck(lambda: _examined(settings), patience=_PATIENCE_S, fresh=_FRESH_S)
 
     @get(
         "/api/doctor",
@@ -40,7 +49,33 @@ def routes(settings: EditorSettings) -> list[ControllerRouterHandler]:
             raise Unavailable(f"It has not looked at everything within {_PATIENCE_S:g} s.")
         return found
 
-    return [doctor]
+    @get(
+        "/api/doctor/last",
+        guards=[Needs("restore")],
+        summary="What `doctor` found last, and how long ago, at once; with `look` it begins to look again",
+    )
+    async def last_examination(look: bool = False) -> LastExamination:
+        if look:
+            examination.begin()
+        last, failure = examination.last, examination.failure
+        found, age, took = (None, None, None) if last is None else last
+        return LastExamination(
+            found=None if found is None else tuple(found),
+            age_s=age,
+            took_s=took,
+            running_s=examination.under_way,
+            failed=None if failure is None else _told(failure),
+        )
+
+    return [doctor, last_examination]
+
+
+def _told(failure: BaseException) -> str:
+    return (
+        failure.detail
+        if isinstance(failure, Refused)
+        else "The last look failed; the log says why."
+    )
 
 
 async def _examined(settings: EditorSettings) -> list[Diagnostic]:

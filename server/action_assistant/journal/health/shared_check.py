@@ -19,24 +19,65 @@ class SharedCheck(Generic[T]):
         self._patience = patience
         self._fresh = fresh
         self._task: asyncio.Task[T] | None = None
-        self._answered_at = 0.0
+        self._asked_at = self._answered_at = 0.0
+        self._last: tuple[T, float, float] | None = None
 
     async def answer(self) -> T | None:
         """The answer; None when there is none in time. Raises what `ask` raises."""
+        task = self.begin()
+        done, _ = await asyncio.wait({task}, timeout=self._patience)
+        return task.result() if done else None
+
+    def begin(self) -> "asyncio.Task[T]":
+        """Ask, unless that is under way or the answer is fresh; return what will have the answer."""
         loop = asyncio.get_running_loop()
         task = self._task
         if task is None or (task.done() and loop.time() - self._answered_at > self._fresh):
             task = self._task = loop.create_task(self._asked())
-        done, _ = await asyncio.wait({task}, timeout=self._patience)
-        return task.result() if done else None
+            task.add_done_callback(_heard)
+            self._asked_at = loop.time()
+        return task
+
+    @property
+    def last(self) -> tuple[T, float, float] | None:
+        """The last answer, how many seconds old it is, and how many seconds it took; None before the first."""
+        if self._last is None:
+            return None
+        answer, at, took = self._last
+        return answer, asyncio.get_running_loop().time() - at, took
+
+    @property
+    def under_way(self) -> float | None:
+        """For how many seconds an answer has been waited for; None where none is."""
+        if self._task is None or self._task.done():
+            return None
+        return asyncio.get_running_loop().time() - self._asked_at
+
+    @property
+    def failure(self) -> BaseException | None:
+        """Why the question that was asked last has no answer; None where it has one, or is under way."""
+        task = self._task
+        return (
+            task.exception() if task is not None and task.done() and not task.cancelled() else None
+        )
 
     async def _asked(self) -> T:
+        loop = asyncio.get_running_loop()
+        begun = loop.time()
         try:
-            return await self._ask()
+            answer = await self._ask()
+            self._last = answer, loop.time(), loop.time() - begun
+            return answer
         finally:
-            self._answered_at = asyncio.get_running_loop().time()
+            self._answered_at = loop.time()
 
     def cancel(self) -> None:
         """Nobody will ask any more."""
         if self._task is not None:
             self._task.cancel()
+
+
+def _heard(task: "asyncio.Task[T]") -> None:
+    """Whoever began it may not wait; `failure` tells."""
+    if not task.cancelled():
+        task.exception()

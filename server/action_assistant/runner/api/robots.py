@@ -11,7 +11,7 @@ from action_assistant.errors import BadInput, NotFound, Refused
 from action_assistant.runner.api.caller import COUNTED, GRAPH_BODY, author_of, body_of
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.behaviours.folder import BehaviourFolder, BehaviourList
-from action_assistant.runner.links.port import SIMULATOR, Candidate, Registration
+from action_assistant.runner.links.port import SIMULATOR, Candidate, Registration, Sighting
 from action_assistant.runner.robots.recordings import Recording
 from action_assistant.runner.robots.registration import Robot
 from action_assistant.runner.robots.robot_events import (
@@ -153,9 +153,19 @@ def _registry(services: RobotServices) -> list[ControllerRouterHandler]:
         robots = services.control.robots
         return ReachStatus(list(robots.all()), robots.no_reach, await _behaviours(services))
 
-    @get("/api/candidates", summary="Engines in sight that nobody registered yet")
+    @get(
+        "/api/candidates",
+        summary="Engines in sight that nobody registered yet, once discovery has had its seconds",
+    )
     async def candidates() -> list[Candidate]:
         return list(await services.control.robots.candidates())
+
+    @get(
+        "/api/candidates/now",
+        summary="The same as far as it is known now, and for how long others may still come into sight",
+    )
+    async def sighting() -> Sighting:
+        return await services.control.robots.sighting()
 
     @post("/api/robots", summary="Register a robot", guards=[Needs("register")])
     async def register(data: Registration, request: _Asking) -> Response[Robot]:
@@ -177,7 +187,7 @@ def _registry(services: RobotServices) -> list[ControllerRouterHandler]:
     async def remove(name: str, request: _Asking) -> None:
         await services.control.remove(name, author_of(request))
 
-    return [robots, reach, candidates, register, change, remove]
+    return [robots, reach, candidates, sighting, register, change, remove]
 
 
 def _one_robot(services: RobotServices) -> list[ControllerRouterHandler]:

@@ -239,6 +239,14 @@ class Candidate(msgspec.Struct, frozen=True, kw_only=True):
     problem: str = ""
 
 
+class Sighting(msgspec.Struct, frozen=True):
+    """Engines that are seen at this moment. `left_s`: seconds for which others may still come into sight,
+    since discovery goes on; 0 where all that answer are seen."""
+
+    engines: tuple[Candidate, ...]
+    left_s: float
+
+
 class Reach(Protocol):
     """What makes links to robots. One per process; owns what the links share."""
 
@@ -252,9 +260,14 @@ class Reach(Protocol):
         that says why. The link hears and answers only while its `run` is kept going."""
         ...
 
+    async def sighting(self) -> Sighting:
+        """Return the engines that are seen now, without waiting for others: on the domain of this
+        process's environment and on those of links. Raises RuntimeError."""
+        ...
+
     async def candidates(self) -> tuple[Candidate, ...]:
-        """Engines that can be seen now: on the domain of this process's environment and on those
-        of links. Takes some seconds at first."""
+        """Return the engines that are seen when discovery has had its time, which takes some seconds at
+        first. Raises RuntimeError."""
         ...
 
     async def aclose(self) -> None:

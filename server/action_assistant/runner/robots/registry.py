@@ -1,7 +1,7 @@
 """The registry: the engines that runs can go to, which are the simulator and registered robots."""
 
 import logging
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from typing import Final, Protocol, TypeAlias
 
 import anyio
@@ -20,6 +20,7 @@ from action_assistant.runner.links.port import (
     Link,
     Reach,
     Registration,
+    Sighting,
 )
 from action_assistant.runner.robots.engine import EngineIndex, KnownEngine
 from action_assistant.runner.robots.foreign_graphs import foreign_graphs
@@ -353,13 +354,23 @@ class Robots:
         return text
 
     async def candidates(self) -> tuple[Candidate, ...]:
-        """Engines in sight that nobody registered yet."""
+        """Return the engines in sight that nobody registered yet, once discovery has had its time."""
         if isinstance(self._reach, str):
             return ()
+        return self._strangers(await self._reach.candidates())
+
+    async def sighting(self) -> Sighting:
+        """Return the same as it is known now, and for how long others may still come into sight."""
+        if isinstance(self._reach, str):
+            return Sighting((), 0.0)
+        seen = await self._reach.sighting()
+        return Sighting(self._strangers(seen.engines), seen.left_s)
+
+    def _strangers(self, engines: Iterable[Candidate]) -> tuple[Candidate, ...]:
         known = {(each.domain, _path(each.get_service)) for each in self._registered.values()}
         return tuple(
             each
-            for each in await self._reach.candidates()
+            for each in engines
             if (each.domain, _path(each.get_service)) not in known
             and each.actor not in self._registered
         )

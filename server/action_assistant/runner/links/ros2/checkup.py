@@ -1,6 +1,7 @@
 """What is wrong with ROS 2 here, as far as can be seen from this process: its environment, who is on
 its domains, and whether each registered robot answers."""
 
+import asyncio
 import importlib
 import os
 import re
@@ -55,7 +56,8 @@ async def look(
         )
     )
     try:
-        standings = await _standings(reach, robots, seen)
+        # Discovery on the domain of this shell goes on while robots are asked.
+        standings, _ = await asyncio.gather(_standings(reach, robots, seen), reach.sighting())
         candidates = await reach.candidates()
     except RuntimeError as error:
         seen.append(

@@ -11,7 +11,7 @@ import anyio
 import anyio.to_thread
 import rclpy
 
-from action_assistant.runner.links.port import Candidate, Link, Registration
+from action_assistant.runner.links.port import Candidate, Link, Registration, Sighting
 from action_assistant.runner.links.ros2.domain import Domain
 from action_assistant.runner.links.ros2.link import Ros2Link
 from action_assistant.runner.links.ros2.outlets import Topics
@@ -57,18 +57,24 @@ class Ros2:
                 self._domains[number, topics] = known
             return known
 
-    async def candidates(self) -> tuple[Candidate, ...]:
-        """Whoever answers as engines do, on the domains of links and the one of the environment."""
+    async def sighting(self) -> Sighting:
+        """Return whoever answers as engines do, on the domains of links and the one of the environment."""
         await self.domain(self._home, topics_of(PINNED))
         domains = tuple(self._domains.values())
         youngest = max(each.settled_at for each in domains)
-        await anyio.sleep(max(0.0, youngest - time.monotonic()))
         found = {
             (domain.number, path): self._candidate(domain, path)
             for domain in domains
             for path in domain.paths()
         }
-        return tuple(found[key] for key in sorted(found))
+        engines = tuple(found[key] for key in sorted(found))
+        return Sighting(engines, max(0.0, youngest - time.monotonic()))
+
+    async def candidates(self) -> tuple[Candidate, ...]:
+        """Return the same once discovery has had its time."""
+        seen = await self.sighting()
+        await anyio.sleep(seen.left_s)
+        return (await self.sighting()).engines if seen.left_s else seen.engines
 
     def _candidate(self, domain: Domain, path: str) -> Candidate:
         servers = domain.servers(path)
