@@ -186,6 +186,39 @@ def test_a_run_state_in_the_file_is_an_error_and_kills_the_simulated_engine(tmp_
     assert (last["kind"], last["code"]) == ("hazard", "H1")
 
 
+def action_file(folder: Path, name: str, **inputs: object) -> None:
+    (folder / name).mkdir(parents=True)
+    described = {"name": name, "type": "sync", "input_parameters": inputs}
+    (folder / name / f"{name.lower()}.umrf.json").write_text(json.dumps(described))
+
+
+def test_simulate_takes_the_actions_of_a_folder_as_check_does(tmp_path: Path) -> None:
+    path, folder = written(tmp_path, TWO), tmp_path / "actions"
+    names = [each["name"] for each in TWO["actions"]]
+    for name in names:
+        action_file(folder, name)
+    answer = run("simulate", "--trace", "--actions", str(folder), path)
+    assert answer.returncode == 0
+    assert json.loads(answer.stdout.splitlines()[-1])["state"] == "FINISHED"
+    assert "refused" not in answer.stdout
+
+
+@pytest.mark.parametrize("other", [{}, {"speed": {"pvf_type": "number"}}])
+def test_a_graph_with_an_action_that_the_folder_lacks_is_refused_and_says_which(
+    tmp_path: Path, other: dict[str, object]
+) -> None:
+    path, folder = written(tmp_path, TWO), tmp_path / "actions"
+    folder.mkdir()
+    if other:
+        action_file(folder, TWO["actions"][0]["name"], **other)
+    answer = run("simulate", "--trace", "--actions", str(folder), path)
+    events = [json.loads(line) for line in answer.stdout.splitlines()]
+    assert [each["code"] for each in events if each["kind"] == "hazard"] == ["refused"]
+    assert TWO["actions"][0]["name"] in answer.stderr
+    assert ("speed" in answer.stderr) == bool(other)
+    assert "RUNNING" not in answer.stdout
+
+
 def test_simulate_tells_a_person_what_the_engine_would_do_wrong(tmp_path: Path) -> None:
     graph = {**TWO, "actions": [TWO["actions"][0], {"name": "B", "type": "sync"}]}
     answer = run("simulate", written(tmp_path, graph))

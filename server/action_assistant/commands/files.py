@@ -76,6 +76,12 @@ def _add_simulate(simulate: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="of Python files that say what actions do, before the script; in real time then",
     )
+    simulate.add_argument(
+        "--actions",
+        type=Path,
+        metavar="DIR",
+        help="of action packages (*umrf.json), which are then the only actions that the engine has",
+    )
     simulate.add_argument("--graphs", type=Path, metavar="DIR", help="of sub-graphs")
     simulate.add_argument(
         "--at",
@@ -245,9 +251,12 @@ def _simulate(options: argparse.Namespace) -> int:
         if refusals := checks.refused_by_parser(reading):
             _print_refusals(options.file, refusals)
             return 1
+        actions = actions_below(options.actions) if options.actions else None
         cut_off = None
-        for event in _trace(options, reading):
+        for event in _trace(options, reading, actions):
             _report(event, as_json=options.trace)
+            if isinstance(event, semantics.HazardEvent) and event.code == "refused":
+                _print_unknown(options, reading, actions)
             if isinstance(event, semantics.HazardEvent) and event.code == semantics.CUT_OFF:
                 cut_off = event
     except codec.Unreadable as error:
@@ -259,7 +268,9 @@ def _simulate(options: argparse.Namespace) -> int:
     return 1
 
 
-def _trace(options: argparse.Namespace, reading: codec.Reading) -> Iterator[semantics.Trace]:
+def _trace(
+    options: argparse.Namespace, reading: codec.Reading, actions: Mapping[str, Signature] | None
+) -> Iterator[semantics.Trace]:
     script = _script(options.script) if options.script else semantics.Script({})
     asked = {
         "script": script,
@@ -268,6 +279,7 @@ def _trace(options: argparse.Namespace, reading: codec.Reading) -> Iterator[sema
         "until_ms": options.seconds * 1000,
         "max_events": _EVENTS,
         "states": reading.states,
+        "signatures": actions,
     }
     if options.behaviours is None:
         return semantics.simulate(reading.graph, facts=SIMULATED, **asked)
@@ -276,6 +288,15 @@ def _trace(options: argparse.Namespace, reading: codec.Reading) -> Iterator[sema
 
     folder = BehaviourFolder.opened(options.behaviours)
     return simulate_in_real_time(reading.graph, folder, **asked)
+
+
+def _print_unknown(
+    options: argparse.Namespace, reading: codec.Reading, actions: Mapping[str, Signature] | None
+) -> None:
+    """Say which actions it is that the engine does not have so: its own refusal does not."""
+    for problem in checks.check_reading(reading, actions, graphs=_library(options.graphs)):
+        if problem.code in {"unknown-action", "signature"}:
+            print(f"{options.file}: {problem.message} ({_at(problem.where)})", file=sys.stderr)
 
 
 def _print_refusals(path: Path, refusals: Sequence[Problem]) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Final
 
 from action_assistant.umrf.facts import SIMULATED, EngineFacts
-from action_assistant.umrf.model import Graph, Key
+from action_assistant.umrf.model import Graph, Key, Signature
 from action_assistant.umrf.semantics.engine import Engine
 from action_assistant.umrf.semantics.graphs import GraphRefused
 from action_assistant.umrf.semantics.script import Script
@@ -26,13 +26,21 @@ def simulate(
     max_events: int = 100_000,
     states: Mapping[Key, str] | None = None,
     actor: str = "",
+    signatures: Mapping[str, Signature] | None = None,
 ) -> Iterator[Trace]:
     """Everything that happens from the start at 0 ms until nothing is left to happen, `until_ms`
     or `max_events`. `commands`: (ms, `stop` | `pause` | `resume`, running name or None for the top
-    graph). Commands reach the engine as calls, so that two stops at once kill it. A start that the
+    graph). `signatures`: the actions that the engine has; without them it has every one. Commands reach the engine as calls, so that two stops at once kill it. A start that the
     engine refuses ends in a hazard `refused`; a trace that is cut off after `max_events` in one more
     event, the hazard `events`."""
-    engine = Engine(facts=facts, script=script, library=library, actor=actor, serial=False)
+    engine = Engine(
+        facts=facts,
+        script=script,
+        library=library,
+        actor=actor,
+        signatures=signatures,
+        serial=False,
+    )
     pending = sorted(commands, key=lambda command: command[0])
     traces = started(engine, graph, states)
     left = max_events

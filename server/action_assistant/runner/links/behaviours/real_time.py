@@ -8,7 +8,7 @@ from math import inf
 from action_assistant.runner.links.behaviours.folder import BehaviourFolder
 from action_assistant.runner.links.behaviours.performer import BehaviourPerformer
 from action_assistant.umrf.facts import SIMULATED
-from action_assistant.umrf.model import Graph, Key
+from action_assistant.umrf.model import Graph, Key, Signature
 from action_assistant.umrf.semantics import Engine, Script, Trace
 from action_assistant.umrf.semantics.simulate import commanded, cut_off, started
 
@@ -23,13 +23,19 @@ def simulate_in_real_time(
     until_ms: float,
     max_events: int,
     states: Mapping[Key, str],
+    signatures: Mapping[str, Signature] | None = None,
 ) -> Iterator[Trace]:
     """Everything that happens from the start until nothing is left to happen, `until_ms` or
     `max_events`. `commands` as there. Whatever goes on at the end is killed."""
     performer, news = BehaviourPerformer(folder), threading.Event()
     performer.wake = news.set
     engine = Engine(
-        facts=SIMULATED, script=script, library=library, serial=False, performer=performer
+        facts=SIMULATED,
+        script=script,
+        library=library,
+        signatures=signatures,
+        serial=False,
+        performer=performer,
     )
     began, left = time.monotonic(), max_events
     pending = sorted(commands, key=lambda command: command[0])
