@@ -56,7 +56,7 @@ test("the lists fold to a rail by which each is opened and put away, also by key
   const problems = rail.getByRole("button", { name: "Problems: 1 to fill in" });
   await expect(problems).toBeVisible();
   await problems.hover();
-  await expect(page.getByRole("tooltip")).toHaveText("Problems: 1 to fill in, 1 warning");
+  await expect(page.getByRole("tooltip")).toHaveText("Problems: 1 to fill in");
   await problems.click();
   await expect(page.getByRole("tab", { name: /Problems/ })).toHaveAttribute(
     "aria-selected",

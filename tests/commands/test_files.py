@@ -186,6 +186,27 @@ def test_a_run_state_in_the_file_is_an_error_and_kills_the_simulated_engine(tmp_
     assert (last["kind"], last["code"]) == ("hazard", "H1")
 
 
+def test_what_is_so_with_nearly_every_graph_is_said_once_last_and_not_as_a_warning(
+    tmp_path: Path,
+) -> None:
+    """`on_error` bypasses unless a file says otherwise, in all of these arrows."""
+    names = ["A", "B", "C", "D"]
+    chain = [
+        {"name": name, "type": "sync",
+         "parents": [{"name": n} for n in names[max(0, place - 1):place]],
+         "children": [{"name": n} for n in names[place + 1:place + 2]]}
+        for place, name in enumerate(names)
+    ]  # fmt: skip
+    chain[3]["type"] = "other"
+    ends = {"graph_entry": [{"name": "A"}], "graph_exit": [{"name": "D"}]}
+    path = written(tmp_path, {"graph_name": "g", "actions": chain} | ends)
+    first, *lines = run("check", path).stdout.splitlines()
+    assert first.endswith("0 errors, 1 warnings")
+    assert [line.split()[:2] for line in lines] == [["warning", "type-unknown:"], ["note", "H3:"]]
+    (told,) = json.loads(run("check", "--json", path).stdout)
+    assert [(p["code"], p["severity"]) for p in told["problems"]][-1] == ("H3", "warning")
+
+
 def action_file(folder: Path, name: str, **inputs: object) -> None:
     (folder / name).mkdir(parents=True)
     described = {"name": name, "type": "sync", "input_parameters": inputs}

@@ -28,8 +28,14 @@ test("a problem of an arrow marks the arrow, one of an action its card, one of t
 
 test("a problem marks every place of which the same is said", () => {
   const also = [{ relation: "b>c" }];
-  const marks = marksOf([{ ...problem("H3", "warning", { relation: "a>b" }), also }]);
+  const marks = marksOf([{ ...problem("H12", "warning", { relation: "a>b" }), also }]);
   expect([...marks.keys()]).toEqual(["a>b", "b>c"]);
+});
+
+test("what is so with nearly every graph on an engine marks no arrow", () => {
+  const also = [{ relation: "b>c" }];
+  const marks = marksOf([{ ...problem("H3", "warning", { relation: "a>b" }), also }]);
+  expect([...marks.keys()]).toEqual([]);
 });
 
 test("a mark names every reason with its code last, what is wrong first", () => {

@@ -17,6 +17,7 @@ export const NO_PROBLEM_MARKS: ProblemMarks = new Map();
 export function problemMarksOf(told: readonly ToldProblem[]): ProblemMarks {
   const places = new Map<string, ToldProblem[]>();
   for (const each of told) {
+    if (each.kind === "note") continue; // it would stand on nearly every graph's arrows
     const others = each.problems.flatMap((problem) => otherPlaces(problem));
     for (const place of new Set([each.place, ...others])) {
       if (place === null) continue;

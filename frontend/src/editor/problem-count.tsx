@@ -37,7 +37,7 @@ export function blockWords(told: readonly ToldProblem[]): string {
 export function ProblemCount({ told }: { told: readonly ToldProblem[] }) {
   const { setPanel } = useEditorContext();
   const { wrong, fillIn, warnings } = countsOf(told);
-  if (told.length === 0) return null;
+  if (wrong + fillIn + warnings === 0) return null;
   const blocks = blockWords(told);
   return (
     <button

@@ -135,6 +135,7 @@ const TITLES: Readonly<Record<ProblemKind, string>> = {
   wrong: "Wrong",
   "fill-in": "To fill in",
   warning: "Warnings: it may go wrong",
+  note: "Known of this engine",
 };
 
 function Part({ kind, told }: { kind: ProblemKind; told: readonly Told[] }) {
@@ -227,7 +228,7 @@ export function ProblemList({ problems, told, seq }: Props) {
   if (!problems) return <p className={style.checked}>Checking …</p>;
   return (
     <div className={style.list}>
-      {told.length === 0 && (
+      {told.every(({ kind }) => kind === "note") && (
         <p className={style.none}>
           <IconCircleCheck size={18} aria-hidden /> No problem found.
         </p>
@@ -237,6 +238,7 @@ export function ProblemList({ problems, told, seq }: Props) {
         <Part kind="wrong" told={told} />
         <Part kind="fill-in" told={told} />
         <Part kind="warning" told={told} />
+        <Part kind="note" told={told} />
       </DataFlowContext>
       <p className={style.checked}>
         Checked at moment {problems.seq}

@@ -13,7 +13,7 @@ from action_assistant.errors import CannotStart
 from action_assistant.safe_text import one_line
 from action_assistant.umrf import check as checks
 from action_assistant.umrf import semantics
-from action_assistant.umrf.codes import rank
+from action_assistant.umrf.codes import QUIET, rank
 from action_assistant.umrf.facts import PINNED, SIMULATED, EngineFacts, facts_for
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.files.action_files import ACTION_DIALECTS
@@ -195,14 +195,19 @@ def _given(paths: Sequence[Path]) -> dict[str, Graph]:
 
 def _print(verdict: CheckVerdict) -> None:
     errors = sum(problem.severity == "error" for problem in verdict.problems)
-    warnings = len(verdict.problems) - errors
+    warnings = sum(kind_word(problem) == "warning" for problem in verdict.problems)
     print(
         f"{verdict.file}: {verdict.dialect or 'unreadable'}, {errors} errors, {warnings} warnings"
     )
     for problem in verdict.problems:
-        print(f"  {problem.severity} {problem.code}: {problem.message} ({_at(problem.where)})")
+        print(f"  {kind_word(problem)} {problem.code}: {problem.message} ({_at(problem.where)})")
     for note in verdict.notes:
         print(f"  note: {note.sentence} ({_at(note.where)})")
+
+
+def kind_word(problem: Problem) -> str:
+    """What a line about a problem begins with: `note` for what is so with nearly every graph."""
+    return "note" if problem.code in QUIET else problem.severity
 
 
 def _convert(options: argparse.Namespace) -> int:

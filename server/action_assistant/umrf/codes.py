@@ -198,13 +198,18 @@ FINAL: Final[frozenset[str]] = STRUCTURAL | {
 }
 
 #: Of what is possible, what comes first: it kills or blocks the engine, it cannot be stopped, it never
-#: ends. H3 stands in nearly every graph from the wild.
-_WORST: Final = ("H4", "H5", "H12", "H8", "H14", "H3")
+#: ends.
+_WORST: Final = ("H4", "H5", "H12", "H8", "H14")
+#: Warnings that are true of nearly every graph, since they come with the engine's own defaults: told once,
+#: after all others, and not counted among them, so that warnings are read.
+QUIET: Final = frozenset({"H3"})
 
 
 def rank(problem: Problem) -> tuple[Severity, int]:
     """The order in which problems are told."""
     code = problem.code
+    if code in QUIET:
+        return problem.severity, len(_WORST) + 1
     return problem.severity, _WORST.index(code) if code in _WORST else len(_WORST)
 
 

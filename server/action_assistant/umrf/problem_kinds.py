@@ -11,6 +11,7 @@ from typing import Final, Literal, TypeAlias
 
 import msgspec
 
+from action_assistant.umrf.codes import QUIET
 from action_assistant.umrf.json.text import Json, parse_small
 from action_assistant.umrf.model import (
     ENTRY,
@@ -25,8 +26,9 @@ from action_assistant.umrf.model import (
 from action_assistant.umrf.parameters import flat_name, keys_of
 from action_assistant.umrf.semantics.values import RemapUnknown, renamed
 
-#: `wrong`: certain harm, or a mistake. `fill-in`: still to be written. `warning`: may go wrong.
-ProblemKind: TypeAlias = Literal["wrong", "fill-in", "warning"]
+#: `wrong`: certain harm, or a mistake. `fill-in`: still to be written. `warning`: may go wrong. `note`:
+#: what is so with nearly every graph on this engine.
+ProblemKind: TypeAlias = Literal["wrong", "fill-in", "warning", "note"]
 
 #: Codes that say that something has not been written or connected so far.
 UNWRITTEN: Final = frozenset(
@@ -69,7 +71,7 @@ def told_counts(problems: Iterable[Problem], graph: Graph) -> ToldCounts:
     misfits: dict[Key, frozenset[str]] = {}
     rows: dict[Key, tuple[str, ...]] = {}
     told: dict[ProblemKind, set[tuple[str, str, str]]] = {
-        "wrong": set(), "fill-in": set(), "warning": set(),
+        "wrong": set(), "fill-in": set(), "warning": set(), "note": set(),
     }  # fmt: skip
     for problem in problems:
         path, what = input_of(problem), problem.message
@@ -99,7 +101,9 @@ def kind_of(problem: Problem, *, misfit: bool = False) -> ProblemKind:
         return "wrong" if misfit else "fill-in"
     if problem.code in UNWRITTEN:
         return "fill-in"
-    return "wrong" if problem.severity == "error" or problem.code in MISTAKES else "warning"
+    if problem.severity == "error" or problem.code in MISTAKES:
+        return "wrong"
+    return "note" if problem.code in QUIET else "warning"
 
 
 def _misfits(

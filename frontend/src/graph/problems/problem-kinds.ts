@@ -30,8 +30,11 @@ export interface CheckedProblem {
   readonly inside?: CheckedPlaceInside;
 }
 
-/** `wrong`: certain harm, or a mistake. `fill-in`: still to be written. `warning`: may go wrong. */
-export type ProblemKind = "wrong" | "fill-in" | "warning";
+/**
+ * `wrong`: certain harm, or a mistake. `fill-in`: still to be written. `warning`: may go wrong. `note`: what is so
+ * with nearly every graph on this engine.
+ */
+export type ProblemKind = "wrong" | "fill-in" | "warning" | "note";
 
 /** Codes that say that something has not been written or connected so far. */
 const UNWRITTEN: ReadonlySet<string> = new Set([
@@ -54,6 +57,9 @@ const MISTAKES: ReadonlySet<string> = new Set([
   "wrong-side",
 ]);
 
+/** Warnings that come with the engine's own defaults: told once and not counted, so that warnings are read. */
+const QUIET: ReadonlySet<string> = new Set(["H3"]);
+
 /** An input to which the check asks for a value: its path; null for any other problem. */
 export function inputOf({ code, where }: CheckedProblem): string | null {
   if (code !== "H7" && code !== "H8") return null;
@@ -70,7 +76,8 @@ export function kindOf(
   const { aid } = problem.where;
   if (input !== null) return aid !== undefined && misfits(aid, input) ? "wrong" : "fill-in";
   if (UNWRITTEN.has(problem.code)) return "fill-in";
-  return problem.severity === "error" || MISTAKES.has(problem.code) ? "wrong" : "warning";
+  if (problem.severity === "error" || MISTAKES.has(problem.code)) return "wrong";
+  return QUIET.has(problem.code) ? "note" : "warning";
 }
 
 /** How many things there are of each kind. */

@@ -24,7 +24,8 @@ test.each([
   ["no-entry", "", "error", "fill-in"],
   ["no-exit", "", "warning", "fill-in"],
   ["parameter-allowed", "/actions/0/input_parameters/a/pvf_value", "warning", "wrong"],
-  ["H3", "/actions/0", "warning", "warning"],
+  ["H4", "/actions/0", "warning", "warning"],
+  ["H3", "/actions/0", "warning", "note"],
   ["H2", "/actions/0", "error", "wrong"],
 ] as const)("%s at %s, %s: %s", (code, path, severity, kind) => {
   expect(kindOf(problem(code, path, { severity }))).toBe(kind);
@@ -77,7 +78,7 @@ test("the same said twice of one place is told once, what is wrong first", () =>
     ["no-exit", 1],
     ["H3", 2],
   ]);
-  expect(countWords(countsOf(told))).toEqual(["1 wrong", "1 to fill in", "1 warning"]);
+  expect(countWords(countsOf(told))).toEqual(["1 wrong", "1 to fill in"]);
 });
 
 const file = new URL("../../../../tests/vectors/problem-kinds.json", import.meta.url);

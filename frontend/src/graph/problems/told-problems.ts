@@ -37,7 +37,12 @@ interface Gathered<P extends CheckedProblem> {
   problems: [P, ...P[]];
 }
 
-const ORDER: Readonly<Record<ProblemKind, number>> = { wrong: 0, "fill-in": 1, warning: 2 };
+const ORDER: Readonly<Record<ProblemKind, number>> = {
+  wrong: 0,
+  "fill-in": 1,
+  warning: 2,
+  note: 3,
+};
 
 /** "x", "x and y", "x, y and z". */
 function listed(words: readonly string[]): string {
@@ -83,7 +88,7 @@ function misfitsIn(flow: DataFlow) {
   };
 }
 
-/** What is wrong, then what is to fill in, then what may go wrong; of each what blocks comes first. */
+/** What is wrong, what is to fill in, what may go wrong, then notes; of each what blocks comes first. */
 export function toldProblems<P extends CheckedProblem>(
   problems: readonly P[],
   graph: Pick<Graph, "actions" | "relations">,

@@ -19,6 +19,7 @@ from action_assistant.runner.robots.foreign_graphs import foreign_graphs
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start.admission import Admitted, Prepared
 from action_assistant.umrf.check import check, is_final
+from action_assistant.umrf.codes import QUIET
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph, Problem
@@ -122,9 +123,13 @@ def of_graph(admitted: Admitted | Prepared) -> Item:
     if over:
         text = f"{len(over)} certain problems are overridden."
         return Item(code="graph", verdict="warned", text=text, problems=(*over, *warned))
-    if warned:
-        text = f"No certain hazard; {_count(len(warned), 'possible one')}."
+    loud = sum(each.code not in QUIET for each in warned)
+    if loud:
+        text = f"No certain hazard; {_count(loud, 'possible one')}."
         return Item(code="graph", verdict="warned", text=text, problems=warned)
+    if warned:
+        text = "No hazard is known but that of every bypass on this engine."
+        return Item(code="graph", verdict="passed", text=text, problems=warned)
     return Item(code="graph", verdict="passed", text="No hazard is known.")
 
 
