@@ -108,6 +108,36 @@ test("Stop goes by socket and by POST at once", async () => {
   live.close();
 });
 
+test("that a Stop is proven is noted when the runner says so, and stays when it falls silent", async () => {
+  const live = opened({ ...run("running"), alarms: [] });
+  live.stop("all");
+  await vi.advanceTimersByTimeAsync(10);
+  expect(live.state.stops[0]?.provenAt).toBeUndefined();
+  newest().say({ type: "run", run: { ...run("stopped", "2026-01-01T00:00:00Z"), alarms: [] } });
+  const proven = live.state.stops[0]?.provenAt;
+  expect(proven).toBeDefined();
+  await vi.advanceTimersByTimeAsync(4_000);
+  expect(live.state.link).toBe("down");
+  expect(live.state.stops[0]?.provenAt).toBe(proven);
+  live.close();
+});
+
+test("nothing is noted as proven while a robot's graphs, or the robot itself, are not known to rest", async () => {
+  for (const engine of [
+    { name: "David", state: "answering", holds: [{ graph: "theirs", active: true, run: null }] },
+    { name: "David", state: "silent", holds: [] },
+  ]) {
+    const live = new LiveSocket("http://h:1");
+    live.open();
+    newest().say({ type: "hello", engines: [engine], runs: [] });
+    live.stop("all");
+    await vi.advanceTimersByTimeAsync(10);
+    expect(live.state.stops[0]).toMatchObject({ state: "heard" });
+    expect(live.state.stops[0]?.provenAt).toBeUndefined();
+    live.close();
+  }
+});
+
 test("a Stop is heard although the socket fails just then", async () => {
   const live = opened(run("running"));
   newest().send = () => {

@@ -7,7 +7,7 @@ import type { Run } from "../runs";
 import type { RunnerApi } from "../schema/runner";
 import { sessionEnd } from "../session-end";
 import { isUrgentChange, withKeptParts } from "./kept-run";
-import { foreignGraphs } from "./open-runs";
+import { foreignGraphs, isProven } from "./open-runs";
 import {
   blockedByBrowser,
   findUnreachableReason,
@@ -32,6 +32,8 @@ export interface StopRequest {
   detail: string;
   /** Of a clock that nobody sets, ms. */
   heardAt?: number;
+  /** When all that it is about was told to rest, as `at`: that stays proven, whatever is unknown later. */
+  provenAt?: number;
 }
 
 export interface LiveState {
@@ -351,7 +353,18 @@ export class LiveSocket {
     this.#tell();
   }
 
+  /** What is proven is noted at once: later the runner may be silent, and other runs may begin. */
+  #noteProven(): void {
+    const isNew = (stop: StopRequest) => stop.provenAt === undefined && isProven(stop, this.state);
+    if (!this.state.stops.some(isNew)) return;
+    const stops = this.state.stops.map((stop) =>
+      isNew(stop) ? { ...stop, provenAt: Date.now() } : stop,
+    );
+    this.state = { ...this.state, stops };
+  }
+
   #tell(): void {
+    this.#noteProven();
     clearTimeout(this.#untold);
     this.#untold = undefined;
     this.#toldAt = performance.now();

@@ -1,7 +1,7 @@
 /** What goes on, as far as this page knows: runs of ours, and what robots run besides. Pure. */
 import type { HeldGraph, Robot } from "../robots";
 import type { Run } from "../runs";
-import type { LiveState } from "./live-socket";
+import type { LiveState, StopRequest } from "./live-socket";
 
 /** The runs that go on, newest first, as far as this page knows. */
 export function openRuns(now: LiveState): Run[] {
@@ -44,4 +44,21 @@ export function unheardRobots(now: LiveState): Robot[] {
   return now.engines.filter(
     ({ simulated, state }) => !simulated && state !== "answering" && state !== "restarted",
   );
+}
+
+/** The runs that a Stop is about, as far as this page knows them. */
+export function stopTargets(stop: StopRequest, now: LiveState): Run[] {
+  const all = stop.run === "all";
+  return [...now.runs.values()].filter((run) =>
+    all ? stop.runs.includes(run.id) : [run.id, run.group].includes(stop.run),
+  );
+}
+
+/** Whether the runner says, and says it now, that all rests that a Stop is about. */
+export function isProven(stop: StopRequest, now: LiveState): boolean {
+  if (now.link !== "live" || stop.state !== "heard") return false;
+  const runs = stopTargets(stop, now);
+  if (runs.some((run) => run.ended_at === null || run.state === "lost")) return false;
+  if (stop.run !== "all") return runs.length > 0;
+  return foreignGraphs(now).length === 0 && unheardRobots(now).length === 0;
 }

@@ -90,6 +90,31 @@ test("without the runner nothing is claimed", () => {
   expect(noticeOf(unanswered, now({}), 9000)?.text).toContain("NOT SENT");
 });
 
+test("what was proven stays proven when the runner is silent later, and the rest is said apart", () => {
+  const proof = { proof_at: "1970-01-01T00:00:02Z", ended_at: "1970-01-01T00:00:02Z" };
+  const ended = now({ state: "stopped", ...proof }, "down");
+  for (const at of [2_500, 60_000]) {
+    for (const asked of [stop, { ...stop, run: "all", runs: ["r"], provenAt: 2_000 } as const]) {
+      expect(noticeOf(asked, ended, at)?.text ?? "").not.toContain("UNCONFIRMED");
+    }
+  }
+  const soon = noticeOf(stop, ended, 2_500);
+  expect(soon?.tone).toBe("done");
+  expect(soon?.text).toMatch(
+    /^Proven: run 7: stopped at \d\d:\d\d:\d\d\. The runner is silent since/,
+  );
+  const other = { ...ended.runs.get("r"), id: "q", number: 8, ended_at: null } as Run;
+  const both = { ...ended, runs: new Map([...ended.runs, ["q", other]]) };
+  const all = { ...stop, run: "all", runs: ["r", "q"] } as const;
+  const text = noticeOf(all, both, 9_000)?.text;
+  expect(text).toMatch(/^STOP UNCONFIRMED: run 8 on David: sent, but no word/);
+  expect(text).toMatch(/Proven before that: run 7: stopped at/);
+  // That nothing was known to run proves nothing when nobody said so.
+  expect(noticeOf({ ...stop, run: "all" }, now(null, "down"), 2_500)?.tone).toBe("loud");
+  // What moves again is not proven any more.
+  expect(noticeOf({ ...all, provenAt: 2_000 }, both, 9_000)?.tone).toBe("loud");
+});
+
 test("a refused Stop says why", () => {
   expect(noticeOf({ ...stop, state: "refused", detail: "no such run" }, now(null), 1200)).toEqual({
     tone: "loud",

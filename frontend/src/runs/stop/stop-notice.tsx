@@ -1,14 +1,14 @@
 /** What became of a Stop, in words, until it is proven. */
 import { useState, useSyncExternalStore } from "react";
 import type { LiveState, StopRequest } from "../../api/live/live-socket";
-import { foreignGraphs, openRuns, unheardRobots } from "../../api/live/open-runs";
+import { foreignGraphs, openRuns, stopTargets, unheardRobots } from "../../api/live/open-runs";
 import { useLive } from "../../api/live/use-live";
 import type { Robot } from "../../api/robots";
 import { needsRestConfirmation } from "../../api/run-stop";
 import type { Run } from "../../api/runs";
 import { HelpLink } from "../../status/help-link";
 import { useRootMark } from "../../ui/hooks/use-root-mark";
-import { clock, duration, useNow } from "../../ui/times";
+import { clock, duration, instant, useNow } from "../../ui/times";
 import style from "./stop-notice.module.css";
 import { askedRun, mayAnswer } from "./stop-surroundings";
 
@@ -24,13 +24,6 @@ export type StopNoticeText = {
   since?: string;
   stays?: true;
 } | null;
-
-function targets(stop: StopRequest, now: LiveState): Run[] {
-  const all = stop.run === "all";
-  return [...now.runs.values()].filter((run) =>
-    all ? stop.runs.includes(run.id) : [run.id, run.group].includes(stop.run),
-  );
-}
 
 /** Why it is not proven, as the runner says; "" when it has not said so yet. */
 function reasonOf(run: Run): string {
@@ -66,16 +59,11 @@ export function noticeOf(stop: StopRequest, now: LiveState, at: number): StopNot
       since,
     };
   }
-  if (now.link === "down") {
-    return {
-      tone: "loud",
-      stays: true,
-      text: "STOP UNCONFIRMED: sent, but no word from the runner since.",
-      since,
-    };
-  }
-  const runs = targets(stop, now);
+  const runs = stopTargets(stop, now);
   const open = runs.filter((run) => run.ended_at === null);
+  const down = now.link === "down";
+  const isKnown = stop.provenAt !== undefined || (stop.run !== "all" && runs.length > 0);
+  if (down && (open.length > 0 || !isKnown)) return silentNotice(runs, since);
   if (open.length > 0) {
     if (waited >= LOUD) return unconfirmed(open, since);
     const names = open.map((run) => `run ${run.number}`).join(", ");
@@ -86,11 +74,40 @@ export function noticeOf(stop: StopRequest, now: LiveState, at: number): StopNot
     const ends = lost.map((run) => `run ${run.number} on ${run.engine}: ${run.detail}`).join(" ");
     return { tone: "loud", text: `STOP UNCONFIRMED: ${ends} Look at the robot.` };
   }
-  const foreign = stop.run === "all" ? foreignNotice(now, since) : null;
+  const foreign = stop.run === "all" && !down ? foreignNotice(now, since) : null;
   if (foreign !== null) return foreign;
-  if (waited > GONE) return null;
+  if (at - (stop.provenAt ?? stop.at) > GONE) return null;
   if (stop.state === "asked") return { tone: "quiet", text: "Stop", since };
+  if (down) return provenNotice(runs, stop.provenAt, now);
   return doneNotice(runs, stop.run === "all" ? unheardRobots(now) : []);
+}
+
+const isAtRest = (run: Run) => run.ended_at !== null && run.state !== "lost";
+const endOf = (run: Run) => {
+  const at = instant(run.proof_at ?? run.ended_at);
+  return `run ${run.number}: ${run.state}${at === null ? "" : ` at ${clock(at)}`}`;
+};
+
+/** The runner is silent since: what it said before that stays true, and of the rest nothing is known. */
+function silentNotice(runs: readonly Run[], since: string): StopNoticeText {
+  const open = runs.filter((run) => !isAtRest(run));
+  const who = open.map((run) => `run ${run.number} on ${run.engine}: `).join("");
+  const before = runs.filter(isAtRest).map(endOf).join(", ");
+  const proven = before === "" ? "" : ` Proven before that: ${before}.`;
+  const text = `STOP UNCONFIRMED: ${who}sent, but no word from the runner since.${proven}`;
+  return { tone: "loud", stays: true, text, since };
+}
+
+/** All that was to be stopped rested before the runner fell silent. */
+function provenNotice(
+  runs: readonly Run[],
+  at: number | undefined,
+  now: LiveState,
+): StopNoticeText {
+  const then = at === undefined ? "" : ` at ${clock(at)}`;
+  const ends = runs.length === 0 ? `nothing ran${then}` : runs.map(endOf).join(" · ");
+  const text = `Proven: ${ends}. The runner is silent since ${clock(now.since)}; what began after that is not known.`;
+  return { tone: "done", text };
 }
 
 /** What others run and what is being stopped, until it is proven; then the loudest first. */
@@ -209,7 +226,8 @@ export function StopNotice() {
   const watching = last !== undefined && last.id !== dismissed;
   const open = openRuns(now).length;
   const busy =
-    watching && (open > 0 || last.state !== "heard" || Date.now() - last.at < GONE + 1000);
+    watching &&
+    (open > 0 || last.state !== "heard" || Date.now() - (last.provenAt ?? last.at) < GONE + 1000);
   const at = useNow(200, busy || now.link !== "live");
   const notice =
     movingAgain(now) ??
