@@ -57,6 +57,7 @@ SCRIPTS: list[dict[str, Any]] = [
     {"*": [{"never": True, "stop_s": 7.0}]},
     {"*": [{"after_s": 4, "ignores_stop": True, "stop_error": True}]},
 ]
+LOADING_MS = (1.0, 60.0, 400.0, 1_500.0, 3_000.0, 8_000.0)
 STILL = ENDED - {"lost", "refused"}
 KNOWINGLY = Override(codes=("proof", "quiet", "others"), reason="it is a test")
 
@@ -106,7 +107,7 @@ class Story:
         self.chance = random.Random(seed)
         self.domain = domain
         self.script = self.chance.choice(SCRIPTS)
-        self.quirks = EngineTraits(loading_ms=self.chance.choice([1.0, 60.0, 400.0]))
+        self.quirks = EngineTraits(loading_ms=self.chance.choice(LOADING_MS))
         self.robots: list[tuple[EmulatorNode, ExitStack]] = []
         self.false: list[str] = []
         self.judged: set[str] = set()

@@ -21,10 +21,12 @@ from action_assistant.journal.events import BareEvent, Draft, Event, StreamSnaps
 from action_assistant.runner import projection
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.links.listeners import Listeners
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import (
     Answer,
     EngineRefused,
+    Feedback,
     Leaves,
     Link,
     NoAnswer,
@@ -222,6 +224,7 @@ class Robot:
         self.stops: list[tuple[float, str]] = []
         self.delivered = 0
         self._began: dict[str, float] = {}
+        self.subscribers = Listeners[Report]()
 
     async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
         """One message, which arrives, unless it gets lost."""
@@ -250,6 +253,18 @@ class Robot:
         if self.chance.random() >= self.loss:
             self.delivered += 1
             await self.engine.stop(graph_name)
+            await self._feed()
+
+    async def _feed(self) -> None:
+        """What a real engine tells by itself as it begins to stop: that its actions are STOPPING."""
+        answer = await self.engine.get()
+        seen = tuple(
+            msgspec.structs.replace(each, source="feedback", asked_at=None)
+            for each in answer.graphs
+            if each.state == "STOPPING"
+        )
+        if seen:
+            self.subscribers.tell(Feedback(actor="", snapshots=seen))
 
     async def pause(self, graph_name: str) -> None:
         """Arrives."""
@@ -275,7 +290,9 @@ class Robot:
         answer = await self.engine.get()
         await anyio.sleep(self.chance.random() * self.old)
         shown = tuple(self._blinded(each, answer) for each in answer.graphs)
-        return msgspec.structs.replace(answer, graphs=shown)
+        graphs = self.engine._engine.graphs
+        texts = {each.graph: codec.write(graphs[each.graph].graph) for each in shown}
+        return msgspec.structs.replace(answer, graphs=shown, texts=texts)
 
     def _blinded(self, shown: Snapshot, answer: Answer) -> Snapshot:
         began = self._began.get(shown.run or "", -1e9)
@@ -289,8 +306,8 @@ class Robot:
         await anyio.sleep_forever()
 
     def listen(self, hear: Callable[[Report], None]) -> Any:
-        """Nothing comes by itself: everything has to be asked for."""
-        return anyio.CancelScope()
+        """Little comes by itself: most has to be asked for."""
+        return self.subscribers.listening(hear)
 
     async def aclose(self) -> None:
         """The engine goes on."""

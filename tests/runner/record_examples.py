@@ -165,6 +165,7 @@ async def foreign_start(stage: Stage) -> None:
     text = codec.write(task)
     stage.network.strangers = 1
     stage.network.carry(Start(graph_name="inspect", targets=(ROBOT,), graph_json=text), "terminal")
+    await confirm_lost(stage.control)
     await all_over(stage.control)
 
 

@@ -137,6 +137,7 @@ async def foreign(place: Place) -> None:
     place.network.carry(
         Start(graph_name="foreign", targets=("Robin",), graph_json=text), "terminal"
     )
+    await confirm_lost(place.control)
     await all_over(place.control)
 
 

@@ -1,13 +1,12 @@
 """Robots in virtual time that also tell what they hear and know, for tests of the registry."""
 
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Any
 
 import msgspec
 
 from action_assistant.runner.execution.service import ExecutionService
-from action_assistant.runner.links.listeners import Listeners
 from action_assistant.runner.links.port import (
     Answer,
     Candidate,
@@ -44,7 +43,6 @@ class Open(Robot):
         self.known_actions: tuple[str, ...] = (WORK,)
         self.known_graphs: tuple[str, ...] = ()
         self.texts: dict[str, str] = {}
-        self._subscribers = Listeners[Report]()
 
     @property
     def standing(self) -> Standing:
@@ -55,20 +53,17 @@ class Open(Robot):
 
     async def get(self) -> Answer:
         """With the index and the texts."""
+        answer = await super().get()
         return msgspec.structs.replace(
-            await super().get(),
-            texts=self.texts,
+            answer,
+            texts=answer.texts | self.texts,
             known_actions=self.known_actions,
             known_graphs=self.known_graphs,
         )
 
-    def listen(self, hear: Callable[[Report], None]) -> Any:
-        """Everything that `tell` is given."""
-        return self._subscribers.listening(hear)
-
     def tell(self, report: Report) -> None:
         """Report something."""
-        self._subscribers.tell(report)
+        self.subscribers.tell(report)
 
     def command(self, command: Command, graph: str, umrf: str = "") -> None:
         """Somebody else publishes something."""

@@ -89,9 +89,10 @@ def shown(control: ExecutionService, run: str) -> Any:
 
 
 async def confirm_lost(control: ExecutionService) -> None:
-    """Wait until a run is lost; then somebody goes there and sees that nothing moves."""
+    """Wait until a run is lost, or may still begin something; then somebody goes there and sees that
+    nothing moves."""
     with anyio.fail_after(600):
-        while not any(each.run.lost for each in control.open.values()):  # noqa: ASYNC110 - by many ways
+        while not any(each.run.lost or each.run.loading for each in control.open.values()):  # noqa: ASYNC110 - by many ways
             await anyio.sleep(0.1)
     for run in tuple(control.open):
         await control.confirm_rest(run, LOOKED, BEN)

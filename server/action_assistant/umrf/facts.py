@@ -16,7 +16,8 @@ class EngineFacts(msgspec.Struct, frozen=True, kw_only=True):
     `hazards`: those of docs/umrf-and-the-engine.md 3 that this build has. `bypass_fixed`: it captures
     the result of a bypass by value, so that H3 is no crash. `synchronises`: graphs with several actors
     run. `pauses_safely`: a stop of a paused graph works. `restart_matches`: starting a graph's JSON again
-    finds its sub-graphs again. Times in milliseconds.
+    finds its sub-graphs again. Times in milliseconds. `longest_loading_ms`: what a person says that an
+    action of this robot takes to load at most; 0 where nobody has said.
     """
 
     commit: str
@@ -37,6 +38,7 @@ class EngineFacts(msgspec.Struct, frozen=True, kw_only=True):
     stop_timeout_ms: int = 5_000
     stop_poll_ms: int = 50
     pause_poll_ms: int = 100
+    longest_loading_ms: int = 0
 
 
 PINNED: Final = EngineFacts(commit="5819055")

@@ -112,7 +112,7 @@ def test_nothing_is_shown_that_was_not_seen_and_live_is_as_it_is_told_later(
     run = replay(events)
     assert run is not None
     if run.state not in ENDED:  # an action failed when the stop came: its code may go on
-        assert run.unconfirmed
+        assert run.doubt
         assert stop is not None
         assert any(call["result"] == "on_error" for call in calls)
     for number, call in enumerate(calls):

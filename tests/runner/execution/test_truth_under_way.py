@@ -9,7 +9,7 @@ from action_assistant.runner.links.port import Answer, Feedback, Leaves, Order, 
 from action_assistant.umrf.files import codec
 from runner.harness import ANN, BEN, Harness, order, sequence, until, virtual
 from runner.registered_robots import NEVER, Open, fleet
-from runner.robots_in_network import OTHER, PATROL, RobotsInNetwork, asked, shown
+from runner.robots_in_network import LOOKED, OTHER, PATROL, RobotsInNetwork, asked, shown
 
 
 class Overtaken(Open):
@@ -63,9 +63,13 @@ async def test_each_run_that_is_open_on_a_robot_hears_what_others_start_there() 
         first = (await control.start(asked(), ANN)).run.id
         await anyio.sleep(0.3)
         await control.stop(first, BEN)
+        await until(lambda: bool(control.open[first].run.loading))
+        await control.confirm_rest(first, LOOKED, BEN)
         await until(lambda: first not in control.open)
         second = (await control.start(order(OTHER, engine="David"), ANN)).run.id
-        await until(lambda: first in control.open)  # an action of it begins after the proof
+        await until(
+            lambda: first in control.open
+        )  # an action of it begins although somebody looked
         assert list(control.open) == [second, first]
         text = codec.write(PATROL)
         scene.network.carry(Start(graph_name="patrol", targets=("David",), graph_json=text), "cli")

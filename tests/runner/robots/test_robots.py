@@ -18,6 +18,7 @@ from action_assistant.runner.runs.events import EngineSaid
 from action_assistant.umrf.files import codec
 from runner.harness import ANN, BEN, Harness, at_once, clock_us, order, sequence, until, virtual
 from runner.registered_robots import NEVER, Open, RegisteredRobots, fleet
+from runner.robots_in_network import LOOKED
 
 
 @virtual
@@ -218,5 +219,9 @@ async def test_with_two_engines_on_one_path_nothing_is_called_stopped() -> None:
         assert now.state == "stopping"
         assert any("2 engines" in alarm.text for alarm in now.alarms)
         david.servers = 1
+        await until(
+            lambda: bool(control.open[run.id].run.loading)
+        )  # whose feedback it was is not known
+        await control.confirm_rest(run.id, LOOKED, BEN)
         await until(lambda: not control.open)
-    assert harness.journal.history(run.id).state == "stopped"
+    assert harness.journal.history(run.id).proof_at is None

@@ -19,7 +19,7 @@ from action_assistant.umrf.semantics import script_from
 from runner.fake_network import Node, now, now_ms
 from runner.harness import ANN, BEN, Harness, ended, engine, order, sequence, until, virtual
 from runner.registered_robots import NEVER, Open, fleet
-from runner.robots_in_network import PATHS, RobotsInNetwork
+from runner.robots_in_network import LOOKED, PATHS, RobotsInNetwork
 
 CODES = ("quiet", "others", "actions", "actors", "H7", "unknown-action", "signature")
 PATROL = sequence("patrol")
@@ -144,10 +144,14 @@ async def test_words_about_the_start_of_somebody_else_refuse_nothing_of_ours() -
         await anyio.sleep(1)
         text = codec.write(PATROL)
         scene.network.carry(Start(graph_name="patrol", targets=("David",), graph_json=text), "cli")
+        await until(
+            lambda: bool(control.open[run.id].run.loading)
+        )  # no feedback tells of that stop
+        await control.confirm_rest(run.id, LOOKED, BEN)
         await ended(control, run.id)
     codes = [each.code for each in scene.harness.journal.history(run.id).alarms]
-    assert codes == ["foreign_start"]
-    assert scene.harness.journal.history(run.id).end == "stopped"
+    assert codes == ["foreign_start", "stop_unconfirmed"]
+    assert scene.harness.journal.history(run.id).end == "error"
 
 
 @virtual

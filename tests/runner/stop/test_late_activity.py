@@ -1,7 +1,7 @@
-"""A run that was called stopped and moves again says so, and is stopped until that is proven anew.
+"""A run that was called over and moves again says so, and is stopped until that is proven.
 
-An action that takes three seconds to load begins two seconds after the stop was proven: nothing that
-an engine sends could have told. The real runner and stand-in robots, in virtual time.
+An action that takes three seconds to load begins although a person has said that the robot rests. The
+real runner and stand-in robots, in virtual time.
 """
 
 import json
@@ -11,6 +11,7 @@ import anyio
 
 from action_assistant.errors import Unavailable
 from action_assistant.runner.emulator.messages import EngineTraits
+from action_assistant.runner.execution.interventions import confirm_rest
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import Order
 from action_assistant.runner.robots.robot_events import stream_of_robot
@@ -20,7 +21,7 @@ from runner.fake_link import FakeLink
 from runner.fake_network import now_ms
 from runner.harness import ANN, BEN, Harness, order, sequence, until, virtual
 from runner.registered_robots import NEVER, Open, fleet
-from runner.robots_in_network import OTHER, PATHS, PATROL, RobotsInNetwork, asked, shown
+from runner.robots_in_network import LOOKED, OTHER, PATHS, PATROL, RobotsInNetwork, asked, shown
 
 SLOW = EngineTraits(loading_ms=3_000.0)
 TWO_SECONDS = {"*": [{"after_s": 2.0}]}
@@ -30,8 +31,21 @@ def scene(**more: Any) -> RobotsInNetwork:
     return RobotsInNetwork(11, **({"quirks": SLOW, "script": TWO_SECONDS} | more))
 
 
+async def said_to_rest(control: ExecutionService) -> str:
+    """A run that was stopped while its first action was still loading, which somebody did not know."""
+    run = (await control.start(asked(), ANN)).run.id
+    await anyio.sleep(0.3)
+    await control.stop(run, BEN)
+    await until(lambda: bool(control.open[run].run.loading))
+    await control.confirm_rest(run, LOOKED, BEN)
+    await until(lambda: run not in control.open)
+    told = await control.find(run)
+    assert (told.state, told.proof_at, told.at_rest is None) == ("error", None, False)
+    return run
+
+
 async def proven_stopped(control: ExecutionService) -> str:
-    """A run that was stopped while its first action was still being loaded."""
+    """A run that was stopped while its first action ran."""
     run = (await control.start(asked(), ANN)).run.id
     await anyio.sleep(0.3)
     await control.stop(run, BEN)
@@ -45,8 +59,7 @@ async def proven_stopped(control: ExecutionService) -> str:
 async def test_it_is_called_stopped_no_more_until_that_is_proven_anew() -> None:
     here = scene()
     async with here.played() as control:
-        run = await proven_stopped(control)
-        first = (await control.find(run)).proof_at
+        run = await said_to_rest(control)
         await until(lambda: here.nodes["David"].robot.moving == ("patrol",))
         await anyio.sleep(1.2)
         told = shown(control, run)
@@ -59,12 +72,10 @@ async def test_it_is_called_stopped_no_more_until_that_is_proven_anew() -> None:
         told = await control.find(run)
         assert (told.state, told.moves_again_at) == ("stopped", None)
         assert told.proof_at is not None
-        assert first is not None
-        assert told.proof_at > first
     kinds = [type(each) for each in here.harness.journal.told(run)]
     again = kinds.index(MovesAgain)
     assert kinds[again - 1] is Ended
-    assert [kinds.count(each) for each in (MovesAgain, Proof, Ended)] == [1, 2, 2]
+    assert [kinds.count(each) for each in (MovesAgain, Proof, Ended)] == [1, 1, 2]
     assert StopSent in kinds[again:]
     assert here.harness.journal.history(run) == told
     (row,) = await here.harness.journal.query(queries.listed(queries.Filter(), 5))
@@ -76,7 +87,7 @@ async def test_it_is_called_stopped_no_more_until_that_is_proven_anew() -> None:
 async def test_answers_show_it_where_all_feedback_is_lost() -> None:
     here = scene(quirks=EngineTraits(loading_ms=3_000.0, loss=1.0))
     async with here.played() as control:
-        run = await proven_stopped(control)
+        run = await said_to_rest(control)
         await until(lambda: here.nodes["David"].robot.moving == ("patrol",))
         await until(lambda: run in control.open, patience=1.5)
 
@@ -85,7 +96,7 @@ async def test_answers_show_it_where_all_feedback_is_lost() -> None:
 async def test_it_is_said_also_while_nothing_can_be_recorded() -> None:
     here = scene()
     async with here.played() as control:
-        run = await proven_stopped(control)
+        run = await said_to_rest(control)
         here.harness.journal.down = True
         await until(lambda: run in control.open)
         await until(lambda: not control.open[run].recorder.recorded)
@@ -104,7 +115,9 @@ async def test_it_is_said_also_where_the_first_end_is_not_recorded_yet() -> None
         await anyio.sleep(0.3)
         here.harness.journal.down = True
         await control.stop(run, BEN)
-        await until(lambda: shown(control, run).state == "stopped")
+        await until(lambda: bool(control.open[run].run.loading))
+        confirm_rest(control.open[run], LOOKED, BEN)
+        assert shown(control, run).state == "error"
         await until(lambda: shown(control, run).moves_again_at is not None)
         here.harness.journal.down = False
         await until(lambda: run not in control.open)
@@ -119,7 +132,7 @@ async def test_a_runner_that_was_restarted_meanwhile_stops_it() -> None:
     async with here.network.running():
         async with here.harness.runner() as control:
             await anyio.sleep(0.5)
-            run = await proven_stopped(control)
+            run = await said_to_rest(control)
         async with here.harness.runner() as control:
             await until(lambda: run in control.open)
             assert shown(control, run).state == "stopping"
@@ -149,6 +162,8 @@ async def test_a_run_that_its_robot_shows_before_it_is_taken_up_again_is_still_o
             await until(lambda: run in control.open)
             await until(lambda: not control.open[run].run.active)  # the next one is being loaded
             await control.stop(run, BEN)
+            await until(lambda: bool(control.open[run].run.loading))
+            await control.confirm_rest(run, LOOKED, BEN)
             await until(lambda: run not in control.open)
             await until(lambda: here.nodes["David"].robot.moving == ("patrol",))
             await until(lambda: run in control.open, patience=3)
@@ -177,8 +192,10 @@ async def test_feedback_that_nobody_can_contradict_is_believed_until_somebody_do
         await until(lambda: shown(control, run).state == "unknown")
         here.nodes["David"].robot.thaw(now_ms())
         here.network.stir(here.nodes["David"])
+        await until(lambda: shown(control, run).actions["Work_0"].state != "RUNNING")
+        await until(lambda: "may still be loading" in control.open[run].run.loading)
+        await control.confirm_rest(run, LOOKED, BEN)  # what it had shown as it stopped is forgotten
         await until(lambda: run not in control.open)
-        assert (await control.find(run)).state == "stopped"
 
 
 @virtual
@@ -200,7 +217,7 @@ async def test_a_start_that_it_overtakes_while_that_is_being_stored_is_refused_a
     here = scene()
     async with here.played() as control:
         began = now_ms()
-        first = await proven_stopped(control)
+        first = await said_to_rest(control)
         await anyio.sleep((began + 2_500 - now_ms()) / 1000)  # half a second before it moves
         assert here.nodes["David"].robot.moving == ()
         here.harness.journal.slow = 2.0
@@ -220,7 +237,7 @@ async def test_a_second_name_of_its_robot_hides_nothing_of_it() -> None:
     here = scene(quirks=EngineTraits(loading_ms=3_000.0, loss=1.0))
     here.harness.links["Twin"] = FakeLink(here.network, "Twin", PATHS["David"])
     async with here.played() as control:
-        run = await proven_stopped(control)
+        run = await said_to_rest(control)
         twin = control.robots.link("Twin")
         assert twin is not None
         await until(lambda: here.nodes["David"].robot.moving == ("patrol",))
@@ -245,7 +262,7 @@ async def test_a_second_name_of_which_nothing_can_be_read_holds_nothing_up() -> 
     async with here.network.running():
         async with here.harness.runner() as control:
             await anyio.sleep(0.5)
-            run = await proven_stopped(control)
+            run = await said_to_rest(control)
         here.harness.journal.newest = failing  # type: ignore[method-assign]
         async with here.harness.runner() as control:
             twin = control.robots.link("Twin")

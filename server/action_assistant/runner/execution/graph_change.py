@@ -18,7 +18,7 @@ log: Final = logging.getLogger(__name__)
 class ChangeMonitor(Protocol):
     """What watches the run."""
 
-    def sends(self, umrf: str) -> None:
+    def sends(self, umrf: str, *, beside: bool = False) -> None:
         """This graph is handed over: what the engine shows is compared with it."""
         ...
 
@@ -70,11 +70,11 @@ async def send_change(
         log.exception("run %s: the change may or may not have left", before.id)
         text = f"Nobody knows whether the graph was changed on {before.engine}: {error!r}"
         it.alarm("modify_unknown", text)
-        _compare(it, order)
+        _compare(it, order, asked)
         raise OutcomeUnknown(text) from error
-    _compare(it, order)
+    _compare(it, order, asked)
 
 
-def _compare(it: ChangedRun, order: Order) -> None:
-    it.watch.sends(order.umrf)
+def _compare(it: ChangedRun, order: Order, asked: ModifyRequested) -> None:
+    it.watch.sends(order.umrf, beside=bool(asked.continue_from))
     it.watch.look()

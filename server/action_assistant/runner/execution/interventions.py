@@ -144,7 +144,7 @@ def confirm_rest(opened: OpenRun, asked: RestRequest, author: Author) -> Run:
     if run.simulated:
         raise Conflict("A simulation moves nothing; use Stop.")
     is_silent = bool(run.lost) or run.unknown_since is not None
-    if not is_silent and not run.unconfirmed:
+    if not is_silent and not run.doubt:
         raise Conflict(
             f"{run.engine} answers for this run, so its answers have to show rest; use Stop."
         )

@@ -2,7 +2,8 @@
 
 import itertools
 import logging
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
+from functools import partial
 from typing import Final, Protocol
 
 import anyio
@@ -21,7 +22,9 @@ from action_assistant.runner.runs.events import Answered, End, Proof, Published,
 from action_assistant.runner.runs.fold import is_news
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.stop.doubtful_errors import DoubtfulErrors
-from action_assistant.runner.stop.proof import NEVER_BEGAN, RestProof, hash_of
+from action_assistant.runner.stop.loading import LoadingAction, LoadingWatch, in_words
+from action_assistant.runner.stop.proof import RestProof, hash_of
+from action_assistant.umrf.triggers import NEVER_BEGAN
 from action_assistant.web.workers.lanes import RunInWorker
 
 log: Final = logging.getLogger(__name__)
@@ -33,6 +36,7 @@ _SILENT_S: Final = 3.0
 _APPEAR_S: Final = 3.0  # until a started graph must show in answers
 _ABSENT_S: Final = 1.0  # for which answers must lack what the engine has said it refused
 _GIVEN_UP_S: Final = 30.0  # until a stopped run that never showed is believed to have never begun
+_LOADING_TOLD_S: Final = 1.5  # what feedback has still to tell has come by then
 _SEVERAL: Final = (
     "{servers} engines are seen on the path of its answers, so that none proves anything"
 )
@@ -61,6 +65,11 @@ class MonitoredRun(Protocol):
 
     def doubt(self, why: str) -> None:
         """The code of an action may go on whatever the engine says."""
+        ...
+
+    def load(self, actions: Sequence[LoadingAction], waited_s: float) -> None:
+        """Nothing moves, but these actions may still be loading, for so long by now; none: that is
+        over."""
         ...
 
     def engine_ended(self) -> None:
@@ -109,6 +118,9 @@ class Monitor:
         self._lacking: str | None = None  # what the graph that was sent lacks to begin
         self._beside: TaskGroup
         self._parts = SubGraphs()
+        self._loading = LoadingWatch(it.run.graph_name, meddled=it.run.reshaped)
+        self._reads = False  # the arrows of graphs, for that
+        self._loads_since: float | None = None
         self._answered = False  # by a get, since the last feedback
         self._exact = exact
         self._rest = RestProof(exact=exact)
@@ -126,11 +138,17 @@ class Monitor:
         self._start.begins()
         self.sends(umrf)
 
-    def sends(self, umrf: str) -> None:
+    def sends(self, umrf: str, *, beside: bool = False) -> None:
         """This graph is handed over: what the engine is asked for from now on is compared with it,
-        once."""
+        once. `beside`: an action of it is started beside those that go on."""
+        self._loading.sends(umrf, beside=beside)
         self._sent = self.umrf = umrf
         self._sent_order = next(self._order)
+
+    def recalls(self, umrf: str) -> None:
+        """This graph was handed over before this began to watch."""
+        self.umrf = umrf
+        self._loading.recalls(umrf)
 
     def hear(self, line: str) -> None:
         """A line of the engine's own log, about whatever."""
@@ -147,13 +165,19 @@ class Monitor:
         if self._stop_sent is None:
             self._stop_sent = next(self._order)
 
-    def disturbed(self) -> None:
-        """Somebody else may just have set it going: what was asked before proves nothing any more."""
+    def disturbed(self, *, meddles: bool) -> None:
+        """Somebody else may just have set it going: what was asked before proves nothing any more.
+        `meddles`: it may be this very graph that goes on, with other arrows or from elsewhere."""
         self._disturbed = next(self._order)
         self._rest.forget()
+        if meddles:
+            self._loading.meddle()
 
-    def feed(self, ours: tuple[Snapshot, ...]) -> None:
-        """Feedback of this run, oldest first. That of others says nothing about an answer to us."""
+    def feed(self, ours: tuple[Snapshot, ...], parts: tuple[Snapshot, ...] = ()) -> None:
+        """Feedback of this run, oldest first, and of graphs that have the names of its sub-graphs. That
+        of others says nothing about an answer to us."""
+        if self._link.standing.servers == 1:
+            self._loading.see((*ours, *parts))
         if not ours:
             return
         if self._it.run.graph_state is None:
@@ -190,6 +214,7 @@ class Monitor:
                 self._it.engine_ended()
             cost = anyio.current_time() - began
             hurry = self._it.run.desired == "stopped" or self._rest.pending
+            hurry = hurry and not self._it.run.loading  # feedback tells when it begins
             pace = _STOP_POLL_S if hurry else _POLL_S
             wait = max(pace, 5 * cost)
 
@@ -226,10 +251,13 @@ class Monitor:
             self._it.tell(Answered(answer.at))
         parts = [each for each in answer.graphs if each.graph.startswith(f"{name}__")]
         shown = [own, *(part for part in parts if part.run in {None, self._it.run.id})]
-        self._note([own, *self._parts.ours(own, shown[1:])])
+        ours = [own, *self._parts.ours(own, shown[1:])]
+        self._note(ours)
         if servers == 1:
-            self._conclude(shown, answer, order, asked)
+            self._loading.see(ours)
+            self._conclude(shown, ours, answer, order, asked)
         else:
+            self._loading.forget()  # feedback may have been of the other one
             self.trouble = _SEVERAL.format(servers=servers or "no")
 
     def _compare(self, answer: Answer, order: int) -> None:
@@ -305,7 +333,15 @@ class Monitor:
         self._absent = self._absent if self._absent is not None else anyio.current_time()
         return anyio.current_time() - self._absent >= _ABSENT_S
 
-    def _conclude(self, shown: list[Snapshot], answer: Answer, order: int, asked: float) -> None:
+    def _conclude(
+        self,
+        shown: list[Snapshot],
+        ours: list[Snapshot],
+        answer: Answer,
+        order: int,
+        asked: float,
+    ) -> None:
+        """`shown`: the graph and all that may be sub-graphs of it; `ours`: those that it has begun."""
         if order < self._disturbed:
             return
         own, at_rest = shown[0], self._rest.seen(shown, asked)
@@ -321,10 +357,12 @@ class Monitor:
         if _never_began(own) and self.umrf is not None and self._lacking is None:
             self._lacking = ""
             self._beside.start_soon(self._found_out, self._find_lacking)
+        loading = self._still_loading(ours, answer)
         if self._it.run.desired != "stopped":
             end = self._it.run.apparent_end
             if end is not None and own.state in TERMINAL and at_rest:
-                self._it.end(end, "")
+                if not loading:
+                    self._it.end(end, "")
             elif at_rest and _never_began(own) and not self._has_begun():
                 self._it.end("refused", self._why_unbegun())
             else:
@@ -332,7 +370,9 @@ class Monitor:
             return
         if self._stop_sent is None or order <= self._stop_sent:
             return
-        if at_rest:
+        if at_rest and loading:
+            self.trouble = in_words(loading)
+        elif at_rest:
             self._it.tell(Proof(answer.at, answer.asked_at, hash_of(shown)))
             self._it.end(self._it.run.apparent_end or "stopped", "")
         elif self._rest.pending:
@@ -344,6 +384,35 @@ class Monitor:
             )
         else:
             self.trouble = f"{', '.join(self._it.run.active) or own.graph} has not stopped yet"
+
+    def _still_loading(self, ours: list[Snapshot], answer: Answer) -> tuple[LoadingAction, ...]:
+        """Return what may still be loading where nothing moves, and tell of it when it stays so."""
+        if self._exact:
+            return ()
+        if not self._rest.pending:
+            self._loads_since = None
+            self._it.load((), 0.0)
+            return ()
+        unread = self._loading.unread(ours)
+        if unread and not self._reads:
+            self._reads = True
+            self._beside.start_soon(self._found_out, partial(self._read_arrows, unread, answer))
+        found = self._loading.actions(ours)
+        if not found:
+            self._loads_since = None
+            self._it.load((), 0.0)
+        elif self._loads_since is None:
+            self._loads_since = anyio.current_time()
+        elif (waited := anyio.current_time() - self._loads_since) >= _LOADING_TOLD_S:
+            self._it.load(found, waited)
+        return found
+
+    async def _read_arrows(self, graphs: Sequence[str], answer: Answer) -> None:
+        try:
+            await self._loading.read(graphs, answer.texts, self._run_in_worker)
+        finally:
+            self._reads = False
+            self.look()
 
     def _has_begun(self) -> bool:
         """Whether it was ever seen otherwise: somebody may have played its start again."""

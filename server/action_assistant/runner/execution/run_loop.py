@@ -5,7 +5,7 @@ while a get hangs, and everything goes on while the journal is down.
 """
 
 import logging
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from typing import Final
 
 import anyio
@@ -15,6 +15,7 @@ from action_assistant.errors import Refused
 from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.execution.graph_change import send_change
 from action_assistant.runner.execution.monitor import Monitor
+from action_assistant.runner.links.engine_text import run_in
 from action_assistant.runner.links.observations import Hazard, Seen
 from action_assistant.runner.links.port import (
     EngineChanged,
@@ -38,6 +39,7 @@ from action_assistant.runner.runs.events import (
     End,
     Ended,
     EngineSaid,
+    Loading,
     ModifyRequested,
     MovesAgain,
     Observed,
@@ -53,6 +55,7 @@ from action_assistant.runner.runs.history import sent_of
 from action_assistant.runner.runs.recorder import RunRecorder, Store
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.stop.doubtful_errors import DoubtfulErrors
+from action_assistant.runner.stop.loading import LoadingAction, in_words
 from action_assistant.runner.stop.proof import SET_GOING
 from action_assistant.runner.stop.stop_loop import StopLoop
 from action_assistant.web.workers.lanes import RunInWorker
@@ -101,6 +104,7 @@ class OpenRun:
         )  # what came before is not known
         self.watch = self._watched()
         self._lines = 0
+        self._loading_told_at = 0.0  # seconds of loading at which that is told again
         self._changed = changed
         self._over = anyio.Event()
         self._again = anyio.Event()
@@ -162,7 +166,8 @@ class OpenRun:
         if self._is_ours(command.graph):
             self._doubts.reach()
         if command.command in SET_GOING and command.graph == self.run.graph_name:
-            self.watch.disturbed()
+            ours = command.command != "start" or run_in(command.umrf) == self.run.id
+            self.watch.disturbed(meddles=ours)
         if command.command == "start":
             self.watch.started_by_others()
         alarm = alarm_of(command, self.run.engine, self.run.graph_name)
@@ -209,16 +214,20 @@ class OpenRun:
     async def _recall(self) -> None:
         """What an earlier process sent. Nothing waits for it: it only says what the run waits for."""
         try:
-            self.watch.umrf = await sent_of(self._store, self.run)
+            umrf = await sent_of(self._store, self.run)
         except (Refused, msgspec.DecodeError):
             log.warning("the graph of run %s cannot be read", self.run.id)
+        else:
+            if umrf is not None:
+                self.watch.recalls(umrf)
 
     def moves_again(self, event: MovesAgain) -> bool:
         """It had ended and moves: it is open again. False when it is stored and left already."""
         if self._is_left or self.run.end is None:
             return not self._is_left
         umrf, self.watch = self.watch.umrf, self._watched()
-        self.watch.umrf = umrf
+        if umrf is not None:
+            self.watch.recalls(umrf)
         self._over = anyio.Event()
         self.tell(event)
         self._again.set()
@@ -326,7 +335,12 @@ class OpenRun:
             case Transitions(run=run, changes=changes) if run == self.run.id:
                 self.observe(changes)
             case Feedback(snapshots=snapshots):
-                self.watch.feed(tuple(each for each in snapshots if each.run == self.run.id))
+                ours = tuple(each for each in snapshots if each.run == self.run.id)
+                inside = f"{self.run.graph_name}__"
+                others = (each for each in snapshots if each.run is None)
+                self.watch.feed(
+                    ours, tuple(each for each in others if each.graph.startswith(inside))
+                )
             case EngineLog():
                 self._hear_line(report)
             case EngineChanged(state="gone", why=why) if self._owns_link:
@@ -371,6 +385,22 @@ class OpenRun:
         self.tell(Unconfirmed(self._clock_us(), why))
         self.alarm("stop_unconfirmed", f"STOP UNCONFIRMED: {why}. {_LOOK_AT_IT}")
 
+    def load(self, actions: Sequence[LoadingAction], waited_s: float) -> None:
+        """Nothing moves, but these actions may still be loading, for so long by now; none: that is over.
+        How long is told again each time that it has doubled."""
+        why, known = in_words(actions), self.run.loading
+        if not why and not known:
+            return
+        is_same = bool(why) and known.startswith(why)
+        if is_same and waited_s < self._loading_told_at:
+            return
+        self._loading_told_at = max(4.0, 2 * waited_s)
+        told = f"{why} ({waited_s:.0f} s so far)" if is_same else why
+        places = tuple((each.graph, each.node) for each in actions)
+        self.tell(Loading(self._clock_us(), told, places))
+        if why:
+            self.alarm("stop_unconfirmed", f"STOP UNCONFIRMED: {why}. {_LOOK_AT_IT}")
+
     def engine_ended(self) -> None:
         """The engine's process has ended, and the code of every action with it."""
         process, run = self.run.process, self.run
@@ -379,12 +409,12 @@ class OpenRun:
             if process is None
             else f"The engine's process, {process.pid} on this computer, has ended."
         )
-        state: End = "error" if run.unconfirmed else "lost"
-        self._rests(AtRest(None, self._clock_us(), how), state, run.unconfirmed or run.lost or how)
+        state: End = "error" if run.doubt else "lost"
+        self._rests(AtRest(None, self._clock_us(), how), state, run.doubt or run.lost or how)
 
     def confirm_rest(self, author: Author, how: str) -> None:
         """Somebody has seen that it is at rest, where no answer of the engine can prove it."""
-        why = self.run.unconfirmed or self.run.lost or self.watch.trouble
+        why = self.run.doubt or self.run.lost or self.watch.trouble
         self._rests(AtRest(author, self._clock_us(), how), "error", why, author.id)
 
     def _rests(self, seen: AtRest, state: End, why: str, author: str = "") -> None:

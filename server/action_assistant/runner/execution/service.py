@@ -32,7 +32,12 @@ from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start.admission import StartRequest
 from action_assistant.runner.start.approvals import Approvals
 from action_assistant.runner.start.idempotency import IdempotentStarts, StopOrder, booked
-from action_assistant.runner.start.preflight import Preflight, Settled, check_items, of_taken
+from action_assistant.runner.start.preflight import (
+    Preflight,
+    Settled,
+    check_items,
+    stands_in_the_way,
+)
 from action_assistant.runner.start.start_checks import (
     NO_SOURCES,
     Cleared,
@@ -211,9 +216,13 @@ class ExecutionService:
         run = await self._idempotent_starts.run_of(asked)
         return None if run is None else await self.find(run)
 
-    def _taken(self, engine: str) -> Run | None:
-        """The run that an engine has from here."""
-        return next((each.run for each in self._going(engine).values()), None)
+    def _taken(self, engine: str, graph_name: str = "") -> Run | None:
+        """Return the run that keeps an engine from another one, of a graph of this name: rather one that
+        goes on than one of which an action may still be loading."""
+        going = (each.run for each in self._going(engine).values())
+        return min(
+            going, key=lambda run: (bool(run.loading), run.graph_name != graph_name), default=None
+        )
 
     def _settled_on(self, engine: str) -> list[Settled]:
         """What somebody has seen at rest there since this process began. A start that others have
@@ -236,14 +245,16 @@ class ExecutionService:
     ) -> Run:
         number, at = self.next_number(), self._clock_us()
         requested, order = booked(asked, cleared, author, at=at, number=number, group=group)
+        overridden = asked.override.codes if asked.override else ()
+        name = cleared.ready.name
         if not cleared.own:  # a run that was over may have moved again since it was looked at
-            check_items([of_taken(asked.engine, self._taken(asked.engine))], ())
+            check_items([self._starting.free(asked.engine, name)], overridden)
         with anyio.CancelScope(shield=True):
             run = await self._idempotent_starts.store(requested)
-            other = None if cleared.own else self._taken(asked.engine)
+            free = None if cleared.own else self._starting.free(asked.engine, name)
             opened = self._opened(run, cleared.link, own=cleared.own, seq=1)
-            if other is not None:
-                opened.end("refused", of_taken(asked.engine, other).text)
+            if free is not None and stands_in_the_way(free, overridden):
+                opened.end("refused", free.text)
             if pressed := self._stops.since(stops, asked.engine, group or ""):
                 opened.stop(*pressed)
             self._tasks.start_soon(self._drive, opened, order, cleared.incarnation)

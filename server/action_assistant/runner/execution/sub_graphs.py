@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
 from action_assistant.runner.links.observations import ACTIVE, TERMINAL, Snapshot
-from action_assistant.runner.stop.proof import NEVER_BEGAN
+from action_assistant.umrf.triggers import NEVER_BEGAN
 
 
 class LastLook(NamedTuple):

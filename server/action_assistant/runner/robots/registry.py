@@ -85,6 +85,10 @@ class ForeignStops(Protocol):
         """Somebody else may just have set it going."""
         ...
 
+    def shows(self, engine: KnownEngine, snapshots: tuple[Snapshot, ...]) -> None:
+        """An engine shows these graphs, in an answer or by feedback. Never waits."""
+        ...
+
 
 Note: TypeAlias = Callable[[str, RobotEvent, str], None]
 Present: TypeAlias = Callable[[str], KnownEngine | None]
@@ -101,7 +105,9 @@ class RegistryContext(msgspec.Struct, frozen=True):
     changed: Callable[[], None]
     foreign: Callable[[KnownEngine, ForeignCommand], Commanded]
     shows: Callable[[KnownEngine, tuple[Snapshot, ...]], None]
-    stops: Callable[[TaskGroup, ClockUs, Note, Callable[[], None], Present], ForeignStops]
+    stops: Callable[
+        [TaskGroup, ClockUs, RunInWorker, Note, Callable[[], None], Present], ForeignStops
+    ]
 
 
 class Robots:
@@ -134,6 +140,7 @@ class Robots:
         self._foreign_stops = ground.stops(
             ground.tasks,
             ground.clock_us,
+            ground.run_in_worker,
             self._robot_log.note,
             lambda: ground.changed(),
             self.present,
@@ -198,7 +205,7 @@ class Robots:
             changed=ground.changed,
             became=self._note_state,
             foreign=self._note_command,
-            shows=ground.shows,
+            shows=self._show,
             recordings=self.recordings,
             indexes=name in self._indexing,
         )
@@ -388,6 +395,10 @@ class Robots:
         at = self._standing().clock_us()
         became = EngineBecame(at=at, state=engine.state, why=engine.why, incarnation=incarnation)
         self.robot_log.note(name, became, name)
+
+    def _show(self, engine: KnownEngine, snapshots: tuple[Snapshot, ...]) -> None:
+        self.foreign_stops.shows(engine, snapshots)
+        self._standing().shows(engine, snapshots)
 
     def _note_command(self, engine: KnownEngine, command: ForeignCommand) -> None:
         name = engine.registration.name

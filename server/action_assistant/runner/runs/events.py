@@ -229,6 +229,17 @@ class Unconfirmed(msgspec.Struct, frozen=True, omit_defaults=True):
     lost: bool = False
 
 
+class Loading(msgspec.Struct, frozen=True, omit_defaults=True):
+    """Nothing of the run moves, but these actions may still be loading, in words in `why`; "" when that
+    is over. They are named by the running name of their graph and their full name."""
+
+    kind: ClassVar[str] = "run.loading.v1"
+
+    at: int
+    why: str = ""
+    actions: tuple[tuple[str, str], ...] = ()
+
+
 class AtRest(msgspec.Struct, frozen=True):
     """How rest was seen where the engine's word is none: `by` a person who looked, or by the runner
     itself (None), which saw the engine's process end."""
@@ -283,6 +294,7 @@ RunEvent: TypeAlias = (
     | AlarmRaised
     | EngineSaid
     | Unconfirmed
+    | Loading
     | Ended
     | MovesAgain
     | Unknown
@@ -307,6 +319,7 @@ _DECODERS: Final[Mapping[str, msgspec.json.Decoder[RunEvent]]] = {
         AlarmRaised,
         EngineSaid,
         Unconfirmed,
+        Loading,
         Ended,
         MovesAgain,
     )

@@ -17,6 +17,7 @@ from action_assistant.runner.runs.events import (
     Answered,
     Ended,
     EngineSaid,
+    Loading,
     ModifyRefused,
     ModifyRequested,
     MovesAgain,
@@ -139,6 +140,11 @@ def follow(run: Run, event: RunEvent) -> Run:
             return replace(run, lost=event.why)
         case Unconfirmed():
             return replace(run, unconfirmed=event.why)
+        case Loading(why=""):
+            return replace(run, loading="", loading_since=None)
+        case Loading():
+            since = event.at if run.loading_since is None else run.loading_since
+            return replace(run, loading=event.why, loading_since=since)
         case Ended():
             return _end(run, event)
         case Requested() | Unknown():
@@ -311,6 +317,8 @@ def _end(run: Run, event: Ended) -> Run:
         at_rest=event.at_rest,
         lost="",
         unconfirmed="",
+        loading="",
+        loading_since=None,
         moves_again_at=None,
         unknown_since=run.unknown_since if event.state == "lost" else None,
     )

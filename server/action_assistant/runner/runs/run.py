@@ -99,6 +99,8 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     unknown_since: int | None = None
     proof_at: int | None = None
     unconfirmed: str = ""  # why nothing that the engine says shows rest any more
+    loading: str = ""  # which actions may still be loading although nothing moves, in words
+    loading_since: int | None = None  # when that was noted first
     lost: str = ""  # why the engine does not hold it any more; nobody has seen it at rest
     at_rest: AtRest | None = None
     moves_again_at: int | None = None  # it had ended, and was seen to move; until its next end
@@ -127,10 +129,15 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
                 return "published"
             case "PAUSED":
                 return "paused"
-            case state if self.unconfirmed and state in TERMINAL and not self.active:
+            case state if self.doubt and state in TERMINAL and not self.active:
                 return "unknown"
             case _:  # also a graph that has finished while nodes still run (H12)
                 return "running"
+
+    @property
+    def doubt(self) -> str:
+        """Why nothing that the engine says now shows rest; "" where it may."""
+        return self.unconfirmed or self.loading
 
     @property
     def active(self) -> tuple[str, ...]:

@@ -318,7 +318,7 @@ def _fields(run: Run, recorded: bool) -> dict[str, Any]:
         "result": run.result,
         "proof_at": _time(run.proof_at),
         "unknown_since": _time(run.unknown_since),
-        "unconfirmed": run.lost or run.unconfirmed or None,
+        "unconfirmed": run.lost or run.doubt or None,
         "at_rest": _at_rest(run.at_rest),
         "moves_again_at": _time(run.moves_again_at),
         "group": run.group,
@@ -327,7 +327,7 @@ def _fields(run: Run, recorded: bool) -> dict[str, Any]:
         "ended_at": _time(run.ended_at),
         "took": of_run(run),
         "stopped_by": run.stopped_by,
-        "detail": run.detail or run.lost or run.unconfirmed,
+        "detail": run.detail or run.lost or run.doubt,
         "alarms": [AlarmShown(each.code, time(each.at), each.text) for each in run.alarms],
         "recorded": recorded,
     }

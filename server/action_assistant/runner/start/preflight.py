@@ -133,17 +133,43 @@ def of_graph(admitted: Admitted | Prepared) -> Item:
     return Item(code="graph", verdict="passed", text="No hazard is known.")
 
 
-def of_taken(engine: str, other: Run | None) -> Item:
-    """One run per robot."""
+def of_taken(
+    engine: str,
+    other: Run | None,
+    graph_name: str = "",
+    longest_loading_ms: int = 0,
+    now_us: int = 0,
+) -> Item:
+    """Return the item for a run that goes on there; there is one run per robot. One of which only may be
+    that an action still loads can be answered for once the time has passed that a person has set, by a
+    start of another name: the Stop of that run goes on. `graph_name`: of the graph that is to start;
+    `longest_loading_ms`: the time that was set, 0 for none."""
     if other is None:
         return Item(code="free", verdict="passed", text=f"{engine} has no other run from here.")
     text = (
         f"{engine} is taken by run {other.number} of {other.graph_name}, started by "
         f"{other.author.name or 'somebody'}; it is {other.state}."
     )
-    if doubt := other.lost or other.unconfirmed:
+    if doubt := other.lost or other.doubt:
         text += f" {doubt.rstrip('.')}. Somebody has to see it at rest and confirm that in the run."
-    return Item(code="free", verdict="blocked", text=text)
+    if not _is_only_loading(other) or not longest_loading_ms:
+        return Item(code="free", verdict="blocked", text=text)
+    waited_s = (now_us - (other.loading_since or now_us)) / 1e6
+    usual_s = longest_loading_ms / 1e3
+    text += (
+        f" It has loaded for {waited_s:.0f} s; {usual_s:g} s at most is what was set for {engine}."
+    )
+    if waited_s <= usual_s or graph_name == other.graph_name:
+        if graph_name == other.graph_name:
+            text += " A graph of another name could be started then; its Stop would hit this one."
+        return Item(code="free", verdict="blocked", text=text)
+    return Item(code="free", verdict="blocked", text=text, codes=("loading",), overridable=True)
+
+
+def _is_only_loading(run: Run) -> bool:
+    """Return whether nothing of a run moves, as far as answers show, but an action that may load."""
+    is_known = run.unknown_since is None and not run.lost and not run.unconfirmed
+    return bool(run.loading) and is_known and not run.active
 
 
 def of_answer(view: EngineView) -> Item:
@@ -178,15 +204,19 @@ def of_robot(view: EngineView, graph: Graph) -> tuple[Item, ...]:
 def check_items(items: Sequence[Item], overridden: Collection[str]) -> None:
     """Refuse a start that an item stands in the way of. Raises Conflict."""
     for item in items:
-        if item.verdict != "blocked":
-            continue
-        if item.overridable and set(item.codes) <= set(overridden):
+        if not stands_in_the_way(item, overridden):
             continue
         rule = " A person may override this with a reason." if item.overridable else ""
         raise Conflict(
             f"{item.text}{rule}",
             where={"path": "/engine", "item": item.code, "items": msgspec.to_builtins(list(items))},
         )
+
+
+def stands_in_the_way(item: Item, overridden: Collection[str]) -> bool:
+    """Return whether an item blocks a start that somebody answers for with these codes."""
+    is_answered = item.overridable and set(item.codes) <= set(overridden)
+    return item.verdict == "blocked" and not is_answered
 
 
 def _proof(view: EngineView) -> Item:

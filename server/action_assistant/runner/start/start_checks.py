@@ -126,7 +126,8 @@ NO_SOURCES: Final = StartSources()
 
 
 class StartChecks:
-    """Looks before starts. `taken(engine)` is the run that an engine has from here, if any;
+    """Looks before starts. `taken(engine, graph_name)` is the run that keeps an engine from a start of a
+    graph of that name, if any;
     `going(engine)` the ids of all that go on there; `settled(engine)` what somebody has seen at rest
     there."""
 
@@ -136,7 +137,7 @@ class StartChecks:
         *,
         clock_us: ClockUs,
         run_in_worker: RunInWorker,
-        taken: Callable[[str], Run | None],
+        taken: Callable[[str, str], Run | None],
         going: Callable[[str], Collection[str]],
         settled: Callable[[str], Sequence[Settled]],
         simulator: Simulator,
@@ -168,8 +169,8 @@ class StartChecks:
             raise BadInput("Only the simulator runs behaviours.", where={"path": "/behaviours"})
         ready = await self._run_in_worker(prepared, asked, robot.facts, random_id())
         await self._approvals.require(robot.registration, ready.tree_digest, starter)
-        free = preflight.of_taken(asked.engine, self._taken(asked.engine))
-        preflight.check_items([free], ())
+        overridden = asked.override.codes if asked.override else ()
+        preflight.check_items([self.free(asked.engine, ready.name)], overridden)
         if self._robots.foreign_stops.going(asked.engine):
             raise Conflict(
                 f"Something is being stopped on {asked.engine}; a start would be stopped with it.",
@@ -183,14 +184,15 @@ class StartChecks:
                 nothing
             )
         items = await self._run_in_worker(looked_at, view, ready, self._prefixes)
-        preflight.check_items([preflight.of_taken(asked.engine, self._taken(asked.engine))], ())
-        preflight.check_items(items, asked.override.codes if asked.override else ())
+        free = self.free(asked.engine, ready.name)
+        preflight.check_items([free], overridden)
+        preflight.check_items(items, overridden)
         return Cleared(
             ready=ready,
             link=robot,
             own=False,
             incarnation=view.answer.incarnation,
-            despite=_despite(ready, items),
+            despite=_despite(ready, (free, *items)),
         )
 
     async def _cleared_simulation(self, asked: StartRequest) -> Cleared:
@@ -279,11 +281,17 @@ class StartChecks:
         except Refused as refused:
             items.append(preflight.of_refusal("graph", refused))
         if robot is not None:
-            items.append(preflight.of_taken(asked.engine, self._taken(asked.engine)))
+            items.append(self.free(asked.engine, ready.name if ready is not None else ""))
             items += await self._look_at(robot, ready)
             items += await self._said_yes(robot, ready, starter)
         digests = (ready.digest, ready.tree_digest) if ready is not None else ("", "")
         return preflight.summed(asked.engine, items, *digests)
+
+    def free(self, engine: str, graph_name: str) -> Item:
+        """Return whether another run keeps a robot from the start of a graph of this name."""
+        longest_ms = self._robots.reachable(engine).facts.longest_loading_ms
+        other = self._taken(engine, graph_name)
+        return preflight.of_taken(engine, other, graph_name, longest_ms, self._clock_us())
 
     async def _look_at(self, robot: KnownEngine, ready: Prepared | None) -> list[Item]:
         try:

@@ -5,14 +5,14 @@ brought no proof; no start from here leaves before: a late stop would hit a run 
 name. What an earlier process left is gone on with once the engine has shown that it is still the same.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Final, TypeAlias
 
 import anyio
 import msgspec
 from anyio.abc import TaskGroup
 
-from action_assistant.errors import NotFound
+from action_assistant.errors import NotFound, Refused
 from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import Answer, ForeignCommand, NoAnswer
@@ -25,7 +25,9 @@ from action_assistant.runner.robots.robot_events import (
 )
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.stop.doubtful_errors import DoubtfulErrors
+from action_assistant.runner.stop.loading import LoadingWatch, in_words
 from action_assistant.runner.stop.proof import SET_GOING, RestProof, send_stop
+from action_assistant.web.workers.lanes import RunInWorker
 
 _GAP_S: Final = 0.1
 _SLOWEST_S: Final = 1.0
@@ -64,6 +66,7 @@ class _ForeignStop:
         self.patience = anyio.CancelScope(deadline=anyio.current_time() + _PATIENCE_S)
         self.disturbed = False  # since the last answer
         self.rest = RestProof(exact=False)
+        self.loading = LoadingWatch(graph)
         self.doubts = DoubtfulErrors(reached=True)
 
 
@@ -76,12 +79,14 @@ class ForeignStopLoop:
         self,
         tasks: TaskGroup,
         clock_us: ClockUs,
+        run_in_worker: RunInWorker,
         note: Callable[[str, RobotEvent, str], None],
         changed: Callable[[], None],
         present: Present,
     ) -> None:
         self._tasks = tasks
         self._clock_us = clock_us
+        self._run_in_worker = run_in_worker
         self._note = note
         self._changed = changed
         self._present = present
@@ -129,6 +134,17 @@ class ForeignStopLoop:
         found = self._going.get((robot, command.graph))
         if command.command in SET_GOING and found is not None:
             found.disturbed = True
+            found.loading.meddle()
+
+    def shows(self, engine: KnownEngine, snapshots: tuple[Snapshot, ...]) -> None:
+        """An engine shows these graphs, in an answer or by feedback. Never waits."""
+        for (robot, graph), it in self._going.items():
+            if robot != engine.registration.name:
+                continue
+            if engine.standing.servers == 1:
+                it.loading.see(_parts_of(snapshots, graph))
+            else:
+                it.loading.meddle()
 
     def _begin(self, it: _ForeignStop, engine: KnownEngine | None) -> None:
         self._going[it.robot, it.graph] = it
@@ -201,9 +217,22 @@ class ForeignStopLoop:
             return "somebody has just set it going again"
         if doubt := it.doubts.look(_shown(answer, it.graph)):
             return doubt
-        if _at_rest(answer, it.graph, it.rest, asked) and not why:
-            return StopWasProven(at=answer.at, graph=it.graph, asked_at=answer.asked_at)
-        return why or f"{it.graph} has not stopped yet"
+        if not _at_rest(answer, it.graph, it.rest, asked) or why:
+            return why or f"{it.graph} has not stopped yet"
+        if loading := await self._still_loading(it, answer):
+            return loading
+        return StopWasProven(at=answer.at, graph=it.graph, asked_at=answer.asked_at)
+
+    async def _still_loading(self, it: _ForeignStop, answer: Answer) -> str:
+        """Return which of its actions may still be loading, in words; "" for none. A sub-graph that is
+        not of this start counts, too: nothing tells them apart."""
+        shown = _shown(answer, it.graph)
+        try:
+            unread = it.loading.unread(shown)
+            await it.loading.read(unread, answer.texts, self._run_in_worker)
+        except Refused:  # no worker can be had: whoever has not begun counts then
+            pass
+        return in_words(it.loading.actions(shown))
 
     def _unproven(self, it: _ForeignStop, why: str) -> StopUnproven:
         return StopUnproven(at=self._clock_us(), graph=it.graph, why=why)
@@ -225,6 +254,10 @@ def _at_rest(answer: Answer, graph: str, rest: RestProof, asked: float) -> bool:
 
 
 def _shown(answer: Answer, graph: str) -> list[Snapshot]:
-    """A graph, if it is held, and then its sub-graphs."""
-    own = [each for each in answer.graphs if each.graph == graph]
-    return [*own, *(each for each in answer.graphs if each.graph.startswith(f"{graph}__"))]
+    return _parts_of(answer.graphs, graph)
+
+
+def _parts_of(snapshots: Sequence[Snapshot], graph: str) -> list[Snapshot]:
+    """Return a graph, if it is there, and then its sub-graphs."""
+    own = [each for each in snapshots if each.graph == graph]
+    return [*own, *(each for each in snapshots if each.graph.startswith(f"{graph}__"))]

@@ -10,14 +10,14 @@ import msgspec
 
 from action_assistant.runner.links.observations import TERMINAL, Snapshot
 from action_assistant.runner.links.port import Link, NotSent
+from action_assistant.umrf.triggers import NEVER_BEGAN
 
 log: Final = logging.getLogger(__name__)
 
-_LOADING_S: Final = 1.0  # an action that is triggered for the first time has begun within this time
-_STARTING_S: Final = 0.3  # and one that has run before within this
+_STARTING_S: Final = (
+    0.3  # an action that has run before is not loaded again: it begins within this time
+)
 _AGAIN_S: Final = 2.0  # one that begins again by itself is FINISHED for a moment in between
-#: States in which an engine keeps a graph or an action that nothing has begun.
-NEVER_BEGAN: Final = frozenset({"UNINITIALIZED", "INITIALIZED"})
 _SEND_S: Final = 1.0
 #: Commands after which a graph may move that was at rest.
 SET_GOING: Final = frozenset({"start", "resume", "modify"})
@@ -44,13 +44,12 @@ def hash_of(shown: Sequence[Snapshot]) -> str:
 
 
 class RestProof:
-    """Whether a graph will not move by itself.
+    """Tells whether a graph has come to rest, actions that may still be loading aside (`loading`).
 
-    An engine that stops or finishes a graph passes by an action that it has triggered and that is
-    still being loaded: that one begins a little later, in a graph that has ended (recorded). So one
-    look is not enough: a graph must be seen at rest for a while, a longer one when it has actions
-    that have never begun. RUNNING without a running action may always be about to start one. `exact`
-    is an engine that hides nothing, as the simulator.
+    An action that has run before and was triggered again is not loaded again: what passes until the
+    engine shows it RUNNING is the start of a thread. So one look is not enough: a graph must be seen at
+    rest for a while. RUNNING without a running action may always be about to start one. `exact` is an
+    engine that hides nothing, as the simulator.
     """
 
     def __init__(self, *, exact: bool) -> None:
@@ -89,8 +88,5 @@ class RestProof:
 
 
 def _long_enough(shown: Sequence[Snapshot]) -> float:
-    """For how long a graph like this must be seen at rest, in seconds."""
-    if any(each.spontaneous for each in shown):
-        return _AGAIN_S
-    idle = any(each in NEVER_BEGAN for graph in shown for each in graph.nodes.values())
-    return _LOADING_S if idle else _STARTING_S
+    """Return for how long a graph like this must be seen at rest, in seconds."""
+    return _AGAIN_S if any(each.spontaneous for each in shown) else _STARTING_S

@@ -1,0 +1,213 @@
+"""Actions that may still be loading: triggered, as far as anybody knows, and never seen to begin.
+
+An engine neither counts nor shows an action that it loads, its own Stop passes it by, and no time of
+waiting tells whether it will come. What can be told is who may have been triggered at all: by the arrows
+of the graph, and by what was seen after the graph had left RUNNING, since from then on no end triggers
+anything (`umrf.triggers`).
+"""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+import msgspec
+
+from action_assistant.runner.links.observations import ACTIVE, Snapshot
+from action_assistant.umrf.files import codec
+from action_assistant.umrf.model import ENTRY
+from action_assistant.umrf.triggers import (
+    LEFT,
+    NEVER_BEGAN,
+    SeenAfter,
+    Triggers,
+    may_be_loading,
+    triggers_of,
+)
+from action_assistant.web.workers.lanes import RunInWorker
+
+_NAMED: Final = 3
+_DRAINED: Final = frozenset({"FINISHED", "HALTED"})
+
+
+class LoadingAction(msgspec.Struct, frozen=True):
+    """One action that may be loading: the running name of its graph, its full name, and what people
+    call it. `sure`: it was triggered; else nobody knows whether it was."""
+
+    graph: str
+    node: str
+    name: str
+    sure: bool
+
+
+def read_triggers(text: str | None, sent: Sequence[str], meddled: bool) -> Triggers | None:
+    """Return what a graph says of triggering; None where it cannot be read. `sent`: as it was sent, and
+    changed since, if that is known. For workers."""
+    try:
+        versions = [triggers_of(codec.read(each).graph, exits_known=True) for each in sent]
+        if len(versions) == 1 and not meddled:
+            return versions[0]
+        if text is None:
+            return None
+        found = triggers_of(codec.read(text).graph, exits_known=False)
+    except codec.Unreadable:
+        return None
+    if not versions and not meddled:
+        return found
+    in_turn = not meddled and all(each.in_turn for each in versions)
+    return msgspec.structs.replace(found, once=(), barring_errors=(), in_turn=in_turn)
+
+
+class LoadingWatch:
+    """What was seen of one graph and its sub-graphs that tells who may have been triggered.
+
+    `meddled`: somebody may have changed the graph, or set actions of it going, so that they may have
+    run more often than its arrows say, and beside each other.
+    """
+
+    def __init__(self, main: str, *, meddled: bool = False) -> None:
+        self._main = main
+        self._meddled = meddled
+        self._sent: list[str] = []
+        self._after: dict[str, tuple[int, SeenAfter]] = {}
+        self._read: dict[str, Triggers | None] = {}
+        self._known: set[str] = {main}  # running names
+        self._age = 0  # counts how often it was forgotten
+
+    def see(self, shown: Sequence[Snapshot]) -> None:
+        """Take in one answer, or feedback of one engine that serves alone. A sub-graph may be begun
+        anew for as long as one that encloses it is RUNNING."""
+        self._known.update(each.graph for each in shown)
+        for each in sorted(shown, key=lambda one: len(one.graph)):
+            if each.state not in LEFT:
+                known = self._after.get(each.graph)
+                if known is not None and (each.asked_at or 0) > known[0]:
+                    del self._after[each.graph]
+            elif self._is_enclosed_by_left(each.graph):
+                first, seen = self._after.get(each.graph, (each.at, SeenAfter()))
+                self._after[each.graph] = first, _and(seen, each)
+
+    def sends(self, umrf: str, *, beside: bool = False) -> None:
+        """This graph is handed over: the first one, or a change. `beside`: an action of it is started
+        beside those that go on."""
+        self.forget()
+        self._sent.append(umrf)
+        self._meddled = self._meddled or beside
+
+    def recalls(self, umrf: str) -> None:
+        """This graph was handed over by an earlier process, or before the run had ended once."""
+        if not self._sent and not self._meddled:
+            self._sent.append(umrf)
+            self._read.pop(self._main, None)
+
+    def meddle(self) -> None:
+        """Somebody else may have changed it, or set it going."""
+        self.forget()
+        self._meddled = True
+
+    def forget(self) -> None:
+        """What was seen proves nothing any more."""
+        self._after.clear()
+        self._read.clear()
+        self._age += 1
+
+    def unread(self, shown: Sequence[Snapshot]) -> tuple[str, ...]:
+        """Return the graphs of which it depends on the arrows who may be loading, and these have not
+        been read."""
+        return tuple(
+            each.graph for each in shown if _is_open(each) and each.graph not in self._read
+        )
+
+    async def read(
+        self, graphs: Sequence[str], texts: Mapping[str, str], run_in_worker: RunInWorker
+    ) -> None:
+        """Read the arrows of graphs, as the engine wrote them in `texts`, or as they were sent. Raises
+        what workers raise."""
+        for graph in graphs:
+            sent = tuple(self._sent) if graph == self._main else ()
+            text = texts.get(graph)
+            if text is None and not sent:
+                continue
+            age = self._age
+            found = await run_in_worker(read_triggers, text, sent, self._meddled)
+            if age == self._age:
+                self._read[graph] = found
+
+    def actions(self, shown: Sequence[Snapshot]) -> tuple[LoadingAction, ...]:
+        """Return the actions that may be loading in graphs of which nothing moves: of a graph, and of
+        its sub-graphs. Of one that was not read, all that have not begun."""
+        held = {each.graph for each in shown}
+        found: list[LoadingAction] = []
+        for each in shown:
+            if _is_open(each):
+                parts = [node for node in each.nodes if _part(each.graph, node) in held]
+                known, seen = self._read.get(each.graph), self._seen(each.graph)
+                found += _named(each, known, seen, parts)
+        return tuple(found)
+
+    def _seen(self, graph: str) -> SeenAfter:
+        return self._after.get(graph, (0, SeenAfter()))[1]
+
+    def _is_enclosed_by_left(self, graph: str) -> bool:
+        enclosing = [each for each in self._known if graph.startswith(f"{each}__")]
+        return all(each in self._after for each in (self._main, *enclosing) if each != graph)
+
+
+def in_words(actions: Sequence[LoadingAction]) -> str:
+    """Return one sentence without its full stop; "" for none."""
+    if not actions:
+        return ""
+    names = list(dict.fromkeys(each.name for each in actions))
+    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+    who, one = f"{', '.join(names[:_NAMED])}{more}", len(names) == 1
+    if all(each.sure for each in actions):
+        return (
+            f"{who} {'is' if one else 'are'} still loading; {'it' if one else 'they'} may move when "
+            f"{'it has' if one else 'they have'} loaded"
+        )
+    return (
+        f"{who} may still be loading, since nothing shows whether {'it was' if one else 'they were'} "
+        f"triggered; {'it' if one else 'they'} may move when {'it has' if one else 'they have'} loaded"
+    )
+
+
+def _is_open(shown: Snapshot) -> bool:
+    """Return whether a graph was begun and some action of it was not."""
+    return shown.state not in NEVER_BEGAN and not NEVER_BEGAN.isdisjoint(shown.nodes.values())
+
+
+def _and(seen: SeenAfter, shown: Snapshot) -> SeenAfter:
+    return SeenAfter(
+        active=seen.active.union(node for node, state in shown.nodes.items() if state in ACTIVE),
+        idle=seen.idle.union(node for node, state in shown.nodes.items() if state in NEVER_BEGAN),
+        drained=seen.drained or shown.state in _DRAINED,
+    )
+
+
+def _named(
+    shown: Snapshot,
+    known: Triggers | None,
+    seen: SeenAfter,
+    parts: Sequence[str],
+) -> list[LoadingAction]:
+    if known is None:  # whoever has not begun may have been triggered
+        names = tuple(node for node, state in shown.nodes.items() if state in NEVER_BEGAN)
+        first: set[str] = set()
+    else:
+        names = may_be_loading(known, shown.state, shown.nodes, seen, parts=parts)
+        first = {each.child for each in known.arrows if each.parent == ENTRY}
+        first -= {each.child for each in known.arrows if each.parent != ENTRY and each.required}
+    alike = Counter(node.rpartition("_")[0] for node in shown.nodes)
+    return [
+        LoadingAction(
+            shown.graph,
+            node,
+            bare if alike[bare := node.rpartition("_")[0]] == 1 else node,
+            node in first or shown.nodes[node] == "INITIALIZED",
+        )
+        for node in names
+    ]
+
+
+def _part(graph: str, node: str) -> str:
+    name, _, number = node.rpartition("_")
+    return f"{graph}__{name}__{number}"
