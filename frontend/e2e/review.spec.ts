@@ -205,7 +205,7 @@ test("a run goes again with one fault, in the simulator", async () => {
   await page.getByRole("button", { name: "Again" }).click();
   await page.getByRole("menuitem", { name: "With one fault …" }).click();
   await page.getByRole("combobox", { name: "Action" }).click();
-  await page.getByRole("option", { name: "Wait_2" }).click();
+  await page.getByRole("option", { name: "Wait 2" }).click();
   await page.getByRole("button", { name: "Run in the simulator" }).click();
   await expect(page).not.toHaveURL(new RegExp(good.id));
   await expect(card(page, "Wait", 2).getByText("error")).toBeVisible({ timeout: 15_000 });

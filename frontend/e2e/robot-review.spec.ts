@@ -244,7 +244,7 @@ test("what ran on the robot is repeated in the simulator with one fault", async 
   await page.getByRole("button", { name: "Again" }).click();
   await page.getByRole("menuitem", { name: "With one fault …" }).click();
   await page.getByRole("combobox", { name: "Action" }).click();
-  await page.getByRole("option", { name: "Reach_0" }).click();
+  await page.getByRole("option", { name: "Reach 0" }).click();
   await page.getByRole("button", { name: "Run in the simulator" }).click();
   await expect(page).not.toHaveURL(new RegExp(runs.good?.id ?? ""));
   await expect(page.getByText("simulated", { exact: true })).toBeVisible();

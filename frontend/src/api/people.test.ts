@@ -1,6 +1,6 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
-import { type Colored, checkedColor, colorsOf, NOBODYS_COLOR } from "./people";
+import { type Colored, checkedColor, colorsOf, currentName, NOBODYS_COLOR } from "./people";
 
 const color = fc.integer({ min: 0, max: 30 }).map((n) => `#0000${n.toString(16).padStart(2, "0")}`);
 const people = fc.uniqueArray(fc.record({ id: fc.constantFrom(..."abcdefghijklmnop"), color }), {
@@ -29,4 +29,18 @@ test("what is no colour gets into no style", () => {
   expect(checkedColor("red;background:url(//x)")).toBe(NOBODYS_COLOR);
   expect(colorsOf([{ id: "a", color: "" }], [])("a")).toBe(NOBODYS_COLOR);
   expect(colorsOf([], [])("nobody")).toBe(NOBODYS_COLOR);
+});
+
+test("who has named themselves since is called by that name, whatever was stored of them then", () => {
+  const me = { id: "me", name: "Ada" };
+  const known = [
+    { id: "b", name: "Bob" },
+    { id: "me", name: "Old Ada" },
+  ];
+  expect(currentName({ id: "me", name: "" }, me, known)).toBe("Ada");
+  expect(currentName({ id: "b", name: "" }, me, known)).toBe("Bob");
+  expect(currentName({ id: "b", name: "Robert" }, me, known)).toBe("Bob");
+  expect(currentName({ id: "gone", name: "Eve" }, me, known)).toBe("Eve"); // nobody knows of another name
+  expect(currentName({ id: "gone", name: "" }, me, known)).toBe("somebody");
+  expect(currentName(null, me, known)).toBe("somebody");
 });

@@ -3,6 +3,7 @@ import { useQuery } from "@tanstack/react-query";
 import { useCallback, useEffect } from "react";
 import { fetchJson } from "./http";
 import type { EditorApi } from "./schema/editor";
+import { usePerson } from "./use-person";
 
 type KnownPerson = EditorApi["Participant"];
 
@@ -36,6 +37,7 @@ export function colorsOf(
 }
 
 const NOBODY: readonly KnownPerson[] = [];
+const NO_IDS: readonly string[] = [];
 
 /** Everyone who acted here, read again when one of `ids` is not among them. */
 export function useKnownPeople(ids: readonly string[]): readonly KnownPerson[] {
@@ -56,4 +58,26 @@ export function useKnownPeople(ids: readonly string[]): readonly KnownPerson[] {
 export function useKnownColors(ids: readonly string[]): (id: string) => string {
   const known = useKnownPeople(ids);
   return useCallback((id: string) => colorsOf([], known)(id), [known]);
+}
+
+interface Named {
+  readonly id: string;
+  readonly name: string;
+}
+
+/** What somebody is called now: what was stored of them, a run for one, has the name of then beside their id. */
+export function currentName(
+  author: Named | null | undefined,
+  me: Named,
+  known: readonly Named[],
+): string {
+  if (!author) return "somebody";
+  const now = author.id === me.id ? me : known.find(({ id }) => id === author.id);
+  return now?.name || author.name || "somebody";
+}
+
+/** What the author of a run is called now. */
+export function useCurrentName(author: Named | null | undefined): string {
+  const { person } = usePerson();
+  return currentName(author, person, useKnownPeople(author ? [author.id] : NO_IDS));
 }

@@ -14,6 +14,7 @@ import { dataFlowOf } from "../graph/parameters/data-flow";
 import type { CheckedPlaceInside, ProblemKind } from "../graph/problems/problem-kinds";
 import { endName } from "../graph/relation-words";
 import { pathWords } from "../graph/value-text";
+import { INTO, spaced } from "../status/level-words";
 import { Tooltip } from "../ui/floating/tooltip";
 import { focusField } from "../ui/focus-field";
 import { fieldOfTold, firstField, type Told } from "./fields/field-problems";
@@ -79,7 +80,7 @@ function WayInside({ inside }: { inside: CheckedPlaceInside | undefined }) {
     key: aids[i] ?? "",
     name: level.slice(0, level.lastIndexOf("_")),
   }));
-  const words = levels.map((level) => level.replace(/_(\d+)$/, " $1")).join(" › ");
+  const words = levels.map(spaced).join(INTO);
   return (
     <button
       type="button"

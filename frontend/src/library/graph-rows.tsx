@@ -1,9 +1,10 @@
 /** Graphs as rows: name, last run in words, problems. */
 import { Skeleton } from "@mantine/core";
 import { Link } from "wouter";
-import { authorName, type GraphSummary } from "../api/graphs";
+import type { GraphSummary } from "../api/graphs";
 import { newestRun } from "../api/live/open-runs";
 import { useLive } from "../api/live/use-live";
+import { useCurrentName } from "../api/people";
 import { runEndText, type Tone } from "../status/progress";
 import { runStatus } from "../status/run-status";
 import { toneColor } from "../status/state-label";
@@ -26,6 +27,7 @@ function subtitle(graph: GraphSummary, words: string | null, now: number): strin
 export function GraphRow({ graph, current }: { graph: GraphSummary; current: boolean }) {
   const { now: live } = useLive();
   const run = newestRun(live, graph.id);
+  const by = useCurrentName(run?.author);
   const goes = run !== null && run.ended_at === null;
   const now = useNow(goes ? 1000 : 20_000);
   let tone: Tone = "idle";
@@ -36,9 +38,7 @@ export function GraphRow({ graph, current }: { graph: GraphSummary; current: boo
     const start = instant(run.started_at) ?? now;
     const end = instant(run.ended_at) ?? now;
     const took = live.link === "down" ? "" : ` · ${stopwatch(now - start)}`;
-    words = goes
-      ? `${authorName(run.author)} · ${status.word}${took}`
-      : `${runEndText(run)} · ${ago(end, now)}`;
+    words = goes ? `${by} · ${status.word}${took}` : `${runEndText(run)} · ${ago(end, now)}`;
   }
   return (
     <Link

@@ -12,9 +12,9 @@ import {
 import { useInfiniteQuery, useMutation } from "@tanstack/react-query";
 import { type MouseEvent, useCallback, useMemo, useState } from "react";
 import { Link, useLocation, useSearch } from "wouter";
-import { authorName } from "../api/graphs";
 import { errorText } from "../api/http";
 import { useLive } from "../api/live/use-live";
+import { useCurrentName } from "../api/people";
 import {
   filterOf,
   importExamples,
@@ -63,6 +63,7 @@ interface RunRowProps {
 
 function Row({ run, now, chosen, onChoose }: RunRowProps) {
   const [, go] = useLocation();
+  const by = useCurrentName(run.author);
   const label = useVersionLabel(run);
   const { tone, word } = useRunStatus(run);
   const start = instant(run.started_at);
@@ -100,7 +101,7 @@ function Row({ run, now, chosen, onChoose }: RunRowProps) {
         <span className={style.version}>{label}</span>
       </td>
       <td className={style.quiet}>{runPlace(run)}</td>
-      <td>{authorName(run.author)}</td>
+      <td>{by}</td>
       <td className={style.quiet}>{start !== null && `${day(start, now)} ${clock(start)}`}</td>
       <td className={style.took}>{took}</td>
       <td className={style.figures}>
@@ -233,7 +234,10 @@ function NoRuns({ runner, failed, isKnown, filtered, isNew, onChanged }: NoRunsP
   if (filtered) {
     return (
       <Empty icon={<IconSearch size={22} />} title="No run fits">
-        Nothing that was recorded matches this search and filter.
+        No run matches this search and filter. A text is searched for in names of graphs, robots,
+        people and actions, in notes, in the number of a run, and in what its events say: causes,
+        alarms, messages, reasons. Values of parameters are not searched, and of a run that goes on
+        only its names are.
       </Empty>
     );
   }

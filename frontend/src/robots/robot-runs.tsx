@@ -6,7 +6,9 @@ import { Link } from "wouter";
 import { errorText } from "../api/http";
 import { foreignGraphs, openRuns } from "../api/live/open-runs";
 import { useLive } from "../api/live/use-live";
+import { useCurrentName } from "../api/people";
 import { heldGraph, type Robot, stopRobot } from "../api/robots";
+import type { Run } from "../api/runs";
 import { runStatus } from "../status/run-status";
 import { StateLabel } from "../status/state-label";
 import style from "./robot-runs.module.css";
@@ -59,6 +61,10 @@ function Foreign(props: Props & { graph: string; stopping: string | null; state:
   );
 }
 
+function StartedBy({ run }: { run: Run }) {
+  return <span className={style.quiet}>started by {useCurrentName(run.author)}</span>;
+}
+
 export function RobotRuns({ robot, onImport }: Props) {
   const { now } = useLive();
   const own = openRuns(now).filter((run) => run.engine === robot.name);
@@ -79,7 +85,7 @@ export function RobotRuns({ robot, onImport }: Props) {
           <Link to={`/runs/${run.id}`} className={style.name}>
             Run {run.number} of {run.graph_name}
           </Link>
-          <span className={style.quiet}>started by {run.author?.name || "somebody"}</span>
+          <StartedBy run={run} />
         </li>
       ))}
       {foreign.map(({ held }) => (

@@ -16,6 +16,7 @@ const run = (part: Partial<Run>) =>
     id: "r",
     number: 1,
     engine: "atlas",
+    graph_name: "Round",
     simulated: false,
     state: "running",
     ended_at: null,
@@ -48,6 +49,20 @@ test("what runs is named by robot, and what was only concluded is marked", () =>
     "atlas: Drive 0",
     "birch: Hold 2 (inferred)",
   ]);
+});
+
+test("what runs inside of an action is named by the way to it, as people call it", () => {
+  const inner = { ...action("RUNNING"), aid: null as unknown as string };
+  const round = run({
+    actions: actions({
+      Fetch_0: action("RUNNING"),
+      Wait_0: action("RUNNING"),
+      "Round__Fetch__0/Grip_0": inner,
+      "Round__Fetch__0__Grip__0/Close_1": inner,
+      "Round__Fetch__0/Lift_0": { ...inner, state: "FINISHED" },
+    }),
+  });
+  expect(movesNow(live([round]))[0]?.words).toBe("Wait 0, Fetch 0 › Grip 0 › Close 1");
 });
 
 test("of a robot that is not heard nothing is said to move, and nothing to rest", () => {

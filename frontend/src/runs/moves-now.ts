@@ -2,6 +2,8 @@
 import type { LiveState } from "../api/live/live-socket";
 import { foreignGraphs, openRuns } from "../api/live/open-runs";
 import type { Run } from "../api/runs";
+import { placesOf } from "../status/level-places";
+import { actionWords } from "../status/level-words";
 import { instant } from "../ui/times";
 
 export interface Moving {
@@ -15,12 +17,24 @@ export interface Moving {
 
 const MOVE: ReadonlySet<string> = new Set(["RUNNING", "STOPPING", "PAUSE_REQUESTED"]);
 
-/** The actions of a run that were seen to move, by their names, with what was not seen marked. */
+/** The actions of a run that were seen to move, in words, with what was not seen marked. Where something moves inside
+ * of an action, that is told, with the way to it, and not the action around it once more. */
 export function movingActions(run: Run): string[] {
-  return Object.entries(run.actions ?? {})
-    .filter(([, action]) => MOVE.has(action.state))
+  const moving = Object.entries(run.actions ?? {}).filter(([, action]) => MOVE.has(action.state));
+  const places = placesOf(run);
+  const around = new Set(
+    moving.flatMap(([name]) => {
+      const levels = places.get(name)?.levels ?? [];
+      return levels.map((_, n) => levels.slice(0, n + 1).join("/"));
+    }),
+  );
+  return moving
+    .filter(([name]) => {
+      const place = places.get(name);
+      return !place || !around.has([...place.levels, place.name].join("/"));
+    })
     .map(([name, action]) => {
-      const words = name.replace(/_(\d+)$/, " $1");
+      const words = actionWords(run, name);
       return action.visits.at(-1)?.how === "inferred" ? `${words} (inferred)` : words;
     });
 }

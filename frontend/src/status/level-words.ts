@@ -1,5 +1,6 @@
 /** Actions on their levels as people read them, and as a run calls them. Pure. */
-import { type LevelPlace, partOf } from "./level-places";
+import type { Run } from "../api/runs";
+import { type LevelPlace, partOf, placesOf } from "./level-places";
 
 /** Between the levels, as people read them. */
 export const INTO = " › ";
@@ -19,4 +20,9 @@ export function spaced(fullName: string): string {
 /** The way to an action, in words. */
 export function wayWords({ levels, name }: Pick<LevelPlace, "levels" | "name">): string {
   return [...levels, name].map(spaced).join(INTO);
+}
+
+/** An action of a run in words, with the actions that it is inside of: `Round__Fetch__0/Lift_0` is Fetch 0 › Lift 0. */
+export function actionWords(run: Run, name: string): string {
+  return wayWords(placesOf(run).get(name) ?? { levels: [], name });
 }

@@ -57,6 +57,7 @@ def test_runs_are_found_by_what_was_said_in_them(
     with process.client() as client:
         assert found(client, text="GRIPPER", graph="reviewed") == [bad]
         assert found(client, text="100%", graph="reviewed") == []
+        assert found(client, text="work_1", graph="reviewed") == [bad, good]
         assert found(client, graph="reviewed", state="finished,error,halted") == [bad, good]
         assert found(client, graph="reviewed", person="nobody") == []
         assert found(client, graph="reviewed", version=two_runs[0]["digest"][:12]) == [bad, good]

@@ -4,9 +4,9 @@ import { IconAlertTriangle, IconArrowsDiff } from "@tabler/icons-react";
 import { useQuery } from "@tanstack/react-query";
 import { type ReactNode, useState } from "react";
 import { Link, useLocation, useSearch } from "wouter";
-import { authorName } from "../../api/graphs";
 import { errorText } from "../../api/http";
 import { useLive } from "../../api/live/use-live";
+import { useCurrentName } from "../../api/people";
 import { type Comparison, listRuns, NO_FILTER, useComparison } from "../../api/review";
 import { getRun } from "../../api/run-stop";
 import { type Run, useRun } from "../../api/runs";
@@ -25,6 +25,7 @@ import { GhostLanes } from "./ghost-lanes";
 import { Steps } from "./steps-table";
 
 function Head({ run, title }: { run: Run; title: string }) {
+  const by = useCurrentName(run.author);
   const now = useNow(60_000);
   const start = instant(run.started_at);
   const end = instant(run.ended_at);
@@ -35,7 +36,7 @@ function Head({ run, title }: { run: Run; title: string }) {
       </Link>
       <StateLabel pill {...useRunStatus(run)} />
       <span className={style.meta}>
-        {run.simulated ? "simulator" : run.engine} · {authorName(run.author)}
+        {run.simulated ? "simulator" : run.engine} · {by}
         {start !== null && ` · ${day(start, now)} ${clock(start)}`}
         {end !== null && boundsText(run.took) && ` · ${boundsText(run.took)}`}
       </span>

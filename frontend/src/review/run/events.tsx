@@ -4,6 +4,7 @@ import { TextInput } from "@mantine/core";
 import { useMemo, useState } from "react";
 import type { ReplayMark } from "../../api/documents/replay";
 import { authorName } from "../../api/graphs";
+import { useCurrentName } from "../../api/people";
 import { type Run, runPlace } from "../../api/runs";
 import { placesOf } from "../../status/level-places";
 import { wayWords } from "../../status/level-words";
@@ -52,6 +53,7 @@ export function eventLines(
   run: Run,
   version: string,
   marks: readonly ReplayMark[] = [],
+  by: string = authorName(run.author),
 ): Happening[] {
   const all: Happening[] = [];
   const start = instant(run.started_at);
@@ -118,7 +120,7 @@ export function eventLines(
   all.sort((a, b) => a.at - b.at || (a.order ?? 0) - (b.order ?? 0));
   if (start === null) return all;
   const where = run.engine === "simulator" ? "in the simulator" : `on ${runPlace(run)}`;
-  const text = `${authorName(run.author)} started ${version} ${where}`;
+  const text = `${by} started ${version} ${where}`;
   return [{ at: start, tone: "idle", name: null, fact: null, text }, ...all];
 }
 
@@ -177,7 +179,8 @@ export function RunEvents(props: Props) {
   const { run, version, marks, selected } = props;
   const [search, setSearch] = useState("");
   const start = instant(run.started_at) ?? 0;
-  const all = useMemo(() => eventLines(run, version, marks), [run, version, marks]);
+  const by = useCurrentName(run.author);
+  const all = useMemo(() => eventLines(run, version, marks, by), [run, version, marks, by]);
   const wanted = search.trim().toLowerCase();
   const found = all.filter(
     (event) => wanted === "" || `${event.name ?? ""} ${event.text}`.toLowerCase().includes(wanted),

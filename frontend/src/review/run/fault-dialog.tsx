@@ -4,6 +4,7 @@ import { useState } from "react";
 import { errorText } from "../../api/http";
 import type { InjectedFault } from "../../api/review";
 import type { Run } from "../../api/runs";
+import { actionWords } from "../../status/level-words";
 import { Segments } from "../../ui/segments";
 import { type Repeated, type RepeatedVersion, repeatRun } from "./repeat-run";
 
@@ -57,7 +58,7 @@ export function FaultDialog({ runner, run, onDone, onClose }: Props) {
         )}
         <Select
           label="Action"
-          data={actions}
+          data={actions.map((value) => ({ value, label: actionWords(run, value) }))}
           value={action}
           onChange={setAction}
           searchable

@@ -5,9 +5,9 @@ import { ReactFlowProvider } from "@xyflow/react";
 import { memo, type ReactNode, useCallback, useEffect, useMemo, useState } from "react";
 import { useSearch } from "wouter";
 import { type ReplayMark, useReplayData } from "../../api/documents/replay";
-import { authorName } from "../../api/graphs";
 import { errorText } from "../../api/http";
 import { useLive } from "../../api/live/use-live";
+import { useCurrentName } from "../../api/people";
 import { useRunsOfSameStart } from "../../api/review";
 import { type Run, useRun } from "../../api/runs";
 import { fromUmrf } from "../../canvas/from-umrf";
@@ -136,9 +136,10 @@ interface AboutRunProps {
 
 /** What was said, with which values, by whom: beside the canvas. */
 function AboutRun({ runner, newest, replay, label, marks, selected, onSelect }: AboutRunProps) {
+  const by = useCurrentName(newest.author);
   return (
     <aside className={style.side} aria-label="About the run">
-      <RunPrint run={newest} version={label} by={authorName(newest.author)} />
+      <RunPrint run={newest} version={label} by={by} />
       <Tabs defaultValue="events" keepMounted={false} className={style.tabs ?? ""}>
         <Tabs.List>
           <Tabs.Tab value="events">Events</Tabs.Tab>
@@ -162,7 +163,7 @@ function AboutRun({ runner, newest, replay, label, marks, selected, onSelect }: 
         </Tabs.Panel>
         <Tabs.Panel value="facts" className={style.panel ?? ""}>
           <RunNotes runner={runner} run={newest.id} />
-          <RunFacts runner={runner} run={newest} version={label} by={authorName(newest.author)} />
+          <RunFacts runner={runner} run={newest} version={label} by={by} />
         </Tabs.Panel>
         <Tabs.Panel value="raw" className={style.panel ?? ""}>
           <RawEvents runner={runner} run={newest} />

@@ -1,8 +1,7 @@
 /** The record of a run on paper: what each action did, when as far as that is known, and who started it. */
 import { type Run, requesterPlace, runPlace, type Visit } from "../../api/runs";
 import { boundsText, durationText } from "../../status/durations";
-import { placesOf } from "../../status/level-places";
-import { INTO } from "../../status/level-words";
+import { actionWords } from "../../status/level-words";
 import { progressOf, runEndText, visitDuration } from "../../status/progress";
 import { PrintSheet } from "../../ui/print-sheet";
 import { clock, dateText, instant } from "../../ui/times";
@@ -66,11 +65,6 @@ function Actions({ run }: { run: Run }) {
   const actions = Object.entries(run.actions ?? {});
   const begin = ([, action]: (typeof actions)[number]) =>
     Date.parse(action.visits[0]?.from ?? "9999-01-01");
-  const places = placesOf(run);
-  const wayOf = (name: string) => {
-    const { levels, name: own } = places.get(name) ?? { levels: [], name };
-    return [...levels, own].join(INTO);
-  };
   const inOrder = actions.sort((a, b) => begin(a) - begin(b));
   return (
     <table className={style.table}>
@@ -86,7 +80,7 @@ function Actions({ run }: { run: Run }) {
       </thead>
       <tbody>
         {inOrder.map(([name, action]) => (
-          <ActionRows key={name} run={run} name={wayOf(name)} action={action} />
+          <ActionRows key={name} run={run} name={actionWords(run, name)} action={action} />
         ))}
       </tbody>
     </table>

@@ -2,8 +2,8 @@
 import { ActionIcon, Button, Text } from "@mantine/core";
 import { IconChartBar, IconChevronDown, IconChevronUp, IconHistory } from "@tabler/icons-react";
 import { Link } from "wouter";
-import { authorName } from "../../api/graphs";
 import { useLive } from "../../api/live/use-live";
+import { useCurrentName } from "../../api/people";
 import type { Run } from "../../api/runs";
 import { boundsText } from "../../status/durations";
 import { useRunStatus } from "../../status/run-status";
@@ -44,6 +44,7 @@ function FoldButton({ folded, onFold }: { folded: boolean; onFold: Props["onFold
 
 /** Who started it, when, and how long it took or has been going on. */
 function Origin({ run, until }: { run: Run; until: number | null }) {
+  const by = useCurrentName(run.author);
   const goes = run.ended_at === null;
   const present = useNow(1000, goes && until === null);
   const start = instant(run.started_at) ?? present;
@@ -55,7 +56,7 @@ function Origin({ run, until }: { run: Run; until: number | null }) {
   return (
     <Text span c="dimmed" size="xs" truncate>
       {run.simulated && "simulated · "}
-      started by {authorName(run.author)} {started} · {took}
+      started by {by} {started} · {took}
     </Text>
   );
 }

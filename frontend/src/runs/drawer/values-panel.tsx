@@ -3,11 +3,10 @@ import { useMemo } from "react";
 import { useLive } from "../../api/live/use-live";
 import { type Run, useRun } from "../../api/runs";
 import type { Graph, Key } from "../../graph/model";
+import { spaced } from "../../status/level-words";
 import { duration, stopwatch, useNow } from "../../ui/times";
 import { valuesOf } from "./action-values";
 import style from "./run-drawer.module.css";
-
-const spaced = (name: string) => name.replace(/_(\d+)$/, " $1");
 
 /** How old the newest answer of the engine is; looked at once a second, with all that tells times. */
 function Age({ run }: { run: Run }) {

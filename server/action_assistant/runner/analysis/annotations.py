@@ -5,7 +5,7 @@ did. The tables here are folds of these streams.
 """
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Final
 
 import msgspec
@@ -26,9 +26,9 @@ from action_assistant.schema.runner_tables import run as runs
 from action_assistant.umrf.model import Graph
 
 _PREFIX: Final = "about/"
-_WORDS: Final = 8_000  # characters of messages that a search looks through
+_WORDS: Final = 20_000  # characters of what was said that a search looks through
 #: Raise it when a run adds up to something else than before: older sums are made again.
-FIGURES: Final = 4
+FIGURES: Final = 5
 #: Beside the results of an action in the table: its visits are a lower bound.
 AT_LEAST: Final = "at_least"
 _TOOK: Final = 100  # durations kept per action and run
@@ -112,16 +112,18 @@ def draft(event: Marked | SummedUp | Put) -> Draft:
     return Draft(event.kind, author, msgspec.json.encode(event))
 
 
-def sum_of(run: Run, graph: Graph | None, at: int) -> SummedUp:
-    """What a run of a graph adds up to."""
+def sum_of(run: Run, graph: Graph | None, at: int, said: Iterable[str] = ()) -> SummedUp:
+    """What a run of a graph adds up to. `said`: the texts of its events."""
     found = causes(run, graph)[:1]
     cause = words(found[0], run) if found else ""
-    said = itertools.chain(
+    texts = itertools.chain(
         [cause, run.detail],
         (alarm.text for alarm in run.alarms),
         (message.text for action in run.actions.values() for message in action.messages),
+        said,
+        run.actions,
     )
-    told = "\n".join(dict.fromkeys(text for text in said if text))[:_WORDS]
+    told = "\n".join(dict.fromkeys(text for text in texts if text))[:_WORDS]
     counts = visit_counts(run)
     actions = {name: _sum(each, counts[name]) for name, each in run.actions.items()}
     return SummedUp(at, actions, told, cause, of_run(run), FIGURES)

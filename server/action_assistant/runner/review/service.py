@@ -27,13 +27,13 @@ from action_assistant.runner.review.ongoing_runs import OngoingRuns, settled
 from action_assistant.runner.review.sum_up_loop import SumUpLoop
 from action_assistant.runner.robots.recordings import Recording, hours
 from action_assistant.runner.runs import views
-from action_assistant.runner.runs.events import Author
+from action_assistant.runner.runs.events import Author, Observed, decode, said_in
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.sent_views import Sent, sent_of
 from action_assistant.runner.sent_graph import read_sent
 from action_assistant.runner.sent_subgraphs import SentSubgraph
-from action_assistant.schema.runner_tables import expectation, review, run_label
+from action_assistant.schema.runner_tables import expectation, review, run_label, runner_event
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 from action_assistant.web.workers.lanes import RunInWorker
@@ -47,6 +47,7 @@ _LAST: Final = 1_000  # runs in one statistics
 _CAUSES: Final = 10  # in one answer
 _ROWS: Final = 400  # parameters of one query
 _PAGE: Final = 500  # events exported at once
+_SAYING: Final = 2_000  # events of a run whose texts are searched
 
 Format: TypeAlias = Literal["jsonl", "csv", "mcap"]
 
@@ -134,7 +135,22 @@ class ReviewService:
         found = (await self.keyframe_store.keyframes(run_id)).keys[-1].run
         good = found.end == "finished" and found.result == "on_true"
         graph = None if good else await self._graph(run_id)  # only failures have causes
-        return await self._run_in_worker(lambda: annotations.sum_of(found, graph, now))
+        said = await self._said(run_id)
+        return await self._run_in_worker(lambda: annotations.sum_of(found, graph, now, said))
+
+    async def _said(self, run_id: str) -> list[str]:
+        """The texts of a run's events, each once, in order. Raises Unavailable."""
+        event = runner_event.c
+        chosen = select(event.kind, event.body).where(
+            event.stream == stream_of(run_id), event.kind != Observed.kind
+        )
+        texts: dict[str, None] = {}
+        for row in await self.rows(chosen.order_by(event.seq).limit(_SAYING)):
+            try:
+                texts.update(dict.fromkeys(said_in(decode(row.kind, row.body))))
+            except msgspec.DecodeError:  # damaged, which is told where the run is read
+                continue
+        return list(texts)
 
     async def whole(self, run_id: str) -> views.RunWhole:
         """A run that is over, and the graph as it was sent. Raises NotFound."""

@@ -5,8 +5,8 @@ with a default: streams of older versions must fold the same for ever. `at` is m
 taken when the thing happened, which may be before it was stored.
 """
 
-from collections.abc import Iterable, Mapping
-from typing import ClassVar, Final, Literal, TypeAlias
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, ClassVar, Final, Literal, TypeAlias
 
 import msgspec
 
@@ -347,3 +347,55 @@ def decode(kind: str, body: bytes) -> RunEvent:
         return Unknown() if known is None else known.decode(body)
     except TypeError as error:  # a damaged database may give out a number
         raise msgspec.DecodeError(str(error)) from error
+
+
+#: Fields of events that are for programs, or too large to be read: all other texts are what somebody said or was told.
+_NOT_SAID: Final = frozenset(
+    {
+        *(
+            "type",
+            "at",
+            "id",
+            "address",
+            "by",
+            "run",
+            "request_id",
+            "graph",
+            "version",
+            "digest",
+            "tree_digest",
+        ),
+        *(
+            "hash",
+            "umrf",
+            "script",
+            "subgraphs",
+            "incarnation",
+            "process",
+            "group",
+            "stop_id",
+            "aid",
+            "path",
+        ),
+    }
+)
+
+
+def said_in(event: RunEvent) -> Iterator[str]:
+    """Yield the texts of an event that people may search for, as they stand in it. What was observed of an engine is
+    not among them: the run that it is folded into has its messages."""
+    if not isinstance(event, Observed):
+        yield from _texts_in(msgspec.to_builtins(event))
+
+
+def _texts_in(value: Any) -> Iterator[str]:
+    match value:
+        case str():
+            yield value
+        case dict():
+            for name, each in value.items():
+                if name not in _NOT_SAID:
+                    yield from _texts_in(each)
+        case list() | tuple():
+            for each in value:
+                yield from _texts_in(each)
