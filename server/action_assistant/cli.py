@@ -97,6 +97,9 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
         "people", "print the link that signs the owner in, of a server that runs", described=True
     ),
     "people": CommandEntry("people", "links that let people in: list, invite, revoke"),
+    "robots": CommandEntry(
+        "robots", "robots that the runner reaches over ROS 2: list, add, remove", described=True
+    ),
     "simulate-robot": CommandEntry(
         "simulate_robot", "a robot that behaves like a real engine, on ROS 2, to practise with"
     ),

@@ -4,6 +4,7 @@ What a Stop needs is imported here and by what is imported here, never at its fi
 the first thing that is asked of a runner.
 """
 
+import logging
 import sys
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -35,7 +36,7 @@ from action_assistant.runner.review.word_indexer import index_words
 from action_assistant.runner.review.worker_queries import StoragePaths, WorkerQueries
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.robots.registry import Robots
-from action_assistant.runner.start.index_writer import IndexWriter, require_folder
+from action_assistant.runner.start.index_writer import IndexWriter, folder_trouble
 from action_assistant.runner.start.start_checks import StartSources
 from action_assistant.runner.watched import WatchedRunner
 from action_assistant.runner.workers import RunnerWorkers
@@ -50,6 +51,8 @@ from action_assistant.web.network.connection_limits import ConnectionLimits
 from action_assistant.web.server.application import application
 
 #: For so long (seconds) a thread may keep the interpreter to itself while the loop waits for it.
+log: Final = logging.getLogger(__name__)
+
 _SWITCH_S: Final = 0.0005
 
 
@@ -182,7 +185,8 @@ def create_app(settings: RunnerSettings) -> ASGIApp:
     if settings.behaviours is not None:
         BehaviourFolder.opened(settings.behaviours)
     for robot, folder in settings.index_folders.items():
-        require_folder(robot, folder)
+        if why := folder_trouble(robot, folder):  # that robot's alone: it may come later
+            log.warning("%s Graphs cannot be written there until it can be read.", why)
     Journal.prepare(_database(settings), "runner", copies=settings.data / before_upgrade.FOLDER)
     revoked = Revocations(settings.data)
     services = RunnerServices()

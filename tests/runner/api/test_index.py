@@ -1,8 +1,5 @@
 """Graphs written into a robot's index, over HTTP, by a runner that was told where."""
 
-import os
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -73,12 +70,32 @@ def test_only_operators_may(client: httpx.Client) -> None:
     assert described["paths"]["/api/robots/{name}/index"]["post"]["x-needs"] == "operate"
 
 
-def test_a_folder_that_is_not_there_is_refused_at_the_start(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "action_assistant", "runner", "--data", str(tmp_path / "data")]
-    environ = {**os.environ, "ACTION_ASSISTANT_INDEX_FOLDERS": "David=/nonexistent"}
-    done = subprocess.run(command, env=environ, capture_output=True, text=True, check=False)
-    told = "There is no folder /nonexistent that David could index: No such file or directory."
-    assert (done.returncode, told in done.stderr) == (2, True), done.stderr
+def test_a_folder_that_is_missing_is_the_trouble_of_its_robot_alone(tmp_path: Path) -> None:
+    index, missing = tmp_path / "index", tmp_path / "missing"
+    index.mkdir()
+    (tmp_path / "file").touch()
+    folders = {"David": missing, "Carol": index, "Eve": tmp_path / "file"}
+    flags = [word for robot, at in folders.items() for word in ("--index-folder", f"{robot}={at}")]
+    process = RunnerProcess(tmp_path / "data", *flags).start()
+    body = msgspec.json.encode(wish(LEG))
+    with process.client() as found:
+        for name in folders:
+            assert found.post("/api/robots", json={"name": name}).status_code == 201
+        refused = problem(found.post("/api/robots/David/index", content=body), 409)
+        assert refused["detail"] == (
+            f"There is no folder {missing} that David could index: No such file or directory. "
+            "Nothing was written."
+        )
+        refused = problem(found.post("/api/robots/Eve/index", content=body), 409)
+        assert "that Eve could index: Not a directory" in refused["detail"]
+        assert found.post("/api/robots/Carol/index", content=body).status_code == 200
+        missing.mkdir()  # its disk is there now
+        assert found.post("/api/robots/David/index", content=body).status_code == 200
+        assert sorted(held(missing)) == sorted(held(index)) != []
+    process.end()
+    told = (tmp_path / "data.log").read_text()
+    for robot in ("David", "Eve"):
+        assert f"that {robot} could index" in told
 
 
 @pytest.mark.parametrize(

@@ -1,14 +1,20 @@
-"""What `doctor` says of memory that nodes cannot share."""
+"""What `doctor` says of memory that nodes cannot share, and of robots that are not there."""
 
 import os
 import subprocess
 import sys
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
+from typing import Any
 
+import anyio
 import pytest
 
+from action_assistant.runner.links.port import Candidate, Registration, Sighting, Standing
 from action_assistant.runner.links.ros2 import checkup
 from action_assistant.runner.links.ros2.checkup import shared_memory
+from action_assistant.system.diagnostics import Diagnostic
+from action_assistant.umrf.facts import EngineFacts
 
 NOBODY = 54_321  # an id that no file of accounts names, as those of containers
 
@@ -49,3 +55,86 @@ def test_a_container_with_memory_of_its_own_is_told_from_one_that_shares_the_hos
 
     assert inside("shm") == "['shared-memory-apart']"
     assert inside("tmpfs") == "[]"
+
+
+class Seen:
+    """A reach that shows engines, none of which answers as a robot that is registered."""
+
+    rmw = "rmw_fastrtps_cpp"
+
+    def __init__(self, *candidates: Candidate) -> None:
+        self._candidates = candidates
+
+    def link(self, registration: Registration, facts: EngineFacts) -> Any:
+        """A link to a robot of which no engine is seen."""
+        return Gone()
+
+    async def sighting(self) -> Sighting:
+        """The engines in sight, and that no other will come."""
+        return Sighting(self._candidates, 0.0)
+
+    async def candidates(self) -> tuple[Candidate, ...]:
+        """The engines in sight."""
+        return self._candidates
+
+    async def aclose(self) -> None:
+        """Let go."""
+
+
+class Gone:
+    """A link to a robot that is not there."""
+
+    standing = Standing(state="gone", why="Nobody answers.")
+
+    async def run(self) -> None:
+        """Nothing comes."""
+
+    def listen(self, hear: object) -> AbstractContextManager[None]:
+        """Nothing is heard."""
+        return nullcontext()
+
+
+def looked(monkeypatch: pytest.MonkeyPatch, robots: int, *seen: Candidate) -> list[Diagnostic]:
+    """What is said of so many robots that are not there."""
+    registered = [Registration(name=f"R{n}", domain=10 + n) for n in range(robots)]
+    monkeypatch.setattr(checkup, "ros2_reach", lambda *_: Seen(*seen))
+    monkeypatch.setattr(checkup, "_origin", lambda _: "here")
+    monkeypatch.setattr(checkup, "_PATIENCE_S", 0.01)
+    return anyio.run(checkup.look, registered, lambda: 0, {})
+
+
+def engine(domain: int, actor: str = "") -> Candidate:
+    path = "/umrf_graph_get"
+    return Candidate(domain=domain, rmw="rmw_fastrtps_cpp", get_service=path, actor=actor)
+
+
+def test_an_engine_without_a_name_is_told_once_however_many_robots_are_absent(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    found = looked(monkeypatch, 33, engine(0))
+    naming = [each for each in found if "domain 0" in each.where or "domain 0" in each.message]
+    naming = [each for each in naming if each.severity != "fine"]
+    assert [each.code for each in naming] == ["engine-unregistered"]
+    assert naming[0].message.endswith("not seen: R0, R1, R2, R3, R4 and 28 more.")
+    assert "--actor-name" in naming[0].remedy
+    assert [each.code for each in found].count("robot-silent") == 33
+
+
+def test_an_engine_that_says_its_name_is_told_with_that_robot_and_no_other(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    found = {each.where: each for each in looked(monkeypatch, 3, engine(0, "R1"), engine(1, "Eve"))}
+    assert [found[f"R{n}"].code for n in range(3)] == [
+        *("robot-silent", "robot-elsewhere"),
+        "robot-silent",
+    ]
+    assert "one answers on domain 0 (/umrf_graph_get)" in found["R1"].message
+    assert "says no name" not in "".join(each.message for each in found.values())
+
+
+def test_where_one_robot_alone_is_absent_an_engine_without_a_name_is_told_with_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    found = {each.where: each for each in looked(monkeypatch, 1, engine(0))}
+    assert found["R0"].code == "robot-elsewhere"
+    assert "says no name" not in found["/umrf_graph_get, domain 0"].message

@@ -48,7 +48,7 @@ from action_assistant.web.workers.lanes import RunInWorker
 
 log: Final = logging.getLogger(__name__)
 
-_NO_LINK: Final = "Nothing can be started or stopped there from here."
+_NO_LINK: Final = "This runner cannot start or stop anything on it."
 _NOT_YET: Final = "It has not answered yet."
 _ANSWERS: Final = frozenset({"answering", "restarted"})
 _TOLD: Final = 500  # newest entries of a flight record
@@ -330,8 +330,13 @@ class Robots:
         if engine is not None:
             return engine
         if name in self._registered:
-            raise Conflict(f"{name}: No link: {self._reach} {_NO_LINK}", where={"path": "/engine"})
-        raise BadInput(f"No robot is called {name!r}.", where={"path": "/engine"})
+            raise Conflict(
+                f"No link to {name}: {self._reach} {_NO_LINK}", where={"path": "/engine"}
+            )
+        raise BadInput(
+            f"No robot called {name!r} is registered here, so nothing can be started on it.",
+            where={"path": "/engine"},
+        )
 
     def present(self, name: str) -> KnownEngine | None:
         """The engine of a robot as it is reached now, None without a link. Raises NotFound."""

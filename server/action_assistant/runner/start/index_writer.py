@@ -10,7 +10,7 @@ from typing import Annotated, Any, Final
 import anyio
 import msgspec
 
-from action_assistant.errors import BadInput, CannotStart, Conflict, Unavailable
+from action_assistant.errors import BadInput, Conflict, Unavailable
 from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.index_folders.comparison import (
     Differing,
@@ -78,16 +78,14 @@ class WritePlan(msgspec.Struct, frozen=True):
     there: tuple[str, ...]
 
 
-def require_folder(robot: str, folder: Path) -> None:
-    """Raises CannotStart where there is no such folder."""
+def folder_trouble(robot: str, folder: Path) -> str:
+    """Return why the folder of a robot cannot be read, a sentence; "" where it can."""
     try:
         with os.scandir(folder):
-            pass
+            return ""
     except OSError as error:
         why = error.strerror or str(error)
-        raise CannotStart(
-            f"There is no folder {folder} that {robot} could index: {why}."
-        ) from error
+        return f"There is no folder {shown_path(str(folder))} that {robot} could index: {why}."
 
 
 def read_index_write(body: bytes) -> IndexWriteRequest:
@@ -197,6 +195,8 @@ class IndexWriter:
                 "one with --index-folder.",
                 where={"path": "/robot"},
             )
+        if why := await self._run_in_worker(folder_trouble, robot, folder):
+            raise Conflict(f"{why} Nothing was written.", where={"path": "/robot"})
         async with self._locks[str(folder)]:
             index = await self._robots.index(robot)
             plan: WritePlan = await self._run_in_worker(

@@ -30,6 +30,7 @@ from action_assistant.umrf.facts import BadProfile, facts_of
 
 _PATIENCE_S: Final = 6.0
 _SAFE_DOMAIN: Final = 101
+_NAMED: Final = 5  # robots in one sentence
 _LAST_DOMAIN: Final = 232
 _SHM: Final = Path("/dev/shm")
 _MOUNTS: Final = Path("/proc/self/mountinfo")
@@ -71,8 +72,16 @@ async def look(
     else:
         known = {(each.domain, f"/{each.get_service.lstrip('/')}") for each in robots}
         strangers = [each for each in candidates if (each.domain, each.get_service) not in known]
-        seen += [_robot(each, standing, strangers) for each, standing in standings]
-        seen += _engines(candidates, strangers)
+        unseen = [
+            each
+            for each, standing in standings
+            if standing.state != "answering" and not standing.servers
+        ]
+        likely = _likely(unseen, strangers)
+        seen += [_robot(each, standing, likely.get(each.name, ())) for each, standing in standings]
+        seen += _engines(
+            candidates, strangers, [each for each in unseen if each.name not in likely]
+        )
     finally:
         await reach.aclose()
     return seen
@@ -219,8 +228,26 @@ async def _answering(link: Link) -> None:
             await answers.wait()
 
 
-def _robot(robot: Registration, standing: Standing, strangers: Sequence[Candidate]) -> Diagnostic:
-    """What one robot's standing means."""
+def _likely(
+    unseen: Sequence[Registration], strangers: Sequence[Candidate]
+) -> dict[str, list[Candidate]]:
+    """Return the engines on another domain that may be a robot, by its name: those that say that name, and,
+    if one robot alone is missing, those that say none."""
+    nameless = len(unseen) == 1
+    found = {
+        robot.name: [
+            each
+            for each in strangers
+            if each.domain != robot.domain
+            and (each.actor == robot.name or (nameless and not each.actor))
+        ]
+        for robot in unseen
+    }
+    return {name: each for name, each in found.items() if each}
+
+
+def _robot(robot: Registration, standing: Standing, elsewhere: Sequence[Candidate]) -> Diagnostic:
+    """What one robot's standing means. `elsewhere`: engines on another domain that may be it."""
     if standing.generation == "older":
         return found(
             "robot-older",
@@ -229,7 +256,7 @@ def _robot(robot: Registration, standing: Standing, strangers: Sequence[Candidat
             "Build its engine with temoto_msgs of March 2025 or later.",
         )
     if standing.state != "answering":
-        return _silent(robot, standing, strangers)
+        return _silent(robot, standing, elsewhere)
     deaf = [name for name in ("start", "stop") if not standing.listeners.get(name)]
     if deaf:
         return found(
@@ -243,7 +270,7 @@ def _robot(robot: Registration, standing: Standing, strangers: Sequence[Candidat
     )
 
 
-def _silent(robot: Registration, standing: Standing, strangers: Sequence[Candidate]) -> Diagnostic:
+def _silent(robot: Registration, standing: Standing, elsewhere: Sequence[Candidate]) -> Diagnostic:
     """Why a robot does not answer, as far as can be seen from here."""
     if "RMW_IMPLEMENTATION" in standing.why:
         return found(
@@ -254,9 +281,6 @@ def _silent(robot: Registration, standing: Standing, strangers: Sequence[Candida
         )
     if standing.servers:
         return found("robot-silent", robot.name, standing.why, _SILENT[standing.servers > 1])
-    elsewhere = [
-        each for each in strangers if each.domain != robot.domain and each.actor in {"", robot.name}
-    ]
     if elsewhere:
         where = " and ".join(f"{each.domain} ({each.get_service})" for each in elsewhere)
         return found(
@@ -281,8 +305,13 @@ _NOBODY: Final = (
 )
 
 
-def _engines(candidates: Sequence[Candidate], strangers: Sequence[Candidate]) -> list[Diagnostic]:
-    """Engines that nobody registered, and what is odd about any."""
+def _engines(
+    candidates: Sequence[Candidate],
+    strangers: Sequence[Candidate],
+    unseen: Sequence[Registration],
+) -> list[Diagnostic]:
+    """Engines that nobody registered, and what is odd about any. `unseen`: robots of which no engine is
+    seen; one that says no name may be any of them, which is said once, with the engine."""
     seen: list[Diagnostic] = []
     for each in candidates:
         place = f"{each.get_service}, domain {each.domain}"
@@ -293,5 +322,23 @@ def _engines(candidates: Sequence[Candidate], strangers: Sequence[Candidate]) ->
             name = f" of {each.actor}" if each.actor else ""
             what = f"An engine{name} that nobody registered answers."
             remedy = "Register it on the Robots page, or leave it alone."
+            absent = [robot.name for robot in unseen if robot.domain != each.domain]
+            if absent and not each.actor:
+                what += (
+                    " It says no name, so it may be one of the robots that are registered on another "
+                    f"domain and not seen: {_some(absent)}."
+                )
+                remedy = (
+                    "Look at the robot which name its engine was started with (--actor-name). If that is "
+                    f"registered, change its domain to {each.domain}; else register it, or leave it alone."
+                )
             seen.append(found("engine-unregistered", place, what, remedy))
     return seen or [fine("engines", "No engine that is not registered is in sight.")]
+
+
+def _some(names: Sequence[str]) -> str:
+    """Return the first names, and how many more there are."""
+    more = len(names) - _NAMED
+    if more <= 0:
+        return ", ".join(names)
+    return f"{', '.join(names[:_NAMED])} and {more} more"

@@ -39,11 +39,11 @@ def generation_of(domain: Domain, servers: tuple[Endpoint, ...]) -> Generation:
 
 
 def two_servers(place: str, count: int) -> str:
-    """Why answers on a path prove nothing."""
+    """Return why answers on a path cannot prove a stop."""
     return (
-        f"{count} engines answer on {place}, so an answer may be another's and proves nothing. Give "
-        "each engine a domain of its own (ROS_DOMAIN_ID); one that died just now is seen for up to "
-        "20 s more."
+        f"{count} engines answer on {place}. Nobody can tell which of them sent an answer, so no answer "
+        "proves a stop. Start each engine with a ROS_DOMAIN_ID of its own. An engine that has just "
+        "crashed may still be counted for up to 20 s."
     )
 
 
