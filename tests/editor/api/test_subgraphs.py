@@ -223,7 +223,10 @@ def test_actions_become_a_graph_of_their_own_and_are_unpacked_again(client: http
     maps = changed(client, again, back)
     names = {value for key, value in maps["actions"].items() if "|" not in key}
     assert names == {"A", "B", "C", "D"}
-    assert {maps["actions"][key] for key in back["actions"]} == {"B", "C"}
+    assert {maps["actions"][key]: key for key in back["actions"]} == {
+        name: known[name] for name in "BC"
+    }
+    assert keys(client, made_graph["id"]) == {name: known[name] for name in "BC"}
 
 
 def test_of_people_who_make_one_of_a_name_at_once_one_gets_it(client: httpx.Client) -> None:

@@ -46,7 +46,8 @@ def test_what_was_made_is_unpacked_to_what_there_was(what: str) -> None:
     assert list(unlike(graph, again(graph, back))) == []
     shown = {a.name: (a.position, a.extra) for a in back.graph.actions}
     assert shown == {a.name: (a.position, a.extra) for a in graph.actions}
-    assert len({a.key for a in back.graph.actions}) == len(graph.actions)
+    assert {a.key for a in back.graph.actions} == {a.key for a in graph.actions}
+    assert set(back.keys) == set(chosen)
 
 
 @pytest.mark.timeout(900)
@@ -71,6 +72,8 @@ def test_any_graph_is_made_and_unpacked_or_it_is_said_why_not() -> None:
             assert made.differences
             return
         told["back"] += 1
+        # Whoever looks at history, statistics or a comparison finds each action again.
+        assert {a.key: a.name for a in back.graph.actions} == {a.key: a.name for a in graph.actions}
         assert back.differences == made.differences or "otherwise" in {
             each.code for each in made.differences
         }
@@ -114,6 +117,17 @@ def test_one_level_unpacked_is_the_flat_graph() -> None:
 
     unpack()
     assert told["unpacked"] > told["all"] / 20
+
+
+def test_an_action_that_is_unpacked_twice_is_two_actions() -> None:
+    twice = graph_of("entry>S", "S>T", "T>exit")
+    one = unpacked(changed(twice, "T", name="S", instance_id=1), "S", TWO)
+    assert isinstance(one, Unpacked)
+    assert set(one.keys) == {action.key for action in TWO.actions}
+    two = unpacked(one.graph, "T", TWO)
+    assert isinstance(two, Unpacked)
+    assert not set(one.keys) & set(two.keys)
+    assert len({action.key for action in two.graph.actions}) == len(two.graph.actions)
 
 
 def test_of_two_places_of_one_sub_graph_only_one_is_unpacked() -> None:

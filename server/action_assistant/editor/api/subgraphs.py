@@ -97,7 +97,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         async with making:
             chosen = await _chosen(services, graph_id, data)
             found = await services.workers.files(subgraph_file, *chosen)
-            made, _ = await services.catalogue.create(found.umrf, person.id)
+            made, _ = await services.catalogue.bring(found.umrf, person.id, keys=found.keys)
         body = MadeSubGraph(made, encoded(found.changes))
         return Response(body, status_code=201, headers={"location": f"/api/graphs/{made.id}"})
 

@@ -21,7 +21,7 @@ from action_assistant.journal.journal import Journal
 from action_assistant.random_ids import random_id
 from action_assistant.schema import editor_tables
 from action_assistant.umrf.check import check
-from action_assistant.umrf.model import Action, Graph
+from action_assistant.umrf.model import Action, Graph, Key
 from action_assistant.web.auth.keys import PersonRef
 from action_assistant.web.workers.lanes import RunInWorker, run_here
 
@@ -135,10 +135,16 @@ class Catalogue:
         return await self._add(changes.first(graph), about, [made], author), None
 
     async def bring(
-        self, body: bytes, author: str, *, run_in_worker: RunInWorker | None = None
+        self,
+        body: bytes,
+        author: str,
+        *,
+        keys: tuple[Key, ...] = (),
+        run_in_worker: RunInWorker | None = None,
     ) -> tuple[GraphView, bytes]:
-        """A graph from a UMRF file. The log keeps the file as it came."""
-        found = await (run_in_worker or self._run_in_worker)(importing.imported, body)
+        """Make a graph from a UMRF file. The log keeps the file as it came. `keys`: of its actions in their
+        order, where they have some."""
+        found = await (run_in_worker or self._run_in_worker)(importing.imported, body, keys)
         about = found.about
         made = h.draft(
             h.CREATED,

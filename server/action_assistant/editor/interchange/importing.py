@@ -24,7 +24,8 @@ from action_assistant.errors import BadInput, NotUmrf, TooLarge
 from action_assistant.umrf.check import check
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.files.action_files import ACTION_DIALECTS
-from action_assistant.umrf.model import Graph, Note, Problem
+from action_assistant.umrf.hierarchy.inlining import under_keys
+from action_assistant.umrf.model import Graph, Key, Note, Problem
 
 
 class ImportReport(msgspec.Struct, frozen=True):
@@ -75,10 +76,12 @@ class ImportedFile(msgspec.Struct, frozen=True):
     about: GraphInfo
 
 
-def imported(body: bytes) -> ImportedFile:
-    """What is stored of a file. Raises BadInput, NotUmrf, TooLarge with the place."""
+def imported(body: bytes, keys: tuple[Key, ...] = ()) -> ImportedFile:
+    """Return what is stored of a file. `keys`: of its actions in their order, where they have some; else
+    they get fresh ones. Raises BadInput, NotUmrf, TooLarge with the place."""
     found = fitting(read_graph(body))
-    update = changes.first(_directed(found.graph))
+    named = dict(zip((action.key for action in found.graph.actions), keys, strict=False))
+    update = changes.first(under_keys(_directed(found.graph), named))
     refuse_too_long(update)
     told = ImportReport(found.dialect, found.notes, found.problems, found.remarks)
     about = info_of(found.graph, check(found.graph))

@@ -12,7 +12,7 @@ from action_assistant.editor.documents.contents import GraphAtSeq, read
 from action_assistant.editor.interchange.edited_text import KeyChange, key_changes
 from action_assistant.errors import Conflict, NotFound
 from action_assistant.umrf.files import codec
-from action_assistant.umrf.hierarchy.extraction import Extracted, extracted
+from action_assistant.umrf.hierarchy.extraction import Extracted, Extraction, extracted
 from action_assistant.umrf.hierarchy.reasons import FlatteningReason
 from action_assistant.umrf.hierarchy.unpacking import Unpackable, unpacked
 from action_assistant.umrf.json.embedded import UmrfGraph
@@ -59,30 +59,39 @@ class UnpackingLook(msgspec.Struct, frozen=True):
 
 
 class SubGraphFile(msgspec.Struct, frozen=True):
-    """The file of a new sub-graph, and JSON of the changes that put an action for it in its place."""
+    """The file of a new sub-graph, the keys of its actions in their order, and JSON of the changes that put
+    an action for it in its place."""
 
     umrf: bytes
+    keys: tuple[Key, ...]
     changes: bytes
 
 
 def extraction_look(sight: GraphAtSeq, chosen: ChosenActions) -> bytes:
     """JSON of an `ExtractionLook`."""
-    return msgspec.json.encode(_look(sight, chosen))
+    return msgspec.json.encode(_look(sight, _extraction(sight, chosen), chosen))
 
 
 def subgraph_file(sight: GraphAtSeq, chosen: ChosenActions) -> SubGraphFile:
     """The new graph. Raises Conflict where there is none."""
-    look = _look(sight, chosen)
+    found = _extraction(sight, chosen)
+    look = _look(sight, found, chosen)
     for reason in look.reasons:
         raise Conflict(reason.message, where={"code": reason.code})
+    assert isinstance(found, Extracted)  # else there are reasons
     for reason in () if chosen.otherwise else look.differences:
         raise Conflict(f"It may do otherwise: {reason.message}", where={"code": reason.code})
-    return SubGraphFile(msgspec.json.encode(look.umrf), msgspec.json.encode(look.changes))
+    keys = tuple(action.key for action in found.inner.actions)
+    return SubGraphFile(msgspec.json.encode(look.umrf), keys, msgspec.json.encode(look.changes))
 
 
-def _look(sight: GraphAtSeq, chosen: ChosenActions) -> ExtractionLook:
+def _extraction(sight: GraphAtSeq, chosen: ChosenActions) -> Extraction:
+    graph = read(sight).moment.graph
+    return extracted(graph, frozenset(chosen.keys), chosen.name, document.new_aid())
+
+
+def _look(sight: GraphAtSeq, found: Extraction, chosen: ChosenActions) -> ExtractionLook:
     moment = read(sight).moment
-    found = extracted(moment.graph, frozenset(chosen.keys), chosen.name, document.new_aid())
     if not isinstance(found, Extracted):
         return ExtractionLook(sight.seq, None, reasons=found.reasons)
     if chosen.taken:

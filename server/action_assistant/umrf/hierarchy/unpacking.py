@@ -39,7 +39,8 @@ Unpacking: TypeAlias = Unpacked | Unpackable
 
 def unpacked(graph: Graph, key: Key, inside: Graph) -> Unpacking:
     """The graph with the actions of `inside` in the place of the action `key`. Other sub-graphs stay
-    what they are. Keys of what is new follow from those that there are."""
+    what they are. What is new keeps the key that it has inside, so that an action which was made a
+    sub-graph and comes back is the same; where that is taken, its key follows from those that there are."""
     action = next(a for a in graph.actions if a.key == key)
     reasons = tuple(dict.fromkeys(_differences(graph, action, inside)))
     if not inside.actions or any(reason.code == "signature" for reason in reasons):
@@ -54,7 +55,7 @@ def unpacked(graph: Graph, key: Key, inside: Graph) -> Unpacking:
     taken = {a.key for a in graph.actions}
     fresh: dict[Key, Key] = {}
     for old, new in found.keys.items():
-        fresh[new] = identity((key, old), taken)
+        fresh[new] = identity((key, old), taken) if old in taken else old
         taken.add(fresh[new])
     left = (["description"] if action.description else []) + [name for name, _ in action.extra]
     return Unpacked(under_keys(found.graph, fresh), tuple(fresh.values()), reasons, tuple(left))
