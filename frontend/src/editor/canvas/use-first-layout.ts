@@ -4,7 +4,7 @@ import { arrange, isUnplaced, type Positions } from "../../canvas/geometry/arran
 import { LAYOUT_PATIENCE_MS } from "../../canvas/geometry/use-laid-out";
 import type { EditorContext } from "../../edit-actions/editor-context";
 import { freshPlaces } from "../../edit-actions/layout";
-import { moveActions } from "../../graph/edit";
+import { placeFirst } from "../../graph/edit";
 import { usePeople } from "../../sync/use-room";
 
 /** Of several pages that open it at once the others wait for one; their places would be the same. */
@@ -60,7 +60,7 @@ export function useFirstLayout(
       const earlier = people.filter(({ client }) => client < context.doc.clientID).length;
       const write = () => {
         const { doc, graph, mayEdit } = now.current.context;
-        if (mayEdit && isUnplaced(graph)) moveActions(doc, found);
+        if (mayEdit && isUnplaced(graph)) placeFirst(doc, found);
       };
       if (earlier === 0) write();
       else timer = setTimeout(write, earlier * TURN_MS);

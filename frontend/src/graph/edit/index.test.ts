@@ -25,6 +25,7 @@ import {
   moveActions,
   moveRelation,
   parametersFrom,
+  placeFirst,
   removeActions,
   removeNotes,
   removeParameter,
@@ -382,4 +383,18 @@ test("turning a graph and laying it out anew is one step of undo", () => {
   undo.redo();
   setDirection(doc, "down");
   expect(mapsOf(doc).meta.has("direction")).toBe(false);
+});
+
+test("the first layout of an import is no step of anybody's undo, and no undo takes it along", () => {
+  const doc = new Y.Doc();
+  const key = addAction(doc, { name: "Drive" });
+  const undo = undoOf(doc);
+  placeFirst(doc, [[key, [40, 60]]]);
+  expect(undo.canUndo()).toBe(false);
+  setField(doc, key, "description", "Drives");
+  undo.undo();
+  expect(actionIn(doc, key)).toMatchObject({ description: "", position: [40, 60] });
+  moveActions(doc, [[key, [80, 60]]]);
+  undo.undo();
+  expect(actionIn(doc, key)?.position).toEqual([40, 60]);
 });
