@@ -162,19 +162,19 @@ test("Enter and Escape of an input method neither write nor discard a draft", ()
 });
 
 test.each([
-  ["has no place any more", "mine", false],
-  ["does not fit when its field goes", "", true],
-])("a draft that %s is offered to its person", (_, typed, isWrong) => {
+  ["has no place any more", "gone"],
+  ["does not fit when its field goes", "unfit"],
+] as const)("a draft that %s is offered to its person", (_, why) => {
   const lost: LostDraft[] = [];
   const stop = pendingDrafts.onLost((draft) => lost.push(draft));
   onCommit.mockReturnValue(false);
-  const check = () => (isWrong ? "It never fits." : null);
+  const check = () => (why === "unfit" ? "It never fits." : null);
   render(<DraftInput of="a1" label="Name" value="old" check={check} onCommit={onCommit} />);
-  type(typed || "odd");
+  type("mine");
   act(() => root.render(null));
   stop();
-  expect(lost.map(({ text, of, written }) => ({ text, of, written }))).toEqual([
-    { text: typed || "odd", of: "a1", written: false },
+  expect(lost.map(({ text, of, why }) => ({ text, of, why }))).toEqual([
+    { text: "mine", of: "a1", why },
   ]);
   expect(pendingDrafts.counts()).toEqual({ writing: 0, waiting: 0 });
 });

@@ -4,6 +4,8 @@ import { type ComponentType, useEffect, useState } from "react";
 const levels = () => import("../../levels/levels").then((part) => part.Levels);
 const sinceMarks = () => import("../../past/since/since-marks").then((part) => part.SinceMarks);
 
+const lostDrafts = () => import("./lost-drafts").then((part) => part.LostDrafts);
+
 function QuietPart({ load }: { load: () => Promise<ComponentType> }) {
   const [Part, setPart] = useState<ComponentType | null>(null);
   useEffect(() => {
@@ -24,6 +26,7 @@ export function QuietParts() {
     <>
       <QuietPart load={levels} />
       <QuietPart load={sinceMarks} />
+      <QuietPart load={lostDrafts} />
     </>
   );
 }

@@ -23,8 +23,11 @@ export interface LostDraft {
   readonly text: string;
   /** The key of what it belongs to: an action, a note, or an arrow; null where that is unknown. */
   readonly of: string | null;
-  /** Whether it was written before: then it is lost only if its thing is. */
-  readonly written: boolean;
+  /**
+   * `gone`: there is nothing any more to write it to. `unfit`: it did not fit its field, which went.
+   * `written`: it was written, and is lost only if its thing is.
+   */
+  readonly why: "gone" | "unfit" | "written";
   /** Writes it after all, once its thing is back. Returns whether that was possible. */
   write(): boolean;
 }

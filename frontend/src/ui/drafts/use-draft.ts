@@ -51,7 +51,7 @@ export function useDraft(options: DraftOptions): DraftField {
     unwritten.current = null;
     pendingDrafts.drop(latest);
     const write = () => text === value || onCommit(text);
-    if (!write()) pendingDrafts.lose({ text, of, written: false, write });
+    if (!write()) pendingDrafts.lose({ text, of, why: "gone", write });
   }, []);
   // The field goes: because its person went on, or because a colleague took away what it belongs to.
   useEffect(
@@ -62,7 +62,8 @@ export function useDraft(options: DraftOptions): DraftField {
       const text = unwritten.current ?? (isWritten ? draft : null);
       unwritten.current = null;
       pendingDrafts.drop(latest);
-      if (text !== null) pendingDrafts.lose({ text, of, written: isWritten, write: () => false });
+      const why = isWritten ? "written" : "unfit";
+      if (text !== null) pendingDrafts.lose({ text, of, why, write: () => false });
     },
     [commit],
   );
