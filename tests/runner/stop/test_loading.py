@@ -9,13 +9,14 @@ import pytest
 
 from action_assistant.errors import Refused
 from action_assistant.runner.emulator.messages import EngineTraits, Start
-from action_assistant.runner.links.observations import ACTIVE
+from action_assistant.runner.links.observations import ACTIVE, Snapshot
 from action_assistant.runner.robots.robot_events import StopUnproven, StopWasProven
 from action_assistant.runner.runs.events import Loading, Override
 from action_assistant.runner.runs.fold import replay
+from action_assistant.runner.stop.loading import LoadingWatch
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import ENTRY, ENTRY_CONDITIONS, EXIT, Graph, Relation
-from runner.harness import ANN, BEN, GO_ON, order, sequence, until, virtual
+from runner.harness import ANN, BEN, GO_ON, at_once, order, sequence, until, virtual
 from runner.robots_in_network import LOOKED, OTHER, PATROL, RobotsInNetwork, asked, shown
 
 SECOND = {"*": [{"after_s": 1.0}]}
@@ -225,3 +226,92 @@ async def test_a_loading_time_that_a_person_has_set_lets_another_graph_start_wit
         control.stop_all(BEN)
         await until(lambda: bool(control.open[second.id].run.loading))
         assert here.nodes["David"].robot.moving == ()
+
+
+@virtual
+async def test_a_graph_that_a_quick_leaf_halts_is_open_until_what_loads_beside_it_has_run() -> None:
+    """`Work_0` starts `Work_1`, a leaf of 10 ms, and `Work_2`, which loads for 3 s."""
+    line = sequence("patrol", 4)
+    keys = [each.key for each in line.actions]
+    pairs = [(0, 1), (0, 2), (2, 3)]
+    graph = Graph(
+        name="patrol",
+        actions=line.actions,
+        relations=(
+            Relation(parent=ENTRY, child=keys[0], conditions=ENTRY_CONDITIONS),
+            *(Relation(parent=keys[a], child=keys[b], conditions=GO_ON) for a, b in pairs),
+            Relation(parent=keys[3], child=EXIT, conditions=GO_ON),
+        ),
+    )
+    script = {
+        "Work_0": [{"after_s": 0.3}],
+        "Work_1": [{"after_s": 0.01}],
+        "*": [{"load_s": 3.0, "after_s": 1.0}],
+    }
+    here = scene(0.001, script)
+    async with here.played() as control:
+        run = (await control.start(order(graph, engine="David"), ANN)).run.id
+        await until(lambda: control.open[run].run.graph_state == "HALTED")
+        await anyio.sleep(2.0)
+        told = shown(control, run)
+        assert (told.state, told.ended_at) == ("unknown", None)
+        assert told.unconfirmed.startswith("Work_2 may still be loading")
+        await until(lambda: here.nodes["David"].robot.moving == ("patrol",))
+        await until(lambda: run not in control.open)
+        assert here.nodes["David"].robot.moving == ()
+        ended = await control.find(run)
+        assert (ended.state, ended.actions["Work_3"].state) == ("halted", "UNINITIALIZED")
+
+
+async def _loading_in(watch: LoadingWatch, *shown: Snapshot, **graphs: Graph) -> list[str]:
+    texts = {name: codec.write(each) for name, each in graphs.items()}
+    watch.see(shown)
+    await watch.read(watch.unread(shown), texts, at_once)
+    return [f"{each.graph}/{each.node}" for each in watch.actions(shown)]
+
+
+def _look(graph: str, state: str, **nodes: str) -> Snapshot:
+    return Snapshot(at=1, asked_at=1, graph=graph, state=state, nodes=nodes)
+
+
+@virtual
+async def test_an_action_of_a_sub_graph_may_be_loading_too() -> None:
+    own = _look("g", "STOPPED", Part_0="FINISHED")
+    inside = _look("g__Part__0", "STOPPED", Work_0="UNINITIALIZED", Work_1="UNINITIALIZED")
+    found = await _loading_in(LoadingWatch("g"), own, inside, g__Part__0=sequence("Part", 2))
+    assert found == ["g__Part__0/Work_0"]
+
+
+@virtual
+async def test_an_end_of_a_sub_graph_counts_only_once_the_graph_around_it_has_left_running() -> (
+    None
+):
+    """Until then the sub-graph may be begun anew: what was seen of it is of another lap."""
+    graphs = {"g__Part__0": sequence("Part", 2)}
+    first = _look("g__Part__0", "STOPPING", Work_0="STOPPING", Work_1="UNINITIALIZED")
+    last = _look("g__Part__0", "STOPPED", Work_0="FINISHED", Work_1="UNINITIALIZED")
+    own = _look("g", "STOPPED", Part_0="FINISHED")
+    within = LoadingWatch("g")
+    within.see((_look("g", "RUNNING", Part_0="RUNNING"), first))
+    assert await _loading_in(within, own, last, **graphs) == ["g__Part__0/Work_1"]
+    after = LoadingWatch("g")
+    after.see((_look("g", "STOPPING", Part_0="STOPPING"), first))
+    assert await _loading_in(after, own, last, **graphs) == []
+
+
+@virtual
+async def test_of_a_graph_that_cannot_be_read_whoever_has_not_begun_may_be_loading() -> None:
+    own = _look("g", "STOPPED", Work_0="FINISHED", Work_1="UNINITIALIZED", Work_2="UNINITIALIZED")
+    assert await _loading_in(LoadingWatch("g"), own) == ["g/Work_1", "g/Work_2"]
+
+
+@virtual
+async def test_feedback_that_says_how_a_graph_ended_takes_nothing_away() -> None:
+    """Anybody may publish it; seed 621 of the random histories did."""
+    own = _look("g", "STOPPED", Work_0="UNINITIALIZED", Work_1="UNINITIALIZED")
+    made_up = msgspec.structs.replace(
+        _look("g", "FINISHED", Work_0="FINISHED", Work_1="FINISHED"), source="feedback"
+    )
+    watch = LoadingWatch("g")
+    watch.see((made_up,))
+    assert await _loading_in(watch, own, g=sequence("g", 2)) == ["g/Work_0"]

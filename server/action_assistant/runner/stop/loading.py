@@ -176,10 +176,12 @@ def _is_open(shown: Snapshot) -> bool:
 
 
 def _and(seen: SeenAfter, shown: Snapshot) -> SeenAfter:
+    """Add one look. Anybody may publish feedback that says how a graph ended: only an answer counts."""
+    has_ended = shown.source == "get" and shown.state in _DRAINED
     return SeenAfter(
         active=seen.active.union(node for node, state in shown.nodes.items() if state in ACTIVE),
         idle=seen.idle.union(node for node, state in shown.nodes.items() if state in NEVER_BEGAN),
-        drained=seen.drained or shown.state in _DRAINED,
+        drained=seen.drained or has_ended,
     )
 
 
