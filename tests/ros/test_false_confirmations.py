@@ -205,8 +205,9 @@ class Story:
         run = opened.run
         if run.state in STILL and run.incarnation is not None and run.id not in self.judged:
             self.judged.add(run.id)
-            self.still.add(run.id)
-            self.compare()
+            if run.at_rest is None:  # else a person has said so, who cannot see what still loads
+                self.still.add(run.id)
+                self.compare()
 
     def compare(self) -> None:
         for run in self.moving() & self.still:

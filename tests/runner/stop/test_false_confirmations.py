@@ -246,7 +246,7 @@ class Story:
         if run.id not in self.judged:
             self.judged.add(run.id)
             where = self.moving().get(run.id)
-            if where is not None:
+            if where is not None and run.at_rest is None:  # else a person has said so
                 self.false.append(f"{run.state} at {now()}: {where} moves")
             elif run.id not in self.replayed | self.looked:
                 self.still[run.id] = now()
