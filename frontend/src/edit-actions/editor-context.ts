@@ -66,6 +66,13 @@ export type Overlay =
   | { readonly kind: "extract"; readonly actions: readonly Key[] }
   /** The actions of the graph for which this one stands, in its place. */
   | { readonly kind: "unpack"; readonly action: Key }
+  /** The graph is called otherwise now, and others have actions that stand for it under the old name. */
+  | {
+      readonly kind: "renamed";
+      readonly before: string;
+      readonly name: string;
+      readonly uses: readonly string[];
+    }
   | { readonly kind: "palette" }
   | { readonly kind: "keys" };
 

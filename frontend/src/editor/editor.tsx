@@ -15,6 +15,7 @@ import {
   useEditorContext,
 } from "../edit-actions/editor-context";
 import { useShortcuts } from "../edit-actions/keys/shortcuts";
+import { useRenameGraph } from "../edit-actions/rename-graph";
 import type { NewAction } from "../graph/edit";
 import type { Graph, Key } from "../graph/model";
 import type { ToldProblem } from "../graph/problems/told-problems";
@@ -222,9 +223,10 @@ function barParts(
   shown: Shown,
   told: readonly ToldProblem[],
   search: string,
+  rename: (name: string) => boolean,
 ): EditorBarParts {
   return {
-    crumbs: crumbsOf(context, search),
+    crumbs: crumbsOf(context, search, rename),
     status: (
       <>
         <PartBoundary waiting={null}>
@@ -281,6 +283,7 @@ export function Editor(props: Props) {
   const { context, adding, overlay, ...editor } = useEditor(id, panels.onPanel, past);
   const link = useThrottledLink();
   const search = useSearch();
+  const rename = useRenameGraph(context);
   const { problems, told, marks } = useToldProblems(id, link.seq, context.graph);
   const threads = useThreads();
   useOpenThreadsOnCards(threads);
@@ -341,7 +344,7 @@ export function Editor(props: Props) {
   };
   return (
     <EditorContextProvider context={context}>
-      {props.bar(barParts(props, context, shown, told, search))}
+      {props.bar(barParts(props, context, shown, told, search, rename))}
       {phone ? (
         <PhoneLayout {...parts} onCanvas={aside} start={() => props.start(shown)} />
       ) : (

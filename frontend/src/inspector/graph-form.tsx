@@ -2,7 +2,8 @@
 import { add, connectTo, palette, removeSelection, showShortcuts, undo } from "../edit-actions/all";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { FirstShortcut } from "../edit-actions/keys/shortcut-keys";
-import { setGraphDescription, setGraphName } from "../graph/edit";
+import { useRenameGraph } from "../edit-actions/rename-graph";
+import { setGraphDescription } from "../graph/edit";
 import { DraftInput } from "../ui/draft-input";
 import { useHasFingersOnly } from "../ui/hooks/use-screen-size";
 import { SharedField } from "./fields/shared-field";
@@ -11,7 +12,9 @@ import style from "./inspector.module.css";
 import { LabelsField } from "./labels-field";
 
 export function GraphForm() {
-  const { doc, graph } = useEditorContext();
+  const context = useEditorContext();
+  const { doc, graph } = context;
+  const rename = useRenameGraph(context);
   const arrows = graph.relations.length;
   return (
     <div className={style.form} data-form="graph">
@@ -20,7 +23,8 @@ export function GraphForm() {
           label="Graph"
           value={graph.name}
           check={(draft) => (draft.trim() === "" ? "A graph has a name." : null)}
-          onCommit={(name) => setGraphName(doc, name.trim())}
+          onCommit={(name) => rename(name.trim())}
+          onLeaving
         />
       </SharedField>
       <SharedField of="graph" field="description">

@@ -6,6 +6,7 @@ import { useEffect, useSyncExternalStore } from "react";
 import { Link } from "wouter";
 import { useLibrary } from "../api/documents/library";
 import { graphsInside } from "../canvas/levels/graphs-inside";
+import { usedIn } from "../canvas/levels/used-in";
 import { useEditorContext } from "../edit-actions/editor-context";
 import style from "./levels.module.css";
 
@@ -15,8 +16,7 @@ function useUsedIn(): readonly string[] {
   const { data: actions = [] } = useLibrary();
   const { subscribe, now } = graphsInside;
   const stands = useSyncExternalStore(subscribe, () => now()?.isNamed ?? false);
-  const found = actions.find(({ name, document }) => document === null && name === graph.name);
-  return stands ? (found?.used_in ?? []).filter((each) => each !== id) : [];
+  return stands ? usedIn(actions, { id, name: graph.name }) : [];
 }
 
 const MANY = 2; // graphs around that change with this one

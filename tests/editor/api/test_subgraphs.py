@@ -229,6 +229,29 @@ def test_actions_become_a_graph_of_their_own_and_are_unpacked_again(client: http
     assert keys(client, made_graph["id"]) == {name: known[name] for name in "BC"}
 
 
+def test_where_a_renamed_graph_is_used_the_actions_follow_by_one_edit_each(
+    client: httpx.Client,
+) -> None:
+    inner = made(client, "Lift", "A")
+    uses = [made(client, "Round", "Lift", "B"), made(client, "Other", "Lift")]
+    stranger = made(client, "Stranger", "C")
+    before = [keys(client, graph) for graph in uses]
+    assert client.patch(f"/api/graphs/{inner}", json={"name": "LiftSafely"}).status_code == 200
+    seqs = [client.get(f"/api/graphs/{graph}").json()["seq"] for graph in uses]
+    body = {"before": "Lift", "name": "LiftSafely", "graphs": [*uses, stranger]}
+    answer = client.post(f"/api/graphs/{inner}/uses", json=body)
+    assert (answer.status_code, answer.json()) == (200, {"changed": uses})
+    for graph, was, seq in zip(uses, before, seqs, strict=True):
+        assert keys(client, graph)["LiftSafely"] == was["Lift"]
+        assert client.get(f"/api/graphs/{graph}").json()["seq"] == seq + 1
+        inside = client.get(f"/api/graphs/{graph}/subgraphs").json()["subgraphs"]
+        assert [each["graph"] for each in inside] == [inner]
+    again = client.post(f"/api/graphs/{inner}/uses", json=body)
+    assert again.json() == {"changed": []}
+    gone = client.post(f"/api/graphs/{inner}/uses", json=body | {"graphs": [uses[0], "nowhere"]})
+    assert gone.status_code == 404
+
+
 def test_of_people_who_make_one_of_a_name_at_once_one_gets_it(client: httpx.Client) -> None:
     tasks = [
         client.post("/api/graphs", json=line(f"T{i}", "A", "B", "C")).json()["id"] for i in range(4)

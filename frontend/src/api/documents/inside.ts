@@ -26,6 +26,15 @@ export async function fetchInside(
   return insideOf(await fetchJson<EditorApi["InsideView"]>(route, { ...(signal && { signal }) }));
 }
 
+/** Gives the actions that stand for a graph in these others its new name. Answers where there were some. */
+export function callUses(
+  graph: string,
+  uses: EditorApi["CallingUses"],
+): Promise<EditorApi["CalledUses"]> {
+  const route = `/api/graphs/${encodeURIComponent(graph)}/uses`;
+  return fetchJson(route, { method: "POST", body: uses, timeoutMs: 60_000 });
+}
+
 const flatRoute = (graph: string): string => `/api/graphs/${encodeURIComponent(graph)}/flat`;
 
 /** A graph and those inside of it as one graph that does the same, or why there is none. */

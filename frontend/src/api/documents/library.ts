@@ -22,10 +22,14 @@ export type UpdatedUse = EditorApi["UpdatedGraph"];
 const below = (id: string) => `/api/actions/${encodeURIComponent(id)}`;
 
 /** Every action of the library, and what else graphs use, by name. */
+export function fetchLibrary(signal?: AbortSignal): Promise<LibraryAction[]> {
+  return fetchJson("/api/actions", { ...(signal && { signal }) });
+}
+
 export function useLibrary() {
   return useQuery({
     queryKey: queryKeys.actions,
-    queryFn: ({ signal }) => fetchJson<LibraryAction[]>("/api/actions", { signal }),
+    queryFn: ({ signal }) => fetchLibrary(signal),
     refetchInterval: 15_000,
   });
 }

@@ -179,6 +179,22 @@ export interface EditorApi {
         errors: EditorApi["BuildFault"][];
     };
     /**
+     * CalledUses
+     * @description The graphs in which an action was called otherwise, each by one edit.
+     */
+    CalledUses: {
+        changed: string[];
+    };
+    /**
+     * CallingUses
+     * @description In which graphs the actions called `before` stand for a graph that is called `name` now.
+     */
+    CallingUses: {
+        before: string;
+        name: string;
+        graphs: string[];
+    };
+    /**
      * Changes
      * @description What somebody changed, as a difference, with at most 30 things of a kind and how many more there are.
      *     `comments`: threads in which something was said.

@@ -2,11 +2,14 @@
 import { NameOfGraph } from "../../canvas/levels/graphs-inside";
 import { addressAround, levelsOf } from "../../canvas/levels/level-path";
 import type { EditorContext } from "../../edit-actions/editor-context";
-import { setGraphName } from "../../graph/edit";
 import { endName } from "../../graph/relation-words";
 import type { Crumb } from "../../ui/top-bar";
 
-export function crumbsOf(context: EditorContext, search: string): Crumb[] {
+export function crumbsOf(
+  context: EditorContext,
+  search: string,
+  rename: (name: string) => boolean,
+): Crumb[] {
   const [only, ...others] = context.selection;
   const action = context.graph.actions.find(({ key }) => key === only);
   return [
@@ -17,9 +20,7 @@ export function crumbsOf(context: EditorContext, search: string): Crumb[] {
     })),
     {
       label: context.graph.name || "Untitled",
-      ...(context.mayEdit && {
-        rename: (name: string) => setGraphName(context.doc, name),
-      }),
+      ...(context.mayEdit && { rename }),
     },
     ...(action && others.length === 0
       ? [{ label: endName(context.graph, action.key), part: true }]

@@ -1,6 +1,7 @@
 /** What opens over the editor, one at a time: menus, the palette, dialogs of single edit actions. */
 
 import { useEffect } from "react";
+import { graphsInside } from "../../canvas/levels/graphs-inside";
 import type { EditorContext, Overlay } from "../../edit-actions/editor-context";
 import type { NewAction } from "../../graph/edit";
 import { lazyPart } from "../../ui/parts/lazy-part";
@@ -22,6 +23,9 @@ const ExtractDialog = lazyPart(() =>
 );
 const UnpackDialog = lazyPart(() =>
   import("../../levels/unpack-dialog").then((part) => part.UnpackDialog),
+);
+const RenamedUses = lazyPart(() =>
+  import("../../canvas/levels/renamed-uses").then((part) => part.RenamedUses),
 );
 const GraphPrint = lazyPart(() => import("./graph-print").then((part) => part.GraphPrint));
 const PackagesDialog = lazyPart(() =>
@@ -80,6 +84,13 @@ function Opened({ context, known, overlay, onClose }: Props) {
       return <ExtractDialog context={context} {...overlay} onClose={onClose} />;
     case "unpack":
       return <UnpackDialog context={context} {...overlay} onClose={onClose} />;
+    case "renamed": {
+      const uses = overlay.uses.map((id) => ({
+        id,
+        name: graphsInside.now()?.names.get(id) ?? "",
+      }));
+      return <RenamedUses graph={context.id} {...overlay} uses={uses} onClose={onClose} />;
+    }
     case "palette":
       return <CommandPalette context={context} onClose={onClose} />;
     case "keys":

@@ -3,11 +3,13 @@ import { Button, Menu } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconCopy, IconDots, IconPencil, IconShare3, IconTrash } from "@tabler/icons-react";
 import { type QueryClient, useQueryClient } from "@tanstack/react-query";
-import { useState } from "react";
+import { type ComponentProps, useState } from "react";
+import { fetchLibrary } from "../../api/documents/library";
 import {
   deleteGraph,
   duplicateGraph,
   type GraphSummary,
+  queryKeys,
   recoverGraph,
   refreshGraphs,
   renameGraph,
@@ -15,6 +17,7 @@ import {
 import { errorText } from "../../api/http";
 import { serverPath } from "../../api/page-url";
 import { useMay } from "../../api/use-person";
+import { usedIn } from "../../canvas/levels/used-in";
 import { lazyPart } from "../../ui/parts/lazy-part";
 import { OverlayBoundary } from "../../ui/parts/part-boundary";
 import style from "./home.module.css";
@@ -65,10 +68,31 @@ function offerBack(client: QueryClient, graph: GraphSummary): void {
 
 const RenameDialog = lazyPart(() => import("./rename-dialog").then((part) => part.RenameDialog));
 
+const RenamedUses = lazyPart(() =>
+  import("../../canvas/levels/renamed-uses").then((part) => part.RenamedUses),
+);
+
+type Renamed = Pick<ComponentProps<typeof RenamedUses>, "before" | "name" | "uses">;
+
 export function GraphMenu({ graph, names }: { graph: GraphSummary; names: readonly string[] }) {
   const client = useQueryClient();
   const mayEdit = useMay("edit");
   const [renaming, setRenaming] = useState<boolean | null>(null);
+  const [renamed, setRenamed] = useState<Renamed | null>(null);
+  const rename = async (name: string) => {
+    const graphs = client.getQueryData<GraphSummary[]>(queryKeys.graphs) ?? [];
+    const named = new Map(graphs.map((each) => [each.id, each.name]));
+    // Where several graphs have the name it may stand for another of them: the check tells that.
+    const isOnly = graphs.filter((each) => each.name === graph.name).length === 1;
+    let uses: Renamed["uses"] = [];
+    const done = await attempt(client, "Not renamed", async () => {
+      const ids = isOnly ? usedIn(await fetchLibrary(), graph) : [];
+      uses = ids.map((id) => ({ id, name: named.get(id) ?? "" }));
+      await renameGraph(graph.id, name);
+    });
+    if (done && uses.length > 0) setRenamed({ before: graph.name, name, uses });
+    return done;
+  };
   const duplicate = () =>
     attempt(client, "Not duplicated", () => duplicateGraph(graph.id, copyName(graph.name, names)));
   const remove = async () => {
@@ -123,8 +147,11 @@ export function GraphMenu({ graph, names }: { graph: GraphSummary; names: readon
             graph={graph}
             opened={renaming}
             onClose={() => setRenaming(false)}
-            onRename={(name) => attempt(client, "Not renamed", () => renameGraph(graph.id, name))}
+            onRename={rename}
           />
+        )}
+        {renamed !== null && (
+          <RenamedUses graph={graph.id} {...renamed} onClose={() => setRenamed(null)} />
         )}
       </OverlayBoundary>
     </>

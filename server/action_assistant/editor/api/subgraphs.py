@@ -1,7 +1,7 @@
 """Routes that make a sub-graph of chosen actions, and unpack one again."""
 
 import asyncio
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
 from litestar import Request, Response, post
@@ -51,6 +51,20 @@ class UnpackingAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     action: Key
     seq: int | None = None
     at: Position | None = None
+
+
+class CallingUses(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """In which graphs the actions called `before` stand for a graph that is called `name` now."""
+
+    before: str
+    name: str
+    graphs: Annotated[tuple[str, ...], msgspec.Meta(max_length=1000)]
+
+
+class CalledUses(msgspec.Struct, frozen=True):
+    """The graphs in which an action was called otherwise, each by one edit."""
+
+    changed: tuple[str, ...]
 
 
 async def _chosen(
@@ -124,4 +138,21 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         )
         return look
 
-    return [look_at_extraction, make_subgraph, look_at_unpacking]
+    @post(
+        "/api/graphs/{graph_id:str}/uses",
+        status_code=200,
+        summary="Give the actions that stand for a graph in others its new name",
+        operation_id="callUses",
+        guards=[Needs("edit")],
+    )
+    async def call_uses(
+        graph_id: str, request: Request[Any, Any, Any], data: CallingUses
+    ) -> CalledUses:
+        services, person = app_state.services, person_of(request)
+        await services.people.seen(person)
+        await services.catalogue.require(graph_id, "graph")
+        return CalledUses(
+            await services.catalogue.call_uses(data.graphs, data.before, data.name, person.id)
+        )
+
+    return [look_at_extraction, make_subgraph, look_at_unpacking, call_uses]

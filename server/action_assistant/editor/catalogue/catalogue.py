@@ -1,6 +1,6 @@
 """The graphs that there are, and the documents of the library's actions: made, imported, named, deleted and brought back."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from datetime import datetime
 from typing import Any, Final
 
@@ -173,6 +173,24 @@ class Catalogue:
                 run_in_worker=self._run_in_worker,
             )
             return await self.get(graph)
+
+    async def call_uses(
+        self, graphs: Collection[str], before: str, name: str, author: str
+    ) -> tuple[str, ...]:
+        """Give the actions called `before` of these graphs another name, one edit for each graph, since the
+        graph for which they stand is called so now. Return the graphs that had one. Raises NotFound, before
+        anything is written, where one of the graphs is gone."""
+        new_name, _ = fit(name, "")
+        for graph in graphs:
+            await self.require(graph, "graph")
+        changed: list[str] = []
+        for graph in dict.fromkeys(graphs):
+            async with self._rooms.enter(h.graph_stream(graph)) as room:
+                if await server_edits.call_actions(
+                    room, author, before, new_name, run_in_worker=self._run_in_worker
+                ):
+                    changed.append(graph)
+        return tuple(changed)
 
     async def delete(self, graph: str, author: str) -> None:
         """Take a graph out of sight; everyone in it has to leave."""

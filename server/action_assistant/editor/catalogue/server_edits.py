@@ -1,6 +1,6 @@
 """Edits that the server makes itself: on a copy, entering the room as the difference (rule R9)."""
 
-from action_assistant.editor.interchange.changes import renaming, restoring
+from action_assistant.editor.interchange.changes import calling_actions, renaming, restoring
 from action_assistant.editor.log.graph_events import DocumentKind
 from action_assistant.editor.rooms.room import Room
 from action_assistant.web.workers.lanes import RunInWorker, run_here
@@ -19,6 +19,15 @@ async def rename(
     state = await room.look(lambda replica, _: replica.doc.get_update())
     update = await run_in_worker(renaming, state, name, description, kind)
     return await room.submit(update, author)
+
+
+async def call_actions(
+    room: Room, author: str, before: str, name: str, *, run_in_worker: RunInWorker = run_here
+) -> bool:
+    """Give every action called `before` another name, as one edit. Return whether there was one."""
+    state, seq = await room.look(lambda replica, seq: (replica.doc.get_update(), seq))
+    update = await run_in_worker(calling_actions, state, before, name)
+    return await room.submit(update, author) > seq
 
 
 async def restore(

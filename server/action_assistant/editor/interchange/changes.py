@@ -5,7 +5,7 @@ from typing import Any
 
 from msgspec import UNSET
 from msgspec.structs import replace
-from pycrdt import Doc, merge_updates
+from pycrdt import Doc, Map, merge_updates
 
 from action_assistant.editor.crdt.messages import NOTHING_NEW
 from action_assistant.editor.documents import document
@@ -67,6 +67,20 @@ def renaming(
         return replace(old, name=name_now, actions=actions)
 
     return editing(state, renamed)
+
+
+def calling_actions(state: bytes, before: str, name: str) -> bytes:
+    """Return the update that gives every action called `before` this name, key by key. Numbers that
+    collide are told apart by the reader."""
+
+    def edit(doc: Doc[Any]) -> None:
+        actions = doc.get("actions", type=Map)
+        with doc.transaction():
+            for action in document.read(doc).actions:
+                if action.name == before and not action.missing:
+                    actions[action.key] = name
+
+    return difference(state, edit)
 
 
 def editing(state: bytes, edit: Callable[[Graph], Graph]) -> bytes:

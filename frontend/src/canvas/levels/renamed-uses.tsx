@@ -1,0 +1,79 @@
+/** Asks, once a graph is called otherwise, whether the actions that stand for it in others follow. */
+import { Button, Checkbox, Group, Modal, Stack } from "@mantine/core";
+import { notifications } from "@mantine/notifications";
+import { useState } from "react";
+import { callUses } from "../../api/documents/inside";
+import { errorText } from "../../api/http";
+
+export interface RenamedUse {
+  readonly id: string;
+  readonly name: string;
+}
+
+interface Props {
+  /** The graph that was renamed. */
+  graph: string;
+  before: string;
+  name: string;
+  /** The graphs with an action of the old name. */
+  uses: readonly RenamedUse[];
+  onClose: () => void;
+}
+
+const counted = (n: number) => (n === 1 ? "1 graph" : `${n} graphs`);
+
+export function RenamedUses({ graph, before, name, uses, onClose }: Props) {
+  const [left, setLeft] = useState<ReadonlySet<string>>(new Set());
+  const [busy, setBusy] = useState(false);
+  const [wrong, setWrong] = useState("");
+  const chosen = uses.filter(({ id }) => !left.has(id));
+  const flip = (id: string) => {
+    const next = new Set(left);
+    if (!next.delete(id)) next.add(id);
+    setLeft(next);
+  };
+  const change = async () => {
+    setBusy(true);
+    try {
+      const graphs = chosen.map(({ id }) => id);
+      const { changed } = await callUses(graph, { before, name, graphs });
+      notifications.show({ message: `Changed in ${counted(changed.length)}, too.` });
+      onClose();
+    } catch (error) {
+      setWrong(errorText(error));
+      setBusy(false);
+    }
+  };
+  return (
+    <Modal opened onClose={onClose} title="Change its name in other graphs, too?" size="30rem">
+      <Stack gap="sm">
+        <p>
+          <bdi>“{before}”</bdi> is called <bdi>“{name}”</bdi> now. Actions called{" "}
+          <bdi>“{before}”</bdi> stand for it in {counted(uses.length)}; left as they are, they stand
+          for no graph any more.
+        </p>
+        {uses.map((use) => (
+          <Checkbox
+            key={use.id}
+            label={<bdi>{use.name || "Untitled"}</bdi>}
+            checked={!left.has(use.id)}
+            onChange={() => flip(use.id)}
+          />
+        ))}
+        {wrong !== "" && <p role="alert">{wrong}</p>}
+        <Group justify="flex-end">
+          <Button onClick={onClose}>Leave them</Button>
+          <Button
+            variant="filled"
+            data-autofocus
+            loading={busy}
+            disabled={chosen.length === 0}
+            onClick={() => void change()}
+          >
+            Change in {counted(chosen.length)}
+          </Button>
+        </Group>
+      </Stack>
+    </Modal>
+  );
+}
