@@ -30,16 +30,27 @@ function importsOf(file: string): string[] {
 }
 const imports = new Map(files.map((file) => [file, importsOf(file)]));
 
-const BELOW_EDITOR = ["graph", "ui", "api", "status", "canvas", "sync", "dry-run", "edit-actions"];
+const BELOW_EDITOR = [
+  "clock",
+  "graph",
+  "ui",
+  "api",
+  "status",
+  "canvas",
+  "sync",
+  "dry-run",
+  "edit-actions",
+];
 /** What each folder may import besides itself: what stands above it here, as far as it needs that. */
 const LAYERS: Readonly<Record<string, readonly string[]>> = {
+  clock: [],
   graph: [],
-  ui: [],
-  api: ["graph"],
+  ui: ["clock"],
+  api: ["clock", "graph"],
   offline: ["api"],
-  status: ["graph", "ui", "api"],
-  canvas: ["graph", "ui", "api", "status"],
-  sync: ["graph", "api"],
+  status: ["clock", "graph", "ui", "api"],
+  canvas: ["clock", "graph", "ui", "api", "status"],
+  sync: ["clock", "graph", "api"],
   "dry-run": ["graph", "api", "status"],
   "edit-actions": ["graph", "ui", "api", "canvas", "dry-run"],
   history: ["graph", "ui", "api"],
@@ -62,9 +73,9 @@ const LAYERS: Readonly<Record<string, readonly string[]>> = {
     "levels",
   ]),
   // Features of their own know neither the editor nor each other.
-  runs: ["graph", "ui", "api", "status", "canvas"],
-  review: ["graph", "ui", "api", "status", "canvas", "history"],
-  robots: ["ui", "api", "status"],
+  runs: ["clock", "graph", "ui", "api", "status", "canvas"],
+  review: ["clock", "graph", "ui", "api", "status", "canvas", "history"],
+  robots: ["clock", "ui", "api", "status"],
   library: ["graph", "ui", "api", "status", "canvas"],
   // The page of actions is an editor of its own, with the same forms and rooms.
   actions: [...BELOW_EDITOR, "people", "comments", "history", "inspector", "packages"].concat([
@@ -72,16 +83,19 @@ const LAYERS: Readonly<Record<string, readonly string[]>> = {
     "library",
   ]),
   account: ["ui", "api"],
-  administration: ["ui", "api"],
-  app: ["graph", "ui", "api", "status", "offline", "canvas", "sync", "dry-run", "editor"].concat([
-    "runs",
-    "review",
-    "robots",
-    "library",
-    "actions",
-    "account",
-    "administration",
-  ]),
+  administration: ["clock", "ui", "api"],
+  app: [
+    "clock",
+    "graph",
+    "ui",
+    "api",
+    "status",
+    "offline",
+    "canvas",
+    "sync",
+    "dry-run",
+    "editor",
+  ].concat(["runs", "review", "robots", "library", "actions", "account", "administration"]),
 };
 
 test("folders import only what lies below them", () => {
@@ -129,6 +143,21 @@ test("what only tests need is imported by tests only", () => {
       topOf(file) !== "testing" && (imports.get(file) ?? []).some((t) => topOf(t) === "testing"),
   );
   expect(wrong).toEqual([]);
+});
+
+/** Who may ask the browser for the time beside the clock, and why. */
+const OWN_TIME: Readonly<Record<string, string>> = {
+  "graph/edit/undo-history.ts":
+    "joins changes within half a second, and graph/ knows nothing of servers",
+};
+
+test("only the clock asks the browser for the time: everything else would be by one that may be hours off", () => {
+  const asks =
+    /\bDate\.now\b|\bnew Date\(\)|\bDate\(\)|\bperformance\.(now|timeOrigin)\b|\.(data|error)UpdatedAt\b/;
+  const found = modules.filter((file) => topOf(file) !== "testing" && asks.test(textOf(file)));
+  const others = found.filter((file) => file !== "clock/server-clock.ts" && !(file in OWN_TIME));
+  expect(others).toEqual([]);
+  expect(Object.keys(OWN_TIME).filter((file) => !found.includes(file))).toEqual([]);
 });
 
 test("nothing is put where the browser lets nobody press STOP: above every layer, or as the whole screen", () => {

@@ -2,7 +2,7 @@
 import { Button, Loader } from "@mantine/core";
 import { IconStethoscope } from "@tabler/icons-react";
 import { errorText } from "../api/http";
-import { useNow } from "../ui/times";
+import { useTick } from "../ui/times";
 import style from "./administration.module.css";
 import { type Finding, type LastExamination, span, useExamination } from "./status";
 
@@ -55,7 +55,7 @@ function Looking({ last, seconds }: { last: LastExamination | undefined; seconds
 
 export function Findings() {
   const { last, heardAt, error, look } = useExamination();
-  const now = useNow();
+  const now = useTick();
   const found = last?.found;
   const running = last?.running_s ?? null;
   const sorted = ORDER.flatMap(

@@ -1,5 +1,7 @@
 /** One of the two processes: whether it can do its work, and what it takes. */
+
 import { errorText } from "../api/http";
+import { serverNow } from "../clock/server-clock";
 import { ago, instant } from "../ui/times";
 import style from "./administration.module.css";
 import { Facts, type StatusFact } from "./facts";
@@ -114,7 +116,7 @@ export function ProcessCard({ title, asked: { data, error } }: Props) {
       {error && (
         <p className={style.refused} role="alert">
           {errorText(error)}
-          {data && ` What stands below was so ${ago(instant(data.at) ?? 0, Date.now())}.`}
+          {data && ` What stands below was so ${ago(instant(data.at) ?? 0, serverNow())}.`}
         </p>
       )}
       {data && <Lacking status={data} />}

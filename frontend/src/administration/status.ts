@@ -1,7 +1,9 @@
 /** How both processes are, and what `doctor` finds: for owners. */
+
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
 import { fetchJson } from "../api/http";
 import type { EditorApi } from "../api/schema/editor";
+import { tick } from "../clock/server-clock";
 
 export type ProcessStatus = EditorApi["ProcessStatus"];
 export type Backups = EditorApi["BackupsShown"];
@@ -26,11 +28,11 @@ export type LastExamination = EditorApi["LastExamination"];
 
 const LAST = ["doctor", "last"];
 
-const examined = (look: boolean, signal?: AbortSignal) =>
-  fetchJson<LastExamination>(`/api/doctor/last${look ? "?look=true" : ""}`, {
-    ...(signal && { signal }),
-    timeoutMs: 10_000,
-  });
+async function examined(look: boolean, signal?: AbortSignal) {
+  const path = `/api/doctor/last${look ? "?look=true" : ""}`;
+  const options = { ...(signal && { signal }), timeoutMs: 10_000 };
+  return { last: await fetchJson<LastExamination>(path, options), heardAt: tick() };
+}
 
 /** What the last look found, at once; while another look goes on, how long it has been. A look takes seconds and
  * starts programs, so it is begun only when somebody asks. */
@@ -39,7 +41,7 @@ export function useExamination() {
   const query = useQuery({
     queryKey: LAST,
     queryFn: ({ signal }) => examined(false, signal),
-    refetchInterval: ({ state }) => (state.data?.running_s == null ? false : 1_000),
+    refetchInterval: ({ state }) => (state.data?.last.running_s == null ? false : 1_000),
     retry: false,
   });
   const look = useMutation({
@@ -47,8 +49,9 @@ export function useExamination() {
     onSuccess: (begun) => client.setQueryData(LAST, begun),
   });
   return {
-    last: query.data,
-    heardAt: query.dataUpdatedAt,
+    last: query.data?.last,
+    /** The tick at which that was heard. */
+    heardAt: query.data?.heardAt ?? 0,
     error: query.error ?? look.error,
     look: look.mutate,
   };

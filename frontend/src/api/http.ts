@@ -1,5 +1,6 @@
 /** Requests to editor and runner, and how they refuse. */
 
+import { hearAnswer, tick } from "../clock/server-clock";
 import { serverPath } from "./page-url";
 import type { EditorApi } from "./schema/editor";
 import { sessionEnd } from "./session-end";
@@ -119,7 +120,9 @@ async function send(url: string, ask: RequestOptions): Promise<Response> {
     init.body = typeof ask.body === "string" ? ask.body : JSON.stringify(ask.body);
   }
   try {
+    const asked = tick();
     const response = await fetch(isEditor ? serverPath(url) : url, init);
+    if (isEditor) hearAnswer(response.headers.get("date"), asked); // others hide it from this page
     if (response.status === 401) void heard401(isEditor);
     return response;
   } catch (error) {

@@ -1,4 +1,5 @@
 /** The editor of a graph with the list on its left and its runs below. */
+
 import { memo, type ReactNode, useEffect, useMemo, useRef, useState } from "react";
 import { Redirect, useSearch } from "wouter";
 import { type GraphAsAction, useGraphsAsActions } from "../api/documents/library";
@@ -8,6 +9,7 @@ import { useLive } from "../api/live/use-live";
 import { type Run, useLastRun } from "../api/runs";
 import { useMay, usePerson } from "../api/use-person";
 import { levelsOf } from "../canvas/levels/level-path";
+import { serverNow } from "../clock/server-clock";
 import { useSeed } from "../editor/dry-run/use-seed";
 import { Editor, type Shown } from "../editor/editor";
 import { templatesOf, useKnownActions, usePlaceable } from "../library/known-actions";
@@ -107,7 +109,7 @@ function useShownRun(id: string): RunHere & { inside: GraphInRun | null } {
 
 /** The right edge of what can be replayed: the end, or now. */
 function useEdge(run: Run | null): number {
-  return instant(run?.ended_at) ?? Date.now();
+  return instant(run?.ended_at) ?? serverNow();
 }
 
 /** Tells what is drawn inside of actions which run is shown. */

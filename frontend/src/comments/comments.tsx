@@ -1,8 +1,10 @@
 /** What people say about an action, or about any: threads with answers, done or open. */
+
 import { Button, NativeSelect } from "@mantine/core";
 import { IconMessageCircle } from "@tabler/icons-react";
 import { useState } from "react";
 import { usePerson } from "../api/use-person";
+import { serverNow } from "../clock/server-clock";
 import { selectedActions, useEditorContext } from "../edit-actions/editor-context";
 import { beginThread, type Thread } from "../graph/edit/comments";
 import type { Action, Key } from "../graph/model";
@@ -31,7 +33,7 @@ function Begin({ action, name }: { action: Action; name: string }) {
   ];
   const author = { id: person.id, name: person.name };
   const say = (text: string) => {
-    beginThread(doc, action.key, { author, at: Date.now(), text }, parameter || null);
+    beginThread(doc, action.key, { author, at: serverNow(), text }, parameter || null);
     setParameter("");
   };
   return (

@@ -1,8 +1,10 @@
 /** One thread: what was said, an answer, and whether it is done. */
+
 import { Button } from "@mantine/core";
 import { IconCheck, IconRotate2 } from "@tabler/icons-react";
 import { useState } from "react";
 import { usePerson } from "../api/use-person";
+import { serverNow } from "../clock/server-clock";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { deleteMessage, reply, resolve, type Thread } from "../graph/edit/comments";
 import { usePersonColors } from "../sync/use-room";
@@ -61,7 +63,7 @@ export function ThreadCard({ thread, place, onPlace }: ThreadCardProps) {
   const waits = useWaitingTexts(`${textScope(id, person.id)}comment/${thread.id}`) > 0;
   const colorOf = usePersonColors(thread.messages.map(({ author }) => author.id));
   const [answering, setAnswering] = useState(() => waits);
-  const me = () => ({ author: { id: person.id, name: person.name }, at: Date.now() });
+  const me = () => ({ author: { id: person.id, name: person.name }, at: serverNow() });
   return (
     <li className={style.thread} data-resolved={thread.resolved || undefined}>
       {place !== null &&

@@ -1,9 +1,11 @@
 /** The log of a robot: what others told it and how its engine was, newest first. */
+
 import { Button, Text } from "@mantine/core";
 import { IconFileImport } from "@tabler/icons-react";
 import { Link } from "wouter";
 import { useLive } from "../api/live/use-live";
 import { commandedGraph, type RobotLogLine, useRobotLog } from "../api/robots";
+import { serverNow } from "../clock/server-clock";
 import { clock, day, instant } from "../ui/times";
 import style from "./robot-log.module.css";
 import { notifyRobotFailure } from "./robot-runs";
@@ -78,7 +80,7 @@ function Line({ robot, told, onImport }: Props & { told: RobotLogLine }) {
   return (
     <li className={style.line} data-kind={told.kind}>
       <time dateTime={told.at}>
-        {day(at, Date.now())} {clock(at)}
+        {day(at, serverNow())} {clock(at)}
       </time>
       <span className={style.words}>
         {robotLogText(told)} <Effect told={told} />

@@ -1,7 +1,9 @@
 /** Whether the page hears the runner, and how old what it shows of a run is, in words. */
+
 import { IconEye, IconPlugConnectedX } from "@tabler/icons-react";
 import { useLive, useRunSeenAt } from "../api/live/use-live";
 import type { Run } from "../api/runs";
+import { serverTimeOf } from "../clock/server-clock";
 import { clock, duration, useNow } from "../ui/times";
 import style from "./connection-status.module.css";
 
@@ -42,7 +44,8 @@ export function ConnectionStatus({ run, whose = false }: { run?: Run | null; who
     return <span className={style.word}>Connecting to the runner …</span>;
   return (
     <span className={style.word} data-link="down" role="status">
-      <IconPlugConnectedX size={13} aria-hidden /> Runner unknown since {clock(now.since)}
+      <IconPlugConnectedX size={13} aria-hidden /> Runner unknown since{" "}
+      {clock(serverTimeOf(now.since))}
     </span>
   );
 }

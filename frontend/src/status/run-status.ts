@@ -1,7 +1,9 @@
 /** How a run stands at this moment, wherever it is listed: nobody knows while the runner is not heard. */
+
 import type { LiveState } from "../api/live/live-socket";
 import { useLive } from "../api/live/use-live";
 import type { Run } from "../api/runs";
+import { serverTimeOf } from "../clock/server-clock";
 import { runEndText, runLabel, type Tone, unknownStatus } from "./progress";
 
 export type Heard = Pick<LiveState, "link" | "since">;
@@ -9,7 +11,7 @@ export type Heard = Pick<LiveState, "link" | "since">;
 /** In a word, as it is counted. What has ended stays so, whoever is heard. Pure. */
 export function runStatus(run: Run, { link, since }: Heard): { tone: Tone; word: string } {
   if (run.ended_at === null && link === "down") {
-    return unknownStatus(since);
+    return unknownStatus(serverTimeOf(since));
   }
   return runLabel(run);
 }

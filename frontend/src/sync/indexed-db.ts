@@ -7,6 +7,7 @@
  * refuses it, each call here rejects, and the room says that nothing is kept.
  */
 
+import { deviceNow } from "../clock/server-clock";
 import type { ReplacedEntries } from "./replaced-history";
 
 /** Whose copy of which graph. */
@@ -29,7 +30,7 @@ export interface UnsavedEdit {
 export const madeNow = (update: Uint8Array, before: ReplacedEntries): UnsavedEdit => ({
   id: freshId(),
   update,
-  at: Date.now(),
+  at: deviceNow(),
   before,
 });
 
@@ -270,7 +271,7 @@ async function writeBatch(
     person: person.id,
     name: person.name,
     seq,
-    usedAt: Date.now(),
+    usedAt: deviceNow(),
   };
   work.objectStore("copies").put(entry, [...place]);
   work.commit();
@@ -324,7 +325,7 @@ let made = 0;
 /** A key that nobody else makes, and that sorts after those made before. No secure context needed. */
 function freshId(): string {
   made += 1;
-  const parts = [Date.now().toString(36).padStart(9, "0"), made.toString(36).padStart(6, "0")];
+  const parts = [deviceNow().toString(36).padStart(9, "0"), made.toString(36).padStart(6, "0")];
   return [...parts, Math.random().toString(36).slice(2, 10)].join("-");
 }
 

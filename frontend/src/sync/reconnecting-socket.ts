@@ -5,6 +5,7 @@
  * said by close codes.
  */
 
+import { tick } from "../clock/server-clock";
 import * as messages from "./messages";
 import type { AdmissionCheck, RefusalReason, Socket } from "./room";
 
@@ -130,12 +131,12 @@ export class ReconnectingSocket {
     const socket = this.options.open(this.options.url());
     socket.binaryType = "arraybuffer";
     this.socket = socket;
-    this.heardAt = Date.now();
+    this.heardAt = tick();
     this.probedAt = null;
     let opened = false;
     socket.onopen = () => {
       if (socket !== this.socket) return;
-      this.heardAt = Date.now();
+      this.heardAt = tick();
       this.unopened = 0;
       opened = true;
       this.speaker.onOpen();
@@ -150,7 +151,7 @@ export class ReconnectingSocket {
 
   private onMessage(socket: Socket, data: unknown): void {
     if (socket !== this.socket) return;
-    this.heardAt = Date.now();
+    this.heardAt = tick();
     this.probedAt = null;
     if (!(data instanceof ArrayBuffer)) return;
     try {
@@ -205,7 +206,7 @@ export class ReconnectingSocket {
     if (this.phase === "away") {
       this.redial();
     } else if (this.phase === "live") {
-      this.probedAt = Date.now();
+      this.probedAt = tick();
       this.send(this.speaker.probe());
     }
   };
@@ -217,7 +218,7 @@ export class ReconnectingSocket {
   private readonly onWatch = (): void => {
     if (this.socket === null) return;
     const limit = this.socket.readyState === OPEN ? SILENCE_MS : OPENING_MS;
-    const now = Date.now();
+    const now = tick();
     const mute = this.probedAt !== null && now - this.probedAt > PROBE_MS;
     if (mute || now - this.heardAt > limit) this.onClose(this.socket, BROKEN);
   };

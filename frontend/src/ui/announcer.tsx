@@ -1,5 +1,7 @@
 /** What happens, said to those who do not see it: a polite live region, never a flood. */
+
 import { useEffect, useState } from "react";
+import { tick } from "../clock/server-clock";
 
 const EVERY = 1500; // ms between two sentences
 const MOST = 3; // things said in one sentence
@@ -15,7 +17,7 @@ export class Announcer {
   say(text: string): void {
     this.#waiting = [...this.#waiting.filter((other) => other !== text), text];
     if (this.#timer !== null) return;
-    const wait = Math.max(50, this.#saidAt + EVERY - performance.now());
+    const wait = Math.max(50, this.#saidAt + EVERY - tick());
     this.#timer = setTimeout(() => this.#flush(), wait);
   }
 
@@ -29,7 +31,7 @@ export class Announcer {
 
   #flush(): void {
     this.#timer = null;
-    this.#saidAt = performance.now();
+    this.#saidAt = tick();
     const said = this.#waiting.slice(-MOST);
     const more = this.#waiting.length - said.length;
     this.#waiting = [];

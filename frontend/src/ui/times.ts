@@ -1,5 +1,7 @@
 /** Times in words. All instants are milliseconds since 1970. */
+
 import { useEffect, useState } from "react";
+import { serverNow, tick } from "../clock/server-clock";
 
 export function instant(text: string | null | undefined): number | null {
   if (!text) return null;
@@ -81,21 +83,31 @@ export function day(at: number, now: number): string {
 }
 
 /**
- * The present, renewed every `every` ms while `going`. All that shows it is renewed at whole multiples,
- * so that it is drawn together.
+ * A moment, renewed every `every` ms while `going`. All that shows it is renewed at whole multiples, so
+ * that it is drawn together.
  */
-export function useNow(every = 1000, going = true): number {
-  const [now, setNow] = useState(() => Date.now());
+function useRenewed(read: () => number, every: number, going: boolean): number {
+  const [now, setNow] = useState(read);
   useEffect(() => {
     if (!going) return;
     let timer: ReturnType<typeof setTimeout>;
     const renew = () => {
-      const present = Date.now();
+      const present = read();
       setNow(present);
       timer = setTimeout(renew, every - (present % every));
     };
     renew();
     return () => clearTimeout(timer);
-  }, [every, going]);
+  }, [read, every, going]);
   return now;
+}
+
+/** The present by the server's clock, ms since 1970: to be compared with what the server tells. */
+export function useNow(every = 1000, going = true): number {
+  return useRenewed(serverNow, every, going);
+}
+
+/** The present as a tick: to be compared with moments of this page. */
+export function useTick(every = 1000, going = true): number {
+  return useRenewed(tick, every, going);
 }

@@ -1,4 +1,5 @@
 /** The one socket to the runner: live state of runs, and the way for Stop. */
+import { hearStamp, tick } from "../../clock/server-clock";
 import { newAid } from "../../graph/ids";
 import { errorText, isFinal } from "../http";
 import type { Robot } from "../robots";
@@ -20,6 +21,7 @@ export type LiveLink = "connecting" | "live" | "down";
 export interface StopRequest {
   id: string;
   run: string | "all";
+  /** The tick at which it was asked. */
   at: number;
   /** Which runs "all" is about: those that went on when it was asked, as far as this page knew, and those
    * that the runner stops since. */
@@ -30,15 +32,15 @@ export interface StopRequest {
    */
   state: "asked" | "heard" | "refused" | "unheard";
   detail: string;
-  /** Of a clock that nobody sets, ms. */
+  /** The tick at which the runner had it. */
   heardAt?: number;
-  /** When all that it is about was told to rest, as `at`: that stays proven, whatever is unknown later. */
+  /** The tick at which all that it is about was told to rest: that stays proven, whatever is unknown later. */
   provenAt?: number;
 }
 
 export interface LiveState {
   link: LiveLink;
-  /** When the link became what it is, ms. */
+  /** The tick at which the link became what it is. */
   since: number;
   /** Why the link is not there, as far as that was found out. */
   unreached?: UnreachableReason | null;
@@ -64,14 +66,14 @@ const ALL_HOLDS = 5_000; // ms; later, "all" would mean runs that nobody had see
 export class LiveSocket {
   state: LiveState = {
     link: "connecting",
-    since: Date.now(),
+    since: tick(),
     engines: [],
     runs: new Map(),
     stops: [],
   };
-  /** When each open run was last shown by its engine, ms. Apart from `now`: it changes each second. */
+  /** When each open run was last shown by its engine, by the server's clock. Apart from `now`: it changes each second. */
   runSeenAt: ReadonlyMap<string, number> = new Map();
-  /** When each robot last answered, ms. */
+  /** When each robot last answered, by the server's clock. */
   robotAnsweredAt: ReadonlyMap<string, number> = new Map();
   readonly #seers = new Set<() => void>();
   readonly #runner: string;
@@ -83,8 +85,7 @@ export class LiveSocket {
   #closed = false;
   /** News of runs that listeners are told of soon. */
   #untold: ReturnType<typeof setTimeout> | undefined;
-  #toldAt = 0; // of a clock that nobody sets
-  #ahead = 0; // ms that this page's clock is before the runner's, at most
+  #toldAt = 0; // tick
   /** What was found out about the last socket that did not open. */
   #unreached: UnreachableReason | null = null;
 
@@ -137,7 +138,7 @@ export class LiveSocket {
     const stop: StopRequest = {
       id: newAid(),
       run,
-      at: Date.now(),
+      at: tick(),
       runs,
       state: "asked",
       detail: "",
@@ -154,7 +155,7 @@ export class LiveSocket {
   /** `whole`: its runs are all that it is about, so that it can be narrowed to them. */
   async #keepStopping({ id, run, at, runs }: StopRequest, whole: boolean): Promise<void> {
     for (;;) {
-      const late = run === "all" && whole && Date.now() - at > ALL_HOLDS;
+      const late = run === "all" && whole && tick() - at > ALL_HOLDS;
       const sent = (late ? runs : [run]).map((each) => this.#sendStop(each, id));
       const errors = (await Promise.allSettled(sent)).flatMap((each) =>
         each.status === "rejected" ? [each.reason as unknown] : [],
@@ -198,7 +199,6 @@ export class LiveSocket {
     const socket = new WebSocket(`${this.#runner.replace(/^http/, "ws")}/api/live`);
     let opened = false;
     this.#socket = socket;
-    this.#ahead = Number.POSITIVE_INFINITY;
     this.#expect(socket);
     socket.onopen = () => {
       opened = true;
@@ -233,7 +233,7 @@ export class LiveSocket {
 
   /** There is no link; another try comes after a while, unless nobody is signed in. */
   #down(): void {
-    if (this.state.link !== "down") this.#set({ link: "down", since: Date.now() });
+    if (this.state.link !== "down") this.#set({ link: "down", since: tick() });
     this.#set({ unreached: this.#unreached });
     clearTimeout(this.#again);
     if (this.#closed || this.#unreached?.kind === "ended") return;
@@ -274,7 +274,7 @@ export class LiveSocket {
         this.#set({
           link: "live",
           unreached: null,
-          since: Date.now(),
+          since: tick(),
           engines: message.engines,
           runs,
         });
@@ -293,10 +293,9 @@ export class LiveSocket {
         this.#set({ engines: message.engines });
         break;
       case "beat": {
-        // By the message that was least under way, so that neither a clock nor delay makes old proof new.
-        this.#ahead = Math.min(this.#ahead, Date.now() - Date.parse(message.at));
-        const seen = times(message.seen, this.#ahead);
-        const heard = times(message.heard, this.#ahead);
+        hearStamp(message.at);
+        const seen = times(message.seen);
+        const heard = times(message.heard);
         if (seen.size + heard.size + this.runSeenAt.size + this.robotAnsweredAt.size === 0) break;
         this.runSeenAt = seen;
         this.robotAnsweredAt = heard;
@@ -313,7 +312,7 @@ export class LiveSocket {
     if (now === before) return; // the runner tells of each change of what it knows, also of the unseen
     this.#joinStops([run]);
     this.state = { ...this.state, runs: new Map(this.state.runs).set(run.id, now) };
-    const wait = this.#toldAt + TOGETHER - performance.now();
+    const wait = this.#toldAt + TOGETHER - tick();
     if (wait <= 0 || isUrgentChange(before, now)) this.#tell();
     else this.#untold ??= setTimeout(() => this.#tell(), wait);
   }
@@ -328,7 +327,7 @@ export class LiveSocket {
   }
 
   #answerStop(id: string, state: StopRequest["state"], detail: string): void {
-    const heard = state === "heard" && { heardAt: performance.now() };
+    const heard = state === "heard" && { heardAt: tick() };
     const stops = this.state.stops.map((stop) =>
       stop.id === id && stop.state !== "heard" ? { ...stop, state, detail, ...heard } : stop,
     );
@@ -341,7 +340,7 @@ export class LiveSocket {
     if (stopping.length === 0) return;
     const stops = this.state.stops.map((stop) => {
       const { heardAt = Number.POSITIVE_INFINITY } = stop;
-      if (stop.run !== "all" || performance.now() - heardAt > JOINS) return stop;
+      if (stop.run !== "all" || tick() - heardAt > JOINS) return stop;
       const more = stopping.map(({ id }) => id).filter((id) => !stop.runs.includes(id));
       return more.length === 0 ? stop : { ...stop, runs: [...stop.runs, ...more] };
     });
@@ -358,7 +357,7 @@ export class LiveSocket {
     const isNew = (stop: StopRequest) => stop.provenAt === undefined && isProven(stop, this.state);
     if (!this.state.stops.some(isNew)) return;
     const stops = this.state.stops.map((stop) =>
-      isNew(stop) ? { ...stop, provenAt: Date.now() } : stop,
+      isNew(stop) ? { ...stop, provenAt: tick() } : stop,
     );
     this.state = { ...this.state, stops };
   }
@@ -367,12 +366,12 @@ export class LiveSocket {
     this.#noteProven();
     clearTimeout(this.#untold);
     this.#untold = undefined;
-    this.#toldAt = performance.now();
+    this.#toldAt = tick();
     for (const listener of this.#listeners) listener();
   }
 }
 
-/** Moments of the runner's clock by name, as ms of this page's, which is `ahead` of it. */
-function times(told: Record<string, string> | undefined, ahead: number): Map<string, number> {
-  return new Map(Object.entries(told ?? {}).map(([name, at]) => [name, Date.parse(at) + ahead]));
+/** Moments of the server's clock by name, ms since 1970. */
+function times(told: Record<string, string> | undefined): Map<string, number> {
+  return new Map(Object.entries(told ?? {}).map(([name, at]) => [name, Date.parse(at)]));
 }

@@ -1,11 +1,13 @@
 /** The live socket and the runner's address for React. */
+
 import { useMemo, useSyncExternalStore } from "react";
+import { tick } from "../../clock/server-clock";
 import type { LiveState } from "./live-socket";
 import { type PageLinkState, pageLink } from "./page-link";
 
 const NOTHING: LiveState = {
   link: "connecting",
-  since: Date.now(),
+  since: tick(),
   engines: [],
   runs: new Map(),
   stops: [],
@@ -30,13 +32,13 @@ export function useLive(): PageLinkState & { now: LiveState } {
   return { ...hold, now };
 }
 
-/** When the engine itself last showed a run, ms; only who asks is rendered again each second. */
+/** When the engine itself last showed a run, by the server's clock; only who asks is rendered again each second. */
 export function useRunSeenAt(run: string): number | undefined {
   const { live } = useSyncExternalStore(pageLink.subscribe, pageLink.now);
   return useSyncExternalStore(live?.subscribeSeen ?? never, () => live?.runSeenAt.get(run));
 }
 
-/** When a robot last answered, ms; an answer that changes nothing is told by a beat alone. */
+/** When a robot last answered, by the server's clock; an answer that changes nothing is told by a beat alone. */
 export function useRobotAnsweredAt(robot: string): number | undefined {
   const { live } = useSyncExternalStore(pageLink.subscribe, pageLink.now);
   return useSyncExternalStore(live?.subscribeSeen ?? never, () => live?.robotAnsweredAt.get(robot));

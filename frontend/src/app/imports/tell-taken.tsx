@@ -1,6 +1,8 @@
 /** What became of files that were taken in, told in few messages however many there were. */
+
 import { Button } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
+import { tick } from "../../clock/server-clock";
 import { type KnownFile, replaceKnown, type TakenFiles } from "./take-files";
 
 const MOST_TOLD = 5;
@@ -9,11 +11,11 @@ const PROGRESS = "files-taken";
 /** After a second: few files are taken before anybody has read it. */
 export function progressOf(count: number): { tell: (done: number) => void; end: () => void } {
   let shown = false;
-  const start = Date.now();
+  const start = tick();
   const tell = (done: number) => {
     const message = `${done} of ${count} files`;
     if (shown) notifications.update({ id: PROGRESS, message, loading: true, autoClose: false });
-    else if (Date.now() - start > 700) {
+    else if (tick() - start > 700) {
       shown = true;
       notifications.show({
         id: PROGRESS,

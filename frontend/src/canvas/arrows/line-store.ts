@@ -1,5 +1,7 @@
 /** The lines of one canvas: simple ones at once, routed ones when a worker has them. */
+
 import { createContext, useCallback, useContext, useSyncExternalStore } from "react";
+import { tick } from "../../clock/server-clock";
 import type { Position, Precondition } from "../../graph/model";
 import type { Bundle } from "./bundles";
 import { lineNow } from "./line-path";
@@ -37,7 +39,7 @@ export class LineStore {
   show(given: Scene): void {
     if (this.led?.settled) this.led = null;
     this.given = given;
-    const rest = Math.max(0, this.restsUntil - performance.now());
+    const rest = Math.max(0, this.restsUntil - tick());
     // Of many lines the cards come first, and what is drawn for the first time comes at once.
     const atOnce = this.scene === null || given.lines.length <= MANY;
     if (rest === 0 && atOnce) this.draw();
@@ -50,12 +52,12 @@ export class LineStore {
     if (!this.given) return;
     const scene = this.asLed(this.given);
     if (this.scene && sameScene(this.scene, scene)) return;
-    const began = performance.now();
+    const began = tick();
     this.scene = scene;
     this.simple = simpleLines(scene);
     this.refresh(new Set([...this.lines.keys(), ...this.simple.keys()]));
     this.send(scene);
-    const took = performance.now() - began;
+    const took = tick() - began;
     this.restsUntil = scene.lines.length > MANY ? began + took / SHARE : 0;
   }
 

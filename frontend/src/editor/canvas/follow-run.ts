@@ -1,10 +1,12 @@
 /** How the view follows a run: along the path that is taken, seldom, and never against the person. */
+
 import type { ReactFlowInstance, Viewport } from "@xyflow/react";
 import { type RefObject, useCallback, useEffect, useRef, useState } from "react";
 import type { Arrow, CanvasNode } from "../../canvas/elements";
 import type { Positions, Sizes } from "../../canvas/geometry/arrange";
 import { type Bounds, boundsOf } from "../../canvas/geometry/viewport";
 import { expandedGraphs } from "../../canvas/levels/expanded-graphs";
+import { tick } from "../../clock/server-clock";
 import type { Key } from "../../graph/model";
 import type { Progress } from "../../status/progress";
 import { glideTo } from "./composited-glide";
@@ -113,7 +115,7 @@ function useHandsOn(frame: RefObject<HTMLElement | null>) {
     const room = frame.current;
     if (room === null) return;
     const touched = () => {
-      last.current = performance.now();
+      last.current = tick();
     };
     const kinds = ["pointerdown", "keydown", "wheel"] as const;
     for (const kind of kinds) room.addEventListener(kind, touched, { passive: true });
@@ -122,9 +124,7 @@ function useHandsOn(frame: RefObject<HTMLElement | null>) {
     };
   }, [frame]);
   const isBusy = useCallback(
-    () =>
-      performance.now() - last.current < HANDS_REST ||
-      document.activeElement?.matches(TYPING) === true,
+    () => tick() - last.current < HANDS_REST || document.activeElement?.matches(TYPING) === true,
     [],
   );
   const release = useCallback(() => {

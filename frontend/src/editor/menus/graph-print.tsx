@@ -1,7 +1,9 @@
 /** The graph on paper: black on white, with its name, version, digest and the day. */
+
 import { useVersions, versionName } from "../../api/graphs";
 import { type PrintPages, pagesOf } from "../../canvas/views/print-pages";
 import { svgPictureOf } from "../../canvas/views/svg-picture";
+import { serverNow } from "../../clock/server-clock";
 import type { EditorContext } from "../../edit-actions/editor-context";
 import { useThrottledLink } from "../../sync/use-room";
 import { PrintSheet } from "../../ui/print-sheet";
@@ -44,7 +46,7 @@ export function GraphPrint({ context }: { context: EditorContext }) {
   const { seq, unsaved } = useThrottledLink();
   const version = unsaved === 0 ? versions?.find((each) => each.seq === seq) : undefined;
   const newest = versions?.[0];
-  const now = Date.now();
+  const now = serverNow();
   const content = () => {
     const { svg, width, height } = svgPictureOf(graph, context.positions(), context.sizes(), ink);
     const pages = pagesOf(width, height);

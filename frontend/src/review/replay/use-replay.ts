@@ -1,4 +1,5 @@
 /** The cursor of a replay: where it stands, whether it plays, and the run as it was known there. */
+
 import { useQueryClient } from "@tanstack/react-query";
 import {
   type Dispatch,
@@ -12,6 +13,7 @@ import {
 } from "react";
 import { useReplayData } from "../../api/documents/replay";
 import type { Run } from "../../api/runs";
+import { tick } from "../../clock/server-clock";
 import { instant } from "../../ui/times";
 import { chapterAt, ReplayPlayer } from "./replay";
 
@@ -90,7 +92,7 @@ function useRunningTime(
 ): void {
   useEffect(() => {
     if (!playing) return;
-    let last = performance.now();
+    let last = tick();
     let frame = requestAnimationFrame(function tick(now) {
       const passed = (now - last) * speed;
       last = now;

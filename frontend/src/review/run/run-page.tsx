@@ -1,4 +1,5 @@
 /** One run: its version on the canvas, every visit on the timeline, what was said, how it ended. */
+
 import { Skeleton, Tabs } from "@mantine/core";
 import { IconAlertTriangle } from "@tabler/icons-react";
 import { ReactFlowProvider } from "@xyflow/react";
@@ -12,6 +13,7 @@ import { useRunsOfSameStart } from "../../api/review";
 import { type Run, useRun } from "../../api/runs";
 import { fromUmrf } from "../../canvas/from-umrf";
 import { GraphView } from "../../canvas/views/graph-view";
+import { serverTimeOf } from "../../clock/server-clock";
 import { type Lane, lanesOf, useLanes } from "../../status/lanes/lanes";
 import { Timeline, type Track } from "../../status/lanes/timeline";
 import { INTO } from "../../status/level-words";
@@ -228,7 +230,7 @@ function RunTimeline(props: RunTimelineProps) {
       <Timeline
         run={newest}
         lanes={lanes}
-        silentSince={unsure ? now.since : silent}
+        silentSince={unsure ? serverTimeOf(now.since) : silent}
         selected={level.fact}
         onPick={onPick}
         picks={picks}
@@ -254,7 +256,7 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
   const goes = newest.ended_at === null;
   const unsure = goes && live.link === "down";
   const present = useNow(1000, goes);
-  const until = unsure ? live.since : (instant(newest.ended_at) ?? present);
+  const until = unsure ? serverTimeOf(live.since) : (instant(newest.ended_at) ?? present);
   const replay = useReplay(runner, newest, until, momentAsked(newest, search));
   const { run } = replay;
   const past = replay.at !== null;

@@ -1,5 +1,7 @@
 /** The record of a run on paper: what each action did, when as far as that is known, and who started it. */
+
 import { type Run, requesterPlace, runPlace, type Visit } from "../../api/runs";
+import { serverNow } from "../../clock/server-clock";
 import { boundsText, durationText } from "../../status/durations";
 import { actionWords } from "../../status/level-words";
 import { progressOf, runEndText, visitDuration } from "../../status/progress";
@@ -92,7 +94,7 @@ export function RunPrint({ run, version, by }: { run: Run; version: string; by: 
   const end = instant(run.ended_at);
   const moment = (at: number) => `${dateText(at)} ${exact(at)}`;
   const stopped = run.stopped_by;
-  const now = Date.now();
+  const now = serverNow();
   return (
     <PrintSheet
       title={`Run ${run.number} of ${run.graph_name}`}

@@ -1,7 +1,9 @@
 /** What the drawer shows while it is open: lanes over time, values at the right. */
+
 import { useCallback, useMemo } from "react";
 import { useLive } from "../../api/live/use-live";
 import type { Run } from "../../api/runs";
+import { serverTimeOf } from "../../clock/server-clock";
 import type { Graph } from "../../graph/model";
 import type { Lane } from "../../status/lanes/lanes";
 import { Timeline, type Track } from "../../status/lanes/timeline";
@@ -15,7 +17,9 @@ function useSilence(): (run: Run) => number | null {
   return (run) => {
     if (run.ended_at !== null) return null;
     const engine = instant(run.unknown_since);
-    return now.link === "down" ? Math.min(engine ?? now.since, now.since) : engine;
+    if (now.link !== "down") return engine;
+    const since = serverTimeOf(now.since);
+    return Math.min(engine ?? since, since);
   };
 }
 

@@ -1,10 +1,12 @@
 /** The head of the drawer: which run, how it stands, and what can be done with it. */
+
 import { ActionIcon, Button, Text } from "@mantine/core";
 import { IconChartBar, IconChevronDown, IconChevronUp, IconHistory } from "@tabler/icons-react";
 import { Link } from "wouter";
 import { useLive } from "../../api/live/use-live";
 import { useCurrentName } from "../../api/people";
 import type { Run } from "../../api/runs";
+import { serverTimeOf } from "../../clock/server-clock";
 import { boundsText } from "../../status/durations";
 import { useRunStatus } from "../../status/run-status";
 import { StateLabel } from "../../status/state-label";
@@ -106,7 +108,7 @@ export function RunHead(props: Props) {
       )}
       <span className={style.version}>{versionLabel}</span>
       <StateLabel pill still {...useRunStatus(run)} />
-      <Origin run={run} until={unsure ? now.since : null} />
+      <Origin run={run} until={unsure ? serverTimeOf(now.since) : null} />
       <span className={style.gap} />
       {told !== "" && (
         <span className={style.alarm} role={announces ? "alert" : undefined} title={told}>

@@ -1,4 +1,5 @@
 /** A start: publishes what is on screen and sends exactly that to the runner, once. */
+
 import { notifications } from "@mantine/notifications";
 import { useMutation, useQueryClient } from "@tanstack/react-query";
 import { insideOf } from "../../api/documents/inside";
@@ -7,6 +8,7 @@ import { publish, queryKeys, type Version, versionName } from "../../api/graphs"
 import { errorPlace, errorText, isOutcomeUnknown } from "../../api/http";
 import { useLive } from "../../api/live/use-live";
 import { type Started, type StartOrder, startRun } from "../../api/runs";
+import { serverNow } from "../../clock/server-clock";
 import { newAid } from "../../graph/ids";
 import { memberText } from "../../graph/json-members";
 import { unansweredStarts } from "./unanswered-starts";
@@ -98,7 +100,7 @@ const NOTHING_KNOWN: Started = { runs: [], failed: {} };
 /** Sends a start. Where nobody says what became of it, that is looked for, and no failure is told. */
 async function surely(what: string, order: StartOrder): Promise<Started> {
   const { request, graph, engines } = order;
-  unansweredStarts.sends({ request, graph, what, engines, at: Date.now() });
+  unansweredStarts.sends({ request, graph, what, engines, at: serverNow() });
   try {
     const started = await startRun(order);
     unansweredStarts.settle(request);

@@ -4,6 +4,7 @@
  * front of the new one. The page asks for no translation (`translate="no"`); this is for those who do
  * not obey.
  */
+import { tick } from "../../clock/server-clock";
 
 const OFTEN = 20; // times that a page is put right within `WITHIN`; who goes on is a fight, and is told
 const WITHIN = 10_000; // ms
@@ -75,7 +76,7 @@ export function outliveOutsideChanges(onChange: () => void): void {
   let times: number[] = [];
   const observer = new MutationObserver((records) => {
     if (!unwrap(records)) return;
-    const now = performance.now();
+    const now = tick();
     times = [...times.filter((at) => now - at < WITHIN), now];
     if (times.length > OFTEN) {
       observer.disconnect();

@@ -1,4 +1,5 @@
 /** What became of a Stop, in words, until it is proven. */
+
 import { useState, useSyncExternalStore } from "react";
 import type { LiveState, StopRequest } from "../../api/live/live-socket";
 import { foreignGraphs, openRuns, stopTargets, unheardRobots } from "../../api/live/open-runs";
@@ -6,9 +7,10 @@ import { useLive } from "../../api/live/use-live";
 import type { Robot } from "../../api/robots";
 import { needsRestConfirmation } from "../../api/run-stop";
 import type { Run } from "../../api/runs";
+import { serverTimeOf, tick } from "../../clock/server-clock";
 import { HelpLink } from "../../status/help-link";
 import { useRootMark } from "../../ui/hooks/use-root-mark";
-import { clock, duration, instant, useNow } from "../../ui/times";
+import { clock, duration, instant, useTick } from "../../ui/times";
 import style from "./stop-notice.module.css";
 import { askedRun, mayAnswer } from "./stop-surroundings";
 
@@ -104,9 +106,9 @@ function provenNotice(
   at: number | undefined,
   now: LiveState,
 ): StopNoticeText {
-  const then = at === undefined ? "" : ` at ${clock(at)}`;
+  const then = at === undefined ? "" : ` at ${clock(serverTimeOf(at))}`;
   const ends = runs.length === 0 ? `nothing ran${then}` : runs.map(endOf).join(" · ");
-  const text = `Proven: ${ends}. The runner is silent since ${clock(now.since)}; what began after that is not known.`;
+  const text = `Proven: ${ends}. The runner is silent since ${clock(serverTimeOf(now.since))}; what began after that is not known.`;
   return { tone: "done", text };
 }
 
@@ -152,7 +154,8 @@ export function movingAgain(now: LiveState): StopNoticeText {
       run.desired === "stopped" ? "It is being stopped again." : "Nobody has asked to stop it.";
     return `run ${run.number}: ${text} ${then}`;
   });
-  const since = now.link === "down" ? ` Runner unknown since ${clock(now.since)}.` : "";
+  const since =
+    now.link === "down" ? ` Runner unknown since ${clock(serverTimeOf(now.since))}.` : "";
   const text = `MOVES AGAIN: ${each.join(" ")}${since} Use the hardware stop if it must not move.`;
   return { tone: "loud", stays: true, text };
 }
@@ -227,8 +230,8 @@ export function StopNotice() {
   const open = openRuns(now).length;
   const busy =
     watching &&
-    (open > 0 || last.state !== "heard" || Date.now() - (last.provenAt ?? last.at) < GONE + 1000);
-  const at = useNow(200, busy || now.link !== "live");
+    (open > 0 || last.state !== "heard" || tick() - (last.provenAt ?? last.at) < GONE + 1000);
+  const at = useTick(200, busy || now.link !== "live");
   const notice =
     movingAgain(now) ??
     (watching ? noticeOf(last, now, at) : null) ??

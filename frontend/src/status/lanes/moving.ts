@@ -1,5 +1,7 @@
 /** What moves along a time axis with time: in small steps that the browser takes without the page. */
+
 import { type RefObject, useLayoutEffect } from "react";
+import { serverNow } from "../../clock/server-clock";
 import { renewalOf, type TimeAxis } from "./axis";
 
 /** A moment of the way, as `Element.animate` takes it. `offset`: the share of the axis, 0 to 1. */
@@ -53,7 +55,7 @@ export function useMoving(
       },
     );
     if (moved === undefined) return;
-    const since = () => Date.now() - axis.start;
+    const since = () => serverNow() - axis.start;
     moved.currentTime = since();
     const looking = setInterval(() => {
       if (Math.abs(Number(moved.currentTime) - since()) > SLACK) moved.currentTime = since();

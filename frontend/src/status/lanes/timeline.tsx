@@ -1,4 +1,5 @@
 /** Lanes of runs over time, by robot: one for each action, with what is not known left hatched. */
+
 import {
   Fragment,
   type KeyboardEvent,
@@ -9,6 +10,7 @@ import {
   useState,
 } from "react";
 import type { Run } from "../../api/runs";
+import { serverNow } from "../../clock/server-clock";
 import { keyOf } from "../../ui/keys";
 import { colorOfName } from "../../ui/name-colors";
 import { duration, instant, stopwatch } from "../../ui/times";
@@ -64,17 +66,17 @@ export interface TimeGap {
 /** From the first start to the last end; while something goes on it grows in steps. */
 function useAxis(tracks: readonly Track[]): TimeAxis {
   const starts = tracks.map(({ run }) => instant(run.started_at ?? run.requested_at));
-  const start = Math.min(...starts.filter((each) => each !== null), Date.now());
+  const start = Math.min(...starts.filter((each) => each !== null), serverNow());
   const ends = tracks.map(({ run }) => instant(run.ended_at));
   const goes = ends.includes(null);
   const end = Math.max(...ends.map((each) => each ?? start));
   const [steps, setSteps] = useState(0);
   useEffect(() => {
     if (!goes) return;
-    const timer = setInterval(() => setSteps(growingSpan(Date.now() - start)), 250);
+    const timer = setInterval(() => setSteps(growingSpan(serverNow() - start)), 250);
     return () => clearInterval(timer);
   }, [goes, start]);
-  const span = goes ? Math.max(steps, growingSpan(Date.now() - start)) : wholeSpan(end - start);
+  const span = goes ? Math.max(steps, growingSpan(serverNow() - start)) : wholeSpan(end - start);
   return useMemo(() => ({ start, span }), [start, span]);
 }
 
@@ -170,7 +172,7 @@ function useSeeking(axis: TimeAxis, cursor: number | null, onSeek: Props["onSeek
   };
   const onKeyDown = (event: KeyboardEvent) => {
     const key = keyOf(event);
-    const here = cursor ?? Math.min(Date.now(), axis.start + axis.span);
+    const here = cursor ?? Math.min(serverNow(), axis.start + axis.span);
     const goal = new Map<string, number | null>([
       ["ArrowLeft", here - 1000],
       ["ArrowRight", cursor === null ? null : here + 1000],

@@ -4,6 +4,7 @@
  * A message with an edit is followed by one that names its place in the log, and twenty people send
  * many of both. Drawing after each would only make frames late that nobody sees.
  */
+import { tick } from "../../clock/server-clock";
 
 /** Calls `tell` soon, once, however often it is asked until then. */
 export type Schedule = (tell: () => void) => void;
@@ -32,7 +33,7 @@ export function frameScheduler(gap = 0): FrameScheduler {
   };
   const tellAll = () => {
     rest();
-    told = performance.now();
+    told = tick();
     const all = [...waiting];
     waiting.clear();
     for (const tell of all) tell();
@@ -45,7 +46,7 @@ export function frameScheduler(gap = 0): FrameScheduler {
     soon(tell) {
       waiting.add(tell);
       if (timer !== undefined) return;
-      const wait = told + gap - performance.now();
+      const wait = told + gap - tick();
       if (wait <= 0) tellWithFrame();
       else timer = setTimeout(tellWithFrame, wait);
     },

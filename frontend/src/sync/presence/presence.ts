@@ -7,6 +7,7 @@
  */
 
 import type { Awareness } from "y-protocols/awareness";
+import { tick } from "../../clock/server-clock";
 import { isEqual } from "../../graph/equal";
 import type { Key, Position } from "../../graph/model";
 import { immediately, type Schedule } from "./frame-scheduler";
@@ -70,7 +71,7 @@ export function presenceOf(awareness: Awareness, soon: Schedule = immediately): 
 
   const send = () => {
     timer = undefined;
-    toldAt = performance.now();
+    toldAt = tick();
     awareness.setLocalState({ ...mine });
   };
   const tell = () => {
@@ -94,7 +95,7 @@ export function presenceOf(awareness: Awareness, soon: Schedule = immediately): 
       if (isEqual(mine, next)) return;
       mine = next;
       if (timer !== undefined) return;
-      const wait = toldAt + INTERVAL_MS - performance.now();
+      const wait = toldAt + INTERVAL_MS - tick();
       if (wait <= 0) send();
       else timer = setTimeout(send, wait);
     },
