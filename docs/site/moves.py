@@ -13,6 +13,8 @@ from typing import Final
 _SCRIPT: Final = re.compile(r"<script>(.*?)</script>", re.DOTALL)
 _SHEET: Final = re.compile(r"<style>(.*?)</style>", re.DOTALL)
 _STYLE: Final = re.compile(r'(<[a-zA-Z][^<>]*?) style="([^"]*)"')
+#: Headings of the list of pages, as the theme writes them: without a level they are none to a reader.
+_CAPTION: Final = re.compile(r'<p class="caption" role="heading">')
 _PICTURE: Final = re.compile(r'<img ([^>]*?)src="([^"]+\.png)"')
 
 
@@ -45,6 +47,7 @@ def _moved(text: str, site: Path, up: str, rules: dict[str, str]) -> str:
         lambda found: f'<link rel="stylesheet" href="{file(found[1], ".css")}">', text
     )
     text = _STYLE.sub(ruled, text)
+    text = _CAPTION.sub('<p class="caption" role="heading" aria-level="2">', text)
     return text.replace("</head>", f'<link rel="stylesheet" href="{up}_static/inline.css"></head>')
 
 

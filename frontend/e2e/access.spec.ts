@@ -153,6 +153,14 @@ for (const scheme of ["light", "dark"] as const) {
       await page.getByRole("main").waitFor();
       await look(path);
     }
+    const runs = await product.ask<{ id: string }[]>("/api/runs?limit=1", {}, product.runnerUrl);
+    for (const { id } of runs) {
+      await page.goto(`${product.url}/runs/compare?a=${id}&b=${id}`);
+      await page.getByRole("heading", { name: "Where they part" }).waitFor();
+      await look("two runs");
+    }
+    await page.goto(`${product.url}/help/`);
+    await look("help");
     expect([...new Set(found)]).toEqual([]);
     await context.close();
   });

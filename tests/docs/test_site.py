@@ -34,6 +34,7 @@ class _Read(HTMLParser):
         self.loaded: list[str] = []
         self.anchors: set[str] = set()
         self.inline: list[str] = []
+        self.levelless: list[str] = []
         self.text = ""
         self._script = False
         self.feed(page.read_text())
@@ -48,6 +49,8 @@ class _Read(HTMLParser):
             self.loaded.append(given[_LOADING[tag]])
         if tag == "style" or "style" in given or any(name.startswith("on") for name in given):
             self.inline.append(f"<{tag} {given}>")
+        if given.get("role") == "heading" and "aria-level" not in given:
+            self.levelless.append(f"<{tag} {given}>")
         self._script = tag == "script"
         if self._script and "src" not in given:
             self.inline.append(f"<script {given}>")
@@ -94,6 +97,7 @@ def test_nothing_is_loaded_from_elsewhere_and_nothing_is_inline() -> None:
     for page, read in pages().items():
         assert [each for each in read.loaded if "//" in each] == [], page
         assert read.inline == [], page
+        assert read.levelless == [], page
     for sheet in SITE.rglob("*.css"):
         assert not re.search(r"@import|url\(\s*['\"]?(?:https?:)?//", sheet.read_text()), sheet
 

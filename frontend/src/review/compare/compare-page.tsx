@@ -83,7 +83,7 @@ function Verdict({ found }: { found: Comparison }) {
 function Before({ found }: { found: Comparison }) {
   return (
     <section>
-      <h3>Before they began</h3>
+      <h2>Before they began</h2>
       {!found.same_engine && (
         <p className={style.same}>
           They ran in different places: {found.a.engine} and {found.b.engine}.
@@ -100,7 +100,7 @@ function WhereTheyPart({ found, onSelect }: SideProps) {
   return (
     <>
       <section>
-        <h3>Where they part</h3>
+        <h2>Where they part</h2>
         {all.length === 0 && <p className={style.same}>Nowhere, as far as was seen.</p>}
         <ol className={style.differences} aria-label="Differences">
           {all.slice(0, MOST).map(({ number, step, title, text }) => (
@@ -117,7 +117,7 @@ function WhereTheyPart({ found, onSelect }: SideProps) {
       </section>
       {same.length > 0 && (
         <section>
-          <h3>The same, as far as seen</h3>
+          <h2>The same, as far as seen</h2>
           {same.slice(0, MOST).map(({ name, text }) => (
             <p key={name} className={style.same}>
               <b>{name}</b> {text}.
