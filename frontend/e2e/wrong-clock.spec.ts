@@ -37,7 +37,7 @@ for (const [what, hours] of [
       await page.evaluate(() => Math.round((Date.now() - performance.timeOrigin) / 3.6e6)),
     ).toBe(hours);
     await start(page);
-    await expect(card(page, "Wait", 1)).toContainText(/running · 0:0\d/);
+    await expect(card(page, "Wait", 1)).toContainText(/running\s*· 0:0\d/);
     await page.getByRole("link", { name: "Runs" }).click();
     const row = page.getByRole("row").filter({ hasText: "chain_8" }).first();
     await expect(row).toContainText(/just now|\d+ s/);

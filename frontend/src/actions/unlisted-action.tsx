@@ -37,7 +37,11 @@ export function UnlistedAction({ listed, knowledge, busy, onAdd, onTake }: Props
   const takeOver = (has: RobotAction) =>
     mayEdit && (
       <Button size="compact-sm" variant="subtle" disabled={busy} onClick={() => onTake(has)}>
-        Take over<span className="visually-hidden"> from {has.robot}</span>
+        Take over
+        <span className="visually-hidden">
+          {" "}
+          from <bdi>{has.robot}</bdi>
+        </span>
       </Button>
     );
   return (

@@ -1,5 +1,7 @@
 /** Runs as the runner tells them. */
+
 import { useQuery } from "@tanstack/react-query";
+import { isolated } from "../words/isolated";
 import { fetchJson } from "./http";
 import { getRun } from "./run-stop";
 import type { RunnerApi } from "./schema/runner";
@@ -29,7 +31,7 @@ export function requesterPlace(asker: Requester | null): string {
 /** Where it ran, in a few words. */
 export function runPlace(run: Run): string {
   if (!run.simulated) return run.engine;
-  return run.engine === "simulator" ? "simulator" : `${run.engine} (simulated)`;
+  return run.engine === "simulator" ? "simulator" : `${isolated(run.engine)} (simulated)`;
 }
 
 /** The engine whose abilities count: the simulator has those of the robot that it plays. */

@@ -60,7 +60,11 @@ function ProposalOf({ draft, onMerge }: DraftRowProps) {
             leftSection={<IconCheck size={14} aria-hidden />}
             onClick={() => say(true)}
           >
-            Yes<span className="visually-hidden"> to {draft.name}</span>
+            Yes
+            <span className="visually-hidden">
+              {" "}
+              to <bdi>{draft.name}</bdi>
+            </span>
           </Button>
           <Button
             size="compact-sm"
@@ -69,7 +73,11 @@ function ProposalOf({ draft, onMerge }: DraftRowProps) {
             leftSection={<IconX size={14} aria-hidden />}
             onClick={() => say(false)}
           >
-            No<span className="visually-hidden"> to {draft.name}</span>
+            No
+            <span className="visually-hidden">
+              {" "}
+              to <bdi>{draft.name}</bdi>
+            </span>
           </Button>
           <Button size="compact-sm" variant="filled" onClick={onMerge}>
             Merge…<span className="visually-hidden"> {draft.name}</span>

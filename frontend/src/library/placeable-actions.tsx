@@ -52,7 +52,7 @@ function RobotRow({ has, onPlace }: { has: RobotAction; onPlace: Place }) {
         Take over
         <span className="visually-hidden">
           {" "}
-          {has.action.name} from {has.robot}
+          {has.action.name} from <bdi>{has.robot}</bdi>
         </span>
       </Button>
     </div>

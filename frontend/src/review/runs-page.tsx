@@ -1,4 +1,5 @@
 /** What ran: newest first, with who, when, how long and how it ended. */
+
 import { ActionIcon, Button, Checkbox, Skeleton } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import {
@@ -30,6 +31,7 @@ import { useRunStatus } from "../status/run-status";
 import { StateLabel } from "../status/state-label";
 import { Empty } from "../ui/empty";
 import { clock, day, instant, stopwatch, useNow } from "../ui/times";
+import { isolated } from "../words/isolated";
 import { useVersionLabel } from "./run/use-version-label";
 import { RunFilters } from "./run-filters";
 import style from "./runs-page.module.css";
@@ -113,7 +115,7 @@ function Row({ run, now, chosen, onChoose }: RunRowProps) {
             variant="subtle"
             color="gray"
             aria-label="Statistics of its graph"
-            title={`Statistics of ${run.graph_name}`}
+            title={`Statistics of ${isolated(run.graph_name)}`}
             onClick={(event: MouseEvent) => event.stopPropagation()}
           >
             <IconChartBar size={15} aria-hidden />

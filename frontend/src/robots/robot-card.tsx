@@ -1,4 +1,5 @@
 /** One robot: its engine in words, what makes answers a proof, what runs there. */
+
 import { ActionIcon, Button, Menu, Tabs } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconAlertTriangle, IconCheck, IconDots, IconPencil, IconTrash } from "@tabler/icons-react";
@@ -11,6 +12,7 @@ import { useMay } from "../api/use-person";
 import { EngineLabel } from "../status/engine-label";
 import { colorOfName } from "../ui/name-colors";
 import { ago, clock, instant, useNow } from "../ui/times";
+import { isolated } from "../words/isolated";
 import { IndexedActions } from "./indexed-actions";
 import style from "./robot-card.module.css";
 import { RobotLog } from "./robot-log";
@@ -73,14 +75,14 @@ function More({ robot, onEdit }: Pick<Props, "robot" | "onEdit">) {
       await forgetRobot(runner ?? "", robot.name);
       await client.invalidateQueries({ queryKey: ["robots"] });
     } catch (error) {
-      const title = `${robot.name} was not forgotten`;
+      const title = `${isolated(robot.name)} was not forgotten`;
       notifications.show({ color: "red", title, message: errorText(error) });
     }
   };
   return (
     <Menu>
       <Menu.Target>
-        <ActionIcon size={32} aria-label={`More about ${robot.name}`}>
+        <ActionIcon size={32} aria-label={`More about ${isolated(robot.name)}`}>
           <IconDots size={17} aria-hidden />
         </ActionIcon>
       </Menu.Target>

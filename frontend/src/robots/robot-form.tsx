@@ -1,4 +1,5 @@
 /** Registers a robot, or changes how it is reached. */
+
 import {
   Button,
   Collapse,
@@ -15,6 +16,7 @@ import { useState } from "react";
 import { errorText, Refusal } from "../api/http";
 import { useLive } from "../api/live/use-live";
 import { changeRobot, type Registration, registerRobot } from "../api/robots";
+import { isolated } from "../words/isolated";
 import type { EditedRobot } from "./robots-page";
 
 export const NEW: Registration = {
@@ -132,7 +134,7 @@ export function RobotForm({ editing, onClose }: { editing: EditedRobot; onClose:
       if (refusedField(problem) !== "" && refusedField(problem) !== "name") setMore(true);
     }
   };
-  const title = editing.isNew ? "Register a robot" : `Change ${editing.robot.name}`;
+  const title = editing.isNew ? "Register a robot" : `Change ${isolated(editing.robot.name)}`;
   return (
     <Modal opened onClose={onClose} title={title} closeButtonProps={{ "aria-label": "Close" }}>
       <form

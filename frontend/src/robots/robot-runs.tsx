@@ -1,4 +1,5 @@
 /** What runs on a robot: runs from here, and graphs that somebody else started. */
+
 import { Button } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconFileImport, IconSquareFilled } from "@tabler/icons-react";
@@ -11,6 +12,7 @@ import { heldGraph, type Robot, stopRobot } from "../api/robots";
 import type { Run } from "../api/runs";
 import { runStatus } from "../status/run-status";
 import { StateLabel } from "../status/state-label";
+import { isolated } from "../words/isolated";
 import style from "./robot-runs.module.css";
 
 interface Props {
@@ -31,7 +33,7 @@ function Foreign(props: Props & { graph: string; stopping: string | null; state:
       .catch((error: unknown) => notifyRobotFailure(`${graph} was not imported`, error));
   const stop = () =>
     stopRobot(runner ?? "", robot.name).catch((error: unknown) =>
-      notifyRobotFailure(`NOT SENT: use the hardware stop of ${robot.name}`, error),
+      notifyRobotFailure(`NOT SENT: use the hardware stop of ${isolated(robot.name)}`, error),
     );
   return (
     <li className={style.line}>
@@ -78,12 +80,12 @@ export function RobotRuns({ robot, onImport }: Props) {
     );
   }
   return (
-    <ul className={style.list} aria-label={`What runs on ${robot.name}`}>
+    <ul className={style.list} aria-label={`What runs on ${isolated(robot.name)}`}>
       {own.map((run) => (
         <li key={run.id} className={style.line}>
           <StateLabel {...runStatus(run, now)} />
           <Link to={`/runs/${run.id}`} className={style.name}>
-            Run {run.number} of {run.graph_name}
+            Run {run.number} of <bdi>{run.graph_name}</bdi>
           </Link>
           <StartedBy run={run} />
         </li>

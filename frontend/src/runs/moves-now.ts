@@ -1,10 +1,12 @@
 /** What moves now, on which robot: only what an engine has shown; the rest is said to be not known. Pure. */
+
 import type { LiveState } from "../api/live/live-socket";
 import { foreignGraphs, openRuns } from "../api/live/open-runs";
 import type { Run } from "../api/runs";
 import { placesOf } from "../status/level-places";
 import { actionWords } from "../status/level-words";
 import { instant } from "../ui/times";
+import { isolated } from "../words/isolated";
 
 export interface Moving {
   readonly robot: string;
@@ -65,7 +67,7 @@ export function movesNow(now: LiveState): Moving[] {
     ({ robot, held }): Moving => ({
       robot: robot.name,
       kind: "moves",
-      words: `${held.graph}, not started here`,
+      words: `${isolated(held.graph)}, not started here`,
       run: null,
     }),
   );

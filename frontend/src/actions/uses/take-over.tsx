@@ -21,7 +21,7 @@ export function TakeOver({ id, has }: Props) {
   return (
     <>
       <Button size="compact-sm" variant="subtle" onClick={() => setOpen(true)}>
-        Take over from {has.robot}
+        Take over from <bdi>{has.robot}</bdi>
       </Button>
       <OverlayBoundary>
         {open !== null && (

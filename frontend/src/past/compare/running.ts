@@ -1,6 +1,8 @@
 /** What runs of a graph now, as something to compare with: a version of it, or what was sent. Pure. */
+
 import { type Version, versionName } from "../../api/graphs";
 import type { Run } from "../../api/runs";
+import { isolated } from "../../words/isolated";
 
 type GoingRun = Pick<Run, "id" | "number" | "graph" | "engine" | "version" | "digest">;
 
@@ -24,7 +26,7 @@ export function runningOf(
       const version = versions.find(({ id }) => id === run.version);
       const known = version !== undefined && version.digest === run.digest;
       const what = known ? versionName(versions, version.id) : "no version of this graph";
-      const words = `${run.engine} now: run ${run.number}, ${what}`;
+      const words = `${isolated(run.engine)} now: run ${run.number}, ${what}`;
       return { run: run.id, words, seq: known ? version.seq : null };
     });
 }

@@ -1,4 +1,5 @@
 /** Two runs on one canvas: a row for each in every card, and the flag where they part. */
+
 import { ReactFlowProvider } from "@xyflow/react";
 import { useCallback, useMemo } from "react";
 import type { Comparison } from "../../api/review";
@@ -9,6 +10,7 @@ import { GraphView } from "../../canvas/views/graph-view";
 import type { Tone } from "../../status/progress";
 import { StateLabel } from "../../status/state-label";
 import { useProgress } from "../../status/use-progress";
+import { isolated } from "../../words/isolated";
 import style from "./compare-page.module.css";
 import { type ActionSummary, comparedActions, outermostAid, rangeText } from "./differences";
 
@@ -86,7 +88,7 @@ export function ComparedCanvas({ found, run, selected, onSelect }: Props) {
           progress={progress}
           selected={picked}
           onSelect={onSelect}
-          label={`Runs ${found.b.number} and ${found.a.number} of ${found.b.graph_name}`}
+          label={`Runs ${found.b.number} and ${found.a.number} of ${isolated(found.b.graph_name)}`}
         />
       </CardStateContext>
     </ReactFlowProvider>

@@ -1,10 +1,12 @@
 /** Where two runs part and why that is likely: differences in words, never between overlapping ranges. Pure. */
+
 import type { ComparedField, ComparedStep, Comparison } from "../../api/review";
 import type { Visit } from "../../api/runs";
 import { plainValue } from "../../history/difference-words";
 import { boundsText } from "../../status/durations";
 import { INTO, spaced, wayWords } from "../../status/level-words";
 import { visitDuration } from "../../status/progress";
+import { isolated } from "../../words/isolated";
 
 /** How long something took, ms; `most` is Infinity where nothing bounds it. */
 export interface DurationRange {
@@ -211,7 +213,8 @@ export function likelyCause(found: Comparison): string | null {
       (change !== "changed" || fields.some(({ field }) => ARROW_DECIDES.test(field))),
   );
   if (led !== undefined) return `the arrow ${led.parent} → ${led.child} was ${led.change}`;
-  if (!found.same_engine) return `they ran on ${found.a.engine} and on ${found.b.engine}`;
+  if (!found.same_engine)
+    return `they ran on ${isolated(found.a.engine)} and on ${isolated(found.b.engine)}`;
   return null;
 }
 

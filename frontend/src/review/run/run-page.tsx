@@ -24,6 +24,7 @@ import { useProgress } from "../../status/use-progress";
 import { Empty } from "../../ui/empty";
 import { instant, useNow } from "../../ui/times";
 import type { Crumb } from "../../ui/top-bar";
+import { isolated } from "../../words/isolated";
 import { LevelBar } from "../levels/level-bar";
 import { graphsOn } from "../levels/sent-levels";
 import { type LevelCursor, useLevel } from "../levels/use-level";
@@ -246,7 +247,7 @@ function RunTimeline(props: RunTimelineProps) {
 
 function canvasLabel({ graph_name }: Run, { levels }: LevelCursor, version: string): string {
   const inside = levels.length > 0 ? `, inside ${levels.join(INTO)}` : "";
-  return `Version ${version} of ${graph_name}${inside}`;
+  return `Version ${version} of ${isolated(graph_name)}${inside}`;
 }
 
 function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {

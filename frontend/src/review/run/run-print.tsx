@@ -7,6 +7,7 @@ import { actionWords } from "../../status/level-words";
 import { progressOf, runEndText, visitDuration } from "../../status/progress";
 import { PrintSheet } from "../../ui/print-sheet";
 import { clock, dateText, instant } from "../../ui/times";
+import { isolated } from "../../words/isolated";
 import style from "./run-print.module.css";
 
 const exact = (at: number) => `${clock(at)}.${Math.floor((at % 1000) / 100)}`;
@@ -97,7 +98,7 @@ export function RunPrint({ run, version, by }: { run: Run; version: string; by: 
   const now = serverNow();
   return (
     <PrintSheet
-      title={`Run ${run.number} of ${run.graph_name}`}
+      title={`Run ${run.number} of ${isolated(run.graph_name)}`}
       facts={[
         ["Version", version],
         ["Digest", run.digest],

@@ -1,10 +1,12 @@
 /** At the right of the lanes: what is known of one action, and how old that is. */
+
 import { useMemo } from "react";
 import { useLive } from "../../api/live/use-live";
 import { type Run, useRun } from "../../api/runs";
 import type { Graph, Key } from "../../graph/model";
 import { spaced } from "../../status/level-words";
 import { duration, stopwatch, useNow } from "../../ui/times";
+import { isolated } from "../../words/isolated";
 import { valuesOf } from "./action-values";
 import style from "./run-drawer.module.css";
 
@@ -41,7 +43,7 @@ export function ValuesPanel({ run, graph, aid }: Props) {
     <aside className={style.values} aria-label={`Values of ${spaced(found.name)}`}>
       <h2>
         {spaced(found.name)}
-        {!run.simulated && ` on ${run.engine}`}
+        {!run.simulated && ` on ${isolated(run.engine)}`}
         <Age run={run} />
       </h2>
       <dl>

@@ -70,7 +70,7 @@ function What({ folder, robot }: { folder: IndexFolderLook; robot: string }) {
       ))}
       {hindered.length === 0 && names !== "" && (
         <span>
-          {names} can be written into {folder.path}. From then on {robot} refuses{" "}
+          {names} can be written into {folder.path}. From then on <bdi>{robot}</bdi> refuses{" "}
           {folder.writable.length > 1 ? "them as graphs of their own" : "it as a graph of its own"}.
         </span>
       )}

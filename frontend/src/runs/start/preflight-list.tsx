@@ -1,9 +1,11 @@
 /** What was looked at on one engine, item by item, in words. */
+
 import { Loader } from "@mantine/core";
 import { IconAlertTriangle, IconCheck, IconX } from "@tabler/icons-react";
 import type { Preflight, PreflightItem } from "../../api/robots";
 import { SIMULATOR } from "../../api/robots";
 import { colorOfName } from "../../ui/name-colors";
+import { isolated } from "../../words/isolated";
 import { IndexWriting } from "./index-writing";
 import { InsideRemedies, type MomentLookedAt } from "./inside-remedies";
 import style from "./preflight-list.module.css";
@@ -77,7 +79,7 @@ export function PreflightList({ engine, alone, look, moment }: Props) {
           <i style={{ background: colorOfName(engine) }} aria-hidden /> {engine}
         </h4>
       )}
-      <ul className={style.list} aria-label={`Looked at on ${engine}`}>
+      <ul className={style.list} aria-label={`Looked at on ${isolated(engine)}`}>
         {look
           ? look.items.map((item) => (
               <Line key={item.code} item={item} look={look} moment={moment} />

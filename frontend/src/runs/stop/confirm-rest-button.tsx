@@ -1,4 +1,5 @@
 /** Offers to end a run by a person's word: where no answer of its engine can prove that nothing moves. */
+
 import { Button } from "@mantine/core";
 import { IconEye } from "@tabler/icons-react";
 import { useState } from "react";
@@ -7,6 +8,7 @@ import type { Run } from "../../api/runs";
 import { useMay } from "../../api/use-person";
 import { lazyPart } from "../../ui/parts/lazy-part";
 import { OverlayBoundary } from "../../ui/parts/part-boundary";
+import { isolated } from "../../words/isolated";
 
 const ConfirmRestDialog = lazyPart(() =>
   import("./confirm-rest-dialog").then((part) => part.ConfirmRestDialog),
@@ -35,7 +37,7 @@ export function ConfirmRestButton({ run, loud = false, named = false }: Props) {
         leftSection={<IconEye size={14} aria-hidden />}
         onClick={() => setAsking(true)}
       >
-        {named ? `I looked at ${run.engine} …` : "I looked …"}
+        {named ? `I looked at ${isolated(run.engine)} …` : "I looked …"}
       </Button>
       <OverlayBoundary>
         {asking !== null && (

@@ -1,4 +1,5 @@
 /** Ends a run by a person's word, and says first what that means. */
+
 import { Button, Modal, Text, TextInput } from "@mantine/core";
 import { IconEye } from "@tabler/icons-react";
 import { useMutation } from "@tanstack/react-query";
@@ -7,6 +8,7 @@ import { errorText } from "../../api/http";
 import { useLive } from "../../api/live/use-live";
 import { confirmRest, type Run } from "../../api/runs";
 import { HoldButton } from "../../ui/floating/hold-button";
+import { isolated } from "../../words/isolated";
 import { notifyFailure } from "../start/use-start";
 import style from "./confirm-rest-dialog.module.css";
 
@@ -31,13 +33,14 @@ export function ConfirmRestDialog({ run, opened, onClose }: Props) {
     <Modal
       opened={opened}
       onClose={onClose}
-      title={`Is ${run.engine} at rest?`}
+      title={`Is ${isolated(run.engine)} at rest?`}
       closeButtonProps={{ "aria-label": "Close" }}
       zIndex={300}
     >
       <Text size="sm">
-        Nothing that the engine says can show whether run {run.number} of {run.graph_name} has come
-        to rest: {(run.unconfirmed ?? "it does not answer").replace(/\.$/, "")}.
+        Nothing that the engine says can show whether run {run.number} of{" "}
+        <bdi>{run.graph_name}</bdi> has come to rest:{" "}
+        {(run.unconfirmed ?? "it does not answer").replace(/\.$/, "")}.
       </Text>
       <Text size="sm" mt="xs">
         Only somebody who has looked at the robot can end this. Until then nothing is started there.
@@ -61,7 +64,7 @@ export function ConfirmRestDialog({ run, opened, onClose }: Props) {
           icon={<IconEye size={14} aria-hidden />}
           label={confirm.isPending ? "Confirming …" : "Hold to confirm"}
           name={said ? `Confirm that run ${run.number} is at rest` : "Say how you saw it first"}
-          question={`Has ${run.engine} come to rest, and have you seen it?`}
+          question={`Has ${isolated(run.engine)} come to rest, and have you seen it?`}
           disabled={!said || confirm.isPending}
           onHeld={() => confirm.mutate()}
         />

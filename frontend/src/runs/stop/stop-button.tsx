@@ -1,9 +1,11 @@
 /** STOP: one, always at the same place, never disabled; STOP ALL by keys from anywhere. */
+
 import { useSyncExternalStore } from "react";
 import type { LiveLink } from "../../api/live/live-socket";
 import { foreignGraphs, openRuns, unheardRobots } from "../../api/live/open-runs";
 import { useLive } from "../../api/live/use-live";
 import type { Run } from "../../api/runs";
+import { isolated } from "../../words/isolated";
 import style from "./stop-button.module.css";
 import { drawnStop, graphOnScreen } from "./stop-surroundings";
 
@@ -20,11 +22,11 @@ export function runToStop(here: readonly Run[]): { id: string; words: string } |
   const [first, ...others] = here;
   if (first === undefined) return null;
   if (others.length === 0) {
-    return { id: first.id, words: `run ${first.number} of ${first.graph_name}` };
+    return { id: first.id, words: `run ${first.number} of ${isolated(first.graph_name)}` };
   }
   const { group } = first;
   if (group === null || others.some((run) => run.group !== group)) return null;
-  return { id: group, words: `the ${here.length} runs of ${first.graph_name}` };
+  return { id: group, words: `the ${here.length} runs of ${isolated(first.graph_name)}` };
 }
 
 const keepButton = (button: HTMLElement | null) => drawnStop.set(button);

@@ -115,6 +115,13 @@ test("what was proven stays proven when the runner is silent later, and the rest
   expect(noticeOf({ ...all, provenAt: 2_000 }, both, 9_000)?.tone).toBe("loud");
 });
 
+test("a name that turns words around keeps the words of a notice where they are", () => {
+  const loud = noticeOf(stop, now({ engine: "Da\u202evid" }), 9_000)?.text;
+  expect(loud).toMatch(/^STOP UNCONFIRMED: run 7 on \u2068Da\u202evid\u2069: /);
+  const named = { id: "a", number: 1, graph_name: "\u202egrab", group: null } as Run;
+  expect(runToStop([named])?.words).toBe("run 1 of \u2068\u202egrab\u2069");
+});
+
 test("a refused Stop says why", () => {
   expect(noticeOf({ ...stop, state: "refused", detail: "no such run" }, now(null), 1200)).toEqual({
     tone: "loud",

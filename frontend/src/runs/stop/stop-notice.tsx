@@ -11,6 +11,7 @@ import { serverTimeOf, tick } from "../../clock/server-clock";
 import { HelpLink } from "../../status/help-link";
 import { useRootMark } from "../../ui/hooks/use-root-mark";
 import { clock, duration, instant, useTick } from "../../ui/times";
+import { isolated } from "../../words/isolated";
 import style from "./stop-notice.module.css";
 import { askedRun, mayAnswer } from "./stop-surroundings";
 
@@ -35,7 +36,7 @@ function reasonOf(run: Run): string {
 }
 
 function unconfirmed(runs: readonly Run[], since?: string): StopNoticeText {
-  const each = runs.map((run) => `run ${run.number} on ${run.engine}`).join(", ");
+  const each = runs.map((run) => `run ${run.number} on ${isolated(run.engine)}`).join(", ");
   const why = runs.map(reasonOf).find((reason) => reason !== "") ?? "no proof has come.";
   const look = runs.some((run) => run.unconfirmed)
     ? " Look at the robot; use its hardware stop."
@@ -73,7 +74,9 @@ export function noticeOf(stop: StopRequest, now: LiveState, at: number): StopNot
   }
   const lost = runs.filter((run) => run.state === "lost");
   if (lost.length > 0) {
-    const ends = lost.map((run) => `run ${run.number} on ${run.engine}: ${run.detail}`).join(" ");
+    const ends = lost
+      .map((run) => `run ${run.number} on ${isolated(run.engine)}: ${run.detail}`)
+      .join(" ");
     return { tone: "loud", text: `STOP UNCONFIRMED: ${ends} Look at the robot.` };
   }
   const foreign = stop.run === "all" && !down ? foreignNotice(now, since) : null;
@@ -93,7 +96,7 @@ const endOf = (run: Run) => {
 /** The runner is silent since: what it said before that stays true, and of the rest nothing is known. */
 function silentNotice(runs: readonly Run[], since: string): StopNoticeText {
   const open = runs.filter((run) => !isAtRest(run));
-  const who = open.map((run) => `run ${run.number} on ${run.engine}: `).join("");
+  const who = open.map((run) => `run ${run.number} on ${isolated(run.engine)}: `).join("");
   const before = runs.filter(isAtRest).map(endOf).join(", ");
   const proven = before === "" ? "" : ` Proven before that: ${before}.`;
   const text = `STOP UNCONFIRMED: ${who}sent, but no word from the runner since.${proven}`;
@@ -121,11 +124,11 @@ function foreignNotice(now: LiveState, since?: string): StopNoticeText {
   if (!held.stopping) {
     return {
       tone: "quiet",
-      text: `Stopping ${held.graph} on ${robot.name} …`,
+      text: `Stopping ${isolated(held.graph)} on ${isolated(robot.name)} …`,
       ...(since && { since }),
     };
   }
-  const text = `STOP UNCONFIRMED: ${held.graph} on ${robot.name}: ${held.stopping}.`;
+  const text = `STOP UNCONFIRMED: ${isolated(held.graph)} on ${isolated(robot.name)}: ${held.stopping}.`;
   return { tone: "loud", stays: true, text };
 }
 
@@ -291,7 +294,7 @@ export function StopNotice() {
               className={style.look}
               onClick={() => askedRun.set(run.id)}
             >
-              {silent.length > 1 ? `I looked at ${run.engine} …` : "I looked …"}
+              {silent.length > 1 ? `I looked at ${isolated(run.engine)} …` : "I looked …"}
             </button>
           ))}
         </span>

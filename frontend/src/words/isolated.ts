@@ -1,0 +1,15 @@
+/** Names within sentences: a name is written by anybody, and its letters may turn the words around it. */
+
+/** What is written from right to left, or says in which direction to write. */
+const TURNS =
+  /[\u0590-\u08ff\u200e\u200f\u202a-\u202e\u2066-\u2069\ufb1d-\ufdff\ufe70-\ufefc]|[\u{10800}-\u{10fff}\u{1e800}-\u{1efff}]/u;
+/** What begins or ends an isolate: within one it would end that one too early, or never. */
+const ISOLATES = /[\u2066-\u2069]/g;
+
+/**
+ * Return a name to stand within a text: whatever directions it has end with it, as in a `<bdi>`. For
+ * texts that are no elements: titles, labels, notices. A name that turns nothing stays as it is.
+ */
+export function isolated(name: string): string {
+  return TURNS.test(name) ? `\u2068${name.replace(ISOLATES, "")}\u2069` : name;
+}
