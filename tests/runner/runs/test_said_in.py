@@ -18,6 +18,7 @@ REQUESTED = events.Requested(
     digest="digest",
     engine="atlas",
     simulated=False,
+    actions={"Lift_0": "the-aid-of-it"},  # its names are in the run
     umrf='{"graph_name":"not searched"}',
     script='{"also":"not searched"}',
     override=events.Override(codes=("E1",), reason="the gate is blocked today"),

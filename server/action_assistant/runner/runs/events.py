@@ -350,35 +350,11 @@ def decode(kind: str, body: bytes) -> RunEvent:
 
 
 #: Fields of events that are for programs, or too large to be read: all other texts are what somebody said or was told.
-_NOT_SAID: Final = frozenset(
-    {
-        *(
-            "type",
-            "at",
-            "id",
-            "address",
-            "by",
-            "run",
-            "request_id",
-            "graph",
-            "version",
-            "digest",
-            "tree_digest",
-        ),
-        *(
-            "hash",
-            "umrf",
-            "script",
-            "subgraphs",
-            "incarnation",
-            "process",
-            "group",
-            "stop_id",
-            "aid",
-            "path",
-        ),
-    }
-)
+_NOT_SAID: Final = frozenset({
+    "actions", "address", "aid", "at", "by", "digest", "graph", "group", "hash", "id", "incarnation", "inner_laps",
+    "laps", "path", "process", "request_id", "run", "script", "stop_id", "subgraphs", "tree_digest", "type", "umrf",
+    "version",
+})  # fmt: skip
 
 
 def said_in(event: RunEvent) -> Iterator[str]:
