@@ -10,7 +10,7 @@ import anyio
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from sqlalchemy import delete
+from sqlalchemy import delete, select
 
 from action_assistant.editor.history import index_queries
 from action_assistant.editor.history.change_index import ChangeIndex
@@ -100,6 +100,21 @@ async def test_however_often_it_is_brought_up_it_holds_the_same(
     monkeypatch.undo()
     await index.upto(GRAPH)
     assert pieces == await index.value(index_queries.between, GRAPH, 0, len(held), _ALL)
+
+
+async def test_a_packed_document_and_one_kept_before_they_were_packed_are_gone_on_with(
+    journal: Journal, rooms: Rooms, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    held = await edited(rooms, 6, 30)
+    index = ChangeIndex(journal)
+    monkeypatch.setattr(index_queries, "_EVENTS", 7)
+    for large in (1 << 30, 0, 1 << 30, 0):  # as it was, packed, and again
+        monkeypatch.setattr(index_queries, "_LARGE", large)
+        await index.upto(GRAPH, await index.head(GRAPH) + 1)
+    (row,) = await journal.query(select(key_change_head.c.document))
+    assert row.document[:1] == b"\x78"
+    assert await index.upto(GRAPH) == len(held)
+    assert _seen(await index.value(index_queries.at, GRAPH, len(held))) == plain(held[-1])
 
 
 @pytest.mark.parametrize("seed", range(examples(8) // 2))

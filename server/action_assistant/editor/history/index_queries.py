@@ -1,5 +1,6 @@
 """Queries of the index of key changes, over a connection. Their results are as large as a graph: for workers."""
 
+import zlib
 from collections.abc import Collection, Iterable
 from typing import Any, Final
 
@@ -15,6 +16,10 @@ from action_assistant.schema.editor_tables import editor_event, key_change, key_
 _EVENTS: Final = 1000  # observed in one go
 _BYTES: Final = 4 << 20  # of them
 _OWNERS: Final = 400  # that one question names
+_LARGE: Final = 64 * 1024  # bytes of a document, from which on it is kept packed
+_ZLIB: Final = (
+    b"\x78"  # how what is packed begins; a document is an array of MessagePack, and does not
+)
 
 _c = key_change.c
 _CHANGE: Final = select(_c.seq, _c.author, _c.at, _c.root, _c.key, _c.before, _c.after)
@@ -40,7 +45,8 @@ class IndexGrowth(msgspec.Struct, frozen=True):
 
 def growth(connection: Connection, graph: str, slice_rows: int) -> IndexGrowth | None:
     """Return what the next events of a graph add to its index; None where there are no more."""
-    seq, document = _head(connection, graph)
+    seq, kept = _head(connection, graph)
+    document = _unpacked(kept)
     more = select(literal(1)).where(_c.graph == graph, _c.seq > seq).limit(1)
     leftovers = connection.execute(more).first() is not None
     events = _some_events(connection, graph, seq)
@@ -54,7 +60,7 @@ def growth(connection: Connection, graph: str, slice_rows: int) -> IndexGrowth |
         msgspec.msgpack.encode(rows[start : start + slice_rows])
         for start in range(0, len(rows), slice_rows)
     )
-    return IndexGrowth(seq, found.seq, found.document, slices, found.damaged, leftovers)
+    return IndexGrowth(seq, found.seq, _packed(found.document), slices, found.damaged, leftovers)
 
 
 def between(
@@ -103,6 +109,23 @@ def of_key(
     """Return all changes of one key, in order of time."""
     same = (_c.graph == graph, _c.root == root, _c.key == key, _c.seq <= upto)
     return _changes(connection, _CHANGE.where(*same).order_by(_c.seq))
+
+
+def _packed(document: bytes) -> bytes:
+    """The document as the head keeps it: the writer holds others for as long as it stores that, and a large one
+    shrinks to a tenth."""
+    return document if len(document) < _LARGE else zlib.compress(document, level=1)
+
+
+def _unpacked(kept: bytes) -> bytes:
+    """The document of a head, also of one that was kept before they were packed. What cannot be unpacked is returned
+    as it is: it is no document either, and the index starts anew."""
+    if kept[:1] != _ZLIB:
+        return kept
+    try:
+        return zlib.decompress(kept)
+    except zlib.error:
+        return kept
 
 
 def _head(connection: Connection, graph: str) -> tuple[int, bytes]:
