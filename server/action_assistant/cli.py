@@ -110,7 +110,10 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
         posix=True,
     ),
     "verify": CommandEntry(
-        "maintenance", "look whether every stored event is what was written", posix=True
+        "maintenance",
+        "look whether the logs are sound; with a line that is kept elsewhere also whether somebody has "
+        "altered them and made their chain anew",
+        posix=True,
     ),
     "rebuild": CommandEntry(
         "maintenance",
