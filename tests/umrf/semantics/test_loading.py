@@ -76,6 +76,14 @@ def test_ends_that_all_lead_on_halt_nothing() -> None:
     assert told(graph, "H14") == []
 
 
+def test_a_branch_whose_errors_are_ignored_is_no_warning() -> None:
+    """Nearly every fork would have one."""
+    ignores = Conditions("run", "run", "ignore")
+    graph = graph_of("entry>A", "A>B", "A>C", "B>D", "C>D", "D>exit",
+                     AB=ignores, AC=ignores, BD=ignores, CD=ignores)  # fmt: skip
+    assert told(graph, "H14") == []
+
+
 def test_a_sub_graph_runs_at_once_so_that_a_leaf_beside_it_halts_nothing() -> None:
     def beside(name: str) -> Graph:
         every = Conditions("run", "run", "run")

@@ -113,13 +113,14 @@ def check_loading(
     subject: Subject, reports: _Reports, together: Together, nested: Container[str] = frozenset()
 ) -> None:
     """H14: ends that halt the graph beside an action that may still load, told once. `nested` as in
-    `check_responses`."""
+    `check_responses`. Not told of ends with on_error: whatever ignores the errors of one branch would have
+    it, and its action would have to fail while another one loads."""
     if "H14" not in subject.facts.hazards:
         return
     runs_at_once = {action.key for action in subject.real if action.name in nested}
     found: list[tuple[Action, Precondition, set[Key]]] = []
     for outcome in PRECONDITIONS:
-        for action in subject.real:
+        for action in subject.real if outcome != "on_error" else ():
             if outcome not in reports.get(action.key, ()):
                 continue
             listed = subject.outgoing.get(action.key, [])
