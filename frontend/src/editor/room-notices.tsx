@@ -1,10 +1,19 @@
 /** Notices of the room over the canvas: what happened to edits, each with what one can do. */
 import { Button, CloseButton } from "@mantine/core";
-import { IconArchive, IconHistory, IconInfoCircle, IconLock, IconUsers } from "@tabler/icons-react";
+import {
+  IconArchive,
+  IconGitMerge,
+  IconHistory,
+  IconInfoCircle,
+  IconLock,
+  IconUsers,
+} from "@tabler/icons-react";
 import { type ReactNode, useCallback, useEffect, useState } from "react";
+import type { ChangedTwice } from "../sync/changed-twice";
 import type { ConnectionNotice } from "../sync/graph-connection";
 import { otherPeopleWait } from "../sync/unsaved-reasons";
 import {
+  useChangedTwice,
   useGraphPart,
   useLinkPart,
   useMyName,
@@ -14,8 +23,12 @@ import {
 } from "../sync/use-room";
 import { lazyPart } from "../ui/parts/lazy-part";
 import { OverlayBoundary } from "../ui/parts/part-boundary";
+import { useChangedTwiceTold } from "./changed-twice-words";
 import style from "./room-notices.module.css";
 
+const ChangedTwiceDialog = lazyPart(() =>
+  import("./changed-twice-dialog").then((part) => part.ChangedTwiceDialog),
+);
 const OthersDialog = lazyPart(() => import("./others-dialog").then((part) => part.OthersDialog));
 const StrandedEditsDialog = lazyPart(() =>
   import("./stranded-edits-dialog").then((part) => part.StrandedEditsDialog),
@@ -90,6 +103,36 @@ function Others() {
   );
 }
 
+/** What this person changed while away and others changed, too. */
+function ChangedByBoth() {
+  const all = useChangedTwice();
+  return all.length === 0 ? null : <SayChangedByBoth all={all} />;
+}
+
+function SayChangedByBoth({ all }: { all: readonly ChangedTwice[] }) {
+  const told = useChangedTwiceTold(all);
+  const [open, setOpen] = useState(false);
+  if (told.length === 0) return null;
+  return (
+    <Say
+      icon={<IconGitMerge size={16} />}
+      tone="warn"
+      action={
+        <Button size="compact-sm" onClick={() => setOpen(true)}>
+          Choose
+        </Button>
+      }
+    >
+      While you were away, others changed{" "}
+      {told.length === 1 ? "something" : `${told.length} things`} that you changed, too. One of both
+      values stands.
+      <OverlayBoundary>
+        <ChangedTwiceDialog told={told} opened={open} onClose={() => setOpen(false)} />
+      </OverlayBoundary>
+    </Say>
+  );
+}
+
 /** Whether the dialog is open: for each choice at first, until the person puts it off. */
 function useStrandedEditsDialog() {
   const choice = useStrandedEdits();
@@ -142,6 +185,7 @@ export function RoomNotices() {
             decision, {choosing.cause}.
           </Say>
         )}
+        <ChangedByBoth />
         <Others />
       </div>
       <OverlayBoundary>

@@ -16,6 +16,7 @@ import * as awarenessProtocol from "y-protocols/awareness";
 import { Awareness, removeAwarenessStates } from "y-protocols/awareness";
 import * as sync from "y-protocols/sync";
 import * as Y from "yjs";
+import { ChangedTwiceStore } from "./changed-twice";
 import { FingerprintCheck } from "./fingerprint";
 import { browserStore, epochName, madeNow, type StoredCopy, type UnsavedEdit } from "./indexed-db";
 import * as messages from "./messages";
@@ -59,6 +60,7 @@ class Connection implements Room, SocketHandler {
   private readonly outbox = new Outbox();
   private readonly listeners = new Set<() => void>();
   private readonly persistence: Persistence | null;
+  readonly changedTwice: ChangedTwiceStore;
   private readonly replaced: ReplacedValues;
   private readonly fingerprintCheck: FingerprintCheck;
   private readonly socket: ReconnectingSocket;
@@ -67,6 +69,9 @@ class Connection implements Room, SocketHandler {
   private epoch = "";
   private told = "";
   private closed = false;
+  /** What the server has, while its own edits have not come yet: those are taken before ours are given. */
+  private asked: Uint8Array | null = null;
+  private learned = false;
   /** Whether the page shows more than the entry of the log that the server named last. */
   private isAhead = false;
 
@@ -75,6 +80,7 @@ class Connection implements Room, SocketHandler {
     this.awareness = new Awareness(this.doc);
     this.address = options.url;
     this.replaced = new ReplacedValues(this.doc, this);
+    this.changedTwice = new ChangedTwiceStore(this.doc);
     this.doc.on("update", this.onUpdate);
     this.awareness.on("update", this.onAwareness);
     this.fingerprintCheck = new FingerprintCheck(this.doc, this.atRest);
@@ -242,6 +248,8 @@ class Connection implements Room, SocketHandler {
 
   onOpen(): void {
     this.outbox.fresh();
+    this.asked = null;
+    this.learned = false;
     this.say({ readOnly: undefined });
     this.socket.send(messages.syncStep1(this.doc));
     // The others saw us go: only a newer clock brings us back.
@@ -313,13 +321,18 @@ class Connection implements Room, SocketHandler {
       case sync.messageYjsSyncStep1:
         if (lacksKnownEdits(this.doc, this.outbox.edits, content))
           this.socket.refuse("other-epoch");
-        else this.give(content);
+        else if (this.learned) this.give(content);
+        else this.asked = content;
         break;
       case sync.messageYjsSyncStep2:
+        if (!this.learned) this.changedTwice.back(this.outbox.edits);
         this.learn(content);
+        this.learned = true;
         this.socket.arrived();
         this.isAhead = false;
         this.say({ state: "live", why: undefined });
+        if (this.asked !== null) this.give(this.asked);
+        this.asked = null;
         break;
       case sync.messageYjsUpdate:
         this.isAhead = true;
@@ -347,7 +360,7 @@ class Connection implements Room, SocketHandler {
   };
 
   private learn(update: Uint8Array): void {
-    Y.applyUpdate(this.doc, update, this);
+    this.changedTwice.take(this.outbox.edits, () => Y.applyUpdate(this.doc, update, this));
     this.persistence?.learned(update);
   }
 

@@ -3,6 +3,7 @@
 import type { Awareness } from "y-protocols/awareness";
 import type * as Y from "yjs";
 import { serverPath } from "../api/page-url";
+import type { ChangedTwiceStore } from "./changed-twice";
 import type { CopyOwner, EditStore, UnsavedEdit } from "./indexed-db";
 import type { StrandedEdits } from "./replaced-history";
 
@@ -38,6 +39,8 @@ export interface RoomLink {
 export interface Room {
   readonly doc: Y.Doc;
   readonly awareness: Awareness;
+  /** What both this person, while away, and somebody else have changed. */
+  readonly changedTwice: ChangedTwiceStore;
   /** The same object until something of it changes. */
   link(): RoomLink;
   onLink(listener: () => void): () => void;

@@ -15,6 +15,7 @@ import {
 import { type Colored, colorsOf, useKnownPeople } from "../api/people";
 import { isEqual } from "../graph/equal";
 import { EMPTY_GRAPH, type Graph } from "../graph/model";
+import type { ChangedTwice } from "./changed-twice";
 import {
   type ConnectionNotice,
   GraphConnection,
@@ -274,6 +275,12 @@ export function useStrandedEdits(): StrandedEditsChoice | null {
       drop: () => connection.drop(stranded),
     };
   }, [connection, stranded]);
+}
+
+/** What both this person, while away, and somebody else have changed, until they have seen it. */
+export function useChangedTwice(): readonly ChangedTwice[] {
+  const { changedTwice } = useRoom().room;
+  return useSyncExternalStore(changedTwice.onChange, changedTwice.now);
 }
 
 /** What may be said softly about this room, until it was read. */

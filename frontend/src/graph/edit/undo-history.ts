@@ -256,7 +256,7 @@ interface LostValue {
 }
 
 /** What somebody else set here at the same time as the person, and lost. */
-function lostValue(event: Y.YMapEvent<unknown>, key: string): LostValue | null {
+export function lostValue(event: Y.YMapEvent<unknown>, key: string): LostValue | null {
   const { transaction, target } = event;
   let isNewest = true;
   for (let item = target._map.get(key) ?? null; item !== null; item = item.left) {
