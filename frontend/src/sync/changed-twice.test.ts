@@ -139,6 +139,19 @@ describe.each([true, false])("where the value of this page stands: %s", (wins) =
   });
 });
 
+test("what waits for seconds on a socket that does not notice is told; what two do at once is not", () => {
+  open(true);
+  const a = addAction(room.doc, { name: "A" });
+  server.stalled = true;
+  setField(room.doc, a, "actor", "mine");
+  server.broadcast((doc) => setField(doc, a, "actor", "theirs"));
+  expect(room.changedTwice.now()).toEqual([]);
+  setField(room.doc, a, "description", "mine");
+  vi.advanceTimersByTime(3_000);
+  server.broadcast((doc) => setField(doc, a, "description", "theirs"));
+  expect(told(room.changedTwice.now())).toEqual([["description", "mine", "theirs"]]);
+});
+
 // -- whatever both do -------------------------------------------------------------------------
 
 const PLACES: readonly (readonly [Root, string])[] = [

@@ -39,6 +39,8 @@ interface Theirs {
   readonly before: unknown;
 }
 
+/** An edit that is not stored by then was made while away, whether or not the socket has noticed. */
+const AWAY_MS = 2_000;
 const NONE: readonly ChangedTwice[] = [];
 const placeOf = (root: Root, key: string) => `${root} ${key}`;
 
@@ -72,9 +74,13 @@ export class ChangedTwiceStore {
 
   /** Takes something of others by `apply`, and looks at what it does to the edits that are still `unsaved`. */
   take(unsaved: readonly UnsavedEdit[], apply: () => void): void {
-    const { own, doc } = this;
-    if (own === null || !unsaved.some((edit) => this.waiting.has(edit))) {
-      this.own = null;
+    const { doc } = this;
+    if (this.own === null || !unsaved.some((edit) => this.waiting.has(edit))) {
+      const late = Date.now() - AWAY_MS;
+      this.back(unsaved.filter(({ at }) => at < late));
+    }
+    const { own } = this;
+    if (own === null) {
       apply();
       return;
     }
