@@ -98,7 +98,8 @@ test("1,200 actions are deleted and brought back by keys, and the next edit is s
     name: "Step",
     instance_id: n,
     type: "sync",
-    description: `Step ${n} of a long task, with words as people write them. `.repeat(8),
+    gui_attributes: { position: { x: (n % 40) * 260, y: Math.floor(n / 40) * 160 } },
+    description: `Step ${n} of a long task, with words as people write them. `.repeat(16),
     input_parameters: { speed: { pvf_type: "number", pvf_value: n } },
     children: n < 1_199 ? [{ name: "Step", instance_id: n + 1 }] : [],
   }));

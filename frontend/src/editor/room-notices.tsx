@@ -1,5 +1,6 @@
 /** Notices of the room over the canvas: what happened to edits, each with what one can do. */
 import { Button, CloseButton } from "@mantine/core";
+import { notifications } from "@mantine/notifications";
 import {
   IconArchive,
   IconGitMerge,
@@ -9,6 +10,7 @@ import {
   IconUsers,
 } from "@tabler/icons-react";
 import { type ReactNode, useCallback, useEffect, useState } from "react";
+import { MOST_VALUE_BYTES, onTooLarge } from "../graph/edit/edit-size";
 import type { ChangedTwice } from "../sync/changed-twice";
 import type { ConnectionNotice } from "../sync/graph-connection";
 import { otherPeopleWait } from "../sync/unsaved-reasons";
@@ -19,6 +21,7 @@ import {
   useMyName,
   useNotice,
   useOthersWaiting,
+  useRoom,
   useStrandedEdits,
 } from "../sync/use-room";
 import { lazyPart } from "../ui/parts/lazy-part";
@@ -153,7 +156,27 @@ function useStrandedEditsDialog() {
   };
 }
 
+/** Says that an edit was refused before it was made, and how large it was. */
+function useTooLargeNotice(): void {
+  const { doc } = useRoom();
+  useEffect(
+    () =>
+      onTooLarge(doc, (bytes) => {
+        notifications.show({
+          color: "red",
+          autoClose: 12_000,
+          title: "Nothing was changed",
+          message: `One value has ${mib(bytes)} MiB, and ${mib(MOST_VALUE_BYTES)} MiB is the most that can be stored.`,
+        });
+      }),
+    [doc],
+  );
+}
+
+const mib = (bytes: number) => (bytes / 2 ** 20).toFixed(2);
+
 export function RoomNotices() {
+  useTooLargeNotice();
   const by = useMyName();
   const said = useNotice();
   const choosing = useStrandedEditsDialog();

@@ -23,14 +23,23 @@ import {
 } from "../model";
 import { readGraph, readTakenUp } from "../read";
 import { asNumber, asResponse } from "../values";
+import { refuseTooLarge } from "./edit-size";
 import { UndoHistory } from "./undo-history";
 
 /** The origin of everything that the person at this page does. */
 const OWN_EDITS: unique symbol = Symbol("the person at this page");
 
-/** Several edits as one: one transaction, one update for the others, one step of undo. */
+/**
+ * Several edits as one: one transaction, one update for the others, one step of undo. With a value that no
+ * message could hold nothing is changed, see `onTooLarge`.
+ */
 export function asOneEdit<T>(doc: Y.Doc, work: () => T): T {
-  return doc.transact(work, OWN_EDITS);
+  if (doc._transaction !== null) return work(); // a part of the edit around it
+  return doc.transact((transaction) => {
+    const result = work();
+    refuseTooLarge(doc, transaction);
+    return result;
+  }, OWN_EDITS);
 }
 
 /** Undo and redo of the person's own edits; one edit (or one `asOneEdit`) is one step. */
