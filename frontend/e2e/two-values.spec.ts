@@ -92,7 +92,7 @@ test("1,200 actions are deleted and brought back by keys, and the next edit is s
   browser,
 }) => {
   test.skip(LONG !== "", LONG);
-  test.setTimeout(150_000);
+  test.setTimeout(240_000);
   const ada = await product.person(browser, "Ada", { loadsAhead: true });
   const actions = Array.from({ length: 1_200 }, (_, n) => ({
     name: "Step",
@@ -117,12 +117,14 @@ test("1,200 actions are deleted and brought back by keys, and the next edit is s
   await expect.poll(count, { timeout: 30_000 }).toBe(0);
   await ada.page.keyboard.press("Control+z");
   await expect.poll(count, { timeout: 60_000 }).toBe(1_200);
-  await saved(ada.page);
+  const settled = () =>
+    expect(ada.page.getByText("Saved", { exact: true })).toBeVisible({ timeout: 60_000 });
+  await settled();
   await ada.page.reload();
-  await saved(ada.page);
+  await settled();
   await add(ada.page, "Next");
-  await saved(ada.page);
-  expect(await count()).toBe(1_201);
+  await settled();
+  await expect.poll(count, { timeout: 60_000 }).toBe(1_201);
   expect(ada.failures).toEqual([]);
   await ada.context.close();
 });
