@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from action_assistant.errors import BadInput, Conflict, NotUmrf, TooLarge
 from action_assistant.runner.runs.events import Override
-from action_assistant.runner.sent_graph import MOST, counted
+from action_assistant.runner.sent_graph import counted
 from action_assistant.runner.sent_subgraphs import SentSubgraph
 from action_assistant.runner.start.admission import (
     StartRequest,
@@ -22,6 +22,7 @@ from action_assistant.umrf.digest import digest
 from action_assistant.umrf.facts import PINNED, SIMULATED
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph, Relation
+from action_assistant.umrf.run_size import MOST_BYTES
 from runner.harness import GO_ON, order, sequence
 from strategies import graphs
 from support.doses import examples
@@ -295,9 +296,9 @@ def test_a_text_with_half_a_character_is_refused() -> None:
 
 def test_escapes_do_not_count_against_the_limit() -> None:
     text, stamp = with_number("5.0")
-    text += b"\n" * (MOST - len(text))
+    text += b"\n" * (MOST_BYTES - len(text))
     body = start_of(msgspec.json.encode(text.decode()), stamp)
-    assert counted(body) < MOST + 200 < len(body)
+    assert counted(body) < MOST_BYTES + 200 < len(body)
     assert admit(read_request(body), SIMULATED).digest == stamp
     too_long = msgspec.json.encode(text.decode() + "\n")
     with pytest.raises(TooLarge):

@@ -26,7 +26,7 @@ def test_what_a_start_says_beside_the_graph_is_looked_at_with_its_place() -> Non
 def test_a_graph_that_is_started_has_a_bound() -> None:
     many = order(sequence(actions=5_001))
     plain = msgspec.Raw(msgspec.json.encode(msgspec.json.decode(many.umrf)))
-    with pytest.raises(TooLarge, match="at most 5,000 actions"):
+    with pytest.raises(TooLarge, match="5,001 actions; at most 5,000 are run"):
         prepared(msgspec.structs.replace(many, umrf=plain), SIMULATED, "r1")
     with pytest.raises(TooLarge, match="at most 2 MB"):
         prepared(many, SIMULATED, "r1")
