@@ -1,17 +1,9 @@
 /** Notices of the room over the canvas: what happened to edits, each with what one can do. */
 import { Button, CloseButton } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
-import {
-  IconArchive,
-  IconGitMerge,
-  IconHistory,
-  IconInfoCircle,
-  IconLock,
-  IconUsers,
-} from "@tabler/icons-react";
-import { type ReactNode, useCallback, useEffect, useState } from "react";
+import { IconArchive, IconHistory, IconInfoCircle, IconLock, IconUsers } from "@tabler/icons-react";
+import { useCallback, useEffect, useState } from "react";
 import { MOST_VALUE_BYTES, onTooLarge } from "../graph/edit/edit-size";
-import type { ChangedTwice } from "../sync/changed-twice";
 import type { ConnectionNotice } from "../sync/graph-connection";
 import { otherPeopleWait } from "../sync/unsaved-reasons";
 import {
@@ -26,11 +18,11 @@ import {
 } from "../sync/use-room";
 import { lazyPart } from "../ui/parts/lazy-part";
 import { OverlayBoundary } from "../ui/parts/part-boundary";
-import { useChangedTwiceTold } from "./changed-twice-words";
+import { Say } from "./room-notice";
 import style from "./room-notices.module.css";
 
-const ChangedTwiceDialog = lazyPart(() =>
-  import("./changed-twice-dialog").then((part) => part.ChangedTwiceDialog),
+const ChangedTwiceNotice = lazyPart(() =>
+  import("./changed-twice-notice").then((part) => part.ChangedTwiceNotice),
 );
 const OthersDialog = lazyPart(() => import("./others-dialog").then((part) => part.OthersDialog));
 const StrandedEditsDialog = lazyPart(() =>
@@ -43,25 +35,6 @@ const words: Record<ConnectionNotice, string> = {
   differed:
     "This page showed something else than the server has, so it was loaded anew. This was reported; nothing of yours is lost.",
 };
-
-interface SayProps {
-  icon: ReactNode;
-  tone?: "warn";
-  children: ReactNode;
-  action?: ReactNode;
-}
-
-function Say({ icon, tone, children, action }: SayProps) {
-  return (
-    <div className={style.say} data-tone={tone}>
-      <span className={style.icon} aria-hidden>
-        {icon}
-      </span>
-      <span className={style.words}>{children}</span>
-      {action}
-    </div>
-  );
-}
 
 /** Nobody can change this graph: why, and what can be done. */
 function ReadOnly() {
@@ -109,30 +82,11 @@ function Others() {
 /** What this person changed while away and others changed, too. */
 function ChangedByBoth() {
   const all = useChangedTwice();
-  return all.length === 0 ? null : <SayChangedByBoth all={all} />;
-}
-
-function SayChangedByBoth({ all }: { all: readonly ChangedTwice[] }) {
-  const told = useChangedTwiceTold(all);
-  const [open, setOpen] = useState(false);
-  if (told.length === 0) return null;
+  if (all.length === 0) return null;
   return (
-    <Say
-      icon={<IconGitMerge size={16} />}
-      tone="warn"
-      action={
-        <Button size="compact-sm" onClick={() => setOpen(true)}>
-          Choose
-        </Button>
-      }
-    >
-      While you were away, others changed{" "}
-      {told.length === 1 ? "something" : `${told.length} things`} that you changed, too. One of both
-      values stands.
-      <OverlayBoundary>
-        <ChangedTwiceDialog told={told} opened={open} onClose={() => setOpen(false)} />
-      </OverlayBoundary>
-    </Say>
+    <OverlayBoundary>
+      <ChangedTwiceNotice all={all} />
+    </OverlayBoundary>
   );
 }
 

@@ -1,0 +1,22 @@
+/** One notice over the canvas, with what one can do about it. */
+import type { ReactNode } from "react";
+import style from "./room-notices.module.css";
+
+interface SayProps {
+  icon: ReactNode;
+  tone?: "warn";
+  children: ReactNode;
+  action?: ReactNode;
+}
+
+export function Say({ icon, tone, children, action }: SayProps) {
+  return (
+    <div className={style.say} data-tone={tone}>
+      <span className={style.icon} aria-hidden>
+        {icon}
+      </span>
+      <span className={style.words}>{children}</span>
+      {action}
+    </div>
+  );
+}
