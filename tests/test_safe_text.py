@@ -8,6 +8,7 @@ import pty
 import re
 import subprocess
 import time
+import unicodedata
 from pathlib import Path
 
 import psutil
@@ -15,8 +16,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from action_assistant.safe_text import PrintableLog, one_line, printable
+from action_assistant.errors import NotFound
+from action_assistant.safe_text import PrintableLog, one_line, printable, sentence
+from action_assistant.umrf.model import Problem, Where
 from action_assistant.web.auth.keys import Keys
+from action_assistant.web.http.problems import problem_of
 from journal import servers
 from support.product import COMMAND, TOKEN, Product, free_ports
 
@@ -30,6 +34,64 @@ def test_json_stays_the_same_json_and_steers_nothing(value: object) -> None:
     assert json.loads(shown) == value
     assert not _CONTROLS.search(shown)
     shown.encode()
+
+
+#: Parts of names, and of what stands around them in a sentence.
+_NAMES = st.lists(
+    st.sampled_from(
+        [*"\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069\u200e\u200f\u061c", "\n"]
+    )
+    | st.sampled_from(["ذراع", "רובוט", "٣", "arm", "1", " ", "_", ", ", "\u0301", "\\"])
+    | st.characters(),
+    max_size=8,
+).map("".join)
+_ISOLATED = re.compile("\u2068[^\u2066-\u2069\u202a-\u202e]*\u2069")
+_TURNS = {"R", "AL", "AN", "RLE", "LRE", "RLO", "LRO", "PDF", "RLI", "LRI", "FSI", "PDI"}
+
+
+def _turns(text: str) -> bool:
+    """Whether a character outside of isolates has a class by which the order can change (UAX 9)."""
+    return any(unicodedata.bidirectional(each) in _TURNS for each in _ISOLATED.sub("", text))
+
+
+@given(_NAMES, _NAMES)
+def test_no_name_turns_the_sentence_around_it(graph: str, robot: str) -> None:
+    said = f"{graph} waits for {robot}: 2 of 3 are (a) there."
+    shown = sentence(said)
+    assert not _turns(shown)
+    assert shown.endswith(": 2 of 3 are (a) there.")
+    assert " waits for " in _ISOLATED.sub("", shown)
+    assert sentence(shown) == shown
+    # Nothing is lost: what is isolated and what is written as JSON writes it can be read back.
+    escaped = re.sub("[\u202a-\u202e\u2066-\u2069]", lambda it: f"\\u{ord(it[0]):04x}", said)
+    assert _ISOLATED.sub(lambda it: it[0][1:-1], shown) == escaped
+    if not any(unicodedata.bidirectional(each) in _TURNS for each in said):
+        assert shown == said
+
+
+@given(_NAMES)
+def test_no_name_turns_what_stands_after_it_on_a_terminal(name: str) -> None:
+    line = one_line(f"run 2 of {name} 3 of 4")
+    assert not _CONTROLS.search(line)
+    assert line == one_line(line)
+    # A mark on both sides: nothing neutral, and no digit, stands beside what is written leftwards.
+    for run in re.finditer("[^\u200e]+", line):
+        classes = {unicodedata.bidirectional(each) for each in run[0]}
+        assert not (classes & {"R", "AL", "AN"} and "L" in classes)
+
+
+@pytest.mark.parametrize(
+    "name", ["a\u202eb", "a\u2066b", "a\u200fb", "ذراع", "a\u2067\u2069\u202eb"]
+)
+def test_no_refusal_and_no_problem_is_turned_by_a_name(name: str) -> None:
+    told = f"{name} is not there: 2 of 3."
+    problem = Problem(code="x", severity="error", where=Where(path=f"/{name}"), message=told)
+    body = problem_of(NotFound(told, where={"path": f"/{name}"}))
+    assert problem.message == sentence(told) == json.loads(body)["detail"]
+    assert not _turns(problem.message)
+    assert (
+        problem.where.path == json.loads(body)["where"]["path"] == f"/{name}"
+    )  # exact: no sentence
 
 
 def test_a_line_of_a_log_cannot_pretend_to_be_two() -> None:

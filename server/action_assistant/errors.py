@@ -23,6 +23,8 @@ The class docstring is the title on the wire, the instance's message the detail.
 
 from typing import ClassVar
 
+from action_assistant.safe_text import sentence
+
 
 class Refused(Exception):
     """Request refused"""
@@ -30,6 +32,7 @@ class Refused(Exception):
     status: ClassVar[int] = 400
 
     def __init__(self, detail: str, *, where: dict[str, object] | None = None) -> None:
+        detail = sentence(detail)
         super().__init__(detail)
         self.detail = detail
         self.where = where

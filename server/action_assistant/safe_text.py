@@ -1,4 +1,5 @@
-"""Texts of strangers on terminals and in logs: without control sequences, and without secrets.
+"""Texts of strangers on terminals, in logs and in sentences: without control sequences, without what
+turns the words around a name, and without secrets.
 
 Names of graphs and robots, paths and headers of requests and what engines say are written by anybody. A
 character that is no text is shown as JSON writes it (`\\u001b`), so that JSON stays the same JSON.
@@ -10,11 +11,24 @@ import sys
 from types import TracebackType
 from typing import Any, Final, TextIO, TypeAlias
 
+import msgspec
+
 #: Controls of both kinds but tab and line feed, overrides of direction, other ends of lines, and halves
 #: of characters, which cannot be written at all.
 _STEERING: Final = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]"
 )
+#: Embeddings, overrides and isolates: what they turn may reach beyond the name that has them.
+_DIRECTING: Final = "\u202a-\u202e\u2066-\u2069"
+#: Letters, digits and marks that are written from right to left.
+_LEFTWARD: Final = (
+    "\u0590-\u08ff\u200f\ufb1d-\ufdff\ufe70-\ufefc\U00010800-\U00010fff\U0001e800-\U0001efff"
+)
+_TURNING: Final = re.compile(f"[{_DIRECTING}{_LEFTWARD}]")
+#: Words from right to left, as they stand in a name; isolated already, or not yet.
+_WORDS: Final = f"[{_LEFTWARD}]+(?:[ _.-]?[0-9]*[ _.-]?[{_LEFTWARD}]+)*"
+_ISOLATED: Final = re.compile(f"\u200e?\u2068({_WORDS})\u2069\u200e?")
+_TURNED: Final = re.compile(f"\u2068({_WORDS})\u2069|({_WORDS})|([{_DIRECTING}])")
 #: What lets somebody in, wherever it stands, and how much of it may be shown.
 _SECRETS: Final[tuple[tuple[re.Pattern[str], str], ...]] = (
     (re.compile(r"\b([A-Za-z0-9]{12})\.[\w-]{43}(?![\w-])"), r"\1.…"),  # an invitation
@@ -36,9 +50,42 @@ def printable(text: str) -> str:
     return _STEERING.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 
+def told(text: str) -> str:
+    """Return sentences as a terminal shows them: no name turns their order.
+
+    Words from right to left stand between marks (U+200E), not in isolates: a terminal that knows none
+    would show them as boxes.
+    """
+    return printable(_ISOLATED.sub("\u200e\\1\u200e", sentence(text)))
+
+
 def one_line(text: str) -> str:
-    """The text, which cannot pretend to be another line."""
-    return printable(text).replace("\n", "\\n")
+    """Return the sentence, as `told` shows it, which cannot pretend to be another line."""
+    return told(text).replace("\n", "\\n")
+
+
+def sentence(text: str) -> str:
+    """Return the sentence in an order that no name in it turns.
+
+    A control of direction is shown as JSON writes it, since nobody knows where the name ends; words from
+    right to left become isolates (U+2068 to U+2069). Any other text stays as it is, and so does an
+    answer of this function.
+    """
+    return _TURNED.sub(_in_order, text) if _TURNING.search(text) else text
+
+
+def _in_order(found: re.Match[str]) -> str:
+    if found[3] is not None:
+        return printable(found[3])
+    return f"\u2068{found[1] or found[2]}\u2069"
+
+
+def hold_names(told: msgspec.Struct, *fields: str) -> None:
+    """Make sentences of these fields as `sentence` does: for `__post_init__` of what people are told."""
+    for field in fields:
+        text = getattr(told, field)
+        if text and _TURNING.search(text):
+            msgspec.structs.force_setattr(told, field, sentence(text))
 
 
 def redacted(text: str, secrets: tuple[str, ...] = ()) -> str:
@@ -51,14 +98,16 @@ def redacted(text: str, secrets: tuple[str, ...] = ()) -> str:
 
 
 class PrintableStream:
-    """A standard stream, through which nothing steers a terminal."""
+    """A standard stream, through which nothing steers a terminal. One of `sentences` has no JSON and no
+    files: no name turns them."""
 
-    def __init__(self, stream: TextIO) -> None:
+    def __init__(self, stream: TextIO, *, sentences: bool = False) -> None:
         self._stream = stream
+        self._shown = told if sentences else printable
 
     def write(self, text: str) -> int:
         """Returns how many characters were taken."""
-        self._stream.write(printable(text))
+        self._stream.write(self._shown(text))
         return len(text)
 
     def __getattr__(self, name: str) -> Any:
@@ -70,7 +119,7 @@ def make_streams_printable() -> None:
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is not None and not isinstance(stream, PrintableStream):
-            setattr(sys, name, PrintableStream(stream))
+            setattr(sys, name, PrintableStream(stream, sentences=name == "stderr"))
 
 
 class PrintableLog(logging.Formatter):

@@ -10,7 +10,7 @@ from typing import Any, Final
 import msgspec
 
 from action_assistant.errors import CannotStart
-from action_assistant.safe_text import one_line
+from action_assistant.safe_text import one_line, told
 from action_assistant.umrf import check as checks
 from action_assistant.umrf import semantics
 from action_assistant.umrf.codes import QUIET, rank
@@ -196,13 +196,13 @@ def _given(paths: Sequence[Path]) -> dict[str, Graph]:
 def _print(verdict: CheckVerdict) -> None:
     errors = sum(problem.severity == "error" for problem in verdict.problems)
     warnings = sum(kind_word(problem) == "warning" for problem in verdict.problems)
-    print(
-        f"{verdict.file}: {verdict.dialect or 'unreadable'}, {errors} errors, {warnings} warnings"
-    )
+    read = verdict.dialect or "unreadable"
+    print(one_line(f"{verdict.file}: {read}, {errors} errors, {warnings} warnings"))
     for problem in verdict.problems:
-        print(f"  {kind_word(problem)} {problem.code}: {problem.message} ({_at(problem.where)})")
+        kind = f"{kind_word(problem)} {problem.code}"
+        print(told(f"  {kind}: {problem.message} ({_at(problem.where)})"))
     for note in verdict.notes:
-        print(f"  note: {note.sentence} ({_at(note.where)})")
+        print(told(f"  note: {note.sentence} ({_at(note.where)})"))
 
 
 def kind_word(problem: Problem) -> str:
@@ -350,21 +350,21 @@ def _report(event: semantics.Trace, *, as_json: bool) -> None:
     if isinstance(event, semantics.NodeResultEvent):
         # What an action answered is ours to know; the engine sends no such thing.
         if event.message and not as_json:
-            said = one_line(event.message)
-            print(f"{event.t_ms / 1000:10.3f} s  {event.graph}  {event.node} says: {said}")
+            said = f"{event.graph}  {event.node} says: {event.message}"
+            print(one_line(f"{event.t_ms / 1000:10.3f} s  {said}"))
         return
     if as_json:
         print(msgspec.json.encode(event).decode())
         return
     match event:
         case semantics.NodeStateEvent(t_ms=at, graph=graph, node=node, state=state):
-            print(f"{at / 1000:10.3f} s  {graph}  {node}: {state}")
+            print(told(f"{at / 1000:10.3f} s  {graph}  {node}: {state}"))
         case semantics.GraphStateEvent(t_ms=at, graph=graph, state=state):
-            print(f"{at / 1000:10.3f} s  {graph}: {state}")
+            print(told(f"{at / 1000:10.3f} s  {graph}: {state}"))
         case semantics.GraphResultEvent(t_ms=at, graph=graph, value=value):
-            print(f"{at / 1000:10.3f} s  {graph} ends with {value}")
+            print(told(f"{at / 1000:10.3f} s  {graph} ends with {value}"))
         case semantics.HazardEvent(t_ms=at, graph=graph, code=code, node=node, message=message):
             who = f"  {node}" if node else ""
-            print(f"{at / 1000:10.3f} s  {graph}{who}: hazard {code}: {message}")
+            print(told(f"{at / 1000:10.3f} s  {graph}{who}: hazard {code}: {message}"))
         case _:
             pass

@@ -20,6 +20,7 @@ from action_assistant.journal.copies.before_upgrade import FOLDER
 from action_assistant.journal.database import Branch, cause_of
 from action_assistant.journal.events import Event, Fold
 from action_assistant.journal.journal import Journal
+from action_assistant.safe_text import told
 from action_assistant.settings import settled
 
 if TYPE_CHECKING:
@@ -190,7 +191,7 @@ async def _is_as_then(
         found = await _head(journal, branch, then.position, data)
     except (OSError, Refused) as error:
         why = error.detail if isinstance(error, Refused) else str(error)
-        print(f"{branch}: cannot be compared with the line of {line.time}: {why}")
+        print(told(f"{branch}: cannot be compared with the line of {line.time}: {why}"))
         return False
     if found.digest != then.digest:
         print(
@@ -249,7 +250,7 @@ def _for_each(
         try:
             return await handler(branch, journal)
         except Unavailable as error:
-            print(f"{branch}: {error.detail}")
+            print(told(f"{branch}: {error.detail}"))
             return False
         finally:
             await journal.close()

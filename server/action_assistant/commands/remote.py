@@ -21,7 +21,7 @@ from action_assistant.commands.client import (
 )
 from action_assistant.commands.databases import runs_copy
 from action_assistant.errors import CannotStart
-from action_assistant.safe_text import one_line
+from action_assistant.safe_text import one_line, told
 
 _ENDED: Final = frozenset({"finished", "halted", "stopped", "error", "refused", "lost"})
 _POLL: Final = 0.2  # seconds
@@ -209,7 +209,7 @@ def _watch(server: Server, run: str) -> int:
                 print(one_line(f"{name}: {action['state']}"), flush=True)
         if now["state"] in _ENDED:
             code, words = verdict(now)
-            print(words)
+            print(told(words))
             return code
         time.sleep(_POLL)
 

@@ -8,6 +8,7 @@ import msgspec
 
 from action_assistant.commands.client import No, Server, print_json, refused, running
 from action_assistant.runner.analysis.expected_runs import Expectation
+from action_assistant.safe_text import one_line, told
 from action_assistant.umrf.courses.expected import checked
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.semantics import script_from
@@ -36,9 +37,10 @@ def verify(options: argparse.Namespace) -> int:
         print("Nothing is expected yet: open a run in the page and choose “Expect this course”.")
     else:
         for each in verdicts:
-            print(f"{'same   ' if each.same else 'DIFFERS'}  {each.name} ({each.against})")
+            verdict = "same   " if each.same else "DIFFERS"
+            print(one_line(f"{verdict}  {each.name} ({each.against})"))
             if each.why:
-                print(f"         {each.why}")
+                print(told(f"         {each.why}"))
     return 0 if all(each.same for each in verdicts) else 1
 
 

@@ -8,6 +8,8 @@ from typing import Final, Literal, TypeAlias
 
 import msgspec
 
+from action_assistant.safe_text import hold_names
+
 Severity: TypeAlias = Literal["error", "warning", "fine"]
 
 
@@ -20,6 +22,9 @@ class Diagnostic(msgspec.Struct, frozen=True, kw_only=True):
     where: str
     message: str
     remedy: str
+
+    def __post_init__(self) -> None:
+        hold_names(self, "message", "remedy")
 
 
 #: Everything that can be wrong, by its code, in the order in which it is explained to people.

@@ -11,6 +11,8 @@ from typing import Final, Literal, TypeAlias
 
 import msgspec
 
+from action_assistant.safe_text import hold_names
+
 Key: TypeAlias = str
 JsonText: TypeAlias = str
 Position: TypeAlias = tuple[float, float]
@@ -159,6 +161,9 @@ class PlaceInside(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True)
     message: str
     where: Where = Where()
 
+    def __post_init__(self) -> None:
+        hold_names(self, "message")
+
 
 class Problem(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """Something about a graph that a person should know. Checks return these, never raise. `also`: the
@@ -172,6 +177,9 @@ class Problem(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     also: tuple[Where, ...] = ()
     inside: PlaceInside | None = None
 
+    def __post_init__(self) -> None:
+        hold_names(self, "message", "fix")
+
 
 class Note(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """What was done with something of a text that was read: translated, or left out.
@@ -184,6 +192,9 @@ class Note(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     where: Where
     times: int = 1
     also: tuple[Where, ...] = ()
+
+    def __post_init__(self) -> None:
+        hold_names(self, "message")
 
     @property
     def sentence(self) -> str:

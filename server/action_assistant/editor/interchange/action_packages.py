@@ -10,6 +10,7 @@ import msgspec
 from action_assistant.editor.documents.contents import GraphAtSeq, first_action, read
 from action_assistant.editor.log.graph_events import DocumentKind
 from action_assistant.errors import NotFound
+from action_assistant.safe_text import hold_names
 from action_assistant.umrf.model import Action, Graph
 from action_assistant.umrf.packages.choosing import disagreements, distinct_actions
 from action_assistant.umrf.packages.generating import ImpossiblePackage, package_files
@@ -33,6 +34,9 @@ class PackageRefusal(msgspec.Struct, frozen=True):
     action: str
     place: str
     reason: str
+
+    def __post_init__(self) -> None:
+        hold_names(self, "reason")
 
 
 class PackageList(msgspec.Struct, frozen=True):

@@ -21,6 +21,7 @@ from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.visits import ActionRun
 from action_assistant.runner.runs.word_index import holds, will_be_indexed
+from action_assistant.safe_text import hold_names
 from action_assistant.schema.runner_tables import action_sum, review, run_label
 from action_assistant.schema.runner_tables import run as runs
 from action_assistant.umrf.model import Graph
@@ -81,6 +82,9 @@ class SummedUp(msgspec.Struct, frozen=True, omit_defaults=True):
     cause: str = ""
     took: Took | None = None
     figures: int = 0
+
+    def __post_init__(self) -> None:
+        hold_names(self, "words", "cause")
 
 
 class Put(msgspec.Struct, frozen=True):

@@ -23,6 +23,7 @@ from action_assistant.runner.analysis.causes import (
 )
 from action_assistant.runner.analysis.levels import INTO, LevelPlace, places_of
 from action_assistant.runner.runs.run import Run
+from action_assistant.safe_text import sentence
 
 _NAMED: Final = 3  # actions in one sentence
 _TENTH_US: Final = 100_000
@@ -30,7 +31,11 @@ _SAME_S: Final = 0.101  # bounds that differ by no more say one figure
 
 
 def words(cause: Cause, run: Run) -> str:
-    """A cause in one plain sentence. The moment stands beside it."""
+    """Return a cause in one plain sentence, whose order no name turns. The moment stands beside it."""
+    return sentence(_in_words(cause, run))
+
+
+def _in_words(cause: Cause, run: Run) -> str:
     who = called(run, cause.action) if cause.action is not None else ""
     match cause:
         case OperatorStop():

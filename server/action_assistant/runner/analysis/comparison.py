@@ -13,6 +13,7 @@ from action_assistant.runner.runs import views
 from action_assistant.runner.runs.counts import visit_counts
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.visits import ActionRun, Visit
+from action_assistant.safe_text import hold_names
 from action_assistant.umrf.difference import ActionChange, Difference, difference
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.json.text import parse_small
@@ -51,6 +52,9 @@ class Parting(msgspec.Struct, frozen=True, kw_only=True):
     messages_a: list[str]
     messages_b: list[str]
 
+    def __post_init__(self) -> None:
+        hold_names(self, "text")
+
 
 class PartingCause(msgspec.Struct, frozen=True, kw_only=True):
     """Something that happened in one of the runs and explains where they part: what a person did, an
@@ -59,6 +63,9 @@ class PartingCause(msgspec.Struct, frozen=True, kw_only=True):
     kind: str
     run: int
     text: str
+
+    def __post_init__(self) -> None:
+        hold_names(self, "text")
 
 
 class RunComparison(msgspec.Struct, frozen=True, kw_only=True):
@@ -79,6 +86,9 @@ class RunComparison(msgspec.Struct, frozen=True, kw_only=True):
     parting: Parting | None
     because: PartingCause | None = None
     text: str
+
+    def __post_init__(self) -> None:
+        hold_names(self, "text")
 
 
 class SentTree(msgspec.Struct, frozen=True):

@@ -11,6 +11,7 @@ from action_assistant.runner.analysis.expected_runs import Expected
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.sent_graph import SentGraph, read_sent
 from action_assistant.runner.sent_subgraphs import Inner, SentSubgraph, graphs_in, read_inside
+from action_assistant.safe_text import hold_names
 from action_assistant.umrf.courses.coverage import (
     ArrowCoverage,
     OutcomeArrow,
@@ -59,6 +60,9 @@ class CheckedCourse(msgspec.Struct, frozen=True, kw_only=True):
     taken: tuple[OutcomeArrow, ...] = ()
     script: JsonObject
 
+    def __post_init__(self) -> None:
+        hold_names(self, "why")
+
 
 class CheckedCourses(msgspec.Struct, frozen=True):
     """All expected courses of a graph, by name, and what those cover together that it still takes."""
@@ -75,6 +79,9 @@ class ArrowProposal(msgspec.Struct, frozen=True, kw_only=True):
     script: JsonObject | None = None
     states: int = 0
     why: str = ""
+
+    def __post_init__(self) -> None:
+        hold_names(self, "why")
 
 
 def check_courses(

@@ -20,6 +20,7 @@ from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.visits import ActionRun, Visit
 from action_assistant.runner.sent_graph import SentGraph, read_sent
 from action_assistant.runner.sent_subgraphs import SentSubgraph, graphs_in, read_inside
+from action_assistant.safe_text import hold_names
 from action_assistant.schema.runner_tables import expectation
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.json.embedded import JsonObject, UmrfGraph
@@ -64,6 +65,9 @@ class Doubt(msgspec.Struct, frozen=True):
 
     action: str
     text: str
+
+    def __post_init__(self) -> None:
+        hold_names(self, "text")
 
 
 class Recorded(msgspec.Struct, frozen=True):

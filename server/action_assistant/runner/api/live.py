@@ -28,6 +28,7 @@ from action_assistant.runner.runs import views
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.stop.foreign_stop import StoppedAll
+from action_assistant.safe_text import hold_names
 from action_assistant.web.auth.access import session_of
 
 log: Final = logging.getLogger(__name__)
@@ -70,6 +71,9 @@ class RefusedMessage(msgspec.Struct, frozen=True, tag="refused", tag_field="type
 
     stop_id: str
     detail: str
+
+    def __post_init__(self) -> None:
+        hold_names(self, "detail")
 
 
 class Hello(msgspec.Struct, frozen=True, tag="hello", tag_field="type"):

@@ -34,6 +34,7 @@ from action_assistant.runner.start.index_writer import (
 )
 from action_assistant.runner.start.preflight import Preflight
 from action_assistant.runner.start.start_checks import GroupRequest, read_group
+from action_assistant.safe_text import hold_names
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.files.action_files import write_action
 from action_assistant.umrf.json.embedded import JsonObject, UmrfGraph
@@ -116,6 +117,9 @@ class RobotLogLine(msgspec.Struct, frozen=True, kw_only=True):
     has_graph: bool = False
     graphs: tuple[str, ...] = ()
     files: tuple[GraphFile, ...] = ()
+
+    def __post_init__(self) -> None:
+        hold_names(self, "why")
 
 
 class RobotStopped(msgspec.Struct, frozen=True):

@@ -10,6 +10,7 @@ from typing import TypeAlias
 import msgspec
 
 from action_assistant.runner.index_folders.scan import DefiningFile, IndexedFiles
+from action_assistant.safe_text import hold_names
 from action_assistant.umrf.check import refused_by_parser
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.echo import echo
@@ -38,6 +39,9 @@ class Hindered(msgspec.Struct, frozen=True):
     """The graph cannot be written; `why` is a sentence."""
 
     why: str
+
+    def __post_init__(self) -> None:
+        hold_names(self, "why")
 
 
 FileState: TypeAlias = There | Lacking | Differing | Hindered

@@ -12,7 +12,7 @@ from typing import Final
 
 import msgspec
 
-from action_assistant.safe_text import one_line
+from action_assistant.safe_text import printable
 from action_assistant.umrf.files.file_names import ACTION_MARK, GRAPH_MARK
 
 DEEP: Final = 2  # folders below the first one
@@ -50,7 +50,7 @@ class _NamedText(msgspec.Struct):
 
 def shown_path(path: str) -> str:
     """A path of a file system, which is bytes, as text of one line."""
-    return one_line(os.fsencode(path).decode(errors="replace"))
+    return printable(os.fsencode(path).decode(errors="replace")).replace("\n", "\\n")
 
 
 def scanned(folder: Path, names: Collection[str]) -> IndexedFiles:

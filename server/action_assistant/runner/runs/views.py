@@ -14,6 +14,7 @@ from action_assistant.runner.runs.events import AtRest, Author, Overridden, Over
 from action_assistant.runner.runs.run import Desired, Result, Run, State
 from action_assistant.runner.runs.sent_views import Sent, SubgraphShown, subgraphs_shown
 from action_assistant.runner.runs.visits import ActionRun, How, Outcome, Visit
+from action_assistant.safe_text import hold_names
 from action_assistant.umrf.json.embedded import UmrfGraph
 
 _LIVE: Final = 3_000  # visits in one live message, over all actions
@@ -65,6 +66,9 @@ class AlarmShown(msgspec.Struct, frozen=True):
     at: datetime
     text: str
 
+    def __post_init__(self) -> None:
+        hold_names(self, "text")
+
 
 class AtRestShown(msgspec.Struct, frozen=True):
     """How rest was seen where no answer of the engine could prove it: by whom (null: the runner saw the
@@ -105,6 +109,9 @@ class RunSummary(msgspec.Struct, frozen=True, kw_only=True):
     detail: str
     alarms: list[AlarmShown]
     recorded: bool
+
+    def __post_init__(self) -> None:
+        hold_names(self, "unconfirmed", "detail")
 
 
 class ArchivedShown(msgspec.Struct, frozen=True):

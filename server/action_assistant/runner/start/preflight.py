@@ -18,6 +18,7 @@ from action_assistant.runner.robots.engine import EngineIndex
 from action_assistant.runner.robots.foreign_graphs import foreign_graphs
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start.admission import Admitted, Prepared
+from action_assistant.safe_text import hold_names
 from action_assistant.umrf.check import check, is_final
 from action_assistant.umrf.codes import QUIET
 from action_assistant.umrf.facts import EngineFacts
@@ -46,6 +47,9 @@ class Item(msgspec.Struct, frozen=True, kw_only=True):
     overridable: bool = False
     problems: tuple[Problem, ...] = ()
     folder: FolderLook | None = None
+
+    def __post_init__(self) -> None:
+        hold_names(self, "text")
 
 
 class Preflight(msgspec.Struct, frozen=True):

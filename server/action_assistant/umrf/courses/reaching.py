@@ -12,6 +12,7 @@ from typing import Final, NamedTuple, TypeAlias
 
 import msgspec
 
+from action_assistant.safe_text import hold_names
 from action_assistant.umrf.courses.coverage import OutcomeArrow, taken
 from action_assistant.umrf.courses.instants import DUE, GIVING_UP, IDLE, RUNS, STOPS, Instant, State
 from action_assistant.umrf.courses.network import EdgeQuestion, Network
@@ -46,6 +47,9 @@ class ArrowUndecided(msgspec.Struct, frozen=True, tag_field="verdict", tag="unde
 
     states: int
     why: str
+
+    def __post_init__(self) -> None:
+        hold_names(self, "why")
 
 
 Reaching: TypeAlias = ArrowReached | ArrowUnreachable | ArrowUndecided

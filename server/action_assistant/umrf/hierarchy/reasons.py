@@ -4,6 +4,7 @@ from typing import Final, Literal, TypeAlias
 
 import msgspec
 
+from action_assistant.safe_text import hold_names
 from action_assistant.umrf.hierarchy.level_courses import Trouble, TroubleKind
 from action_assistant.umrf.model import Key
 
@@ -33,6 +34,9 @@ class FlatteningReason(msgspec.Struct, frozen=True):
     code: FlatteningCode
     message: str
     at: LevelPath = ()
+
+    def __post_init__(self) -> None:
+        hold_names(self, "message")
 
 
 _KINDS: Final[dict[TroubleKind, tuple[FlatteningCode, str]]] = {

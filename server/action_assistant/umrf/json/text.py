@@ -14,6 +14,7 @@ from typing import Final, NoReturn, TypeAlias
 
 import msgspec
 
+from action_assistant.safe_text import sentence
 from action_assistant.umrf.json.places import doubled_in, path_at, place_at, places_of
 from action_assistant.umrf.json.places import pointer as pointer
 
@@ -44,6 +45,7 @@ class Unreadable(Exception):
         line: int = 1,
         column: int = 1,
     ) -> None:
+        message = sentence(message)
         super().__init__(message)
         self.code = code
         self.message = message

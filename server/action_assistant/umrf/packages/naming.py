@@ -10,6 +10,7 @@ from typing import Final
 
 import msgspec
 
+from action_assistant.safe_text import hold_names
 from action_assistant.umrf.packages.reserved import (
     C_FUNCTIONS,
     CLASS_NAMES,
@@ -32,6 +33,9 @@ class NameRefusal(msgspec.Struct, frozen=True):
 
     place: str
     reason: str
+
+    def __post_init__(self) -> None:
+        hold_names(self, "reason")
 
     @property
     def sentence(self) -> str:

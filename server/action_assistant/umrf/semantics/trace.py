@@ -7,6 +7,8 @@ from typing import TypeAlias
 
 import msgspec
 
+from action_assistant.safe_text import hold_names
+
 
 class NodeStateEvent(msgspec.Struct, frozen=True, tag_field="kind", tag="node_state"):
     """An action changed its state. Times are milliseconds as the caller counts them."""
@@ -51,6 +53,9 @@ class NotReady(msgspec.Struct, frozen=True, tag_field="kind", tag="not_ready"):
     node: str
     why: str
 
+    def __post_init__(self) -> None:
+        hold_names(self, "why")
+
 
 class GraphResultEvent(msgspec.Struct, frozen=True, tag_field="kind", tag="graph_result"):
     """The exit of a graph was satisfied with this result."""
@@ -75,6 +80,9 @@ class HazardEvent(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="ki
     effect: str
     node: str | None = None
     message: str = ""
+
+    def __post_init__(self) -> None:
+        hold_names(self, "message")
 
 
 class NodeResultEvent(

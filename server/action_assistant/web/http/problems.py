@@ -12,6 +12,7 @@ from litestar.types import ExceptionHandlersMap
 
 from action_assistant.errors import Refused
 from action_assistant.logs.context import request_id
+from action_assistant.safe_text import hold_names
 
 log: Final = logging.getLogger(__name__)
 
@@ -40,6 +41,9 @@ class ProblemDetails(msgspec.Struct, frozen=True, omit_defaults=True):
     detail: str
     where: Annotated[dict[str, Any], _PLACE] | None = None
     request_id: str | None = msgspec.field(default_factory=request_id)
+
+    def __post_init__(self) -> None:
+        hold_names(self, "detail")
 
 
 def problem_of(refused: Refused) -> bytes:

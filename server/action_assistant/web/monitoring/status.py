@@ -10,6 +10,7 @@ from typing import Final, Literal, TypeAlias
 import msgspec
 
 from action_assistant.journal.journal import Journal
+from action_assistant.safe_text import hold_names
 from action_assistant.system import limits
 from action_assistant.system.posix import resource
 from action_assistant.version import VERSION
@@ -79,6 +80,9 @@ class RobotLink(msgspec.Struct, frozen=True):
     state: str
     why: str = ""
     heard_at: datetime | None = None
+
+    def __post_init__(self) -> None:
+        hold_names(self, "why")
 
 
 class Activity(msgspec.Struct, frozen=True, kw_only=True):
