@@ -11,10 +11,10 @@ import anyio.lowlevel
 import psutil
 import pytest
 
-from action_assistant.errors import Conflict, TooLarge, TooMany, Unavailable
+from action_assistant.errors import BadInput, Conflict, TooLarge, TooMany, Unavailable
 from action_assistant.runner.workers import Crashed, Lane, RunnerWorkers
 from action_assistant.web.auth import caller
-from action_assistant.web.auth.caller import Caller, done_for_nobody
+from action_assistant.web.auth.caller import BackgroundTasks, Caller, done_for_nobody
 from runner.worker_tasks import devour, die, pid, refuse, spin, standing, stumble
 
 
@@ -133,6 +133,32 @@ async def test_what_nobody_waits_for_ends() -> None:
                 with pytest.raises(Unavailable, match="gone"):
                     await run_in_worker(spin, 60.0)
         worker.wait(10)
+
+
+@pytest.mark.parametrize("ending", [{"type": "http.disconnect"}, BadInput("It ended early.")])
+async def test_a_background_task_outlives_the_request_in_which_it_began(
+    ending: dict[str, str] | BadInput,
+) -> None:
+    async def receive() -> dict[str, str]:
+        if isinstance(ending, BadInput):
+            raise ending
+        return ending
+
+    async with lane() as run_in_worker, anyio.create_task_group() as tasks:
+        answers: list[int] = []
+        answered = anyio.Event()
+
+        async def work() -> None:
+            answers.append(await run_in_worker(max, 3, 4))
+            answered.set()
+
+        async with asked_by("ann", receive):
+            BackgroundTasks(tasks).start_soon(work)
+            with pytest.raises(Unavailable, match="gone"):
+                await run_in_worker(spin, 60.0)
+        with anyio.fail_after(10):
+            await answered.wait()
+        assert answers == [4]
 
 
 async def test_nobody_waits_behind_the_many_requests_of_somebody_else() -> None:

@@ -41,6 +41,7 @@ from action_assistant.runner.start.start_checks import StartSources
 from action_assistant.runner.watched import WatchedRunner
 from action_assistant.runner.workers import RunnerWorkers
 from action_assistant.settings import ARCHIVE, Keep, RunnerSettings
+from action_assistant.web.auth.caller import BackgroundTasks
 from action_assistant.web.auth.keys import Keys
 from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.auth.scrape_token import ScrapeToken
@@ -146,9 +147,10 @@ async def _asking(
 ) -> AsyncIterator[tuple[WorkerQueries, WorkerQueries]]:
     """What asks for people, and what asks for ourselves and waits behind nobody's questions."""
     async with anyio.create_task_group() as tasks:
+        background = BackgroundTasks(tasks)
         yield (
-            WorkerQueries(workers.looks, place, archive_store, tasks),
-            WorkerQueries(workers.ours, place, archive_store, tasks),
+            WorkerQueries(workers.looks, place, archive_store, background),
+            WorkerQueries(workers.ours, place, archive_store, background),
         )
         tasks.cancel_scope.cancel()
 

@@ -9,7 +9,6 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from typing import Any, Final
 
 import anyio
-from anyio.abc import TaskGroup
 from sqlalchemy import Row
 
 from action_assistant.errors import BadInput, Conflict, NotFound, Refused
@@ -49,7 +48,7 @@ from action_assistant.runner.start.start_checks import (
 )
 from action_assistant.runner.stop.foreign_stop import ForeignStopLoop, StoppedAll
 from action_assistant.runner.stop.late_activity import LateActivity
-from action_assistant.web.auth.caller import done_for_nobody
+from action_assistant.web.auth.caller import BackgroundTasks
 from action_assistant.web.workers.lanes import RunInWorker
 
 log: Final = logging.getLogger(__name__)
@@ -69,7 +68,7 @@ class ExecutionService:
         robots: Robots,
         *,
         clock_us: ClockUs,
-        tasks: TaskGroup,
+        tasks: BackgroundTasks,
         run_in_worker: RunInWorker,
         simulator: Simulator,
         past: Past | None = None,
@@ -125,7 +124,7 @@ class ExecutionService:
                 journal,
                 robots,
                 clock_us=clock_us,
-                tasks=tasks,
+                tasks=BackgroundTasks(tasks),
                 run_in_worker=run_in_worker,
                 simulator=simulator,
                 past=past,
@@ -282,7 +281,6 @@ class ExecutionService:
         return opened
 
     async def _drive(self, opened: OpenRun, order: Order | None, incarnation: str = "") -> None:
-        done_for_nobody()  # a run goes on without whoever started it
         begin({"run": opened.run.id})
         await opened.drive(order, incarnation)
         self.open.pop(opened.run.id, None)

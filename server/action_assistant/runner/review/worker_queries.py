@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any, Concatenate, Final, NoReturn, ParamSpec, TypeVar
 
 import msgspec
-from anyio.abc import TaskGroup
 
 from action_assistant.errors import Refused, Unavailable
 from action_assistant.journal.events import Draft, StreamSnapshot
@@ -24,7 +23,7 @@ from action_assistant.runner.review.service import ReviewService
 from action_assistant.runner.runs.history import RunHistory, RunnerJournal
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.runner.runs.run import Run
-from action_assistant.web.auth.caller import done_for_nobody
+from action_assistant.web.auth.caller import BackgroundTasks
 from action_assistant.web.workers.lanes import RunInWorker
 
 log: Final = logging.getLogger(__name__)
@@ -49,7 +48,7 @@ class WorkerQueries:
         run_in_worker: RunInWorker,
         place: StoragePaths,
         journal: SnapshotJournal,
-        tasks: TaskGroup,
+        tasks: BackgroundTasks,
     ) -> None:
         self.opened: Mapping[str, OngoingRun] = {}
         self._run_in_worker = run_in_worker
@@ -108,7 +107,6 @@ class WorkerQueries:
 
     async def _store(self, kept: Sequence[StreamSnapshot]) -> None:
         """A cache: it is made again when the journal can be written, and its loss ends nothing."""
-        done_for_nobody()
         for each in kept:
             try:
                 await self._journal.keep_snapshot(each.stream, each.seq, each.state)

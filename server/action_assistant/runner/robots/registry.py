@@ -6,7 +6,6 @@ from typing import Final, Protocol, TypeAlias
 
 import anyio
 import msgspec
-from anyio.abc import TaskGroup
 
 from action_assistant.errors import BadInput, Conflict, NotFound
 from action_assistant.journal.events import Draft
@@ -44,6 +43,7 @@ from action_assistant.runner.robots.robot_events import (
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.history import RunnerJournal
 from action_assistant.umrf.facts import PINNED, BadProfile, EngineFacts, facts_of
+from action_assistant.web.auth.caller import BackgroundTasks
 from action_assistant.web.workers.lanes import RunInWorker
 
 log: Final = logging.getLogger(__name__)
@@ -99,14 +99,14 @@ class RegistryContext(msgspec.Struct, frozen=True):
     `shows` of all graphs that an engine shows; `stops` makes what stops foreign graphs."""
 
     journal: RunnerJournal
-    tasks: TaskGroup
+    tasks: BackgroundTasks
     clock_us: ClockUs
     run_in_worker: RunInWorker
     changed: Callable[[], None]
     foreign: Callable[[KnownEngine, ForeignCommand], Commanded]
     shows: Callable[[KnownEngine, tuple[Snapshot, ...]], None]
     stops: Callable[
-        [TaskGroup, ClockUs, RunInWorker, Note, Callable[[], None], Present], ForeignStops
+        [BackgroundTasks, ClockUs, RunInWorker, Note, Callable[[], None], Present], ForeignStops
     ]
 
 

@@ -9,7 +9,6 @@ from typing import ClassVar, Final, TypeAlias
 
 import anyio
 import msgspec
-from anyio.abc import TaskGroup
 
 from action_assistant.errors import NotFound, Unavailable
 from action_assistant.journal.events import Draft, Event
@@ -17,6 +16,7 @@ from action_assistant.runner.links.port import Command, EngineState, ForeignComm
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.history import RunnerJournal
 from action_assistant.runner.runs.recorder import StreamAppender
+from action_assistant.web.auth.caller import BackgroundTasks
 
 _PATIENCE_S: Final = 5.0  # until something that has to be stored is given up
 
@@ -203,7 +203,7 @@ def left_unproven(told: Iterable[RobotEvent]) -> list[StopAsked]:
 class RobotLog:
     """Writes and reads the streams of robots."""
 
-    def __init__(self, journal: RunnerJournal, tasks: TaskGroup) -> None:
+    def __init__(self, journal: RunnerJournal, tasks: BackgroundTasks) -> None:
         self._journal = journal
         self._tasks = tasks
         self._pens: dict[str, StreamAppender] = {}

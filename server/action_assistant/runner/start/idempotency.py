@@ -5,7 +5,6 @@ from contextlib import asynccontextmanager
 from weakref import WeakValueDictionary
 
 import anyio
-from anyio.abc import TaskGroup
 
 from action_assistant.errors import Conflict, Refused, Unavailable
 from action_assistant.journal.events import Draft
@@ -19,6 +18,7 @@ from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start.admission import StartRequest
 from action_assistant.runner.start.start_checks import Cleared
+from action_assistant.web.auth.caller import BackgroundTasks
 
 
 def booked(
@@ -87,7 +87,7 @@ class StopOrder:
 class IdempotentStarts:
     """Where starts are written down."""
 
-    def __init__(self, journal: RunnerJournal, tasks: TaskGroup, clock_us: ClockUs) -> None:
+    def __init__(self, journal: RunnerJournal, tasks: BackgroundTasks, clock_us: ClockUs) -> None:
         self._journal = journal
         self._tasks = tasks
         self._clock_us = clock_us

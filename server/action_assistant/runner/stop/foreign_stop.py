@@ -5,12 +5,12 @@ brought no proof; no start from here leaves before: a late stop would hit a run 
 name. What an earlier process left is gone on with once the engine has shown that it is still the same.
 """
 
+import logging
 from collections.abc import Callable, Iterator, Sequence
 from typing import Final, TypeAlias
 
 import anyio
 import msgspec
-from anyio.abc import TaskGroup
 
 from action_assistant.errors import NotFound, Refused
 from action_assistant.runner.clock import ClockUs
@@ -27,7 +27,10 @@ from action_assistant.runner.runs.events import Author
 from action_assistant.runner.stop.doubtful_errors import DoubtfulErrors
 from action_assistant.runner.stop.loading import LoadingWatch, in_words
 from action_assistant.runner.stop.proof import SET_GOING, RestProof, send_stop
+from action_assistant.web.auth.caller import BackgroundTasks
 from action_assistant.web.workers.lanes import RunInWorker
+
+log: Final = logging.getLogger(__name__)
 
 _GAP_S: Final = 0.1
 _SLOWEST_S: Final = 1.0
@@ -77,7 +80,7 @@ class ForeignStopLoop:
 
     def __init__(
         self,
-        tasks: TaskGroup,
+        tasks: BackgroundTasks,
         clock_us: ClockUs,
         run_in_worker: RunInWorker,
         note: Callable[[str, RobotEvent, str], None],
@@ -174,7 +177,7 @@ class ForeignStopLoop:
             if engine is None:
                 told: RobotEvent | str = _NO_LINK
             elif engine is known:
-                told = await self._once(it, engine)
+                told = await self._steadily(it, engine)
             else:
                 it.rest.forget()
                 told = await self._recognise(it, engine)
@@ -198,6 +201,15 @@ class ForeignStopLoop:
         if not it.life or not answer.incarnation:
             return self._unproven(it, _UNKNOWN_LIFE)
         return "" if answer.incarnation == it.life else self._unproven(it, _RESTARTED)
+
+    async def _steadily(self, it: _ForeignStop, engine: KnownEngine) -> RobotEvent | str:
+        """Send once and look once. A fault of ours keeps no Stop from being sent again."""
+        try:
+            return await self._once(it, engine)
+        except Exception as error:
+            log.exception("a stop of %s on %s failed, and is sent again", it.graph, it.robot)
+            it.rest.forget()
+            return f"the runner failed: {error!r}"
 
     async def _once(self, it: _ForeignStop, engine: KnownEngine) -> RobotEvent | str:
         """One message and one look: how it ends, or why it is not proven yet."""

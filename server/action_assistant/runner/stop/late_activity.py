@@ -11,7 +11,6 @@ from typing import Final, Protocol, TypeAlias, TypeVar
 
 import anyio
 import msgspec
-from anyio.abc import TaskGroup
 
 from action_assistant.errors import NotFound, Refused
 from action_assistant.runner.clock import ClockUs
@@ -23,6 +22,7 @@ from action_assistant.runner.robots.robot_events import Commanded, RobotLog
 from action_assistant.runner.runs.events import MovesAgain
 from action_assistant.runner.runs.history import RunHistory
 from action_assistant.runner.runs.run import Run
+from action_assistant.web.auth.caller import BackgroundTasks
 
 log: Final = logging.getLogger(__name__)
 
@@ -65,7 +65,7 @@ class LateActivity:
         open_: Mapping[str, Reopenable],
         history: RunHistory,
         robots: RobotRecords,
-        tasks: TaskGroup,
+        tasks: BackgroundTasks,
         *,
         clock_us: ClockUs,
         reopen: Reopen,

@@ -3,12 +3,15 @@
 Imported by workers too, so it imports little.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Coroutine, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple, TypeVarTuple, Unpack
 
 import anyio
+from anyio.abc import TaskGroup
+
+from action_assistant.errors import Refused
 
 if TYPE_CHECKING:
     from litestar.types import Receive
@@ -27,9 +30,14 @@ class Caller(NamedTuple):
         if self.receive is None:
             await anyio.sleep_forever()
         else:
-            while (await self.receive())["type"] != "http.disconnect":
+            try:
+                while (await self.receive())["type"] != "http.disconnect":
+                    pass
+            except Refused:  # nothing more can be read of them
                 pass
 
+
+_Values = TypeVarTuple("_Values")
 
 _CALLER: Final[ContextVar[Caller | None]] = ContextVar("caller", default=None)
 
@@ -69,3 +77,27 @@ def acting_for(person: str) -> Iterator[None]:
 def done_for_nobody() -> None:
     """From here on this task, and those that it begins, go on for themselves."""
     _CALLER.set(None)
+
+
+class BackgroundTasks:
+    """Starts tasks that outlive the request in which they begin.
+
+    A task inherits the caller of the code that starts it. When that request ends, whatever the task
+    asks of a worker would be refused, and the refusal would end the whole group. So services that live
+    as long as their process are given this instead of a TaskGroup.
+    """
+
+    def __init__(self, tasks: TaskGroup) -> None:
+        self._tasks = tasks
+
+    def start_soon(
+        self,
+        work: Callable[[Unpack[_Values]], Coroutine[object, object, object]],
+        *values: *_Values,
+    ) -> None:
+        """Start a task that nobody waits for."""
+        token = _CALLER.set(None)
+        try:
+            self._tasks.start_soon(work, *values)
+        finally:
+            _CALLER.reset(token)
