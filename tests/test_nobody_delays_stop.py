@@ -283,13 +283,13 @@ def test_a_start_whose_worker_dies_is_refused_and_nothing_was_sent(runner: Runne
 def test_bodies_that_are_too_large_are_refused(runner: RunnerProcess) -> None:
     with runner.client() as client:
         for path, size in [
-            ("/api/runs", 2_000_001),
-            ("/api/runs/x/script", 2_000_001),
-            ("/api/preflight", 2_000_001),
-            ("/api/groups", 2_000_001),
-            ("/api/expectations", 2_000_001),
-            ("/api/expectations/check", 2_000_001),
-            ("/api/expectations/proposal", 2_000_001),
+            ("/api/runs", 2_100_001),
+            ("/api/runs/x/script", 2_100_001),
+            ("/api/preflight", 2_100_001),
+            ("/api/groups", 2_100_001),
+            ("/api/expectations", 2_100_001),
+            ("/api/expectations/check", 2_100_001),
+            ("/api/expectations/proposal", 2_100_001),
             ("/api/robots", 100_001),
             ("/api/approvals", 100_001),
         ]:

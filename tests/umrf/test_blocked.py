@@ -108,13 +108,15 @@ def went_well(folder: Path, name: str) -> bool:
 
 
 def test_recorded_graphs_that_went_well_are_not_blocked() -> None:
-    found = {}
-    for name, folder in engine_runs().items():
+    found, runs = {}, engine_runs()
+    for name, folder in runs.items():
         path = folder / f"{name}.graph.json"
         if not refused_by_parser(read(path.read_bytes())) and went_well(folder, name):
             codes = blocked(path)
             found |= {name: codes} if codes else {}
-    assert found == {name: known["codes"] for name, known in KNOWN["recordings"].items()}
+    # Those of the engine's own graphs are not everywhere (UMRF_SHARED).
+    known = {name: each["codes"] for name, each in KNOWN["recordings"].items() if name in runs}
+    assert found == known
 
 
 def test_with_the_files_of_the_actions_an_optional_input_blocks_nothing() -> None:

@@ -120,10 +120,10 @@ class HeldDirectory:
                 out.write(content)
                 out.flush()
                 os.fsync(file)
+            os.fsync(self._at)
         except BaseException:
             os.unlink(name, dir_fd=self._at)
             raise
-        os.fsync(self._at)
 
     def complete(
         self, name: str, content: bytes, mode: int | None, owner: Owner | None = None
