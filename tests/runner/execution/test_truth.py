@@ -111,10 +111,12 @@ def test_nothing_is_shown_that_was_not_seen_and_live_is_as_it_is_told_later(
     events = journal.told(stream.removeprefix("run/"))
     run = replay(events)
     assert run is not None
-    if run.state not in ENDED:  # an action failed when the stop came: its code may go on
+    if run.state not in ENDED:
+        # An action failed when the stop came, and its code may go on; or the feedback was lost that tells
+        # who was not triggered, and another may still be loading.
         assert run.doubt
         assert stop is not None
-        assert any(call["result"] == "on_error" for call in calls)
+        assert run.loading or any(call["result"] == "on_error" for call in calls)
     for number, call in enumerate(calls):
         visits = run.actions[f"Work_{number}"].visits
         assert len(visits) <= 1  # every action runs once

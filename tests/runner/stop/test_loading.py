@@ -16,6 +16,7 @@ from action_assistant.runner.runs.fold import replay
 from action_assistant.runner.stop.loading import LoadingWatch
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import ENTRY, ENTRY_CONDITIONS, EXIT, Graph, Relation
+from runner.fake_network import now, now_ms
 from runner.harness import ANN, BEN, GO_ON, at_once, order, sequence, until, virtual
 from runner.robots_in_network import LOOKED, OTHER, PATROL, RobotsInNetwork, asked, shown
 
@@ -315,3 +316,45 @@ async def test_feedback_that_says_how_a_graph_ended_takes_nothing_away() -> None
     watch = LoadingWatch("g")
     watch.see((made_up,))
     assert await _loading_in(watch, own, g=sequence("g", 2)) == ["g/Work_0"]
+
+
+@virtual
+async def test_what_an_engine_showed_that_stood_beside_it_for_a_moment_proves_nothing() -> None:
+    """Both were told to start. Discovery shows the second one late: what it said until then looked like
+    the word of the only engine."""
+    here = scene(12.0, {"*": [{"after_s": 1.0}]})
+    first = here.nodes["David"].robot
+    async with here.played() as control:
+        here.quirks = EngineTraits(loading_ms=1.0, loss=0.0)
+        here.script = {"*": [{"never": True, "stop_s": 0.2}]}
+        second = here.robot("David")
+        second.seen_at = now() + 0.55
+        await anyio.sleep(0.25)
+        run = (await control.start(asked(), ANN)).run.id
+        await anyio.sleep(0.1)
+        await control.stop(run, BEN)
+        await until(lambda: now() > second.seen_at + 0.5)
+        second.robot.quit(now_ms())
+        here.network.stir(second)
+        await until(lambda: not second.seen)
+        await anyio.sleep(3)
+        assert first.moving == ()
+        assert shown(control, run).proof_at is None
+        assert shown(control, run).unconfirmed.startswith(NAME)
+        await until(lambda: first.moving == ("patrol",))
+        await until(lambda: run not in control.open)
+        assert (first.moving, (await control.find(run)).state) == ((), "stopped")
+
+
+@virtual
+async def test_feedback_of_a_moving_action_counts_only_while_the_answers_do_not_deny_it() -> None:
+    """The answer says that nothing has begun: what feedback shows moving is of another engine."""
+    moving = msgspec.structs.replace(
+        _look("g", "STOPPING", Work_0="STOPPING", Work_1="UNINITIALIZED"), source="feedback"
+    )
+    own = _look("g", "STOPPED", Work_0="UNINITIALIZED", Work_1="UNINITIALIZED")
+    watch = LoadingWatch("g")
+    watch.see((moving,))
+    assert await _loading_in(watch, own, g=sequence("g", 2)) == ["g/Work_0"]
+    obeyed = _look("g", "STOPPED", Work_0="FINISHED", Work_1="UNINITIALIZED")
+    assert await _loading_in(watch, obeyed, g=sequence("g", 2)) == []

@@ -176,7 +176,7 @@ class Monitor:
     def feed(self, ours: tuple[Snapshot, ...], parts: tuple[Snapshot, ...] = ()) -> None:
         """Feedback of this run, oldest first, and of graphs that have the names of its sub-graphs. That
         of others says nothing about an answer to us."""
-        if self._link.standing.servers == 1:
+        if self._is_alone():
             self._loading.see((*ours, *parts))
         if not ours:
             return
@@ -187,6 +187,16 @@ class Monitor:
         if news := fresh(self._it.run, ours) if overtaken else ours:
             asked = self._seen_asked
             self._it.observe(tuple(replace(each, since_asked=asked) for each in news))
+
+    def _is_alone(self) -> bool:
+        """Return whether one engine serves the path, in the life that the run was sent to. If not, nobody
+        knows which of them sent feedback, now or before discovery showed it: all of it is forgotten."""
+        now = self._link.standing
+        lives = {self._it.run.incarnation, now.incarnation} - {None, ""}
+        if now.servers == 1 and len(lives) <= 1:
+            return True
+        self._loading.forget()
+        return False
 
     async def run(self) -> None:
         """Ask until cancelled. What takes longer is found out beside it: no proof waits for that."""
@@ -205,6 +215,7 @@ class Monitor:
                 with anyio.fail_after(_GET_S):
                     answer = await self._link.get()
             except (NoAnswer, TimeoutError) as nothing:
+                self._is_alone()
                 self._hear_nothing(str(nothing))
             else:
                 self._take(answer, order, began)
@@ -257,7 +268,7 @@ class Monitor:
             self._loading.see(ours)
             self._conclude(shown, ours, answer, order, asked)
         else:
-            self._loading.forget()  # feedback may have been of the other one
+            self._is_alone()
             self.trouble = _SEVERAL.format(servers=servers or "no")
 
     def _compare(self, answer: Answer, order: int) -> None:

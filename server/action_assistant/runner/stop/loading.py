@@ -140,12 +140,16 @@ class LoadingWatch:
         for each in shown:
             if _is_open(each):
                 parts = [node for node in each.nodes if _part(each.graph, node) in held]
-                known, seen = self._read.get(each.graph), self._seen(each.graph)
+                known, seen = self._read.get(each.graph), self._seen(each)
                 found += _named(each, known, seen, parts)
         return tuple(found)
 
-    def _seen(self, graph: str) -> SeenAfter:
-        return self._after.get(graph, (0, SeenAfter()))[1]
+    def _seen(self, shown: Snapshot) -> SeenAfter:
+        """Return what was seen of a graph; nothing, where this look denies that what moved has begun:
+        then another engine has shown it, or somebody has made it up."""
+        seen = self._after.get(shown.graph, (0, SeenAfter()))[1]
+        denied = any(shown.nodes.get(each) in NEVER_BEGAN for each in seen.active)
+        return SeenAfter() if denied else seen
 
     def _is_enclosed_by_left(self, graph: str) -> bool:
         enclosing = [each for each in self._known if graph.startswith(f"{each}__")]
