@@ -1,11 +1,15 @@
 """Robots are registered, watched and recorded."""
 
+import asyncio
+from contextvars import Context
+
 import anyio
 import msgspec
 import pytest
 
 from action_assistant.errors import BadInput, Conflict, NotFound
 from action_assistant.runner.api.live import Hub
+from action_assistant.runner.emulator.messages import Stop
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import (
     Candidate,
@@ -18,7 +22,7 @@ from action_assistant.runner.runs.events import EngineSaid
 from action_assistant.umrf.files import codec
 from runner.harness import ANN, BEN, Harness, at_once, clock_us, order, sequence, until, virtual
 from runner.registered_robots import NEVER, Open, RegisteredRobots, fleet
-from runner.robots_in_network import LOOKED
+from runner.robots_in_network import LOOKED, RobotsInNetwork
 
 
 @virtual
@@ -225,3 +229,25 @@ async def test_with_two_engines_on_one_path_nothing_is_called_stopped() -> None:
         await control.confirm_rest(run.id, LOOKED, BEN)
         await until(lambda: not control.open)
     assert harness.journal.history(run.id).proof_at is None
+
+
+@virtual
+async def test_a_command_of_others_that_comes_by_itself_in_no_task_is_heard_and_looked_into() -> (
+    None
+):
+    """A link over ROS 2 hands over what its own thread has read: by callbacks of the event loop."""
+    faults: list[object] = []
+    here = RobotsInNetwork(5)
+    async with here.played() as control:
+        loop = asyncio.get_running_loop()
+        loop.set_exception_handler(lambda _, told: faults.append(told))
+        await anyio.sleep(60)
+        asked_at = control.robots.heard()["David"]
+        stop = Stop(graph_name="patrol", targets=("David",))
+        loop.call_later(0.1, lambda: here.network.carry(stop, "cli"), context=Context())
+        await anyio.sleep(5)
+        assert faults == []
+        assert control.robots.heard()["David"] >= asked_at + 4_000_000
+        await until(lambda: not control.robots.robot_log.waiting)
+        heard = [each for _, each in await control.robots.robot_log.newest("David", 9)]
+        assert [each.command for each in heard if isinstance(each, Commanded)] == ["stop"]

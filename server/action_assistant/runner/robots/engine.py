@@ -4,6 +4,7 @@ A link around the link. Runs use it like any other, and everything that is heard
 so that nobody asks twice.
 """
 
+import asyncio
 import logging
 from collections.abc import Awaitable, Callable
 from contextlib import AbstractContextManager
@@ -239,14 +240,15 @@ class KnownEngine:
     def look_closely(self) -> None:
         """A run has ended there, or others told it something: what comes of that is asked more
         often for a while."""
-        if anyio.current_time() >= self._close_until:
+        now = _now()
+        if now >= self._close_until:
             self._look.set()
-        self._close_until = anyio.current_time() + _AFTERWARDS_S
+        self._close_until = now + _AFTERWARDS_S
 
     def let_index(self) -> None:
         """What it indexes was just written: ask it again when it has read that, and not before. Gets that
         a run or a Stop needs go on."""
-        self._indexing_until = anyio.current_time() + _INDEXES_S
+        self._indexing_until = _now() + _INDEXES_S
         self._look.set()
 
     async def indexed(self) -> None:
@@ -311,6 +313,11 @@ class KnownEngine:
         if texts != self._index[0]:
             self._index = texts, await run_in_worker(read_index, *texts)
         return self._index[1]
+
+
+def _now() -> float:
+    """Return what `anyio.current_time` does, also where what comes by itself is heard: in no task."""
+    return asyncio.get_running_loop().time()
 
 
 def read_index(actions: tuple[str, ...], graphs: tuple[str, ...]) -> EngineIndex:
