@@ -358,3 +358,21 @@ async def test_feedback_of_a_moving_action_counts_only_while_the_answers_do_not_
     assert await _loading_in(watch, own, g=sequence("g", 2)) == ["g/Work_0"]
     obeyed = _look("g", "STOPPED", Work_0="FINISHED", Work_1="UNINITIALIZED")
     assert await _loading_in(watch, obeyed, g=sequence("g", 2)) == []
+
+
+@virtual
+async def test_how_long_an_action_usually_loads_is_said_once_it_was_seen_to_begin_three_times() -> (
+    None
+):
+    here = scene(3.0, {"*": [{"after_s": 0.2}]}, loss=0.0)
+    async with here.played() as control:
+        told: list[str] = []
+        for _ in range(4):
+            run = (await control.start(asked(), ANN)).run.id
+            await anyio.sleep(0.2)
+            await control.stop(run, BEN)
+            await until(lambda run=run: bool(control.open[run].run.loading))
+            told.append(shown(control, run).unconfirmed)
+            await until(lambda run=run: run not in control.open)
+        assert told == [NAME, NAME, NAME, f"{NAME} (usually 3 s)"]
+        assert (await control.find(run)).proof_at is not None

@@ -55,7 +55,7 @@ from action_assistant.runner.runs.history import sent_of
 from action_assistant.runner.runs.recorder import RunRecorder, Store
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.stop.doubtful_errors import DoubtfulErrors
-from action_assistant.runner.stop.loading import LoadingAction, in_words
+from action_assistant.runner.stop.loading import LoadingAction, LoadingTimes, in_words
 from action_assistant.runner.stop.proof import SET_GOING
 from action_assistant.runner.stop.stop_loop import StopLoop
 from action_assistant.web.workers.lanes import RunInWorker
@@ -89,6 +89,7 @@ class OpenRun:
         clock_us: ClockUs,
         run_in_worker: RunInWorker,
         changed: "Callable[[OpenRun], None]",
+        loading_times: LoadingTimes | None = None,
     ) -> None:
         self.run = run
         self.revision = 0
@@ -105,6 +106,8 @@ class OpenRun:
         self.watch = self._watched()
         self._lines = 0
         self._loading_told_at = 0.0  # seconds of loading at which that is told again
+        self._loading_times = loading_times or LoadingTimes()
+        self._sent_at: int | None = None  # when its start left; None: an earlier process sent it
         self._changed = changed
         self._over = anyio.Event()
         self._again = anyio.Event()
@@ -185,6 +188,9 @@ class OpenRun:
         self.recorder.put(event, author or self.run.engine)
         if self.run.end is not None:
             self._over.set()
+        if isinstance(event, Ended) and self._sent_at is not None:
+            self._loading_times.learn(self.run, self._sent_at)
+            self._sent_at = None
         self._stopping.notice()
         self._touch()
 
@@ -314,6 +320,7 @@ class OpenRun:
                 Silent(self._clock_us(), at, f"Nobody knows whether the start left: {error!r}")
             )
         else:
+            self._sent_at = self._clock_us()
             self.tell(self._published(at, incarnation))
 
     def _published(self, at: int, incarnation: str) -> Published:
@@ -395,7 +402,9 @@ class OpenRun:
         if is_same and waited_s < self._loading_told_at:
             return
         self._loading_told_at = max(4.0, 2 * waited_s)
-        told = f"{why} ({waited_s:.0f} s so far)" if is_same else why
+        usual = self._loading_times.usual(self.run.engine, actions)
+        times = [f"{waited_s:.0f} s so far"] * is_same + [usual] * bool(usual)
+        told = f"{why} ({'; '.join(times)})" if times else why
         places = tuple((each.graph, each.node) for each in actions)
         self.tell(Loading(self._clock_us(), told, places))
         if why:

@@ -48,6 +48,7 @@ from action_assistant.runner.start.start_checks import (
 )
 from action_assistant.runner.stop.foreign_stop import ForeignStopLoop, StoppedAll
 from action_assistant.runner.stop.late_activity import LateActivity
+from action_assistant.runner.stop.loading import LoadingTimes
 from action_assistant.web.auth.caller import BackgroundTasks
 from action_assistant.web.workers.lanes import RunInWorker
 
@@ -101,6 +102,7 @@ class ExecutionService:
         )
         self._robot_watchers: list[Callable[[], None]] = []
         self._settled: dict[str, Settled] = {}
+        self._loading_times = LoadingTimes()
         self._number, self._stops = 0, StopOrder()
 
     @classmethod
@@ -275,6 +277,7 @@ class ExecutionService:
             clock_us=self._clock_us,
             run_in_worker=self._run_in_worker,
             changed=self._changed,
+            loading_times=self._loading_times,
         )
         self.open[run.id] = opened
         self._changed(opened)

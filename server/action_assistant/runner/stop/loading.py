@@ -6,13 +6,15 @@ of the graph, and by what was seen after the graph had left RUNNING, since from 
 anything (`umrf.triggers`).
 """
 
-from collections import Counter
+import statistics
+from collections import Counter, deque
 from collections.abc import Mapping, Sequence
 from typing import Final
 
 import msgspec
 
 from action_assistant.runner.links.observations import ACTIVE, Snapshot
+from action_assistant.runner.runs.run import Run
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import ENTRY
 from action_assistant.umrf.triggers import (
@@ -26,6 +28,9 @@ from action_assistant.umrf.triggers import (
 from action_assistant.web.workers.lanes import RunInWorker
 
 _NAMED: Final = 3
+_LEARNT: Final = 20  # newest begins of one action that a usual time is taken of,
+_ENOUGH: Final = 3  # and how many it takes at least
+_EXACT_US: Final = 2_000_000  # a begin that is known less exactly tells no time
 _DRAINED: Final = frozenset({"FINISHED", "HALTED"})
 
 
@@ -154,6 +159,42 @@ class LoadingWatch:
     def _is_enclosed_by_left(self, graph: str) -> bool:
         enclosing = [each for each in self._known if graph.startswith(f"{each}__")]
         return all(each in self._after for each in (self._main, *enclosing) if each != graph)
+
+
+class LoadingTimes:
+    """How long actions took from their trigger until they were seen to begin, by robot and by their own
+    name, since this runner began. It only changes words: no time tells whether an action will come.
+
+    Learnt is what is certain: the first action of a run that begins was triggered by its start.
+    """
+
+    def __init__(self) -> None:
+        self._known: dict[tuple[str, str], deque[float]] = {}
+
+    def learn(self, run: Run, sent_at: int) -> None:
+        """Learn from a run of which the start left at that moment, in microseconds UTC."""
+        begun = [
+            (each.visits[0], node)
+            for node, each in run.actions.items()
+            if each.visits and not each.older
+        ]
+        if not begun or run.simulated or run.reshaped or run.parts:
+            return
+        first, node = min(begun, key=lambda each: each[0].start)
+        if first.how == "observed" and first.start - first.not_before <= _EXACT_US:
+            key = run.engine, node.rpartition("_")[0]
+            times = self._known.setdefault(key, deque(maxlen=_LEARNT))
+            times.append((first.start - sent_at) / 1e6)
+
+    def usual(self, robot: str, actions: Sequence[LoadingAction]) -> str:
+        """Return how long one action usually loads, in words; "" for several, and where too few begins
+        were seen."""
+        nodes = {each.node.rpartition("_")[0] for each in actions}
+        times = self._known.get((robot, nodes.pop()), ()) if len(nodes) == 1 else ()
+        if len(times) < _ENOUGH:
+            return ""
+        usual = statistics.median(times)
+        return f"usually {usual:.0f} s" if usual >= 1 else "usually less than 1 s"
 
 
 def in_words(actions: Sequence[LoadingAction]) -> str:
