@@ -7,6 +7,7 @@
  */
 
 import type * as Y from "yjs";
+import { deviceNow } from "../clock/server-clock";
 import { endsOf, ROOTS, type Root, rootOf, splitKey } from "../graph/document-keys";
 import { asOneEdit } from "../graph/edit/document-writes";
 import { lostValue } from "../graph/edit/undo-history";
@@ -76,7 +77,7 @@ export class ChangedTwiceStore {
   take(unsaved: readonly UnsavedEdit[], apply: () => void): void {
     const { doc } = this;
     if (this.own === null || !unsaved.some((edit) => this.waiting.has(edit))) {
-      const late = Date.now() - AWAY_MS;
+      const late = deviceNow() - AWAY_MS;
       this.back(unsaved.filter(({ at }) => at < late));
     }
     const { own } = this;

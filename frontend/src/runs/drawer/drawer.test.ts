@@ -29,6 +29,7 @@ const action = (aid: string, state: string, visits: object[] = []) => ({
 const run = (part: object) =>
   ({
     id: "r",
+    graph_name: "round",
     engine: "atlas",
     simulated: false,
     state: "running",
