@@ -26,6 +26,11 @@ export class Outbox {
     return this.waiting.map(({ edit }) => edit);
   }
 
+  /** The edits that no message of this socket carries yet. */
+  get unsent(): readonly UnsavedEdit[] {
+    return this.waiting.filter(({ message }) => message === NOT_SENT).map(({ edit }) => edit);
+  }
+
   /** Whether the room has been given what it lacked, so that single updates may follow. */
   get answered(): boolean {
     return this.answeredSync;

@@ -96,9 +96,10 @@ export class ReconnectingSocket {
     this.dial();
   }
 
-  /** The other end is who it should be: the next failure is a new one. */
+  /** The other end is who it should be, and answers: the next failure is a new one. */
   arrived(): void {
     this.attempts = 0;
+    this.probedAt = null;
     this.phase = "live";
   }
 
@@ -152,7 +153,8 @@ export class ReconnectingSocket {
   private onMessage(socket: Socket, data: unknown): void {
     if (socket !== this.socket) return;
     this.heardAt = tick();
-    this.probedAt = null;
+    // It may have been on its way before the question: only the answer ends the doubt.
+    if (this.probedAt !== null) this.probedAt = this.heardAt;
     if (!(data instanceof ArrayBuffer)) return;
     try {
       this.speaker.onMessage(new Uint8Array(data));

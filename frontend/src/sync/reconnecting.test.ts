@@ -1,7 +1,7 @@
 /** When a room that lost its connection tries again. */
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import type * as Y from "yjs";
-import { FakeServer } from "../testing/fake-server";
+import { FakeServer, type FakeSocket } from "../testing/fake-server";
 import { connectRoom, type Room } from "./room-connection";
 
 let server: FakeServer;
@@ -101,6 +101,72 @@ test.each(["online", "offline", "visibilitychange"])(
     page.end();
   },
 );
+
+/** Holds all that goes over a socket, as a network that is away does; the answer lets it through. */
+function holdBack(socket: FakeSocket) {
+  const [out, back]: [Uint8Array[], Uint8Array[]] = [[], []];
+  const [send, deliver] = [socket.send.bind(socket), socket.deliver.bind(socket)];
+  socket.send = (data) => void out.push(data);
+  socket.deliver = (data) => void back.push(data);
+  return {
+    /** The server gets what was said, even by a page that has left this socket. */
+    arrives: () => {
+      for (const data of out.splice(0)) server.take(socket, data);
+    },
+    comesBack: () => {
+      Object.assign(socket, { send, deliver });
+      for (const data of back.splice(0)) deliver(data);
+    },
+  };
+}
+
+const saying = (value: string, doc: Y.Doc) => doc.getMap("meta").set("description", value);
+
+test.each(["online", "offline", "visibilitychange"])(
+  "on %s an edit waits for the answer, so that a value of others is taken before it is overwritten",
+  (kind) => {
+    const page = stage();
+    const { doc, changedTwice, link } = page.other;
+    [doc.clientID, server.doc.clientID] = [2_000, 1_000]; // what is set here wins
+    const network = holdBack(server.accept());
+    page.happens(kind);
+    saying("mine", doc);
+    expect(link()).toMatchObject({ state: "live", unsaved: 1 });
+    server.broadcast((theirs) => saying("theirs", theirs));
+    vi.advanceTimersByTime(7_000);
+    expect(link().state).toBe("offline");
+    network.arrives(); // the old socket is heard before the new one
+    expect(server.doc.getMap("meta").get("description")).toBe("theirs");
+    vi.advanceTimersByTime(300);
+    server.accept();
+    expect(link()).toMatchObject({ state: "live", unsaved: 0 });
+    expect(server.doc.getMap("meta").get("description")).toBe("mine");
+    expect(changedTwice.now()).toMatchObject([{ mine: "mine", theirs: "theirs" }]);
+    page.end();
+  },
+);
+
+test("what was edited while a socket was in doubt goes over it when it has answered, and not before", () => {
+  const page = stage();
+  const { doc, changedTwice, link } = page.other;
+  [doc.clientID, server.doc.clientID] = [2_000, 1_000];
+  const socket = server.accept();
+  const network = holdBack(socket);
+  page.happens("offline");
+  saying("mine", doc);
+  write("too", doc);
+  server.broadcast((theirs) => saying("theirs", theirs));
+  vi.advanceTimersByTime(4_000);
+  page.happens("online");
+  network.arrives();
+  expect(server.doc.getMap("meta").toJSON()).toEqual({ description: "theirs" });
+  network.comesBack();
+  expect(server.last).toBe(socket);
+  expect(link()).toMatchObject({ state: "live", unsaved: 0 });
+  expect(server.doc.getMap("meta").toJSON()).toEqual({ description: "mine", too: 1 });
+  expect(changedTwice.now()).toMatchObject([{ mine: "mine", theirs: "theirs" }]);
+  page.end();
+});
 
 test("reconnects are spread over half of the time, so that a thousand do not come at once", () => {
   for (const [random, expected] of [

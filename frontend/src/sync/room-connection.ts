@@ -72,6 +72,9 @@ class Connection implements Room, SocketHandler {
   /** What the server has, while its own edits have not come yet: those are taken before ours are given. */
   private asked: Uint8Array | null = null;
   private learned = false;
+  /** Whether the socket may be dead and has not answered yet. An edit that is given to it would be stored when
+   * the network is back, before this page has taken what others did meanwhile: their value would be gone. */
+  private isDoubted = false;
   /** Whether the page shows more than the entry of the log that the server named last. */
   private isAhead = false;
 
@@ -243,6 +246,7 @@ class Connection implements Room, SocketHandler {
   }
 
   probe(): Uint8Array<ArrayBuffer> {
+    this.isDoubted = true;
     return messages.syncStep1(this.doc);
   }
 
@@ -250,6 +254,7 @@ class Connection implements Room, SocketHandler {
     this.outbox.fresh();
     this.asked = null;
     this.learned = false;
+    this.isDoubted = false;
     this.say({ readOnly: undefined });
     this.socket.send(messages.syncStep1(this.doc));
     // The others saw us go: only a newer clock brings us back.
@@ -331,7 +336,9 @@ class Connection implements Room, SocketHandler {
         this.socket.arrived();
         this.isAhead = false;
         this.say({ state: "live", why: undefined });
+        this.isDoubted = false;
         if (this.asked !== null) this.give(this.asked);
+        else if (this.outbox.answered) this.giveUnsent();
         this.asked = null;
         break;
       case sync.messageYjsUpdate:
@@ -383,6 +390,15 @@ class Connection implements Room, SocketHandler {
     });
   }
 
+  /** What was edited while the socket was in doubt. */
+  private giveUnsent(): void {
+    const { unsent } = this.outbox;
+    if (unsent.length === 0) return;
+    this.sendUpdate(Y.mergeUpdates(unsent.map(({ update }) => update)), () =>
+      this.outbox.sentAll(),
+    );
+  }
+
   /** Sends an update, in pieces where one message could not hold it; `sent` counts the last of them. */
   private sendUpdate(update: Uint8Array, sent: () => void): void {
     const pieces = piecesOf(update);
@@ -406,7 +422,7 @@ class Connection implements Room, SocketHandler {
       this.outbox.edited(edit);
     }
     // Until the room asked for what it lacks, everything travels with that answer, in order.
-    if (this.outbox.answered && this.socket.isOpen) {
+    if (this.outbox.answered && this.socket.isOpen && !this.isDoubted) {
       this.sendUpdate(update, () => this.outbox.sentAll());
     }
     this.say({ unsaved: this.outbox.unsaved });
