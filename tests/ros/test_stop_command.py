@@ -68,6 +68,33 @@ def test_stop_says_unconfirmed_and_exits_1_until_somebody_has_looked(
         david.end()
 
 
+@pytest.mark.timeout(240)
+def test_stop_exits_1_while_an_action_may_be_loading_and_0_once_it_has_run(
+    domain: int, tmp_path: Path
+) -> None:
+    david = RobotProcess(domain, tmp_path, {"*": [{"load_s": 15.0, "after_s": 0.5}]})
+    (tmp_path / "pair.json").write_text(json.dumps(GRAPH))
+    try:
+        with running(tmp_path / "data") as product, product.runner() as runner:
+            runner.post("/api/robots", json={"name": "David", "domain": domain})
+            _answering(product)
+            graph = product.cli("import", str(tmp_path / "pair.json")).stdout.split()[0]
+            run = product.cli("run", graph, "--engine", "David", "--no-wait").stdout.strip()
+            told = product.cli("stop", run)
+            assert (told.returncode, told.stdout) == (1, "")
+            assert "STOP UNCONFIRMED for run 1 of pair" in told.stderr
+            assert "A is still loading; it may move when it has loaded" in told.stderr
+            assert runner.get(f"/api/runs/{run}").json()["proof_at"] is None
+            deadline = time.monotonic() + 60
+            while (told := product.cli("stop", run)).returncode == 1:
+                assert time.monotonic() < deadline, told
+            ended = runner.get(f"/api/runs/{run}").json()
+            assert (ended["state"], ended["actions"]["A_0"]["state"]) == ("stopped", "FINISHED")
+            assert ended["proof_at"] is not None
+    finally:
+        david.end()
+
+
 def _moving(product: Product) -> None:
     """Wait until the runner shows that the graph of others moves."""
     with product.runner() as runner:
