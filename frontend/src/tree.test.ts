@@ -46,16 +46,16 @@ const BELOW_EDITOR = [
 const LAYERS: Readonly<Record<string, readonly string[]>> = {
   clock: [],
   words: [],
-  graph: [],
+  graph: ["words"],
   ui: ["clock", "words"],
   api: ["clock", "words", "graph"],
   offline: ["api"],
   status: ["clock", "words", "graph", "ui", "api"],
   canvas: ["clock", "words", "graph", "ui", "api", "status"],
   sync: ["clock", "words", "graph", "api"],
-  "dry-run": ["graph", "api", "status"],
-  "edit-actions": ["graph", "ui", "api", "canvas", "dry-run"],
-  history: ["graph", "ui", "api"],
+  "dry-run": ["words", "graph", "api", "status"],
+  "edit-actions": ["words", "graph", "ui", "api", "canvas", "dry-run"],
+  history: ["words", "graph", "ui", "api"],
   people: BELOW_EDITOR,
   comments: BELOW_EDITOR,
   find: BELOW_EDITOR,
@@ -78,13 +78,13 @@ const LAYERS: Readonly<Record<string, readonly string[]>> = {
   runs: ["clock", "words", "graph", "ui", "api", "status", "canvas"],
   review: ["clock", "words", "graph", "ui", "api", "status", "canvas", "history"],
   robots: ["clock", "words", "ui", "api", "status"],
-  library: ["graph", "ui", "api", "status", "canvas"],
+  library: ["words", "graph", "ui", "api", "status", "canvas"],
   // The page of actions is an editor of its own, with the same forms and rooms.
   actions: [...BELOW_EDITOR, "people", "comments", "history", "inspector", "packages"].concat([
     "editor",
     "library",
   ]),
-  account: ["ui", "api"],
+  account: ["words", "ui", "api"],
   administration: ["clock", "words", "ui", "api"],
   app: [
     "clock",
@@ -146,23 +146,6 @@ test("what only tests need is imported by tests only", () => {
       topOf(file) !== "testing" && (imports.get(file) ?? []).some((t) => topOf(t) === "testing"),
   );
   expect(wrong).toEqual([]);
-});
-
-/** Where a name in a text is no part of a sentence that people read as it stands, and why. */
-const BARE_NAMES: Readonly<Record<string, string>> = {
-  "review/run/run-menu.tsx": "begins the name of a new course, which is isolated where it stands",
-};
-
-test("names of graphs and robots are isolated within sentences: their letters may turn the words around", () => {
-  const inText = /\$\{(?!isolated\()[\w.!?]*\b(graph_name|engine|robot\.name|held\.graph)\}/;
-  const inElement = /\b(on|of|in|from|to) \{[\w.]*\b(graph_name|engine|robot|robot\.name)\}/;
-  const bare = modules.filter((file) =>
-    textOf(file)
-      .split("\n")
-      .some((line) => !/key=|encodeURI/.test(line) && (inText.test(line) || inElement.test(line))),
-  );
-  expect(bare.filter((file) => !(file in BARE_NAMES))).toEqual([]);
-  expect(Object.keys(BARE_NAMES).filter((file) => !bare.includes(file))).toEqual([]);
 });
 
 /** Who may ask the browser for the time beside the clock, and why. */

@@ -9,6 +9,7 @@ import {
   rememberName,
 } from "../api/session";
 import { Logo } from "../ui/top-bar";
+import { isolated } from "../words/isolated";
 import style from "./sign-in.module.css";
 import { useSignInField } from "./use-sign-in-field";
 
@@ -29,7 +30,8 @@ export function Invitation({ link, invited, onOpen }: Props) {
       <Paper className={style.card} withBorder radius="lg">
         <Logo />
         <Title order={1} size="h3" mt="md">
-          {invited.by === "" ? "You are invited" : `${invited.by} invites you`} as {invited.role}
+          {invited.by === "" ? "You are invited" : `${isolated(invited.by)} invites you`} as{" "}
+          {invited.role}
         </Title>
         <Text c="dimmed" mt="xs">
           To TeMoto Action Assistant, where robot tasks are drawn and run. You may{" "}

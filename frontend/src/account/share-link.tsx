@@ -5,6 +5,7 @@ import { useState } from "react";
 import { codeUrl, type Invitation, type useRevoke } from "../api/sharing";
 import { copyText } from "../ui/copy-text";
 import { ago, instant, useNow } from "../ui/times";
+import { isolated } from "../words/isolated";
 import style from "./share-dialog.module.css";
 
 const MOST_GUESTS = 6;
@@ -14,7 +15,7 @@ export function guestWords(guests: Invitation["guests"]): string {
   if (guests.length === 0) return "Nobody came in by it yet";
   const names = guests.slice(0, MOST_GUESTS).map(({ person }) => person.name || "Guest");
   const more = guests.length - names.length;
-  return `${names.join(", ")}${more > 0 ? ` and ${more} more` : ""} came in`;
+  return `${names.map(isolated).join(", ")}${more > 0 ? ` and ${more} more` : ""} came in`;
 }
 
 function Copy({ link, label }: { link: string; label: string }) {
@@ -25,7 +26,7 @@ function Copy({ link, label }: { link: string; label: string }) {
     <Button
       className={style.copy ?? ""}
       leftSection={state === "done" ? <IconCheck size={15} /> : <IconCopy size={15} />}
-      aria-label={`${words}: the link for ${label}`}
+      aria-label={`${words}: the link for ${isolated(label)}`}
       onClick={() => void copy()}
     >
       {words}
@@ -36,7 +37,7 @@ function Copy({ link, label }: { link: string; label: string }) {
 function Code({ src, label }: { src: string; label: string }) {
   return (
     <figure className={style.code}>
-      <img src={src} alt={`QR code of the link for ${label}`} width={232} height={232} />
+      <img src={src} alt={`QR code of the link for ${isolated(label)}`} width={232} height={232} />
       <figcaption>Point the camera of a phone or tablet at it.</figcaption>
     </figure>
   );
@@ -70,7 +71,7 @@ export function ShareLink({ invitation, origin, revoke }: Props) {
         <TextInput
           readOnly
           className={style.text ?? ""}
-          aria-label={`Link for ${label}`}
+          aria-label={`Link for ${isolated(label)}`}
           value={link}
           onFocus={(event) => event.currentTarget.select()}
         />
@@ -78,7 +79,7 @@ export function ShareLink({ invitation, origin, revoke }: Props) {
         <Button
           leftSection={<IconQrcode size={15} />}
           aria-expanded={code}
-          aria-label={`Code of the link for ${label}`}
+          aria-label={`Code of the link for ${isolated(label)}`}
           onClick={() => setCode(!code)}
         >
           Code
@@ -87,7 +88,7 @@ export function ShareLink({ invitation, origin, revoke }: Props) {
           color="red"
           variant="subtle"
           className={style.revoke ?? ""}
-          aria-label={`Revoke the link for ${label}`}
+          aria-label={`Revoke the link for ${isolated(label)}`}
           onClick={() => setAsking(true)}
         >
           Revoke

@@ -4,6 +4,7 @@ import { IconFileImport, IconPlus, IconSearch } from "@tabler/icons-react";
 import { type ReactNode, useDeferredValue, useMemo, useRef, useState } from "react";
 import { useMay } from "../api/use-person";
 import { useSearchKey } from "../ui/hooks/use-search-key";
+import { isolated } from "../words/isolated";
 import { ActionRows } from "./action-rows";
 import style from "./actions-page.module.css";
 import { type ActionFilter, foundActions, type ListedAction } from "./listing";
@@ -35,7 +36,9 @@ interface FilterProps {
 function Filters({ robots, filter, onFilter }: FilterProps) {
   const all = [
     ...WORDS,
-    ...robots.map((robot) => [`robot:${robot}`, `On ${robot}`] as readonly [ActionFilter, string]),
+    ...robots.map(
+      (robot) => [`robot:${robot}`, `On ${isolated(robot)}`] as readonly [ActionFilter, string],
+    ),
   ];
   return (
     <fieldset className={style.filters}>

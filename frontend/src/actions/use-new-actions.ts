@@ -9,6 +9,7 @@ import { errorText, Refusal } from "../api/http";
 import { useLive } from "../api/live/use-live";
 import type { RobotAction } from "../library/robot-actions";
 import { takeFromRobot } from "../library/take-from-robot";
+import { isolated } from "../words/isolated";
 
 /** There is one of that name already. */
 function isTaken(error: unknown): boolean {
@@ -48,7 +49,7 @@ export function useNewActions() {
     try {
       await deleteGraph(id);
       notifications.show({
-        title: `${name} is deleted from the library`,
+        title: `${isolated(name)} is deleted from the library`,
         message: "Graphs keep what they use. It can be brought back below the list.",
       });
       go("/actions");

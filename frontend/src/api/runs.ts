@@ -25,7 +25,7 @@ export type Run = RunnerApi["RunSummary"] & {
 /** Where somebody asked from, as words that follow the name; "" where it was not recorded. */
 export function requesterPlace(asker: Requester | null): string {
   if (asker?.by === undefined) return "";
-  return ` · by ${asker.by}, from ${asker.address ?? "this computer"}`;
+  return ` · by ${isolated(asker.by)}, from ${asker.address ?? "this computer"}`;
 }
 
 /** Where it ran, in a few words. */

@@ -10,6 +10,7 @@ import { StateLabel } from "../status/state-label";
 import { useInStep } from "../status/use-in-step";
 import { colorOfName } from "../ui/name-colors";
 import { stopwatch, useNow } from "../ui/times";
+import { isolated } from "../words/isolated";
 import style from "./action-card.module.css";
 import {
   CardStateContext,
@@ -136,7 +137,7 @@ export const ActionCard = memo(function ActionCard({
         data-side={right ? "left" : "top"}
         isConnectable={isConnectable}
         role="img"
-        aria-label={`Input of ${action.name} ${action.instanceId}`}
+        aria-label={`Input of ${isolated(action.name)} ${action.instanceId}`}
       />
       {action.actor !== "" && <span className={style.robot}>{action.actor}</span>}
       {change && <ChangeTag mark={change} beside={action.actor !== ""} />}
@@ -166,7 +167,7 @@ export const ActionCard = memo(function ActionCard({
           data-outcome={outcome}
           role="img"
           aria-label={`When ${outcomeWord[outcome]}`}
-          title={`When ${action.name} ${action.instanceId} is ${outcomeWord[outcome]}`}
+          title={`When ${isolated(action.name)} ${action.instanceId} is ${outcomeWord[outcome]}`}
           style={{ ...spotOf(i, right), color: outcomeColor[outcome] }}
         >
           <OutcomeSign outcome={outcome} size={11} />

@@ -1,6 +1,7 @@
 /** What a card says of its inputs: at rest, in a run, and all of it while it is selected. */
 import { IconArrowLeft } from "@tabler/icons-react";
 import type { CardRow } from "../graph/parameters/card-rows";
+import { isolated } from "../words/isolated";
 import style from "./card-lines.module.css";
 
 const TITLES: Readonly<Record<CardRow["kind"], string>> = {
@@ -29,7 +30,7 @@ function Line({ row, inferred, old, differs }: LineProps) {
       data-kind={kind}
       data-inferred={doubt || undefined}
       data-differs={differs || undefined}
-      title={`${name}: ${text}${TITLES[kind]}${doubt ? ", of a visit that was inferred" : ""}`}
+      title={`${isolated(name)}: ${text}${TITLES[kind]}${doubt ? ", of a visit that was inferred" : ""}`}
     >
       <span className={style.name}>{name}</span>
       <span className={style.value}>

@@ -18,6 +18,7 @@ import {
 import { dataFlowOf, type InputGivers } from "../graph/parameters/data-flow";
 import { movedTogether, movesBetween, shifted } from "../graph/waypoints";
 import type { Progress } from "../status/progress";
+import { isolated } from "../words/isolated";
 import { type Bundle, bundlesOf, pillSizeOf } from "./arrows/bundles";
 import { gridOffset, type Scene, type SceneCard } from "./arrows/scene";
 import { expectedCard, expectedEnd } from "./card-handles";
@@ -242,7 +243,7 @@ function cardWords(action: Action, { progress, marks }: NodeOptions): string {
   const robot = action.actor === "" ? "" : `, robot ${action.actor}`;
   const state = progress.get(action.key)?.word;
   const now = state === undefined ? "" : `, ${state}`;
-  return `${action.name} ${action.instanceId}${robot}${now}${problemMarkWords(marks.get(action.key))}`;
+  return `${isolated(action.name)} ${action.instanceId}${robot}${now}${problemMarkWords(marks.get(action.key))}`;
 }
 
 type Names = ReadonlyMap<Key, string>;
@@ -252,7 +253,8 @@ function namesOf(graph: Graph): Names {
     [ENTRY, "entry"],
     [EXIT, "exit"],
   ]);
-  for (const { key, name, instanceId } of graph.actions) names.set(key, `${name} ${instanceId}`);
+  for (const { key, name, instanceId } of graph.actions)
+    names.set(key, `${isolated(name)} ${instanceId}`);
   return names;
 }
 

@@ -12,6 +12,7 @@ import { endName } from "../graph/relation-words";
 import { pathWords } from "../graph/value-text";
 import { Empty } from "../ui/empty";
 import { Tooltip } from "../ui/floating/tooltip";
+import { isolated } from "../words/isolated";
 import style from "./comments.module.css";
 import { ThreadCard } from "./thread-card";
 import { Write } from "./write";
@@ -37,7 +38,12 @@ function Begin({ action, name }: { action: Action; name: string }) {
     setParameter("");
   };
   return (
-    <Write place={[id, action.key]} label={`Comment on ${name}`} button="Comment" onSay={say}>
+    <Write
+      place={[id, action.key]}
+      label={`Comment on ${isolated(name)}`}
+      button="Comment"
+      onSay={say}
+    >
       {all.length > 0 && (
         <NativeSelect
           size="xs"

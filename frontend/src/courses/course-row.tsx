@@ -7,6 +7,7 @@ import type { Script } from "../api/dry-runs";
 import { authorName } from "../api/graphs";
 import { Tooltip } from "../ui/floating/tooltip";
 import { day, useNow } from "../ui/times";
+import { isolated } from "../words/isolated";
 import style from "./courses.module.css";
 
 const SIGNS = { same: "✓", other: "✗", unknown: "?" } as const;
@@ -48,7 +49,7 @@ export function CourseRow({ course, mayEdit, onPlay, onDrop }: Props) {
       <Tooltip label="Play it on the canvas">
         <ActionIcon
           size="sm"
-          aria-label={`Play ${name} on the canvas`}
+          aria-label={`Play ${isolated(name)} on the canvas`}
           onClick={() => onPlay(course.script as Script)}
         >
           <IconFlask size={15} aria-hidden />
@@ -56,7 +57,7 @@ export function CourseRow({ course, mayEdit, onPlay, onDrop }: Props) {
       </Tooltip>
       {mayEdit && (
         <Tooltip label="Expect it no more">
-          <ActionIcon size="sm" aria-label={`Expect ${name} no more`} onClick={onDrop}>
+          <ActionIcon size="sm" aria-label={`Expect ${isolated(name)} no more`} onClick={onDrop}>
             <IconTrash size={15} aria-hidden />
           </ActionIcon>
         </Tooltip>

@@ -10,6 +10,7 @@ import { commandsOf, scriptOf } from "../dry-run/script";
 import type { DryRun } from "../dry-run/use-dry-run";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { useThrottledLink } from "../sync/use-room";
+import { isolated } from "../words/isolated";
 import { NameField } from "./name-field";
 
 /** Why a dry-run cannot be expected; null where it can. */
@@ -32,7 +33,7 @@ export function KeepDryRun({ run }: { run: DryRun }) {
     setPanel("courses");
     notifications.show({
       title: "Expected from now on",
-      message: `“${name}” is held against every later version of the graph.`,
+      message: `“${isolated(name)}” is held against every later version of the graph.`,
     });
   };
   if (naming) {

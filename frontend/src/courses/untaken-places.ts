@@ -4,6 +4,7 @@ import type { UntakenPlaces } from "../canvas/card-highlights";
 import { relationId } from "../graph/document-keys";
 import type { Graph, Precondition } from "../graph/model";
 import { endName } from "../graph/relation-words";
+import { isolated } from "../words/isolated";
 
 /** By relation, those that are listed twice alike: a course cannot tell them apart. */
 export function untakenPlaces(graph: Graph, { coverage }: CheckedCourses): UntakenPlaces {
@@ -24,7 +25,7 @@ export function untakenPlaces(graph: Graph, { coverage }: CheckedCourses): Untak
 
 /** `Dock_0 → Charge_0`. */
 export function arrowWords(graph: Graph, { parent, child }: OutcomeArrow): string {
-  return `${endName(graph, parent)} → ${endName(graph, child)}`;
+  return `${isolated(endName(graph, parent))} → ${isolated(endName(graph, child))}`;
 }
 
 /** Whether the arrow is on screen still: the answer may be older than the last edit. */

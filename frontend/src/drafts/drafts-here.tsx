@@ -11,6 +11,7 @@ import { usePerson } from "../api/use-person";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { lazyPart } from "../ui/parts/lazy-part";
 import { OverlayBoundary } from "../ui/parts/part-boundary";
+import { isolated } from "../words/isolated";
 import { answersWords, apartWords } from "./draft-words";
 import style from "./drafts.module.css";
 import { useDraftStep } from "./use-draft-step";
@@ -93,7 +94,7 @@ async function deleteDraft({ id, name }: GraphDraft, client: QueryClient): Promi
   await deleteGraph(id);
   await refreshGraphs(client);
   notifications.show({
-    title: `“${name}” is deleted`,
+    title: `“${isolated(name)}” is deleted`,
     message: "It can be brought back from the list of graphs.",
   });
 }
@@ -116,7 +117,7 @@ function Row(props: DraftRowProps) {
       {mayEdit && (
         <ActionIcon
           className={style.remove ?? ""}
-          aria-label={`Delete the draft ${draft.name}`}
+          aria-label={`Delete the draft ${isolated(draft.name)}`}
           loading={busy}
           onClick={() => void step(() => deleteDraft(draft, client))}
         >

@@ -15,6 +15,7 @@ import { refreshHistory } from "../api/documents/history";
 import { errorText } from "../api/http";
 import { CoursesOfText } from "../courses/courses-told";
 import { namesWords } from "../history/history-words";
+import { isolated } from "../words/isolated";
 import style from "./drafts.module.css";
 import { MergeConflicts } from "./merge-conflicts";
 import { MergeProblems } from "./merge-problems";
@@ -44,7 +45,7 @@ function useMerge({ draft, into, onClose }: Props) {
       await refreshHistory(client, graph);
       onClose();
       notifications.show({
-        title: into === "origin" ? `“${draft.name}” is merged` : "Taken over",
+        title: into === "origin" ? `“${isolated(draft.name)}” is merged` : "Taken over",
         message: changed ? "The history leads back." : "Everything stays as it was.",
       });
     });
@@ -52,7 +53,8 @@ function useMerge({ draft, into, onClose }: Props) {
 }
 
 function Intro({ found, draft, into }: Props & { found: MergePreview }) {
-  const into_name = into === "origin" ? draft.origin_name || "the graph" : `“${draft.name}”`;
+  const into_name =
+    into === "origin" ? draft.origin_name || "the graph" : `“${isolated(draft.name)}”`;
   if (isNothing(found.changes)) return <p>As it is chosen, nothing changes.</p>;
   return (
     <p>
@@ -71,7 +73,7 @@ function Body(props: Props) {
   const { conflicts, changes, problems, seq, draft_seq } = found.data;
   const seen = `${seq} ${draft_seq}`;
   const left = conflicts.filter(({ place }) => choices[place] === undefined).length;
-  const names = { origin: draft.origin_name || "the graph", draft: `“${draft.name}”` };
+  const names = { origin: draft.origin_name || "the graph", draft: `“${isolated(draft.name)}”` };
   return (
     <div className={style.merge} aria-busy={found.isFetching}>
       {conflicts.length > 0 && (

@@ -3,6 +3,7 @@
 import type { TraceEvent } from "../api/dry-runs";
 import { fullName, type Graph, type Key } from "../graph/model";
 import type { Progress, Tone } from "../status/progress";
+import { isolated } from "../words/isolated";
 
 /** All that happens at one time. */
 export interface PlaybackMoment {
@@ -226,7 +227,8 @@ function waitWords(why: string): string {
   return inputs ? "waits for a value" : "waits for other actions";
 }
 
-function listed(names: readonly string[]): string {
+function listed(all: readonly string[]): string {
+  const names = all.map(isolated);
   const last = names.at(-1) ?? "";
   return names.length < 2 ? last : `${names.slice(0, -1).join(", ")} and ${last}`;
 }

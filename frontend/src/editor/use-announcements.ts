@@ -7,6 +7,7 @@ import { endName } from "../graph/relation-words";
 import type { Progress } from "../status/progress";
 import { useRoom } from "../sync/use-room";
 import { announcer } from "../ui/announcer";
+import { isolated } from "../words/isolated";
 
 /** The names of what a transaction touched: actions, and the ends of arrows. */
 function touched(graph: Graph, doc: Y.Doc, transaction: Y.Transaction): string[] {
@@ -20,7 +21,7 @@ function touched(graph: Graph, doc: Y.Doc, transaction: Y.Transaction): string[]
       if (relations && ends === null) continue;
       names.add(
         ends
-          ? `${endName(graph, ends.parent)} to ${endName(graph, ends.child)}`
+          ? `${isolated(endName(graph, ends.parent))} to ${isolated(endName(graph, ends.child))}`
           : endName(graph, head),
       );
     }
@@ -42,8 +43,8 @@ export function useRemoteEditAnnouncements(graph: Graph, begun: boolean): void {
       const people = new Set(presence.people().map(({ name }) => name || "a guest"));
       const [only = "Somebody"] = people;
       const who = people.size === 1 ? only : "Somebody";
-      const what = names.length > 3 ? `${names.length} things` : names.join(", ");
-      announcer.say(`${who} changed ${what}`);
+      const what = names.length > 3 ? `${names.length} things` : names.map(isolated).join(", ");
+      announcer.say(`${isolated(who)} changed ${what}`);
     };
     doc.on("afterTransaction", onEnd);
     return () => doc.off("afterTransaction", onEnd);

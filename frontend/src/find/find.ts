@@ -5,6 +5,7 @@ import { relationId } from "../graph/document-keys";
 import { ENTRY, EXIT, type Graph, type Key, PRECONDITIONS } from "../graph/model";
 import { placeOf } from "../graph/problems/told-problems";
 import { pathWords, valueText } from "../graph/value-text";
+import { isolated } from "../words/isolated";
 
 export interface Hit {
   /** Key of the action, or id of the relation. */
@@ -74,7 +75,7 @@ function entriesOf(graph: Graph, problems: readonly Problem[]): SearchEntry[] {
     return {
       id: relationId(relation),
       kind: "arrow",
-      title: `${name(relation.parent)} → ${name(relation.child)}`,
+      title: `${isolated(name(relation.parent))} → ${isolated(name(relation.child))}`,
       keys: [relation.parent, relation.child],
       facts: [
         ...(relation.parent === ENTRY ? [] : said).map((outcome) => ({

@@ -4,6 +4,7 @@
  * Pure. Each change keeps the keys it is made of, so that some of them can be taken and others not.
  */
 
+import { isolated } from "../words/isolated";
 import {
   bundleOfKey,
   endsOf,
@@ -173,7 +174,9 @@ function titleOf(thing: GraphChange["thing"], head: string, given: ChangesInput)
       return nameOf(head, given);
     case "arrow": {
       const ends = endsOf(head);
-      return ends === null ? head : `${nameOf(ends.parent, given)} → ${nameOf(ends.child, given)}`;
+      return ends === null
+        ? head
+        : `${isolated(nameOf(ends.parent, given))} → ${isolated(nameOf(ends.child, given))}`;
     }
     case "comment":
       return "Comment";
@@ -222,8 +225,8 @@ function fieldOf(root: Root, rest: string): string {
   if (slash < 0) return rest;
   const [kind, path] = [rest.slice(0, slash), rest.slice(slash + 1)];
   const name = segmentsOf(path).join(" ");
-  if (kind === "in") return `Input ${name}`;
-  if (kind === "out") return `Output ${name}`;
+  if (kind === "in") return `Input ${isolated(name)}`;
+  if (kind === "out") return `Output ${isolated(name)}`;
   return kind === "remap" ? `Output ${path} as` : path;
 }
 

@@ -1,4 +1,6 @@
 /** What a graph says, apart from how it is drawn: equal texts for equal tasks. */
+
+import { isolated } from "../words/isolated";
 import {
   type Action,
   ENTRY,
@@ -87,13 +89,14 @@ export function differences(before: Graph, after: Graph): MeaningDifference[] {
     before.name !== after.name || before.description !== after.description
       ? [{ kind: "changed", what: "Name or description of the graph", details: [] } as const]
       : [];
-  const arrow = ([parent, child]: MeaningEntry) => `Arrow ${ends(parent)} → ${ends(String(child))}`;
+  const arrow = ([parent, child]: MeaningEntry) =>
+    `Arrow ${isolated(ends(parent))} → ${isolated(ends(String(child)))}`;
   return [
     ...head,
     ...compared(
       old.actions,
       now.actions,
-      ([name]) => `Action ${name}`,
+      ([name]) => `Action ${isolated(name)}`,
       (name) => {
         const found = (graph: Graph) => graph.actions.find((each) => fullName(each) === name);
         return inAction(found(before), found(after));

@@ -5,6 +5,7 @@
  * waits: a required parent only has to have ended, and the last one decides.
  */
 
+import { isolated } from "../words/isolated";
 import {
   ENTRY,
   EXIT,
@@ -42,11 +43,11 @@ export function relationWords(graph: Graph, relation: Relation): readonly string
   if (relation.only !== null && relation.child !== EXIT) return [oneSidedWords(relation, parent)];
   const toEnd = relation.child === EXIT;
   const sentences = groups(relation).map(({ response, outcomes }) => {
-    const when = `${parent} ${any(outcomes.map((outcome) => ENDINGS[outcome]))}`;
+    const when = `${isolated(parent)} ${any(outcomes.map((outcome) => ENDINGS[outcome]))}`;
     return toEnd ? endWords(response, when) : responseWords(response, when);
   });
   if (sentences.length > 0) return sentences;
-  return [`Does nothing, however ${parent} ends.`];
+  return [`Does nothing, however ${isolated(parent)} ends.`];
 }
 
 /** The outcomes for which an arrow does nothing, as a sentence; null when there are none. */
@@ -55,7 +56,7 @@ export function ignoredWords(graph: Graph, relation: Relation): string | null {
   const ignored = PRECONDITIONS.filter((outcome) => relation.conditions[outcome] === "ignore");
   if (ignored.length === 0 || ignored.length === PRECONDITIONS.length) return null;
   const endings = any(ignored.map((outcome) => ENDINGS[outcome]));
-  return `Nothing happens when ${nameOf(graph, relation.parent)} ${endings}.`;
+  return `Nothing happens when ${isolated(nameOf(graph, relation.parent))} ${endings}.`;
 }
 
 /** When an action runs, or the graph ends: all its arrows, and how they wait for each other. */
@@ -78,11 +79,11 @@ export function startWords(graph: Graph, key: Key): readonly string[] {
 /** A file that lists a relation on one side only (hazards H2 and H2b). */
 function oneSidedWords(relation: Relation, parent: string): string {
   if (relation.only === "children") {
-    return `Only ${parent} knows of this arrow: the engine breaks down when ${parent} ends.`;
+    return `Only ${isolated(parent)} knows of this arrow: the engine breaks down when ${isolated(parent)} ends.`;
   }
   return relation.required
-    ? `${parent} does not know of this arrow, yet is waited for: this never runs.`
-    : `${parent} does not know of this arrow: nothing comes of it.`;
+    ? `${isolated(parent)} does not know of this arrow, yet is waited for: this never runs.`
+    : `${isolated(parent)} does not know of this arrow: nothing comes of it.`;
 }
 
 function groups(relation: Relation): { response: Response; outcomes: Precondition[] }[] {
@@ -124,7 +125,8 @@ function endWords(response: Response, when: string): string {
 function waitWords(graph: Graph, relations: readonly Relation[]): string | null {
   const starts = relations.some((relation) => relation.parent === ENTRY);
   const parents = relations.filter((relation) => relation.parent !== ENTRY);
-  const names = (some: readonly Relation[]) => all(some.map((r) => nameOf(graph, r.parent)));
+  const names = (some: readonly Relation[]) =>
+    all(some.map((r) => isolated(nameOf(graph, r.parent))));
   const required = parents.filter((relation) => relation.required);
   const free = parents.filter((relation) => !relation.required);
   if (starts && required.length > 0) {
@@ -152,5 +154,5 @@ export function endName(graph: Graph, key: Key): string {
   const action = graph.actions.find((candidate) => candidate.key === key);
   if (!action) return "something deleted";
   const shared = graph.actions.some((other) => other !== action && other.name === action.name);
-  return shared ? `${action.name} ${action.instanceId}` : action.name;
+  return shared ? `${isolated(action.name)} ${action.instanceId}` : action.name;
 }

@@ -1,5 +1,6 @@
 /** What differs between two moments: actions and arrows that came, went or changed, field by field. */
 import type { GraphDifference } from "../api/graphs";
+import { isolated } from "../words/isolated";
 import style from "./difference-view.module.css";
 import { type FieldChange, linesOf } from "./difference-words";
 
@@ -57,7 +58,7 @@ export function DifferenceView({ found, label }: { found: Changes; label: string
       {found.relations.map((change) => (
         <li key={`${change.parent} ${change.child}`} data-change={change.change}>
           <b>
-            {change.parent} → {change.child}
+            {isolated(change.parent)} → {isolated(change.child)}
           </b>{" "}
           <span className={style.change}>{change.change}</span>
           <Fields fields={change.fields} />

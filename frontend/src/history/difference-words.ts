@@ -1,6 +1,7 @@
 /** What differs between two moments of a document, in words. Pure. */
 import { memberNames, memberText } from "../graph/json-members";
 import { pathWords } from "../graph/value-text";
+import { isolated } from "../words/isolated";
 
 /** A field that says something else. */
 export interface FieldChange {
@@ -80,7 +81,7 @@ export function changedLines({ field, before, after }: FieldChange): ChangedLine
   const members = [...new Set([...memberNames(before), ...memberNames(after)])];
   const lines = members.flatMap((member) => {
     const [was, is] = [memberText(before, member), memberText(after, member)];
-    const spoken = member === "pvf_value" ? name : `${name}, ${memberWord(member)}`;
+    const spoken = member === "pvf_value" ? name : `${isolated(name)}, ${memberWord(member)}`;
     return was === is ? [] : [{ name: spoken, before: was, after: is }];
   });
   return lines.length > 0 ? lines : [{ name, before, after }];

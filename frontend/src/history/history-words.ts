@@ -1,6 +1,7 @@
 /** What was done to a document, in a few words. Pure. */
 import type { HistoryEntry } from "../api/documents/history";
 import { authorName, type VersionAuthor } from "../api/graphs";
+import { isolated } from "../words/isolated";
 
 const DONE: Readonly<Record<HistoryEntry["kind"], string>> = {
   created: "made it",
@@ -20,7 +21,7 @@ type MergedIn = NonNullable<HistoryEntry["merged"]>;
 
 /** `Ben and Mari`, `Ben, Mari and 2 others`. */
 export function namesWords(people: readonly VersionAuthor[]): string {
-  const names = people.map((person) => authorName(person));
+  const names = people.map((person) => isolated(authorName(person)));
   if (names.length > 3) return `${names.slice(0, 2).join(", ")} and ${names.length - 2} others`;
   const last = names.pop() ?? "nobody";
   return names.length === 0 ? last : `${names.join(", ")} and ${last}`;
@@ -28,13 +29,17 @@ export function namesWords(people: readonly VersionAuthor[]): string {
 
 function mergedWords({ draft, name, source, authors }: MergedIn): string {
   const who = namesWords(authors);
-  return source === draft ? `merged the draft “${name}” by ${who}` : `took over what ${who} did`;
+  return source === draft
+    ? `merged the draft “${isolated(name)}” by ${isolated(who)}`
+    : `took over what ${isolated(who)} did`;
 }
 
 export function doneWords({ kind, version, adapted, merged }: Done): string {
   if (merged) return mergedWords(merged);
-  if (adapted) return `took parameters of ${adapted.action} over`;
-  return kind === "published" && version?.label ? `kept version ${version.label}` : DONE[kind];
+  if (adapted) return `took parameters of ${isolated(adapted.action)} over`;
+  return kind === "published" && version?.label
+    ? `kept version ${isolated(version.label)}`
+    : DONE[kind];
 }
 
 const EDITS: ReadonlySet<HistoryEntry["kind"]> = new Set([

@@ -10,6 +10,7 @@ import { connect, removeRelation, setEntry, unsetEntry } from "../graph/edit";
 import { type Action, ENTRY, EXIT, type Precondition, type Relation } from "../graph/model";
 import { endName } from "../graph/relation-words";
 import { Tooltip } from "../ui/floating/tooltip";
+import { isolated } from "../words/isolated";
 import style from "./inspector.module.css";
 
 function Line({ relation, context }: { relation: Relation; context: EditorContext }) {
@@ -38,7 +39,7 @@ function Line({ relation, context }: { relation: Relation; context: EditorContex
       <Tooltip label="Delete this arrow">
         <ActionIcon
           size="sm"
-          aria-label={`Delete the arrow to ${endName(context.graph, relation.child)}`}
+          aria-label={`Delete the arrow to ${isolated(endName(context.graph, relation.child))}`}
           onClick={() => removeRelation(context.doc, id)}
         >
           <IconX size={13} />

@@ -8,6 +8,7 @@ import { type InterfaceParameter, interfaceOf } from "../graph/parameters/graph-
 import { TYPES, withRequired, withType } from "../graph/parameters/values";
 import { endName } from "../graph/relation-words";
 import { pathWords } from "../graph/value-text";
+import { isolated } from "../words/isolated";
 import style from "./inspector.module.css";
 
 interface ParameterProps {
@@ -31,7 +32,7 @@ function InterfaceRow({ side, of: parameter }: ParameterProps) {
       <button
         type="button"
         className={style.owner}
-        title={`Of ${keys.map((key) => endName(graph, key)).join(", ")}`}
+        title={`Of ${keys.map((key) => isolated(endName(graph, key))).join(", ")}`}
         onClick={() => {
           select(keys);
           view.show(keys);
@@ -42,7 +43,7 @@ function InterfaceRow({ side, of: parameter }: ParameterProps) {
       <Select
         size="xs"
         w={104}
-        aria-label={`Type of ${name}`}
+        aria-label={`Type of ${isolated(name)}`}
         data={[...types]}
         value={type}
         disabled={!mayEdit}

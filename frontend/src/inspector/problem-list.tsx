@@ -17,6 +17,7 @@ import { pathWords } from "../graph/value-text";
 import { INTO, spaced } from "../status/level-words";
 import { Tooltip } from "../ui/floating/tooltip";
 import { focusField } from "../ui/focus-field";
+import { isolated } from "../words/isolated";
 import { fieldOfTold, firstField, type Told } from "./fields/field-problems";
 import { ProblemNote, tellNothingLeft } from "./fields/problem-note";
 import { NumberField } from "./parameters/number-rows";
@@ -28,7 +29,8 @@ import style from "./problem-list.module.css";
 function placeWords(graph: Graph, place: string | null): string {
   if (place === null) return "";
   const relation = graph.relations.find((candidate) => relationId(candidate) === place);
-  if (relation) return `${endName(graph, relation.parent)} → ${endName(graph, relation.child)}`;
+  if (relation)
+    return `${isolated(endName(graph, relation.parent))} → ${isolated(endName(graph, relation.child))}`;
   const action = graph.actions.find((candidate) => candidate.key === place);
   return action ? endName(graph, action.key) : "";
 }

@@ -7,6 +7,7 @@ import { relationId } from "../graph/document-keys";
 import { removeRelation, setRequired, setResponse } from "../graph/edit";
 import { ENTRY, EXIT, RESPONSES, type Relation, type Response } from "../graph/model";
 import { endName, ignoredWords, relationWords } from "../graph/relation-words";
+import { isolated } from "../words/isolated";
 import { SharedField } from "./fields/shared-field";
 import style from "./inspector.module.css";
 import { RemapList } from "./parameters/remap-list";
@@ -50,7 +51,7 @@ export function RelationForm({ relation }: { relation: Relation }) {
         </button>
       </div>
       {entry ? (
-        <p className={style.hint}>The graph starts with {child}.</p>
+        <p className={style.hint}>The graph starts with {isolated(child)}.</p>
       ) : (
         <>
           <section className={style.section}>
@@ -61,7 +62,7 @@ export function RelationForm({ relation }: { relation: Relation }) {
                     <OutcomeSign outcome={outcome} /> {outcomeWord[outcome]}
                   </span>
                   <Select
-                    aria-label={`When ${parent} is ${outcomeWord[outcome]}`}
+                    aria-label={`When ${isolated(parent)} is ${outcomeWord[outcome]}`}
                     data={responses}
                     value={relation.conditions[outcome]}
                     onChange={(next) =>
@@ -83,7 +84,7 @@ export function RelationForm({ relation }: { relation: Relation }) {
           </div>
           <SharedField of={id} field="required">
             <Switch
-              label={`${child} waits for this`}
+              label={`${isolated(child)} waits for this`}
               description={
                 relation.required
                   ? `It ${relation.child === EXIT ? "ends the graph" : "runs"} only after all that it waits for have reported.`

@@ -16,6 +16,7 @@ import type { EditorContext } from "../edit-actions/editor-context";
 import { collisionsOfActions, places } from "../graph/edit/key-changes";
 import { newAid } from "../graph/ids";
 import type { Key } from "../graph/model";
+import { isolated } from "../words/isolated";
 import style from "./levels.module.css";
 import { ReasonList } from "./reason-list";
 import { makeActionEdit, subGraphName } from "./subgraph-edits";
@@ -84,10 +85,10 @@ function useMaking(context: EditorContext, look: ExtractionLook, again: () => Pr
     await Promise.all([refreshGraphs(client), refreshLibrary(client)]);
     const late = meanwhile(made.changes);
     if (late !== "")
-      return `The graph “${name}” is made, but the actions stay here too: changed meanwhile: ${late}.`;
+      return `The graph “${isolated(name)}” is made, but the actions stay here too: changed meanwhile: ${late}.`;
     makeActionEdit(context, made.changes);
     notifications.show({
-      title: `“${name}” is a graph of its own now`,
+      title: `“${isolated(name)}” is a graph of its own now`,
       message: "Undo brings the actions back here; that graph then stays in the list of graphs.",
     });
     return null;

@@ -2,6 +2,7 @@
 import { IconArrowsDiagonal, IconStairsDown } from "@tabler/icons-react";
 import type { MouseEvent } from "react";
 import { graphsInside, type InsideSignProps } from "../canvas/levels/graphs-inside";
+import { isolated } from "../words/isolated";
 import style from "./levels.module.css";
 
 interface SignProps {
@@ -34,13 +35,13 @@ export function InsideSign({ of, name }: InsideSignProps) {
     <span className={style.signs} data-signs>
       <SignButton
         title="Expand the graph inside  }"
-        label={`Expand the graph inside ${name}`}
+        label={`Expand the graph inside ${isolated(name)}`}
         Sign={IconArrowsDiagonal}
         onClick={() => graphsInside.now()?.expand.toggle(of)}
       />
       <SignButton
         title="Open the graph inside  ]"
-        label={`Open the graph inside ${name}`}
+        label={`Open the graph inside ${isolated(name)}`}
         Sign={IconStairsDown}
         onClick={() => graphsInside.now()?.enter(of)}
       />

@@ -8,6 +8,7 @@ import { useLibrary } from "../api/documents/library";
 import { graphsInside } from "../canvas/levels/graphs-inside";
 import { usedIn } from "../canvas/levels/used-in";
 import { useEditorContext } from "../edit-actions/editor-context";
+import { isolated } from "../words/isolated";
 import style from "./levels.module.css";
 
 /** The graphs with an action that stands for this one, by id. */
@@ -36,7 +37,7 @@ function useNoticeOfMany(graphs: readonly string[]): void {
         color: "yellow",
         autoClose: NOTICE_MS,
         title: `This graph runs inside ${count} others`,
-        message: `What you change here changes in each: ${names.slice(0, NAMED).join(", ")}${count > NAMED ? " …" : "."} Undo takes it back.`,
+        message: `What you change here changes in each: ${names.slice(0, NAMED).map(isolated).join(", ")}${count > NAMED ? " …" : "."} Undo takes it back.`,
       });
     };
     undo.on("stack-item-added", tell);

@@ -10,6 +10,7 @@ import { useEditorContext } from "../edit-actions/editor-context";
 import type { Graph } from "../graph/model";
 import { announcer } from "../ui/announcer";
 import { useStableCallback } from "../ui/hooks/use-stable-callback";
+import { isolated } from "../words/isolated";
 import { expansion } from "./in-place/expansion";
 import { useExpansion } from "./in-place/use-expansion";
 import { InsideSign } from "./inside-sign";
@@ -84,7 +85,7 @@ function useWayIn(byName: ReadonlyMap<string, string>) {
       here = inside;
       at = typeof level?.graph === "object" && level.graph !== null ? level.graph : { actions: [] };
       levels = level?.levels ?? new Map();
-      if (n === keys.length - 1) announcer.say(`Inside ${name}`);
+      if (n === keys.length - 1) announcer.say(`Inside ${isolated(name)}`);
     }
     go(addressInside(search, by, here));
   });

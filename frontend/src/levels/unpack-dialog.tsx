@@ -9,6 +9,7 @@ import { collisionsOfActions, places } from "../graph/edit/key-changes";
 import type { Key } from "../graph/model";
 import { announcer } from "../ui/announcer";
 import { useStableCallback } from "../ui/hooks/use-stable-callback";
+import { isolated } from "../words/isolated";
 import style from "./levels.module.css";
 import { ReasonList } from "./reason-list";
 import { makeActionEdit } from "./subgraph-edits";
@@ -52,7 +53,7 @@ function Asked({ look, context, onClose, name }: Asking) {
       <ReasonList label="What would be otherwise" reasons={told} {...{ context, onClose }} />
       {left.length > 0 && (
         <p className={style.quiet}>
-          No action has these any more: {left.join(", ")} of <bdi>{name}</bdi>.
+          No action has these any more: {left.map(isolated).join(", ")} of <bdi>{name}</bdi>.
         </p>
       )}
       <div className={style.answers}>
@@ -109,7 +110,7 @@ export function UnpackDialog({ context, action, onClose }: Props) {
   }, [context.id, action, looked, stopped, placeOf]);
   if (look === null) return null;
   return (
-    <Modal opened onClose={onClose} title={`Unpack ${name}`} size="32rem">
+    <Modal opened onClose={onClose} title={`Unpack ${isolated(name)}`} size="32rem">
       <Asked {...{ look, context, onClose, name }} />
     </Modal>
   );

@@ -5,6 +5,7 @@ import { actionDrag } from "../canvas/action-drag";
 import type { NewAction } from "../graph/edit";
 import { LateOpening } from "../ui/floating/late-opening";
 import { lazyPart } from "../ui/parts/lazy-part";
+import { isolated } from "../words/isolated";
 import { type KnownAction, signature } from "./known-actions";
 import style from "./sidebar.module.css";
 
@@ -13,7 +14,11 @@ const ActionFacts = lazyPart(() => import("./action-facts").then((part) => part.
 function About({ known }: { known: KnownAction }) {
   return (
     <LateOpening opens="menu" part={(button) => <ActionFacts button={button} known={known} />}>
-      <button type="button" className={style.about} aria-label={`About ${known.template.name}`}>
+      <button
+        type="button"
+        className={style.about}
+        aria-label={`About ${isolated(known.template.name)}`}
+      >
         <IconInfoCircle size={15} aria-hidden />
       </button>
     </LateOpening>

@@ -15,6 +15,7 @@ import {
 import { errorText } from "../api/http";
 import { useMay } from "../api/use-person";
 import { ago, instant, useNow } from "../ui/times";
+import { isolated } from "../words/isolated";
 import style from "./deleted-graphs-dialog.module.css";
 
 /** The last deleted first: what one looks for is mostly what has just gone. */
@@ -49,7 +50,7 @@ function Row({ graph, kind, now }: { graph: GraphSummary; kind: Kind; now: numbe
       <span className={style.text}>
         <bdi className={style.name}>
           {graph.name || "Untitled"}
-          {graph.draft_of && `, draft “${graph.draft_of.name}”`}
+          {graph.draft_of && `, draft “${isolated(graph.draft_of.name)}”`}
         </bdi>
         <span className={style.sub}>
           {[

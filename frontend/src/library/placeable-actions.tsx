@@ -9,6 +9,7 @@ import { errorText } from "../api/http";
 import { useLive } from "../api/live/use-live";
 import type { NewAction } from "../graph/edit";
 import { LongList } from "../ui/long-list";
+import { isolated } from "../words/isolated";
 import { ActionRow } from "./action-row";
 import { RowSkeletons } from "./graph-rows";
 import { matchesSearch } from "./graph-selection";
@@ -52,7 +53,7 @@ function RobotRow({ has, onPlace }: { has: RobotAction; onPlace: Place }) {
         Take over
         <span className="visually-hidden">
           {" "}
-          {has.action.name} from <bdi>{has.robot}</bdi>
+          {isolated(has.action.name)} from <bdi>{has.robot}</bdi>
         </span>
       </Button>
     </div>
@@ -90,7 +91,7 @@ function Graphs({ graphs, onPlace }: { graphs: readonly KnownGraph[]; onPlace: P
   if (graphs.length === 0) return null;
   const on = (name: string) => {
     const having = indexed.get(name);
-    if (having !== undefined) return `on ${having.join(", ")}`;
+    if (having !== undefined) return `on ${having.map(isolated).join(", ")}`;
     // One that has not told what it has may have it.
     return robots.length === 0 || unknown.length > 0 ? "" : "on no robot";
   };

@@ -5,6 +5,7 @@ import { type IndexedByRobot, useIndexedByRobots } from "../api/robots";
 import { flatName, pathOf } from "../graph/document-keys";
 import type { NewAction } from "../graph/edit";
 import { pathWords } from "../graph/value-text";
+import { isolated } from "../words/isolated";
 
 export type IndexedAction = IndexedByRobot["actions"][number];
 
@@ -81,8 +82,8 @@ function sideDifferences(own: readonly TypedParameter[], theirs: Types, what: st
   const others = Object.entries(theirs).flatMap(([flat, type]) => {
     const name = what + flat.replaceAll("::", ".");
     const mine = known.get(flat);
-    if (mine === undefined) return [`${name} besides`];
-    return mine.pvf_type === type || mine.pvf_type === null ? [] : [`${name} is ${type}`];
+    if (mine === undefined) return [`${isolated(name)} besides`];
+    return mine.pvf_type === type || mine.pvf_type === null ? [] : [`${isolated(name)} is ${type}`];
   });
   return [...missing, ...others];
 }

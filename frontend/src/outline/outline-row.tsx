@@ -21,6 +21,7 @@ import type { Progress } from "../status/progress";
 import { StateLabel } from "../status/state-label";
 import type { PersonHere } from "../sync/use-room";
 import { colorOfName, initials } from "../ui/name-colors";
+import { isolated } from "../words/isolated";
 import style from "./outline.module.css";
 import { type RowAction, rowActionsOf } from "./row-actions";
 import { RowEdit, type RowEditKind } from "./row-edit";
@@ -67,10 +68,10 @@ export function Others({ people }: { people: readonly PersonHere[] }) {
       key={id}
       className={style.person}
       style={{ background: checkedColor(color) }}
-      title={`${name || "Guest"} has it selected`}
+      title={`${isolated(name || "Guest")} has it selected`}
     >
       <span aria-hidden>{initials(name || "Guest")}</span>
-      <span className="visually-hidden"> {name || "Guest"} has it selected</span>
+      <span className="visually-hidden"> {isolated(name || "Guest")} has it selected</span>
     </span>
   ));
 }
@@ -176,7 +177,7 @@ export function RowActions(props: RowActionsProps) {
       size={32}
       className={style.more ?? ""}
       tabIndex={active ? 0 : -1}
-      aria-label={`What to do with ${label}`}
+      aria-label={`What to do with ${isolated(label)}`}
       onClick={() => setOpened(!opened)}
     >
       <IconDots size={16} aria-hidden />
@@ -220,9 +221,9 @@ export function labelOf(row: OutlineItem, name: string): string {
     case "action":
       return name;
     case "outcome":
-      return `${name}, ${outcomeWord[row.outcome]}`;
+      return `${isolated(name)}, ${outcomeWord[row.outcome]}`;
     case "target":
-      return `the arrow to ${name}`;
+      return `the arrow to ${isolated(name)}`;
     case "inside":
       return row.part.action.name;
     case "note":

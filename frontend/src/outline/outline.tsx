@@ -19,6 +19,7 @@ import { announcer } from "../ui/announcer";
 import { Empty } from "../ui/empty";
 import { useIsPhone } from "../ui/hooks/use-screen-size";
 import { keyOf } from "../ui/keys";
+import { isolated } from "../words/isolated";
 import style from "./outline.module.css";
 import { OutlineRow, type RowHandlers } from "./outline-row";
 import { PhoneRow } from "./phone-row";
@@ -224,7 +225,7 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
           className={style.tree}
           // biome-ignore lint/a11y/noNoninteractiveElementToInteractiveRole: WAI-ARIA names table as its element
           role="treegrid"
-          aria-label={`Outline of ${graph.name || "the graph"}`}
+          aria-label={`Outline of ${isolated(graph.name || "the graph")}`}
           aria-rowcount={rows.length}
           tabIndex={-1}
           onKeyDown={onKey}

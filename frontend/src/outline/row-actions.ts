@@ -14,6 +14,7 @@ import {
 import { type Action, ENTRY, type Key, type Precondition, spokenOutcomes } from "../graph/model";
 import { endName } from "../graph/relation-words";
 import { type KeyPress, keyOf } from "../ui/keys";
+import { isolated } from "../words/isolated";
 import type { RowEditKind } from "./row-edit";
 import type { BundleRow, OutlineItem } from "./rows";
 
@@ -107,7 +108,7 @@ export function removeRow(context: EditorContext, row: OutlineItem): string {
   if (row.kind === "action") {
     const name = endName(context.graph, row.action.key);
     removeActions(context.doc, [row.action.key]);
-    return `${name} is deleted`;
+    return `${isolated(name)} is deleted`;
   }
   if (row.kind === "note") {
     removeNotes(context.doc, [row.note.key.slice(2)]);
@@ -122,7 +123,7 @@ export function removeRow(context: EditorContext, row: OutlineItem): string {
       for (const outcome of own) setResponse(context.doc, id, outcome, "ignore");
     });
   } else removeRelation(context.doc, id);
-  return `The arrow to ${endName(context.graph, row.relation.child)} is deleted`;
+  return `The arrow to ${isolated(endName(context.graph, row.relation.child))} is deleted`;
 }
 
 /** The relation through which a row stands where it stands. */
@@ -145,5 +146,5 @@ export function moveRow(context: EditorContext, row: OutlineItem, step: -1 | 1):
   if (one === undefined || other === undefined) return "There is nothing to change places with";
   swapOrder(context.doc, siblings.map(relationId), at, at + step);
   const before = step < 0 ? "before" : "after";
-  return `${endName(context.graph, one.child)} stands ${before} ${endName(context.graph, other.child)}`;
+  return `${isolated(endName(context.graph, one.child))} stands ${before} ${isolated(endName(context.graph, other.child))}`;
 }

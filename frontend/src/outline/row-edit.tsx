@@ -10,6 +10,7 @@ import { ENTRY, EXIT, type Precondition, RESPONSES, type Response } from "../gra
 import { endName } from "../graph/relation-words";
 import { useDraft } from "../ui/drafts/use-draft";
 import { keyOf } from "../ui/keys";
+import { isolated } from "../words/isolated";
 import style from "./outline.module.css";
 import { outcomesOf } from "./row-actions";
 import type { OutlineItem } from "./rows";
@@ -76,7 +77,9 @@ function Connect({ row, onDone }: Props) {
     if (entry) setEntry(context.doc, target);
     else connect(context.doc, from, target, outcome);
     const when = entry ? "" : ` when ${outcomeWord[outcome]}`;
-    onDone(`Connected ${endName(context.graph, from)} to ${endName(context.graph, target)}${when}`);
+    onDone(
+      `Connected ${isolated(endName(context.graph, from))} to ${isolated(endName(context.graph, target))}${when}`,
+    );
   };
   return (
     <div className={style.pair}>
@@ -120,17 +123,17 @@ function Pick({ row, change, onDone }: Props) {
         for (const outcome of own) setResponse(context.doc, id, outcome, next as Response);
       });
       const when = own.map((outcome) => outcomeWord[outcome]).join(" or ");
-      return onDone(`When ${when}: ${next} ${name}`);
+      return onDone(`When ${when}: ${next} ${isolated(name)}`);
     }
     const moved = asOneEdit(context.doc, () =>
       own.map((outcome) => retarget(context.doc, id, outcome, { child: next })),
     );
     if (moved.includes(null)) return onDone("It cannot lead there");
-    onDone(`The arrow leads to ${endName(context.graph, next)}`);
+    onDone(`The arrow leads to ${isolated(endName(context.graph, next))}`);
   };
   return (
     <Select
-      aria-label={response ? `What ${name} does` : "Leads to"}
+      aria-label={response ? `What ${isolated(name)} does` : "Leads to"}
       searchable={!response}
       autoFocus
       defaultDropdownOpened

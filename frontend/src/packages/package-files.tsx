@@ -5,6 +5,7 @@ import { IconCopy, IconDownload } from "@tabler/icons-react";
 import { errorText } from "../api/http";
 import { packageDownload, usePackage } from "../api/packages";
 import { copyText } from "../ui/copy-text";
+import { isolated } from "../words/isolated";
 import style from "./packages.module.css";
 
 interface Props {
@@ -47,7 +48,7 @@ export function PackageFiles({ graph, seq, name, path }: Props) {
           download={`${name}.zip`}
           leftSection={<IconDownload size={14} aria-hidden />}
         >
-          Download {name}
+          Download {isolated(name)}
         </Button>
       </div>
       {contents.isPending && <Skeleton height={240} />}

@@ -2,6 +2,7 @@
 import { IconChevronRight, IconFile, IconPackage } from "@tabler/icons-react";
 import { useState } from "react";
 import type { PackageOutline } from "../api/packages";
+import { isolated } from "../words/isolated";
 import style from "./packages.module.css";
 
 interface Props {
@@ -31,7 +32,7 @@ export function PackageTree({ packages, shown, path, onShow }: Props) {
                 type="button"
                 aria-expanded={open}
                 className={style.folder}
-                title={`The package of ${outline.action}`}
+                title={`The package of ${isolated(outline.action)}`}
                 onClick={() => turn(outline.package)}
               >
                 <IconChevronRight size={14} aria-hidden />

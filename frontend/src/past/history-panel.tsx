@@ -11,6 +11,7 @@ import { usePersonColors, useThrottledLink } from "../sync/use-room";
 import { keyOf } from "../ui/keys";
 import { Segments } from "../ui/segments";
 import { day, useNow } from "../ui/times";
+import { isolated } from "../words/isolated";
 import { EntryRow } from "./entry-row";
 import style from "./history-panel.module.css";
 import { RunRow, VersionRow } from "./marks-in-list";
@@ -36,7 +37,7 @@ function onArrowKeys(event: KeyboardEvent<HTMLElement>): void {
 /** What is said of an entry besides what it changed. */
 function didWords(entry: HistoryEntry, entries: readonly HistoryEntry[], now: number) {
   if (entry.kind === "edited") return entry.changes === undefined ? "changed it" : null;
-  if (entry.reverted) return `undid what ${entry.reverted.author.name || "somebody"} did`;
+  if (entry.reverted) return `undid what ${isolated(entry.reverted.author.name || "somebody")} did`;
   if (entry.restored === undefined) return doneWords(entry);
   const of = entryAt(entries, entry.restored);
   const at = of === null ? null : Date.parse(of.until);

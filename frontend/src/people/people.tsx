@@ -8,6 +8,7 @@ import type { Participant } from "../sync/presence/presence";
 import { useColorsAfterReturn, useFollowing, usePeople } from "../sync/use-room";
 import { Tooltip } from "../ui/floating/tooltip";
 import { initials } from "../ui/name-colors";
+import { isolated } from "../words/isolated";
 import style from "./people.module.css";
 
 const MOST = 4;
@@ -36,7 +37,7 @@ export function People({ me }: { me: string }) {
   const others = onePerId(leader ? [...people, leader] : people);
   if (others.length === 0) return null;
   const shown = others.slice(0, MOST);
-  const names = others.map(personName).join(", ");
+  const names = others.map((each) => isolated(personName(each))).join(", ");
   return (
     <div className={style.people}>
       <span className="visually-hidden">Also here: {names}</span>
@@ -56,7 +57,7 @@ export function People({ me }: { me: string }) {
               className={style.face}
               style={colored(checkedColor(person.color))}
               aria-pressed={followed}
-              aria-label={`Follow ${personName(person)}`}
+              aria-label={`Follow ${isolated(personName(person))}`}
               onClick={() => follow(followed ? null : person.client)}
             >
               {initials(personName(person))}
@@ -142,10 +143,10 @@ export function PersonSign({ person, color }: InitialProps) {
     <span
       className={style.initial}
       style={colored(color)}
-      title={`${personName(person)} is writing`}
+      title={`${isolated(personName(person))} is writing`}
     >
       <span aria-hidden>{initials(personName(person))}</span>
-      <span className="visually-hidden">{personName(person)} is writing</span>
+      <span className="visually-hidden">{isolated(personName(person))} is writing</span>
     </span>
   );
 }

@@ -5,6 +5,7 @@ import { IconFilter, IconPin, IconSearch, IconTrash } from "@tabler/icons-react"
 import { useEffect, useState } from "react";
 import { filterOf, NO_FILTER, queryOf, type RunFilter, useLabels } from "../api/review";
 import { Segments } from "../ui/segments";
+import { isolated } from "../words/isolated";
 import { dateOf, MoreRunFilters } from "./more-filters";
 import style from "./runs-page.module.css";
 
@@ -48,9 +49,9 @@ function filterWords(filter: RunFilter): string {
   const words = [
     ending === "All" ? "" : ending,
     filter.text && `“${filter.text}”`,
-    filter.robot && `on ${filter.robot}`,
-    filter.label && `labelled ${filter.label}`,
-    filter.person && `by ${filter.person}`,
+    filter.robot && `on ${isolated(filter.robot)}`,
+    filter.label && `labelled ${isolated(filter.label)}`,
+    filter.person && `by ${isolated(filter.person)}`,
     filter.pinned && "pinned",
     filter.since && `since ${dateOf(filter.since)}`,
     filter.until && `until ${dateOf(filter.until)}`,
@@ -81,7 +82,7 @@ function SavedFilters({ filter, onChange }: Pick<Props, "filter" | "onChange">) 
               {each.name}
             </Menu.Item>
             <ActionIcon
-              aria-label={`Forget “${each.name}”`}
+              aria-label={`Forget “${isolated(each.name)}”`}
               onClick={() => setSaved(saved.filter((other) => other !== each))}
             >
               <IconTrash size={14} aria-hidden />

@@ -12,6 +12,7 @@ import { INTO } from "../status/level-words";
 import { runLabel } from "../status/progress";
 import { toneColor } from "../status/state-label";
 import { Empty } from "../ui/empty";
+import { isolated } from "../words/isolated";
 import type { RunBarParts } from "./run/run-page";
 import style from "./statistics-page.module.css";
 
@@ -197,7 +198,7 @@ function Found({ found }: { found: Statistics }) {
             <ul className={style.list}>
               {found.never_taken.slice(0, 6).map((arrow) => (
                 <li key={`${arrow.parent} ${arrow.child}`}>
-                  {arrow.parent} → {arrow.child}{" "}
+                  {isolated(arrow.parent)} → {isolated(arrow.child)}{" "}
                   <span className={style.quiet}>on {arrow.outcomes.join(", ")}</span>
                 </li>
               ))}

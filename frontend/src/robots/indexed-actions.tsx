@@ -2,11 +2,12 @@
 import { Text } from "@mantine/core";
 import { useLive } from "../api/live/use-live";
 import { useIndexedByRobot } from "../api/robots";
+import { isolated } from "../words/isolated";
 import style from "./indexed-actions.module.css";
 
 function parameters(inputs: Record<string, string>): string {
   return Object.entries(inputs)
-    .map(([name, type]) => `${name}: ${type}`)
+    .map(([name, type]) => `${isolated(name)}: ${type}`)
     .join(", ");
 }
 
@@ -31,7 +32,7 @@ export function IndexedActions({ robot }: { robot: string }) {
       </ul>
       {graphs.length > 0 && (
         <p className={style.graphs}>
-          Graphs of its own: <b>{graphs.join(", ")}</b>
+          Graphs of its own: <b>{graphs.map(isolated).join(", ")}</b>
         </p>
       )}
       {unread > 0 && <Text c="var(--warn)">{unread} of its files cannot be read.</Text>}

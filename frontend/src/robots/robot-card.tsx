@@ -43,7 +43,7 @@ function robotSigns(robot: Robot): Sign[] {
   }
   if (robot.others > 0) {
     const who = robot.others === 1 ? "1 other program" : `${robot.others} other programs`;
-    signs.push({ good: false, text: `${who} can start things there` });
+    signs.push({ good: false, text: `${isolated(who)} can start things there` });
   }
   if (robot.actor !== "" && robot.actor !== robot.name) {
     signs.push({ good: false, text: `Its feedback calls itself ${robot.actor}` });

@@ -7,6 +7,7 @@ import { useLive } from "../api/live/use-live";
 import { commandedGraph, type RobotLogLine, useRobotLog } from "../api/robots";
 import { serverNow } from "../clock/server-clock";
 import { clock, day, instant } from "../ui/times";
+import { isolated } from "../words/isolated";
 import style from "./robot-log.module.css";
 import { notifyRobotFailure } from "./robot-runs";
 
@@ -33,9 +34,12 @@ const BECAME: Readonly<Record<string, string>> = {
 /** Which files somebody wrote for it, and what became of others. */
 function writtenText({ sender, files, why }: RobotLogLine): string {
   const each = files.map(
-    ({ graph, path, kept }) => `${graph} (${path}${kept ? `; before: ${kept}` : ""})`,
+    ({ graph, path, kept }) => `${isolated(graph)} (${path}${kept ? `; before: ${kept}` : ""})`,
   );
-  const done = files.length > 0 ? `${sender} wrote ${each.join(", ")}` : `${sender} wrote nothing`;
+  const done =
+    files.length > 0
+      ? `${isolated(sender)} wrote ${each.join(", ")}`
+      : `${isolated(sender)} wrote nothing`;
   return why === "" ? done : `${done}: ${why}`;
 }
 
@@ -43,17 +47,17 @@ function writtenText({ sender, files, why }: RobotLogLine): string {
 function robotLogText(told: RobotLogLine): string {
   switch (told.kind) {
     case "commanded":
-      return `Somebody else ${DONE[told.command] ?? told.command} ${told.graph || "a graph"}`;
+      return `Somebody else ${DONE[told.command] ?? told.command} ${isolated(told.graph || "a graph")}`;
     case "became":
       return `${BECAME[told.state] ?? told.state}${told.why === "" ? "" : `: ${told.why}`}`;
     case "stop_asked":
-      return `${told.sender} asked to stop ${told.graph}, which was not started from here`;
+      return `${isolated(told.sender)} asked to stop ${isolated(told.graph)}, which was not started from here`;
     case "stop_proven":
-      return `${told.graph} is proven to have stopped`;
+      return `${isolated(told.graph)} is proven to have stopped`;
     case "stop_unproven":
-      return `Nothing has proven that ${told.graph} stopped: ${told.why}`;
+      return `Nothing has proven that ${isolated(told.graph)} stopped: ${told.why}`;
     case "index_write_asked":
-      return `${told.sender} asked to write ${told.graphs.join(", ")} into its index folder`;
+      return `${isolated(told.sender)} asked to write ${told.graphs.map(isolated).join(", ")} into its index folder`;
     case "index_written":
       return writtenText(told);
   }

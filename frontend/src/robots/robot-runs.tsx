@@ -30,7 +30,7 @@ function Foreign(props: Props & { graph: string; stopping: string | null; state:
   const take = () =>
     heldGraph(runner ?? "", robot.name, graph)
       .then((text) => onImport(text, graph))
-      .catch((error: unknown) => notifyRobotFailure(`${graph} was not imported`, error));
+      .catch((error: unknown) => notifyRobotFailure(`${isolated(graph)} was not imported`, error));
   const stop = () =>
     stopRobot(runner ?? "", robot.name).catch((error: unknown) =>
       notifyRobotFailure(`NOT SENT: use the hardware stop of ${isolated(robot.name)}`, error),
@@ -64,7 +64,7 @@ function Foreign(props: Props & { graph: string; stopping: string | null; state:
 }
 
 function StartedBy({ run }: { run: Run }) {
-  return <span className={style.quiet}>started by {useCurrentName(run.author)}</span>;
+  return <span className={style.quiet}>started by {isolated(useCurrentName(run.author))}</span>;
 }
 
 export function RobotRuns({ robot, onImport }: Props) {

@@ -4,6 +4,7 @@ import { useMemo } from "react";
 import { Link } from "wouter";
 import { useLive } from "../api/live/use-live";
 import { colorOfName } from "../ui/name-colors";
+import { isolated } from "../words/isolated";
 import { type Moving, movesNow } from "./moves-now";
 import style from "./moves-now-line.module.css";
 
@@ -34,7 +35,7 @@ export function MovesNowLine() {
   const { now } = useLive();
   const moving = useMemo(() => movesNow(now), [now]);
   if (moving.length === 0) return null;
-  const all = moving.map(({ robot, words }) => `${robot}: ${words}`).join(" · ");
+  const all = moving.map(({ robot, words }) => `${isolated(robot)}: ${words}`).join(" · ");
   return (
     <section className={style.line} aria-label="Moves now" title={all}>
       <span className={style.head} aria-hidden>

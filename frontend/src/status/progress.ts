@@ -2,6 +2,7 @@
 import { MOVES } from "../api/run-stop";
 import type { ActionRun, Run, Visit } from "../api/runs";
 import { clock } from "../ui/times";
+import { isolated } from "../words/isolated";
 
 export type Tone = "idle" | "run" | "true" | "false" | "error" | "stopped" | "done" | "unknown";
 
@@ -205,8 +206,8 @@ export function runLabel(run: Run): { tone: Tone; word: string } {
 export function runEndText(run: Run): string {
   const { word } = runLabel(run);
   const by = run.stopped_by?.name;
-  if (run.state === "stopped" && by) return `stopped by ${by}`;
-  if (run.at_rest?.by) return `${word}: seen at rest by ${run.at_rest.by.name}`;
+  if (run.state === "stopped" && by) return `stopped by ${isolated(by)}`;
+  if (run.at_rest?.by) return `${word}: seen at rest by ${isolated(run.at_rest.by.name)}`;
   if (run.at_rest) return `${word}: its engine has ended`;
   if (run.state === "lost") return "lost: nothing proves its end";
   if (run.state === "finished" && run.result === "on_true") return "finished";

@@ -1,5 +1,6 @@
 /** Why edits are not saved, in sentences for people. */
 
+import { isolated } from "../words/isolated";
 import type { OtherPerson } from "./indexed-db";
 import type { RefusalReason, RoomLink } from "./room-connection";
 
@@ -25,7 +26,9 @@ export function unsavedReason(link: RoomLink): string | null {
 /** Whose edits wait on this device until they sign in again; null when nobody's do. */
 export function otherPeopleWait(others: readonly OtherPerson[]): string | null {
   if (others.length === 0) return null;
-  const parts = others.map(({ name, waiting }) => `${changes(waiting)} of ${name || "a guest"}`);
+  const parts = others.map(
+    ({ name, waiting }) => `${changes(waiting)} of ${isolated(name || "a guest")}`,
+  );
   const [only] = others;
   const one = others.length === 1 && only?.waiting === 1;
   return `${parts.join(" and ")} ${one ? "waits" : "wait"} on this device until they sign in again.`;

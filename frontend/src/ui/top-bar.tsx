@@ -2,6 +2,7 @@
 
 import { Fragment, type ReactNode, useState } from "react";
 import { Link, useRouter } from "wouter";
+import { isolated } from "../words/isolated";
 import { useDraft } from "./drafts/use-draft";
 import { keyOf } from "./keys";
 import style from "./top-bar.module.css";
@@ -84,7 +85,7 @@ function Here({ crumb: { label, rename } }: { crumb: Crumb }) {
   if (!writing) {
     return (
       <h1 className={style.here}>
-        <button type="button" title={`${label}\nRename`} onClick={() => setWriting(true)}>
+        <button type="button" title={`${isolated(label)}\nRename`} onClick={() => setWriting(true)}>
           <bdi>{label}</bdi>
         </button>
       </h1>

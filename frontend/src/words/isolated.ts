@@ -11,5 +11,16 @@ const ISOLATES = /[\u2066-\u2069]/g;
  * texts that are no elements: titles, labels, notices. A name that turns nothing stays as it is.
  */
 export function isolated(name: string): string {
-  return TURNS.test(name) ? `\u2068${name.replace(ISOLATES, "")}\u2069` : name;
+  if (!TURNS.test(name)) return name;
+  return `\u2068${isBalanced(name) ? name : name.replace(ISOLATES, "")}\u2069`;
+}
+
+/** Return whether all that is isolated within ends within: so it is in words with isolated names. */
+function isBalanced(text: string): boolean {
+  let open = 0;
+  for (const [control] of text.matchAll(ISOLATES)) {
+    open += control === "\u2069" ? -1 : 1;
+    if (open < 0) return false;
+  }
+  return open === 0;
 }

@@ -2,6 +2,7 @@
 import { Button } from "@mantine/core";
 import { Link } from "wouter";
 import { useGraphs } from "../../api/graphs";
+import { isolated } from "../../words/isolated";
 import style from "./details.module.css";
 
 interface Props {
@@ -35,7 +36,8 @@ export function UsedIn({ usedIn, differs, onTake }: Props) {
                 older parameters
                 {onTake && (
                   <Button size="compact-sm" variant="subtle" onClick={() => onTake(id, nameOf(id))}>
-                    Take over<span className="visually-hidden"> what {nameOf(id)} has</span>
+                    Take over
+                    <span className="visually-hidden"> what {isolated(nameOf(id))} has</span>
                   </Button>
                 )}
               </span>

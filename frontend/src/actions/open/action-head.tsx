@@ -7,6 +7,7 @@ import type { EditAction } from "../../edit-actions/edit-action";
 import { isEnabled, labelOf } from "../../edit-actions/edit-action";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import { Tooltip } from "../../ui/floating/tooltip";
+import { isolated } from "../../words/isolated";
 import style from "./open.module.css";
 
 function Tool({ editAction }: { editAction: EditAction }) {
@@ -40,7 +41,11 @@ function More({ name, onDelete }: Pick<Props, "name" | "onDelete">) {
   return (
     <Menu>
       <Menu.Target>
-        <ActionIcon size={34} className={style.tool ?? ""} aria-label={`More about ${name}`}>
+        <ActionIcon
+          size={34}
+          className={style.tool ?? ""}
+          aria-label={`More about ${isolated(name)}`}
+        >
           <IconDots size={17} aria-hidden />
         </ActionIcon>
       </Menu.Target>

@@ -24,6 +24,7 @@ import { People } from "../../people/people";
 import { roomUrl } from "../../sync/room-connection";
 import { RoomProvider, useLinkPart, useThrottledLink } from "../../sync/use-room";
 import { Empty } from "../../ui/empty";
+import { isolated } from "../../words/isolated";
 import { ActionOverview } from "../details/action-overview";
 import { OnRobots } from "../details/on-robots";
 import { UsedIn } from "../details/used-in";
@@ -75,7 +76,9 @@ function Places({ known, action, knowledge, context }: PlacesProps) {
   const take = async (graph: string, name: string) => {
     try {
       await takeFromGraph(context.id, graph);
-      notifications.show({ message: `The library has what ${name} had. The history leads back.` });
+      notifications.show({
+        message: `The library has what ${isolated(name)} had. The history leads back.`,
+      });
     } catch (error) {
       notifications.show({ color: "red", title: "Not taken over", message: errorText(error) });
     } finally {

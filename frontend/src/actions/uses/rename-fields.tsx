@@ -1,6 +1,7 @@
 /** What may only be called otherwise: asked, and never taken for granted. */
 import { Checkbox, NativeSelect } from "@mantine/core";
 import { pathWords } from "../../graph/value-text";
+import { isolated } from "../../words/isolated";
 import style from "./update-dialog.module.css";
 import type { Update } from "./use-update";
 
@@ -23,7 +24,7 @@ function Others({ update }: { update: Update }) {
         return (
           <NativeSelect
             key={name}
-            label={`${name} is`}
+            label={`${isolated(name)} is`}
             disabled={update.busy}
             value={choices.find(({ ticked }) => ticked)?.key ?? ""}
             data={[
@@ -55,7 +56,7 @@ export function RenameChoices({ update }: { update: Update }) {
       {update.suggested.map((each) => (
         <Checkbox
           key={each.key}
-          label={`${nameOf(each)} is now ${pathWords(each.to)}`}
+          label={`${isolated(nameOf(each))} is now ${pathWords(each.to)}`}
           checked={each.ticked}
           disabled={update.busy || (each.clashes && !each.ticked)}
           onChange={() => update.tick(each.key)}

@@ -10,6 +10,7 @@ import { useLive } from "../../api/live/use-live";
 import { indexedAction } from "../../api/robots";
 import { DifferenceView, meansSomething } from "../../history/difference-view";
 import type { RobotAction } from "../../library/robot-actions";
+import { isolated } from "../../words/isolated";
 import style from "./update-dialog.module.css";
 
 interface Props {
@@ -47,7 +48,7 @@ function useTaking({ id, has, onClose }: Props) {
     try {
       await replaceAction(id, text, difference.after);
       notifications.show({
-        message: `The library has what ${has.robot} has. The history leads back.`,
+        message: `The library has what ${isolated(has.robot)} has. The history leads back.`,
       });
       onClose();
     } catch (error) {
@@ -75,7 +76,7 @@ function Body(props: Props) {
       )}
       {found.isPending && <Skeleton height={120} />}
       {found.isError && <p role="alert">{errorText(found.error)}</p>}
-      {data && !some && <p>The file that {has.robot} has says the same.</p>}
+      {data && !some && <p>The file that {isolated(has.robot)} has says the same.</p>}
       {data && some && <DifferenceView found={data.difference} label="What would change" />}
       <div className={style.answers}>
         <Button onClick={onClose}>Close</Button>
@@ -100,7 +101,7 @@ export function TakeOverDialog(props: Props) {
     <Modal
       opened={opened}
       onClose={onClose}
-      title={`Take over ${has.action.name} from ${has.robot}`}
+      title={`Take over ${isolated(has.action.name)} from ${isolated(has.robot)}`}
       size="lg"
     >
       <Body {...props} />

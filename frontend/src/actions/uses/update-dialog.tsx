@@ -6,6 +6,7 @@ import { Link } from "wouter";
 import type { ActionUse, UpdatedUse } from "../../api/documents/library";
 import { errorText } from "../../api/http";
 import { DifferenceView } from "../../history/difference-view";
+import { isolated } from "../../words/isolated";
 import { RenameChoices } from "./rename-fields";
 import style from "./update-dialog.module.css";
 import { type Update, useUpdate } from "./use-update";
@@ -32,7 +33,7 @@ function Use({ use, update, mayEdit }: UseProps) {
       <div className={style.head}>
         {mayEdit && (
           <Checkbox
-            aria-label={`Update ${name || "Untitled"}`}
+            aria-label={`Update ${isolated(name || "Untitled")}`}
             checked={!update.isLeft(graph)}
             disabled={update.busy}
             onChange={() => update.leave(graph)}
@@ -43,7 +44,9 @@ function Use({ use, update, mayEdit }: UseProps) {
         </h3>
         <span className={style.quiet}>{count === 1 ? "used once" : `used ${count} times`}</span>
       </div>
-      {difference && <DifferenceView found={difference} label={`What changes in ${name}`} />}
+      {difference && (
+        <DifferenceView found={difference} label={`What changes in ${isolated(name)}`} />
+      )}
     </li>
   );
 }
@@ -65,7 +68,7 @@ function Done({ done, update }: { done: readonly UpdatedUse[]; update: Update })
           <li key={graph}>
             <bdi>{nameOf(graph)}</bdi>
             <Link to={`/graphs/${graph}?history`}>
-              History<span className="visually-hidden"> of {nameOf(graph)}</span>
+              History<span className="visually-hidden"> of {isolated(nameOf(graph))}</span>
             </Link>
           </li>
         ))}
@@ -122,7 +125,7 @@ export function UpdateDialog(props: Props) {
     <Modal
       opened={props.opened}
       onClose={props.onClose}
-      title={`Graphs that use ${props.name}`}
+      title={`Graphs that use ${isolated(props.name)}`}
       size="xl"
     >
       <Body {...props} />

@@ -3,6 +3,7 @@ import { type NodeHandle, Position as Side } from "@xyflow/react";
 import type { Direction, Graph, Key } from "../../graph/model";
 import { spokenNote } from "../../graph/note-links";
 import type { Progress } from "../../status/progress";
+import { isolated } from "../../words/isolated";
 import type { Scene } from "../arrows/scene";
 import type { Arrow, CanvasNode } from "../elements";
 import type { Positions } from "../geometry/arrange";
@@ -47,7 +48,7 @@ function foldedNode(node: NoteNode, block: FrameBlock): FoldedNode {
   return {
     ...{ id, position, width, height, selected },
     type: "folded",
-    ariaLabel: `Frame, ${note.color}, folded: ${name}. ${says}${problemMarkWords(block.mark)}`,
+    ariaLabel: `Frame, ${note.color}, folded: ${isolated(name)}. ${says}${problemMarkWords(block.mark)}`,
     // Entry and Exit are seen on it also while it is chosen.
     zIndex: 0,
     connectable: false,

@@ -2,6 +2,7 @@
 import { createContext, use } from "react";
 import type { Key } from "../../graph/model";
 import type { NoteLink } from "../../graph/note-links";
+import { isolated } from "../../words/isolated";
 import style from "./note-text.module.css";
 
 /** Where links lead. Without it they are words. */
@@ -30,7 +31,7 @@ export function ActionLink({ link }: { link: NoteLink }) {
     <button
       type="button"
       className={`${style.link} nodrag`}
-      title={`Show ${target.label}`}
+      title={`Show ${isolated(target.label)}`}
       onClick={(event) => {
         event.stopPropagation(); // else the note would be chosen
         links.open(target.key);

@@ -36,6 +36,7 @@ import { useRoom } from "../../sync/use-room";
 import { useStableCallback } from "../../ui/hooks/use-stable-callback";
 import { lazyPart } from "../../ui/parts/lazy-part";
 import { PartBoundary } from "../../ui/parts/part-boundary";
+import { isolated } from "../../words/isolated";
 import style from "./editable-canvas.module.css";
 import { arrowAt } from "./hit-test";
 import type { useCanvasElements } from "./use-canvas-elements";
@@ -81,7 +82,7 @@ function PendingHint({
   return (
     <div className={style.hint} role="status">
       <span>
-        When {endName(context.graph, pending.key)} is{" "}
+        When {isolated(endName(context.graph, pending.key))} is{" "}
         <b style={{ color: outcomeColor[pending.outcome] }}>
           <OutcomeSign outcome={pending.outcome} /> {outcomeWord[pending.outcome]}
         </b>

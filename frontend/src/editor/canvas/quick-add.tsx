@@ -13,6 +13,7 @@ import { asOneEdit, connect, insertInto, type NewAction } from "../../graph/edit
 import type { Position } from "../../graph/model";
 import { endName } from "../../graph/relation-words";
 import { keyOf } from "../../ui/keys";
+import { isolated } from "../../words/isolated";
 import style from "./quick-add.module.css";
 
 interface Props {
@@ -112,7 +113,7 @@ export function QuickAdd({ context, request, known, onClose }: Props) {
     >
       {from && (
         <p className={style.from}>
-          when {endName(context.graph, from.key)} is{" "}
+          when {isolated(endName(context.graph, from.key))} is{" "}
           <span style={{ color: outcomeColor[from.outcome] }}>
             <OutcomeSign outcome={from.outcome} /> {outcomeWord[from.outcome]}
           </span>
@@ -152,7 +153,7 @@ export function QuickAdd({ context, request, known, onClose }: Props) {
             >
               <span className={style.name}>
                 {isNew && <IconPlus size={13} aria-hidden />}
-                {isNew ? `New action “${template.name}”` : template.name}
+                {isNew ? `New action “${isolated(template.name)}”` : template.name}
               </span>
               {template.description && <span className={style.sub}>{template.description}</span>}
             </div>

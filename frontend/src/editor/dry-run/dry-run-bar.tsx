@@ -24,6 +24,7 @@ import { FirstShortcut } from "../../edit-actions/keys/shortcut-keys";
 import { fullName } from "../../graph/model";
 import { endName } from "../../graph/relation-words";
 import { Tooltip } from "../../ui/floating/tooltip";
+import { isolated } from "../../words/isolated";
 import style from "./dry-run-bar.module.css";
 import { SeedEnd, SeedNote } from "./dry-run-seed";
 
@@ -82,7 +83,7 @@ function Choices({ context, run }: { context: EditorContext; run: DryRun }) {
     <div
       className={style.choices}
       role="group"
-      aria-label={`How does ${endName(context.graph, going.key)} end?`}
+      aria-label={`How does ${isolated(endName(context.graph, going.key))} end?`}
     >
       {others ? (
         <Select

@@ -11,6 +11,7 @@ import { endName } from "../../graph/relation-words";
 import { keyOf, typedCharacter } from "../../ui/keys";
 import { colorOfName } from "../../ui/name-colors";
 import { matching, type Option, PickList } from "../../ui/pick-list";
+import { isolated } from "../../words/isolated";
 import { candidates } from "../canvas/quick-add";
 import style from "./arrow-dialog.module.css";
 
@@ -202,7 +203,7 @@ export function targetsOf(
     const isNew = !known.includes(template);
     return {
       id: FRESH + template.name,
-      label: isNew ? `New action “${template.name}”` : template.name,
+      label: isNew ? `New action “${isolated(template.name)}”` : template.name,
       sub: isNew
         ? ""
         : `${template.ofGraph ? "a graph" : "one more of the library"} · ${template.description ?? ""}`,

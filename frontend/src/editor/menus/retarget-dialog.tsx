@@ -14,6 +14,7 @@ import {
 } from "../../graph/model";
 import { endName } from "../../graph/relation-words";
 import { matching, type Option, PickList } from "../../ui/pick-list";
+import { isolated } from "../../words/isolated";
 import { leadElsewhere } from "../canvas/lead-elsewhere";
 import { ends } from "./arrow-dialog";
 import style from "./arrow-dialog.module.css";
@@ -75,8 +76,9 @@ function EndChoice({ context, relation: { parent, child }, end, onPick }: EndCho
   );
   return (
     <div className={style.outcomes}>
-      {button("child", `to another than ${endName(context.graph, child)}`)}
-      {parent !== ENTRY && button("parent", `from another than ${endName(context.graph, parent)}`)}
+      {button("child", `to another than ${isolated(endName(context.graph, child))}`)}
+      {parent !== ENTRY &&
+        button("parent", `from another than ${isolated(endName(context.graph, parent))}`)}
     </div>
   );
 }

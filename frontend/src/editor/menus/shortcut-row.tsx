@@ -16,6 +16,7 @@ import {
 } from "../../edit-actions/keys/own-shortcuts";
 import { ShortcutKeys } from "../../edit-actions/keys/shortcut-keys";
 import { keyOf } from "../../ui/keys";
+import { isolated } from "../../words/isolated";
 import style from "./shortcut-sheet.module.css";
 
 interface Props {
@@ -41,7 +42,7 @@ function wishFor(editAction: EditAction, own: OwnShortcuts, keys: string): Wish 
   const others = takenBy(withOwn(EDIT_ACTIONS, own), editAction.name, keys);
   if (others.length === 0) return null;
   const printed = printedKeys(keys).join(" ");
-  const names = others.map(({ label }) => `“${label}”`).join(", ");
+  const names = others.map(({ label }) => `“${isolated(label)}”`).join(", ");
   return { keys, problem: `${printed} is taken by ${names}.`, others: others.every(isChangeable) };
 }
 

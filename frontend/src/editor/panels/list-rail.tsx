@@ -16,6 +16,7 @@ import { Tooltip } from "../../ui/floating/tooltip";
 import { whenThere } from "../../ui/focus-field";
 import { type ListTab, useListTab } from "../../ui/hooks/use-list-tab";
 import { keyOf } from "../../ui/keys";
+import { isolated } from "../../words/isolated";
 import style from "./list-rail.module.css";
 import { type EditorSidePanel, ENTRY_BUTTON, type Panels, ROW } from "./use-panels";
 
@@ -86,7 +87,7 @@ interface RailButtonProps {
 }
 
 function RailButton({ name, icon, open, more, onPress }: RailButtonProps) {
-  const words = more ? `${name}: ${more}` : name;
+  const words = more ? `${isolated(name)}: ${more}` : name;
   return (
     <Tooltip label={words}>
       <button

@@ -1,5 +1,6 @@
 /** Changes of a document that the server has worked out, key by key: what others changed meanwhile, and the edit. */
 import type * as Y from "yjs";
+import { isolated } from "../../words/isolated";
 import {
   bundleOfKey,
   endsOf,
@@ -115,7 +116,7 @@ function placeOf(graph: Graph, { root, key, before, after }: DocumentChange): st
     const action = graph.actions.find((candidate) => candidate.key === end);
     return action ? `${action.name} ${action.instanceId}` : "a new action";
   };
-  if (ends) return `${name(ends.parent)} → ${name(ends.child)}`;
+  if (ends) return `${isolated(name(ends.parent))} → ${isolated(name(ends.child))}`;
   if (root === "positions" && head.startsWith("g/")) return "notes";
   if (isName && typeof after === "string") return after;
   const isGone = graph.actions.every((action) => action.key !== head);

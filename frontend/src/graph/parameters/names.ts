@@ -1,4 +1,6 @@
 /** Names that a new parameter may well have: what its neighbours give or want, and its namesakes have. Pure. */
+
+import { isolated } from "../../words/isolated";
 import type { ParameterSide } from "../document-keys";
 import type { Action, Graph, Parameter } from "../model";
 import { pathWords } from "../value-text";
@@ -40,12 +42,12 @@ export function nameSuggestions(
     }
   };
   for (const other of neighbours(graph, action, side)) {
-    if (side === "in") add(other.outputs, `given by ${other.name}`);
-    else add(other.inputs, `wanted by ${other.name}`);
+    if (side === "in") add(other.outputs, `given by ${isolated(other.name)}`);
+    else add(other.inputs, `wanted by ${isolated(other.name)}`);
   }
   for (const other of graph.actions) {
     if (other === action || other.name !== action.name) continue;
-    add(side === "in" ? other.inputs : other.outputs, `as in another ${other.name}`);
+    add(side === "in" ? other.inputs : other.outputs, `as in another ${isolated(other.name)}`);
   }
   return [...found.values()];
 }

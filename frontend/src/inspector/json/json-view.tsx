@@ -14,6 +14,7 @@ import { applyChanges, collisions, places } from "../../graph/edit/key-changes";
 import { Tooltip } from "../../ui/floating/tooltip";
 import { lazyPart } from "../../ui/parts/lazy-part";
 import { PartBoundary } from "../../ui/parts/part-boundary";
+import { isolated } from "../../words/isolated";
 import type { JsonError } from "./json-editor";
 import { actionAt, rangeOf, rangeOfArrow } from "./json-positions";
 import style from "./json-view.module.css";
@@ -81,8 +82,8 @@ function Meanwhile({ names, onRest, onAll, onBack }: MeanwhileProps) {
   return (
     <div className={style.foot} role="alertdialog" aria-label="Changed meanwhile">
       <p data-tone="warning">
-        <IconAlertTriangle size={14} aria-hidden /> Somebody changed {names.join(", ")} since you
-        began. What shall stay?
+        <IconAlertTriangle size={14} aria-hidden /> Somebody changed{" "}
+        {names.map(isolated).join(", ")} since you began. What shall stay?
       </p>
       <div className={style.buttons}>
         <Button size="compact-sm" onClick={onAll}>

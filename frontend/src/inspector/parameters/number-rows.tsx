@@ -13,6 +13,7 @@ import { complaint, shown, typed, withValue } from "../../graph/parameters/value
 import { pathWords } from "../../graph/value-text";
 import { DraftInput } from "../../ui/draft-input";
 import { Tooltip } from "../../ui/floating/tooltip";
+import { isolated } from "../../words/isolated";
 import { useInLibrary } from "../fields/in-library";
 import { SharedField } from "../fields/shared-field";
 import style from "../inspector.module.css";
@@ -128,7 +129,7 @@ export function NumberRows({ action, side, block }: Props) {
               <ActionIcon
                 size={24}
                 disabled={false}
-                aria-label={`The numbers of ${name} one by one`}
+                aria-label={`The numbers of ${isolated(name)} one by one`}
                 aria-expanded={open}
                 onClick={() => setOpen(!open)}
               >

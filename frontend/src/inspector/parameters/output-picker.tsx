@@ -7,6 +7,7 @@ import { leaveOutputs, takeOutputs } from "../../graph/edit/data-flow";
 import type { Key } from "../../graph/model";
 import type { OutputChoice } from "../../graph/parameters/output-choices";
 import { Tooltip } from "../../ui/floating/tooltip";
+import { isolated } from "../../words/isolated";
 import style from "./data-flow.module.css";
 
 const MOST = 40;
@@ -114,7 +115,7 @@ export function OutputPicker({ owner, paths, name, choices, renamed }: Props) {
         <Tooltip label="Take it from an output" disabled={box.dropdownOpened}>
           <ActionIcon
             size={26}
-            aria-label={`Take ${name} from an output`}
+            aria-label={`Take ${isolated(name)} from an output`}
             aria-expanded={box.dropdownOpened}
             onClick={() => box.toggleDropdown()}
           >
@@ -124,7 +125,7 @@ export function OutputPicker({ owner, paths, name, choices, renamed }: Props) {
       </Combobox.Target>
       <Combobox.Dropdown>
         <Combobox.Search
-          aria-label={`Outputs for ${name}`}
+          aria-label={`Outputs for ${isolated(name)}`}
           placeholder="Outputs"
           value={search}
           onChange={(event) => {

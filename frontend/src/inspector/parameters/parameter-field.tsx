@@ -11,6 +11,7 @@ import { outputChoices } from "../../graph/parameters/output-choices";
 import type { ParameterValue } from "../../graph/parameters/values";
 import { pathWords } from "../../graph/value-text";
 import { Tooltip } from "../../ui/floating/tooltip";
+import { isolated } from "../../words/isolated";
 import { useInLibrary } from "../fields/in-library";
 import style from "../inspector.module.css";
 import flowStyle from "./data-flow.module.css";
@@ -57,7 +58,7 @@ function Label({ name, fullName, field, open, onOpen }: LabelProps) {
           size={24}
           className={style.remove ?? ""}
           disabled={false}
-          aria-label={`What the parameter ${fullName} is`}
+          aria-label={`What the parameter ${isolated(fullName)} is`}
           aria-expanded={open}
           onClick={(event) => {
             event.preventDefault();

@@ -17,6 +17,7 @@ import {
 } from "../../graph/parameters/values";
 import { pathWords } from "../../graph/value-text";
 import { DraftChoice, DraftInput } from "../../ui/draft-input";
+import { isolated } from "../../words/isolated";
 import style from "../inspector.module.css";
 
 interface Props {
@@ -34,7 +35,7 @@ export function ParameterSettings({ owner, side, parameter, others, onClose }: P
   const write = (change: (now: string) => string) =>
     setParameter(doc, owner, side, parameter.path, change);
   return (
-    <section className={style.adding} aria-label={`What the parameter ${name} is`}>
+    <section className={style.adding} aria-label={`What the parameter ${isolated(name)} is`}>
       <DraftInput
         label="Name"
         value={name}
@@ -95,7 +96,7 @@ export function ParameterSettings({ owner, side, parameter, others, onClose }: P
           variant="subtle"
           color="red"
           leftSection={<IconTrash size={13} aria-hidden />}
-          aria-label={`Remove the parameter ${name}`}
+          aria-label={`Remove the parameter ${isolated(name)}`}
           onClick={() => removeParameter(doc, owner, side, parameter.path)}
         >
           Remove

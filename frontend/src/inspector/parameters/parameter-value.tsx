@@ -13,6 +13,7 @@ import {
 import { DraftInput } from "../../ui/draft-input";
 import { Tooltip } from "../../ui/floating/tooltip";
 import { Segments } from "../../ui/segments";
+import { isolated } from "../../words/isolated";
 import { useInLibrary } from "../fields/in-library";
 import style from "../inspector.module.css";
 
@@ -71,7 +72,7 @@ function TakeAway({ name, write }: Pick<ValueProps, "name" | "write">) {
     <Tooltip label="No value: let an output fill it">
       <ActionIcon
         size={26}
-        aria-label={`Take the value of ${name} away`}
+        aria-label={`Take the value of ${isolated(name)} away`}
         onClick={() => write((now) => withValue(now, null))}
       >
         <IconBackspace size={14} aria-hidden />

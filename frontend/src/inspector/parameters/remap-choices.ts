@@ -2,6 +2,7 @@
 import { flatName } from "../../graph/document-keys";
 import type { Action, Parameter, Remap } from "../../graph/model";
 import { parameterValueOf } from "../../graph/parameters/values";
+import { isolated } from "../../words/isolated";
 
 /** One end of a renaming as a choice; `reason` says why it cannot be chosen. */
 export interface RemapChoice {
@@ -53,10 +54,10 @@ export function misfit(
   const output = named(parent?.outputs, source);
   const input = named(child?.inputs, target);
   if (parent !== undefined && output === undefined) {
-    return `${parent.name} gives no ${source}: the engine breaks down here.`;
+    return `${isolated(parent.name)} gives no ${source}: the engine breaks down here.`;
   }
   if (child !== undefined && input === undefined)
-    return `${child.name} takes no ${target}: nothing happens.`;
+    return `${isolated(child.name)} takes no ${target}: nothing happens.`;
   if (output === undefined || input === undefined) return null;
   const [from, to] = [parameterValueOf(output.text), parameterValueOf(input.text)];
   if (from.type !== to.type) {

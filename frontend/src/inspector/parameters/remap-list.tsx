@@ -7,6 +7,7 @@ import { relationId } from "../../graph/document-keys";
 import { setRemap } from "../../graph/edit";
 import type { Relation } from "../../graph/model";
 import { endName } from "../../graph/relation-words";
+import { isolated } from "../../words/isolated";
 import style from "../inspector.module.css";
 import { misfit, passed, type RemapChoice, sources, targets } from "./remap-choices";
 
@@ -71,7 +72,7 @@ function AddRemap({ relation, onDone }: { relation: Relation; onDone: () => void
       }}
     >
       <Pick
-        label={`Output of ${endName(graph, relation.parent)}`}
+        label={`Output of ${isolated(endName(graph, relation.parent))}`}
         choices={outputs}
         value={source}
         onPick={(name) => {
@@ -81,7 +82,7 @@ function AddRemap({ relation, onDone }: { relation: Relation; onDone: () => void
       />
       <Pick
         key={source}
-        label={`Reaches ${endName(graph, relation.child)} as`}
+        label={`Reaches ${isolated(endName(graph, relation.child))} as`}
         choices={targets(child, relation.remap, type)}
         value={target}
         onPick={setTarget}
@@ -119,8 +120,8 @@ export function RemapList({ relation }: { relation: Relation }) {
       )}
       {same.length === 0 && relation.remap.length === 0 && !adding && (
         <p className={style.hint}>
-          Nothing: no output of {endName(graph, relation.parent)} is called and typed as an input of{" "}
-          {endName(graph, relation.child)}.
+          Nothing: no output of {isolated(endName(graph, relation.parent))} is called and typed as
+          an input of {isolated(endName(graph, relation.child))}.
         </p>
       )}
       <ul className={style.arrows}>

@@ -20,6 +20,7 @@ import { cardRows } from "../../graph/parameters/card-rows";
 import type { Progress } from "../../status/progress";
 import { StateLabel } from "../../status/state-label";
 import { colorOfName } from "../../ui/name-colors";
+import { isolated } from "../../words/isolated";
 import { expansion } from "./expansion";
 import style from "./level-frame.module.css";
 import type { LevelGraph } from "./level-graph";
@@ -103,7 +104,7 @@ const InnerCard = memo(function InnerCard({
         {instanceId > 0 && <span className={card.instance}>{instanceId}</span>}
         {opensGraph(name) && (
           <HeadButton
-            label={`Expand the graph inside ${name}`}
+            label={`Expand the graph inside ${isolated(name)}`}
             Sign={IconArrowsDiagonal}
             onClick={() => expansion.now().toggle(path)}
           />
@@ -142,13 +143,13 @@ function Head({ level, name, progress }: FrameProps) {
       <span className={style.count}>{count}</span>
       <span className={style.buttons}>
         <HeadButton
-          label={`Open the graph inside ${name}`}
+          label={`Open the graph inside ${isolated(name)}`}
           keys="]"
           Sign={IconStairsDown}
           onClick={() => expansion.now().enter(path)}
         />
         <HeadButton
-          label={`Collapse the graph inside ${name}`}
+          label={`Collapse the graph inside ${isolated(name)}`}
           keys="}"
           Sign={IconArrowsDiagonalMinimize2}
           onClick={() => expansion.now().toggle(path)}
@@ -203,7 +204,7 @@ function LevelFrame({ level, name, progress }: FrameProps) {
     <div
       className={style.frame}
       role="group"
-      aria-label={`Graph inside ${name}`}
+      aria-label={`Graph inside ${isolated(name)}`}
       data-level={level.path}
     >
       <Head level={level} name={name} progress={progress} />

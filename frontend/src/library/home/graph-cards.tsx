@@ -16,6 +16,7 @@ import { colorOfName, initials } from "../../ui/name-colors";
 import { lazyPart } from "../../ui/parts/lazy-part";
 import { PartBoundary } from "../../ui/parts/part-boundary";
 import { ago, instant, useNow } from "../../ui/times";
+import { isolated } from "../../words/isolated";
 import { GraphCounts } from "../graph-counts";
 import { allLabels, type GraphOrder, lastRuns, ORDERS, selectGraphs } from "../graph-selection";
 import style from "./graph-cards.module.css";
@@ -39,7 +40,7 @@ function LastRun({ run, now }: { run: Run; now: number }) {
 function People({ people }: { people: NonNullable<GraphSummary["people"]> }) {
   const colorOf = useKnownColors(people.map(({ id }) => id));
   if (people.length === 0) return null;
-  const names = people.map(({ name }) => name || "Guest").join(", ");
+  const names = people.map(({ name }) => isolated(name || "Guest")).join(", ");
   return (
     <span className={style.people} title={`Now here: ${names}`}>
       <span className="visually-hidden">Now here: {names}</span>

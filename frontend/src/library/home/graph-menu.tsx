@@ -20,6 +20,7 @@ import { useMay } from "../../api/use-person";
 import { usedIn } from "../../canvas/levels/used-in";
 import { lazyPart } from "../../ui/parts/lazy-part";
 import { OverlayBoundary } from "../../ui/parts/part-boundary";
+import { isolated } from "../../words/isolated";
 import style from "./home.module.css";
 
 /** "x copy", "x copy 2" …: the first that no graph is called. */
@@ -56,7 +57,7 @@ function offerBack(client: QueryClient, graph: GraphSummary): void {
   };
   notifications.show({
     id,
-    title: `${graph.name} is deleted`,
+    title: `${isolated(graph.name)} is deleted`,
     message: (
       <Button size="compact-sm" mt="xs" onClick={bringBack}>
         Bring it back
@@ -103,7 +104,11 @@ export function GraphMenu({ graph, names }: { graph: GraphSummary; names: readon
     <>
       <Menu>
         <Menu.Target>
-          <button type="button" className={style.more} aria-label={`More about ${graph.name}`}>
+          <button
+            type="button"
+            className={style.more}
+            aria-label={`More about ${isolated(graph.name)}`}
+          >
             <IconDots size={16} aria-hidden />
           </button>
         </Menu.Target>

@@ -2,6 +2,7 @@
 import { Button, Group, Modal, TextInput } from "@mantine/core";
 import { useState } from "react";
 import type { GraphSummary } from "../../api/graphs";
+import { isolated } from "../../words/isolated";
 
 interface Props {
   graph: GraphSummary;
@@ -46,7 +47,7 @@ export function RenameDialog({ opened, ...props }: Props) {
     <Modal
       opened={opened}
       onClose={props.onClose}
-      title={`Rename ${props.graph.name}`}
+      title={`Rename ${isolated(props.graph.name)}`}
       closeButtonProps={{ "aria-label": "Close" }}
       centered
     >

@@ -8,6 +8,7 @@ import { useSingleKeys } from "../../edit-actions/keys/shortcuts";
 import { endsOf } from "../../graph/document-keys";
 import { Tooltip } from "../../ui/floating/tooltip";
 import { keyOf } from "../../ui/keys";
+import { isolated } from "../../words/isolated";
 import style from "../past-bar.module.css";
 import { type ChangedThing, countWords, type GraphChanges, walkOrder } from "./graph-difference";
 
@@ -21,11 +22,11 @@ export function showThing({ select, view }: EditorContext, { key, thing }: Chang
 }
 
 function thingWords({ name, change, looks, lines }: ChangedThing): string {
-  if (looks) return `${name}: only where it stands`;
+  if (looks) return `${isolated(name)}: only where it stands`;
   const [line] = lines;
   if (change !== "changed" || line === undefined) return `${name} ${change}`;
   const more = lines.length > 1 ? ` and ${lines.length - 1} more` : "";
-  return `${name}: ${line.name} ${line.before ?? "nothing"} → ${line.after ?? "nothing"}${more}`;
+  return `${isolated(name)}: ${isolated(line.name)} ${line.before ?? "nothing"} → ${line.after ?? "nothing"}${more}`;
 }
 
 /** N and P, wherever nobody is typing. */

@@ -3,6 +3,7 @@ import { memo, useMemo } from "react";
 import { CHANGE_SIGNS } from "../../canvas/changes/change-marks";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import { useStableCallback } from "../../ui/hooks/use-stable-callback";
+import { isolated } from "../../words/isolated";
 import style from "../past-details.module.css";
 import { showThing } from "./changes-walk";
 import { type ChangedThing, type GraphChanges, walkOrder } from "./graph-difference";
@@ -34,7 +35,8 @@ const Thing = memo(
             <b>{name}</b> <span className={style.quiet}>{looks ? "only moved" : change}</span>
             {lines.map((line) => (
               <span key={line.name} className={style.change}>
-                {line.name} <del>{line.before ?? ""}</del> → <code>{line.after ?? "nothing"}</code>
+                {isolated(line.name)} <del>{line.before ?? ""}</del> →{" "}
+                <code>{line.after ?? "nothing"}</code>
               </span>
             ))}
           </span>

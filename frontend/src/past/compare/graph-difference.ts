@@ -13,6 +13,7 @@ import {
 } from "../../graph/model";
 import { cardRows } from "../../graph/parameters/card-rows";
 import { type FieldChange, linesOf } from "../../history/difference-words";
+import { isolated } from "../../words/isolated";
 import { spokenName } from "../told/entry-words";
 
 export interface ChangedThing {
@@ -207,7 +208,7 @@ export function changesBetween(
     ...actions.map((pair) => thingOf(pair, "action", nameOf(pair.key), actionFields)),
     ...relations.map((pair) => {
       const ends = pair.after ?? pair.before;
-      const name = ends ? `${nameOf(ends.parent)} → ${nameOf(ends.child)}` : "";
+      const name = ends ? `${isolated(nameOf(ends.parent))} → ${isolated(nameOf(ends.child))}` : "";
       return thingOf(pair, "arrow", name, relationFields);
     }),
     ...notes.map((pair) => {

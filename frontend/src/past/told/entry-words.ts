@@ -1,6 +1,7 @@
 /** What an entry of the history changed, in words about actions, arrows and notes. Pure. */
 import type { HistoryEntry } from "../../api/documents/history";
 import { type FieldChange, linesOf } from "../../history/difference-words";
+import { isolated } from "../../words/isolated";
 
 /** `looks`: only where things stand, which means nothing to a robot. `said`: notes and comments. */
 type LineSign = "added" | "removed" | "changed" | "looks" | "said";
@@ -144,7 +145,9 @@ function graphLines(fields: readonly FieldChange[]): EntryLine[] {
       return { sign: "changed", of: null, parts };
     }
     const sign = line.name === "direction" ? "looks" : "changed";
-    const words = text(sign === "looks" ? "turned the drawing" : `set the graph's ${line.name}`);
+    const words = text(
+      sign === "looks" ? "turned the drawing" : `set the graph's ${isolated(line.name)}`,
+    );
     const values = sign === "looks" ? [] : fromTo(line.before, line.after);
     return { sign, of: null, parts: [words, ...values] };
   });

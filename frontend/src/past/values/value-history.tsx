@@ -9,6 +9,7 @@ import { errorText } from "../../api/http";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import { usePersonColors, useThrottledLink } from "../../sync/use-room";
 import { day, hourMinute, instant, useNow } from "../../ui/times";
+import { isolated } from "../../words/isolated";
 import { useTimeline } from "../told/use-timeline";
 import { blamedName } from "./blame-words";
 import { canSetBack, setBack } from "./set-back";
@@ -53,7 +54,7 @@ function ValueTable({ field, spans, colorOf, at }: TableProps) {
   const here = spans.findLast(({ value }) => value.seq <= at);
   return (
     <table className={style.table}>
-      <caption className="visually-hidden">Values of {blamedName(field)}</caption>
+      <caption className="visually-hidden">Values of {isolated(blamedName(field))}</caption>
       <thead className="visually-hidden">
         <tr>
           <th scope="col">Value</th>
@@ -109,7 +110,7 @@ function SetBack({ of, field, span }: Props & { span: ValueSpan }) {
     lookAt(null);
     notifications.show(
       done
-        ? { message: `${name} is ${span.text} again`, autoClose: 4_000 }
+        ? { message: `${isolated(name)} is ${span.text} again`, autoClose: 4_000 }
         : { color: "red", title: "Not set back", message: "What it belongs to is not there now." },
     );
   };
@@ -122,7 +123,7 @@ function SetBack({ of, field, span }: Props & { span: ValueSpan }) {
       onClick={set}
     >
       <span className={style.backWords}>
-        Set {name} back to <code>{span.text}</code>
+        Set {isolated(name)} back to <code>{span.text}</code>
       </span>
     </Button>
   );
@@ -148,7 +149,7 @@ export function ValueHistory({ of, field }: Props) {
     <div className={style.values}>
       {numbers > 1 && <ValueChart {...{ spans, colorOf, at }} />}
       <ValueTable {...{ field, spans, colorOf, at }} />
-      <ul className={style.facts} aria-label={`What ran with each ${blamedName(field)}`}>
+      <ul className={style.facts} aria-label={`What ran with each ${isolated(blamedName(field))}`}>
         {factsOf(spans).map(({ text, words }) => (
           <li key={text}>
             <b>

@@ -15,11 +15,13 @@ import { endsOf } from "../../graph/document-keys";
 import { notesOf } from "../../graph/edit/notes";
 import type { Graph } from "../../graph/model";
 import { endName } from "../../graph/relation-words";
+import { isolated } from "../../words/isolated";
 
 /** What a key of the document is called: an action, an arrow, a note. */
 function thingName(graph: Graph, key: string): string {
   const ends = endsOf(key);
-  if (ends !== null) return `${endName(graph, ends.parent)} → ${endName(graph, ends.child)}`;
+  if (ends !== null)
+    return `${isolated(endName(graph, ends.parent))} → ${isolated(endName(graph, ends.child))}`;
   if (!key.startsWith("g/")) return endName(graph, key);
   const text = notesOf(graph).find((note) => note.key === key)?.text ?? "";
   return text === "" ? "a note" : `“${text.slice(0, 40)}”`;
@@ -32,7 +34,7 @@ export function leftWords(graph: Graph, left: readonly string[]): string {
   if (left.length === 0) return "";
   const names = left.slice(0, MOST).map((key) => thingName(graph, key));
   const more = left.length > names.length ? ` and ${left.length - names.length} more` : "";
-  return `Left as it is, since others changed it or built on it: ${names.join(", ")}${more}.`;
+  return `Left as it is, since others changed it or built on it: ${names.map(isolated).join(", ")}${more}.`;
 }
 
 export function useGoingBack(context: EditorContext) {
@@ -55,7 +57,7 @@ export function useGoingBack(context: EditorContext) {
     go("Not undone", async () => {
       const { left } = await revertEdits(id, { author: author.id, from_seq, seq });
       const message = leftWords(graph, left) || "Nobody had changed it since.";
-      const title = `What ${authorName(author)} did is undone`;
+      const title = `What ${isolated(authorName(author))} did is undone`;
       notifications.show({ title, message, autoClose: left.length > 0 ? 12_000 : 5_000 });
     });
   const restore = (seq: number, of?: string) =>

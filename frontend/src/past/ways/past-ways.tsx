@@ -4,6 +4,7 @@ import { IconCopyPlus, IconRestore } from "@tabler/icons-react";
 import type { Version } from "../../api/graphs";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import { useThrottledLink } from "../../sync/use-room";
+import { isolated } from "../../words/isolated";
 import { useGoingBack } from "./going-back";
 import style from "./past-ways.module.css";
 import { useCopyAsGraph } from "./use-copies";
@@ -38,7 +39,7 @@ export function PastWays({ versions }: { versions: readonly Version[] }) {
         leftSection={<IconCopyPlus size={15} aria-hidden />}
         onClick={() => void copies.copy(at, called)}
       >
-        Copy {called} as a new graph
+        Copy {isolated(called)} as a new graph
       </Button>
       <p>To go back is an edit like any other: nothing is lost, and it can be undone.</p>
     </div>

@@ -11,6 +11,7 @@ import { useEditorContext } from "../../edit-actions/editor-context";
 import { withPast } from "../../edit-actions/past-links";
 import { copyNameOf } from "../../graph/edit/copy-name";
 import { copyText } from "../../ui/copy-text";
+import { isolated } from "../../words/isolated";
 
 /** Copies a moment as a new graph, and says where that is. `called`: `v11`, or when it was. */
 export function useCopyAsGraph() {
@@ -29,7 +30,7 @@ export function useCopyAsGraph() {
       const made = await copyMoment(id, at, name);
       notifications.show({
         title: "Copied as a new graph",
-        message: <Link to={`/graphs/${made.id}`}>Open {made.name}</Link>,
+        message: <Link to={`/graphs/${made.id}`}>Open {isolated(made.name)}</Link>,
         autoClose: 15_000,
       });
     } catch (error) {

@@ -16,6 +16,7 @@ import { useRunStatus } from "../../status/run-status";
 import { StateLabel } from "../../status/state-label";
 import { Empty } from "../../ui/empty";
 import { clock, day, instant, useNow } from "../../ui/times";
+import { isolated } from "../../words/isolated";
 import type { RunBarParts } from "../run/run-page";
 import { GraphChanges } from "./changes";
 import style from "./compare-page.module.css";
@@ -32,7 +33,7 @@ function Head({ run, title }: { run: Run; title: string }) {
   return (
     <section className={style.run} aria-label={title}>
       <Link to={`/runs/${run.id}`} className={style.link}>
-        Run {run.number} · {run.graph_name}
+        Run {run.number} · {isolated(run.graph_name)}
       </Link>
       <StateLabel pill {...useRunStatus(run)} />
       <span className={style.meta}>
@@ -86,7 +87,7 @@ function Before({ found }: { found: Comparison }) {
       <h2>Before they began</h2>
       {!found.same_engine && (
         <p className={style.same}>
-          They ran in different places: {found.a.engine} and {found.b.engine}.
+          They ran in different places: {isolated(found.a.engine)} and {isolated(found.b.engine)}.
         </p>
       )}
       <GraphChanges found={found} />

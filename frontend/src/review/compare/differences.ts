@@ -139,7 +139,7 @@ function differenceOf(
     const did = ran === null ? "" : ` and ${ended(ran)} after ${rangeText(rangeOf(ran))}`;
     const again = step.visit > 1 ? " again" : "";
     const text = `In ${where} it ran${again}${did}; in ${not} it did not.`;
-    return { title: `${who} ran only in ${where}`, text };
+    return { title: `${isolated(who)} ran only in ${where}`, text };
   }
   const slower =
     step.slower === null || step.slower === undefined
@@ -175,7 +175,7 @@ export function sameAsSeen(found: Comparison): { name: string; text: string }[] 
 
 function changedWords({ field, before, after }: ComparedField): string {
   const name = field.replace(/^(in|out)\//, "");
-  return `its ${name} was ${plainValue(after)} instead of ${plainValue(before)}`;
+  return `its ${isolated(name)} was ${plainValue(after)} instead of ${plainValue(before)}`;
 }
 
 /** What the visit ran with in one run and not in the other, as far as engines told it. */
@@ -206,13 +206,15 @@ export function likelyCause(found: Comparison): string | null {
   if (field !== undefined) return changedWords(field);
   const input = ranWithOther(step);
   if (input !== null) return input;
-  if (own !== undefined && own.change !== "changed") return `${own.name} was ${own.change}`;
+  if (own !== undefined && own.change !== "changed")
+    return `${isolated(own.name)} was ${own.change}`;
   const led = found.graph.relations.find(
     ({ child, change, fields }) =>
       child === step.action &&
       (change !== "changed" || fields.some(({ field }) => ARROW_DECIDES.test(field))),
   );
-  if (led !== undefined) return `the arrow ${led.parent} → ${led.child} was ${led.change}`;
+  if (led !== undefined)
+    return `the arrow ${isolated(led.parent)} → ${isolated(led.child)} was ${led.change}`;
   if (!found.same_engine)
     return `they ran on ${isolated(found.a.engine)} and on ${isolated(found.b.engine)}`;
   return null;

@@ -3,6 +3,7 @@ import type { Replay, ReplayMark } from "../../api/documents/replay";
 import type { Run } from "../../api/runs";
 import type { TimeGap, TimeSign } from "../../status/lanes/timeline";
 import { clock, instant } from "../../ui/times";
+import { isolated } from "../../words/isolated";
 
 const SIGNS: Record<string, TimeSign["tone"]> = {
   "run.stop_requested.v1": "stopped",
@@ -21,17 +22,17 @@ export function markText(mark: Pick<ReplayMark, "kind" | "by" | "text" | "since"
   const text = mark.text ? `: ${mark.text}` : "";
   switch (mark.kind) {
     case "run.requested.v1":
-      return `${by} asked for the start${mark.text ? ` in spite of problems: “${mark.text}”` : ""}`;
+      return `${isolated(by)} asked for the start${mark.text ? ` in spite of problems: “${mark.text}”` : ""}`;
     case "run.published.v1":
       return "The start message was sent";
     case "run.stop_requested.v1":
-      return `${by} pressed Stop`;
+      return `${isolated(by)} pressed Stop`;
     case "run.pause_requested.v1":
-      return `${by} asked for a pause`;
+      return `${isolated(by)} asked for a pause`;
     case "run.resume_requested.v1":
-      return `${by} let it go on`;
+      return `${isolated(by)} let it go on`;
     case "run.modify_requested.v1":
-      return `${by} sent another version`;
+      return `${isolated(by)} sent another version`;
     case "run.modify_refused.v1":
       return `The other version was not taken${text}`;
     case "run.stop_sent.v1":

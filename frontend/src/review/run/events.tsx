@@ -17,6 +17,7 @@ import {
 } from "../../status/progress";
 import { toneColor } from "../../status/state-label";
 import { clock, instant } from "../../ui/times";
+import { isolated } from "../../words/isolated";
 import { markText } from "../replay/replay-marks";
 import style from "./events.module.css";
 
@@ -120,7 +121,7 @@ export function eventLines(
   all.sort((a, b) => a.at - b.at || (a.order ?? 0) - (b.order ?? 0));
   if (start === null) return all;
   const where = run.engine === "simulator" ? "in the simulator" : `on ${runPlace(run)}`;
-  const text = `${by} started ${version} ${where}`;
+  const text = `${isolated(by)} started ${version} ${where}`;
   return [{ at: start, tone: "idle", name: null, fact: null, text }, ...all];
 }
 

@@ -5,6 +5,7 @@ import { type Run, requesterPlace, runPlace } from "../../api/runs";
 import { boundsText } from "../../status/durations";
 import { runEndText } from "../../status/progress";
 import { clock, day, instant, useNow } from "../../ui/times";
+import { isolated } from "../../words/isolated";
 import style from "./run-facts.module.css";
 
 type Rest = NonNullable<Run["at_rest"]>;
@@ -17,7 +18,7 @@ interface Props {
 }
 
 function restWords(rest: Rest, moment: (at: number | null) => string): string {
-  const who = rest.by ? `by ${rest.by.name}${requesterPlace(rest.by)}` : "by the runner";
+  const who = rest.by ? `by ${isolated(rest.by.name)}${requesterPlace(rest.by)}` : "by the runner";
   return `${moment(instant(rest.at))} ${who}: “${rest.how}”`;
 }
 

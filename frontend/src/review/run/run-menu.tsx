@@ -16,6 +16,7 @@ import { graphMoment } from "../../api/documents/texts";
 import { useVersions, versionName } from "../../api/graphs";
 import { errorText } from "../../api/http";
 import type { Run } from "../../api/runs";
+import { isolated } from "../../words/isolated";
 import { FaultDialog } from "./fault-dialog";
 import { type Repeated, type RepeatedVersion, repeatRun } from "./repeat-run";
 import style from "./run-page.module.css";
@@ -128,7 +129,7 @@ export function RunMenu({ runner, run, engines, onStart }: MenuProps) {
   const graph = run.graph ?? "";
   const versions = useVersions(graph, run.version).data ?? [];
   const version = versions.find((each) => each.id === run.version);
-  const where = engines.join(", ");
+  const where = engines.map(isolated).join(", ");
   const complain = (error: unknown) =>
     notifications.show({ color: "red", title: "Not started", message: errorText(error) });
   const show = ({ run: fresh, doubts }: Repeated) => {

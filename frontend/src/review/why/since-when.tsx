@@ -9,6 +9,7 @@ import { errorText } from "../../api/http";
 import type { Run } from "../../api/runs";
 import { DifferenceView } from "../../history/difference-view";
 import { clock, day, instant, useNow } from "../../ui/times";
+import { isolated } from "../../words/isolated";
 import style from "./since-when.module.css";
 
 type CourseChange = SinceWhen["partings"][number];
@@ -34,7 +35,7 @@ function PlaceView({ place, graph }: { place: CourseChange; graph: string }) {
       </p>
       <DifferenceView
         found={{ actions: [], relations: [], ...changes }}
-        label={`What ${authorName(place.author)} changed`}
+        label={`What ${isolated(authorName(place.author))} changed`}
       />
       <p className={style.step}>
         Step {place.place}: <del>{place.before}</del> <ins>{place.after}</ins>

@@ -12,6 +12,7 @@ import { useRunStatus } from "../../status/run-status";
 import { StateLabel } from "../../status/state-label";
 import { colorOfName } from "../../ui/name-colors";
 import { clock, day, instant, stopwatch, useNow } from "../../ui/times";
+import { isolated } from "../../words/isolated";
 import { PauseButton } from "../pause-button";
 import { ConfirmRestButton } from "../stop/confirm-rest-button";
 import style from "./run-drawer.module.css";
@@ -58,7 +59,7 @@ function Origin({ run, until }: { run: Run; until: number | null }) {
   return (
     <Text span c="dimmed" size="xs" truncate>
       {run.simulated && "simulated · "}
-      started by {by} {started} · {took}
+      started by {isolated(by)} {started} · {took}
     </Text>
   );
 }

@@ -10,6 +10,7 @@ import { useLive } from "../../api/live/use-live";
 import type { Preflight, PreflightItem } from "../../api/robots";
 import { useMay } from "../../api/use-person";
 import { HoldButton } from "../../ui/floating/hold-button";
+import { isolated } from "../../words/isolated";
 import type { MomentLookedAt } from "./inside-remedies";
 import style from "./preflight-list.module.css";
 
@@ -44,28 +45,28 @@ function Waiting({ robot, seconds }: { robot: string; seconds: number }) {
   if (seconds < PATIENCE)
     return (
       <span>
-        <Loader size={12} color="var(--ink3)" /> Written. Waiting until {robot} has indexed it …
-        <span aria-hidden> {seconds} s</span>
+        <Loader size={12} color="var(--ink3)" /> Written. Waiting until {isolated(robot)} has
+        indexed it …<span aria-hidden> {seconds} s</span>
       </span>
     );
   return (
     <span>
-      Written, but {robot} has not indexed it within {PATIENCE} s. Its engine may look only at its
-      start (<code>--indexing-rate 0</code>): restart it. Or it looks in another folder.
+      Written, but {isolated(robot)} has not indexed it within {PATIENCE} s. Its engine may look
+      only at its start (<code>--indexing-rate 0</code>): restart it. Or it looks in another folder.
     </span>
   );
 }
 
 /** What writing would do, before anybody does it. */
 function What({ folder, robot }: { folder: IndexFolderLook; robot: string }) {
-  const names = folder.writable.map(({ graph }) => graph).join(", ");
+  const names = folder.writable.map(({ graph }) => isolated(graph)).join(", ");
   const replaced = folder.writable.filter(({ replaces }) => replaces !== "");
   const hindered = Object.entries(folder.hindered);
   return (
     <>
       {hindered.map(([graph, why]) => (
         <span key={graph}>
-          {graph} cannot be written into {folder.path}. {why}
+          {isolated(graph)} cannot be written into {folder.path}. {why}
         </span>
       ))}
       {hindered.length === 0 && names !== "" && (
@@ -77,14 +78,14 @@ function What({ folder, robot }: { folder: IndexFolderLook; robot: string }) {
       {hindered.length === 0 &&
         replaced.map(({ graph, replaces }) => (
           <span key={graph}>
-            {replaces}, which has another {graph}, would be replaced, and kept beside.
+            {replaces}, which has another {isolated(graph)}, would be replaced, and kept beside.
           </span>
         ))}
       {names === "" && folder.waiting.length > 0 && (
         <span>
           {folder.waiting.join(", ")} {folder.waiting.length > 1 ? "are" : "is"} in {folder.path}{" "}
-          already, and {robot} has not indexed it. Its engine may look only at its start: restart
-          it.
+          already, and {isolated(robot)} has not indexed it. Its engine may look only at its start:
+          restart it.
         </span>
       )}
     </>
@@ -101,7 +102,7 @@ interface WriteButtonProps {
 /** The button; where it would replace files it is held, or asks. */
 function WriteButton({ folder, robot, busy, onWrite }: WriteButtonProps) {
   const replaced = folder.writable.filter(({ replaces }) => replaces !== "");
-  const label = `Write them where ${robot} looks them up`;
+  const label = `Write them where ${isolated(robot)} looks them up`;
   const icon = <IconFilePencil size={14} aria-hidden />;
   if (replaced.length === 0)
     return (
@@ -167,7 +168,7 @@ export function IndexWriting({ item, look, robot, graph, seq, onLookAgain }: Pro
       <span role="status">
         {write.isPending && "Writing …"}
         {write.isSuccess && isBlocked && <Waiting robot={robot} seconds={seconds} />}
-        {write.isSuccess && !isBlocked && `Written, and ${robot} has indexed it.`}
+        {write.isSuccess && !isBlocked && `Written, and ${isolated(robot)} has indexed it.`}
       </span>
     </span>
   );

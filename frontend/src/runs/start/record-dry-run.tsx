@@ -5,6 +5,7 @@ import { useVersions } from "../../api/graphs";
 import { useLive } from "../../api/live/use-live";
 import { SIMULATOR } from "../../api/robots";
 import { HoldButton } from "../../ui/floating/hold-button";
+import { isolated } from "../../words/isolated";
 import { nextLabel, useStart } from "./use-start";
 
 interface Props {
@@ -33,7 +34,7 @@ export function RecordDryRun({ graph, seq, obstacle, script, onStarted }: Props)
           ? `Record this: start ${label} in the simulator, as decided here`
           : `Record this: ${why}`
       }
-      question={`Start ${label} in the simulator with the decisions made here? It is recorded as a run.`}
+      question={`Start ${isolated(label)} in the simulator with the decisions made here? It is recorded as a run.`}
       disabled={why !== null || start.isPending}
       onHeld={() =>
         start.mutate({ seq, engines: [SIMULATOR], digest: null, script }, { onSuccess: onStarted })

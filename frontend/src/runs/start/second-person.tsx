@@ -7,6 +7,7 @@ import { errorText } from "../../api/http";
 import { useLive } from "../../api/live/use-live";
 import type { Preflight } from "../../api/robots";
 import { useMay, usePerson } from "../../api/use-person";
+import { isolated } from "../../words/isolated";
 import style from "./start-dialog.module.css";
 
 interface Props {
@@ -25,10 +26,11 @@ function Said({ given, me, label }: { given: readonly Approval[]; me: string; la
     <Text size="sm">
       {others.length > 0 && (
         <>
-          Said yes to {label}: <bdi>{others.map(({ author }) => author.name).join(", ")}</bdi>.{" "}
+          Said yes to {isolated(label)}:{" "}
+          <bdi>{others.map(({ author }) => isolated(author.name)).join(", ")}</bdi>.{" "}
         </>
       )}
-      {mine && `You said yes to ${label}: somebody else may start it.`}{" "}
+      {mine && `You said yes to ${isolated(label)}: somebody else may start it.`}{" "}
       <span className={style.doubt}>
         A second person needs a browser of their own. One link that is opened in two browsers may be
         one person: that cannot be told here.
@@ -65,7 +67,7 @@ export function SecondPerson({ graph, label, looks }: Props) {
           leftSection={<IconUserCheck size={14} aria-hidden />}
           onClick={() => say.mutate()}
         >
-          Say yes to {label}, for somebody else to start it
+          Say yes to {isolated(label)}, for somebody else to start it
         </Button>
       )}
       {say.error !== null && (

@@ -10,6 +10,7 @@ import { SIMULATOR } from "../../api/robots";
 import { HoldButton } from "../../ui/floating/hold-button";
 import { lazyPart } from "../../ui/parts/lazy-part";
 import { OverlayBoundary } from "../../ui/parts/part-boundary";
+import { isolated } from "../../words/isolated";
 import style from "./start-control.module.css";
 import { lastEngines, nextLabel, notifyFailure, useStart } from "./use-start";
 
@@ -54,8 +55,8 @@ export function StartControl(props: Props) {
       : obstacle;
   const simulated = engines.every((engine) => engine === SIMULATOR);
   const icon = <IconPlayerPlayFilled size={13} aria-hidden />;
-  const words = start.isPending ? "Starting …" : `Start ${label}`;
-  const where = engines.join(", ");
+  const words = start.isPending ? "Starting …" : `Start ${isolated(label)}`;
+  const where = engines.map(isolated).join(", ");
   const wide = compact ? words : `${words} on ${where} …`;
   const ask = () =>
     void settle().then(setAsking, (error) => notifyFailure("Not started", errorText(error)));
@@ -68,8 +69,8 @@ export function StartControl(props: Props) {
           name={why === null ? `Start ${label} in the simulator` : `Start ${label}: ${why}`}
           question={
             goes
-              ? `A run of this graph goes already. Start ${label} beside it, in the simulator?`
-              : `Start exactly ${label}, as it is on screen, in the simulator?`
+              ? `A run of this graph goes already. Start ${isolated(label)} beside it, in the simulator?`
+              : `Start exactly ${isolated(label)}, as it is on screen, in the simulator?`
           }
           disabled={why !== null}
           onHeld={() => start.mutate({ seq: settle(), engines: [SIMULATOR], digest: null })}
@@ -86,7 +87,9 @@ export function StartControl(props: Props) {
             {thumb ? <TwoLines first={words} second={`on ${where} …`} /> : wide}
           </span>
           <span className="visually-hidden">
-            {why === null ? `Start ${label} on ${where} …` : `Start ${label}: ${why}`}
+            {why === null
+              ? `Start ${isolated(label)} on ${where} …`
+              : `Start ${isolated(label)}: ${why}`}
           </span>
         </Button>
       )}

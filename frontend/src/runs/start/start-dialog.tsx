@@ -16,6 +16,7 @@ import { EngineLabel } from "../../status/engine-label";
 import { HelpLink } from "../../status/help-link";
 import { HoldButton } from "../../ui/floating/hold-button";
 import { colorOfName } from "../../ui/name-colors";
+import { isolated } from "../../words/isolated";
 import { useBehaviours } from "./behaviours-choice";
 import { PreflightList } from "./preflight-list";
 import { SecondPerson } from "./second-person";
@@ -153,7 +154,7 @@ function Exactly({
       <dt>Digest</dt>
       <dd className={style.mono}>{digest === "" ? "…" : `${digest.slice(0, 16)}…`}</dd>
       <dt>{engines.length > 1 ? "Robots" : "On"}</dt>
-      <dd>{engines.join(", ") || "nowhere yet"}</dd>
+      <dd>{engines.map(isolated).join(", ") || "nowhere yet"}</dd>
     </dl>
   );
 }
@@ -209,7 +210,7 @@ export function StartDialog(props: Props) {
     <Modal
       opened
       onClose={onClose}
-      title={`Start ${label} of ${name}`}
+      title={`Start ${isolated(label)} of ${isolated(name)}`}
       closeButtonProps={{ "aria-label": "Close" }}
       size="lg"
     >
@@ -264,8 +265,12 @@ export function StartDialog(props: Props) {
         <HoldButton
           icon={<IconPlayerPlayFilled size={13} aria-hidden />}
           label={why ?? "Hold to start"}
-          name={why === null ? `Start ${label} on ${where.join(", ")}` : `Start ${label}: ${why}`}
-          question={`Start exactly ${label} of ${name} on ${where.join(", ")}?`}
+          name={
+            why === null
+              ? `Start ${label} on ${where.map(isolated).join(", ")}`
+              : `Start ${label}: ${why}`
+          }
+          question={`Start exactly ${isolated(label)} of ${isolated(name)} on ${where.map(isolated).join(", ")}?`}
           disabled={why !== null}
           onHeld={begin}
         />

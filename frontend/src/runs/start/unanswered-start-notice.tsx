@@ -8,6 +8,7 @@ import { SIMULATOR } from "../../api/robots";
 import { findStart, type Run, type StartFound } from "../../api/runs";
 import { useRunStatus } from "../../status/run-status";
 import { colorOfName } from "../../ui/name-colors";
+import { isolated } from "../../words/isolated";
 import style from "./unanswered-start-notice.module.css";
 import { type SentStart, unansweredStarts } from "./unanswered-starts";
 
@@ -29,7 +30,7 @@ export function unknownWords(
   const left = missing(sent, found);
   if (left.length === 0) return null;
   const where = left.map((engine) => (engine === SIMULATOR ? "the simulator" : engine));
-  const head = `NOT KNOWN whether ${sent.what} started on ${where.join(", ")}.`;
+  const head = `NOT KNOWN whether ${sent.what} started on ${where.map(isolated).join(", ")}.`;
   const after = "It is looked for, and not sent again. Stop works.";
   if (silent || found === undefined) return `${head} The runner has not answered. ${after}`;
   if (found.under_way) return `${head} The runner is still carrying it out. ${after}`;

@@ -11,6 +11,7 @@ import { type Started, type StartOrder, startRun } from "../../api/runs";
 import { serverNow } from "../../clock/server-clock";
 import { newAid } from "../../graph/ids";
 import { memberText } from "../../graph/json-members";
+import { isolated } from "../../words/isolated";
 import { unansweredStarts } from "./unanswered-starts";
 
 export interface StartInput {
@@ -83,7 +84,7 @@ export function useStart(graph: string) {
     },
     onSuccess: ({ failed }) => {
       for (const [robot, why] of Object.entries(failed))
-        notifyFailure(`Not started on ${robot}`, why);
+        notifyFailure(`Not started on ${isolated(robot)}`, why);
     },
     onError: (error) => {
       const where = errorPlace(error);

@@ -139,7 +139,7 @@ function doneNotice(runs: readonly Run[], unknown: readonly Robot[]): StopNotice
     const text = runs.length === 0 ? "The runner says that nothing runs." : `${ends}.`;
     return { tone: "done", text };
   }
-  const names = unknown.map(({ name }) => name).join(", ");
+  const names = unknown.map(({ name }) => isolated(name)).join(", ");
   const one = unknown.length === 1 ? "runs" : "run";
   const why = unknown[0]?.why ?? "";
   const head = runs.length === 0 ? "No run from here goes on." : `${ends}.`;
