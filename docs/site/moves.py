@@ -1,4 +1,4 @@
-"""What is done to built pages: nothing inline is left, and pictures keep their room.
+"""What is done to built pages: nothing inline is left, parts have names, and pictures keep their room.
 
 So the help's Content-Security-Policy can refuse everything inline: no text of a document ever becomes a
 script or a style. And a page that is opened at a heading stays there while its pictures come.
@@ -15,6 +15,15 @@ _SHEET: Final = re.compile(r"<style>(.*?)</style>", re.DOTALL)
 _STYLE: Final = re.compile(r'(<[a-zA-Z][^<>]*?) style="([^"]*)"')
 #: Headings of the list of pages, as the theme writes them: without a level they are none to a reader.
 _CAPTION: Final = re.compile(r'<p class="caption" role="heading">')
+#: What a reader of screens goes by and the theme leaves out: names of the two columns, no heading of a
+#: column without words, a way to scroll what is wide by keys, and a heading of the search.
+_NAMED: Final = (
+    ('<aside class="sidebar-drawer">', '<aside class="sidebar-drawer" aria-label="All pages">'),
+    ('<aside class="toc-drawer">', '<aside class="toc-drawer" aria-label="On this page">'),
+    ('<th class="head"><p></p></th>', "<td></td>"),
+    ("<pre>", '<pre tabindex="0">'),
+    ('<div id="search-results">', '<h1>Search</h1>\n<div id="search-results">'),
+)
 _PICTURE: Final = re.compile(r'<img ([^>]*?)src="([^"]+\.png)"')
 
 
@@ -48,6 +57,8 @@ def _moved(text: str, site: Path, up: str, rules: dict[str, str]) -> str:
     )
     text = _STYLE.sub(ruled, text)
     text = _CAPTION.sub('<p class="caption" role="heading" aria-level="2">', text)
+    for theirs, ours in _NAMED:
+        text = text.replace(theirs, ours)
     return text.replace("</head>", f'<link rel="stylesheet" href="{up}_static/inline.css"></head>')
 
 

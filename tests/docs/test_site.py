@@ -102,6 +102,14 @@ def test_nothing_is_loaded_from_elsewhere_and_nothing_is_inline() -> None:
         assert not re.search(r"@import|url\(\s*['\"]?(?:https?:)?//", sheet.read_text()), sheet
 
 
+def test_a_reader_of_screens_and_a_keyboard_get_along_on_every_page() -> None:
+    nameless = r'<aside class="[^"]*(?<!no-toc)">|<th[^>]*>(<p></p>)?</th>|<pre>'
+    for page in SITE.rglob("*.html"):
+        text = page.read_text()
+        assert not re.search(nameless, text), page
+        assert len(re.findall("<h1[ >]", text)) == 1, page
+
+
 def test_every_document_is_a_page_that_the_navigation_or_a_list_leads_to() -> None:
     names = {path.stem for path in (ROOT / "docs").glob("*.md")}
     assert names <= {path.stem for path in SITE.glob("*.html")}
