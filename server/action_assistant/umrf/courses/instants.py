@@ -52,8 +52,8 @@ class Instant:
     when all children of one that ended ignored it, which halts the graph if there are none.
     """
 
-    __slots__ = ("_bypassed", "_net", "_now", "_read", "_tasks", "active", "early", "end", "last",
-                 "others", "running", "states")  # fmt: skip
+    __slots__ = ("_bypassed", "_net", "_now", "_read", "_returning", "_tasks", "active", "early", "end",
+                 "last", "others", "running", "states")  # fmt: skip
 
     def __init__(self, net: Network, read: Reader, now_ms: float, running: int, active: int):
         self._net = net
@@ -66,6 +66,7 @@ class Instant:
         self.active = active
         self.end: End | None = None
         self.early = False
+        self._returning = -1
         self.last = -1
         self.others: list[int] = []
 
@@ -91,7 +92,9 @@ class Instant:
         failed = result == "on_error"
         does = IDLE if failed else state.does
         self._put(place, state._replace(does=does, filled=state.filled or not failed))
+        self._returning = place
         self._inform(place, result, self._net.edges[place])
+        self._returning = -1
         if self.end == "crashed":
             return
         state = self._state(place)
@@ -192,7 +195,8 @@ class Instant:
 
     def _finish(self, place: int) -> None:
         self.end = "finished"
-        own = place >= 0 and self._state(place).does in ACTIVE
+        # One that was bypassed while it runs goes on.
+        own = place == self._returning >= 0 and self._state(place).does in ACTIVE
         self.early = self.active > own
 
     def _dispatch(self, child: int, state: State, response: str) -> None:
