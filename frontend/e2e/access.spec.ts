@@ -150,7 +150,8 @@ for (const scheme of ["light", "dark"] as const) {
     await look("robots");
     for (const path of ["/runs/statistics", "/runs/compare", "/nowhere"]) {
       await page.goto(product.url + path);
-      await page.getByRole("main").waitFor();
+      // The bar comes with its screen, a moment after the place for it.
+      await page.getByRole("heading", { level: 1 }).waitFor();
       await look(path);
     }
     const runs = await product.ask<{ id: string }[]>("/api/runs?limit=1", {}, product.runnerUrl);
