@@ -28,7 +28,8 @@ test.beforeAll(async ({ browser }) => {
 test.afterAll(() => product.dispose());
 
 function face(page: Page, name: string) {
-  return page.getByRole("button", { name: `Follow ${name}`, exact: false });
+  // A name that could turn the sentence around is isolated in it.
+  return page.getByRole("button", { name: new RegExp(`^Follow \u2068?${name}`) });
 }
 
 const frame = (page: Page) => page.getByText(/^Following/);
