@@ -137,18 +137,19 @@ export class Product {
     return (answer.status === 204 ? undefined : await answer.json()) as T;
   }
 
-  /** The id of a new graph of one action after the other. The simulator gives each a second. */
-  async chain(length: number): Promise<string> {
+  /** Make a graph `chain_LENGTH` of `actions` that follow one another, and return its id. The simulator gives
+   * each a second. A Stop on a robot is proven for certain only where no next action can be loading. */
+  async chain(length: number, actions = length): Promise<string> {
     const named = (instance: number) => ({ name: "Wait", instance_id: instance });
     const graph = {
       graph_name: `chain_${length}`,
       graph_entry: [named(0)],
-      graph_exit: [named(length - 1)],
-      actions: Array.from({ length }, (_, i) => ({
+      graph_exit: [named(actions - 1)],
+      actions: Array.from({ length: actions }, (_, i) => ({
         ...named(i),
         type: "sync",
         parents: i === 0 ? [] : [named(i - 1)],
-        children: i === length - 1 ? [] : [named(i + 1)],
+        children: i === actions - 1 ? [] : [named(i + 1)],
       })),
     };
     const { id } = await this.ask<{ id: string }>("/api/graphs", {

@@ -134,7 +134,7 @@ test("a graph runs on the robot to its end, live in the page", async () => {
 
 test("two robots run together, and one press of keys stops both until it is proven", async () => {
   const { page } = ada;
-  await startOn(page, await product.chain(3), ["David", "Eve"]);
+  await startOn(page, await product.chain(3, 1), ["David", "Eve"]);
   await expect
     .poll(async () => (await runs()).slice(0, 2).map((run) => run.state))
     .toEqual(["running", "running"]);
@@ -152,7 +152,7 @@ test("two robots run together, and one press of keys stops both until it is prov
 
 test("a start of somebody else is seen, named, imported and stopped", async () => {
   const { page } = ada;
-  const graph = await product.ask<object>(`/api/graphs/${await product.chain(2)}/umrf`);
+  const graph = await product.ask<object>(`/api/graphs/${await product.chain(2, 1)}/umrf`);
   stranger.start("Eve", JSON.stringify({ ...graph, graph_name: "theirs" }), robots.length + 1);
   await page.goto(`${product.url}/robots`);
   const there = card(page, "Eve");
@@ -185,7 +185,7 @@ test.describe("what the page shows of an engine that", () => {
   });
 
   test("falls silent, and speaks again", async () => {
-    const run = await begin("Eve", await product.chain(4));
+    const run = await begin("Eve", await product.chain(4, 1));
     await expect(word("Eve", run)).toContainText("running");
     eve.freeze();
     await expect(word("Eve", run)).toContainText("unknown since", { timeout: 15_000 });
@@ -197,7 +197,7 @@ test.describe("what the page shows of an engine that", () => {
   });
 
   test("gets its start late", async () => {
-    const run = await begin("Late", await product.chain(4));
+    const run = await begin("Late", await product.chain(4, 1));
     await expect(word("Late", run)).toContainText("starting");
     await expect(word("Late", run)).toContainText("unknown since", { timeout: 15_000 });
     await expect(word("Late", run)).toContainText("running", { timeout: 15_000 });
@@ -206,9 +206,9 @@ test.describe("what the page shows of an engine that", () => {
   });
 
   test("runs a graph of the same name as another one, and is not meant", async () => {
-    const graph = await product.chain(5);
+    const graph = await product.chain(5, 1);
     const run = await begin("David", graph);
-    const other = await begin("Eve", await product.chain(5));
+    const other = await begin("Eve", await product.chain(5, 1));
     for (const [robot, number] of [
       ["David", run],
       ["Eve", other],
@@ -226,7 +226,7 @@ test.describe("what the page shows of an engine that", () => {
   });
 
   test("is started anew", async () => {
-    const run = await begin("David", await product.chain(4));
+    const run = await begin("David", await product.chain(4, 1));
     await expect(word("David", run)).toContainText("running");
     await david.end();
     await expect(word("David", run)).toBeHidden({ timeout: 15_000 });
@@ -244,7 +244,7 @@ test.describe("what the page shows of an engine that", () => {
     const { page } = ada;
     const older = "Speaks an older generation of messages: it cannot be used";
     await expect(card(page, "Old").getByText(older)).toBeVisible();
-    await choose(page, await product.chain(2), ["Old"]);
+    await choose(page, await product.chain(2, 1), ["Old"]);
     await expect(lookedAt(page, "Old").getByText(/generation/)).toBeVisible();
     const start = page.getByRole("button", { name: "Something stands in the way" });
     await expect(start).toBeDisabled();
@@ -252,7 +252,7 @@ test.describe("what the page shows of an engine that", () => {
 
   test("calls an action ERROR that does not obey: only who has looked ends that", async () => {
     const { page } = ada;
-    const graph = await product.chain(6);
+    const graph = await product.chain(6, 1);
     const run = await begin("David", graph);
     await expect(word("David", run)).toContainText("running");
     await page.goto(`${product.url}/graphs/${graph}`);
@@ -282,7 +282,7 @@ test.describe("what the page shows of an engine that", () => {
 
   test("never speaks again: nothing is claimed, and its Stop is loud", async () => {
     const { page } = ada;
-    const graph = await product.chain(4);
+    const graph = await product.chain(4, 1);
     const run = await begin("Eve", graph);
     await expect(word("Eve", run)).toContainText("running");
     eve.freeze();

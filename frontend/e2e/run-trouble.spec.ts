@@ -96,7 +96,7 @@ test.afterAll(async () => {
 
 test("two robots run one graph: the page says whose run it shows, and shows the other one", async () => {
   const { page } = ada;
-  const graph = await product.chain(3);
+  const graph = await product.chain(3, 1);
   await begin(graph, "David", "Eve");
   await page.goto(`${product.url}/graphs/${graph}`);
   await saved(page);
@@ -155,7 +155,7 @@ test("a start that the robot holds and never begins is refused, with the reason,
   await expect(strip(page).getByText("refused", { exact: true })).toBeVisible();
   await expect(strip(page)).toContainText("Work_0 waits for its input “speed”");
   await page.screenshot({ path: test.info().outputPath("refused.png") });
-  await begin(await product.chain(2), "Eve");
+  await begin(await product.chain(2, 1), "Eve");
   await expect.poll(async () => (await runs())[0]?.state).toBe("running");
   await stopAll(page);
 });
@@ -168,7 +168,7 @@ test("the answer to a start on two robots gets lost: both runs are found, and no
     await route.fetch();
     await route.abort("connectionreset");
   });
-  await page.goto(`${product.url}/graphs/${await product.chain(3)}`);
+  await page.goto(`${product.url}/graphs/${await product.chain(3, 1)}`);
   await saved(page);
   await page.getByRole("button", { name: "Choose where to start" }).click();
   for (const robot of ["David", "Eve"]) {
@@ -199,7 +199,7 @@ test("the answer to a start on two robots gets lost: both runs are found, and no
 
 test("a dry-run does not hide a run that goes on", async () => {
   const { page } = ada;
-  const graph = await product.chain(4);
+  const graph = await product.chain(4, 1);
   await begin(graph, "David");
   await page.goto(`${product.url}/graphs/${graph}`);
   await saved(page);
