@@ -1,4 +1,4 @@
-"""How long others' edits wait while the largest graph allowed is imported, and while each of its routes is called.
+"""Measure how long others' edits wait while the largest graph allowed is imported, and while each of its routes is called.
 
 An editor in a process of its own; somebody edits a small graph, 100 times a second, whether or not the edits
 before are acknowledged. `python largest.py` prints the tables; `PROBE_DATABASE` names a Postgres database.
@@ -74,7 +74,7 @@ class Prober(Person):
         self._nth = 0
 
     def heard(self, person: Person, data: bytes) -> None:
-        """What others do is of no interest."""
+        """Ignore what others do."""
 
     def _take(self, data: bytes) -> None:
         super()._take(data)

@@ -1,4 +1,4 @@
-"""What is done to built pages: nothing inline is left, parts have names, and pictures keep their room.
+"""Change built pages so that nothing inline is left, parts have names, and pictures keep their room.
 
 So the help's Content-Security-Policy can refuse everything inline: no text of a document ever becomes a
 script or a style. And a page that is opened at a heading stays there while its pictures come.

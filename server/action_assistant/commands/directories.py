@@ -39,7 +39,7 @@ class Directory(Protocol):
         """A folder in it, made if need be; to be closed."""
 
     def read(self, name: str) -> tuple[bytes, int]:
-        """What a file holds, and who may do what with it."""
+        """Return the content of a file, and its mode."""
 
     def write_new(
         self, name: str, content: bytes, mode: int | None, owner: Owner | None = None
@@ -100,7 +100,7 @@ class HeldDirectory:
         return type(self)(os.open(name, flags, dir_fd=self._at))
 
     def read(self, name: str) -> tuple[bytes, int]:
-        """What a file holds."""
+        """Return the content of a file."""
         flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
         _refuse_special(self.status(name))  # opening a device may do something
         with os.fdopen(os.open(name, flags, dir_fd=self._at), "rb") as file:
@@ -191,7 +191,7 @@ class NamedDirectory:
         return type(self)(path)
 
     def read(self, name: str) -> tuple[bytes, int]:
-        """What a file holds."""
+        """Return the content of a file."""
         path = self._path / _component(name)
         _refuse_link(path)
         if path.exists() and not path.is_file():
@@ -240,12 +240,12 @@ class NamedDirectory:
         (self._path / _component(name)).unlink()
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Do nothing: this kind holds no folder open."""
 
 
 @contextmanager
 def closing(directory: Directory) -> Iterator[Directory]:
-    """It is let go of after the block."""
+    """Close the folder after the block."""
     try:
         yield directory
     finally:

@@ -206,7 +206,7 @@ def _print(verdict: CheckVerdict) -> None:
 
 
 def kind_word(problem: Problem) -> str:
-    """What a line about a problem begins with: `note` for what is so with nearly every graph."""
+    """Return the word with which a line about a problem begins: `note` for what is so with nearly every graph."""
     return "note" if problem.code in QUIET else problem.severity
 
 

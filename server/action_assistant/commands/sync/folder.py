@@ -42,7 +42,7 @@ class PutAside(msgspec.Struct, frozen=True):
 
 
 class Coming(msgspec.Struct, frozen=True):
-    """What a file is about to hold: the text of the graph at the change `seq`."""
+    """The text that a file is about to hold: that of the graph at the change `seq`."""
 
     token: _Token
     seq: _Seq

@@ -87,7 +87,7 @@ class Blame:
 
 
 def fields_of(connection: Connection, graph: str, owner: str, at: int) -> list[FieldBlame]:
-    """Who gave each field of an owner its value. Raises NotFound."""
+    """Return who gave each field of an owner its value. Raises NotFound."""
     found = index_queries.at(connection, graph, at, {owner})
     if not found:
         raise NotFound(f"There is nothing {owner!r} in this graph at that moment.")
