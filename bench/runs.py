@@ -25,7 +25,7 @@ from action_assistant.runner.analysis.keyframes import APART, KeyframeStore
 from action_assistant.runner.analysis.replay import run_replay
 from action_assistant.runner.archives import archive_file
 from action_assistant.runner.links.observations import NodeResult, NodeState
-from action_assistant.runner.review.keyframe_loop import due_after
+from action_assistant.runner.review.background_loops import due_after
 from action_assistant.runner.review.listing import numbers_with
 from action_assistant.runner.review.service import ReviewService
 from action_assistant.runner.review.worker_queries import StoragePaths, WorkerQueries
@@ -41,7 +41,7 @@ from action_assistant.runner.runs.events import (
 )
 from action_assistant.runner.runs.fold import replay
 from action_assistant.runner.runs.recorder import stream_of
-from action_assistant.runner.runs.sent_views import Sent
+from action_assistant.runner.runs.sent_graphs import Sent
 from action_assistant.runner.runs.word_index import index_some
 from action_assistant.runner.workers import RunnerWorkers
 from action_assistant.schema.runner_tables import action_sum, review, run_label, unindexed_run

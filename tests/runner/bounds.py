@@ -9,8 +9,8 @@ from action_assistant.runner.emulator.engine import EmulatedEngine
 from action_assistant.runner.emulator.messages import EngineTraits, index_of
 from action_assistant.runner.runs.events import Override
 from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runs.sent_graphs import SentSubgraph
 from action_assistant.runner.runs.visits import Visit
-from action_assistant.runner.sent_subgraphs import SentSubgraph
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import ENTRY, ENTRY_CONDITIONS, EXIT, Conditions, Graph, Relation

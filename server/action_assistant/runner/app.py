@@ -21,6 +21,7 @@ from action_assistant.public_url import RUNNER
 from action_assistant.runner import projection
 from action_assistant.runner.api.caller import SMALL
 from action_assistant.runner.api.live import Hub
+from action_assistant.runner.api.monitoring import WatchedRunner
 from action_assistant.runner.api.runs import routes
 from action_assistant.runner.api.services import RunnerServices
 from action_assistant.runner.archives.archive_store import ArchiveStore
@@ -31,14 +32,13 @@ from action_assistant.runner.links.behaviours.folder import BehaviourFolder
 from action_assistant.runner.links.port import Reach
 from action_assistant.runner.links.ros2.availability import ros2_reach
 from action_assistant.runner.links.simulated import Simulators
+from action_assistant.runner.review.background_loops import index_words
 from action_assistant.runner.review.service import ReviewService
-from action_assistant.runner.review.word_indexer import index_words
 from action_assistant.runner.review.worker_queries import StoragePaths, WorkerQueries
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.start.index_writer import IndexWriter, folder_trouble
 from action_assistant.runner.start.start_checks import StartSources
-from action_assistant.runner.watched import WatchedRunner
 from action_assistant.runner.workers import RunnerWorkers
 from action_assistant.settings import ARCHIVE, Keep, RunnerSettings
 from action_assistant.web.auth.caller import BackgroundTasks

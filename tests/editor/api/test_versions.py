@@ -8,7 +8,7 @@ import msgspec
 import pytest
 
 from action_assistant.errors import TooLarge
-from action_assistant.runner.sent_subgraphs import SentSubgraph
+from action_assistant.runner.runs.sent_graphs import SentSubgraph
 from action_assistant.runner.start.admission import Admitted, StartRequest, admit
 from action_assistant.umrf.facts import facts_of
 from action_assistant.umrf.run_size import MOST_BYTES

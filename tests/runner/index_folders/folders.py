@@ -9,7 +9,7 @@ import msgspec
 
 from action_assistant.runner.index_folders.writing import WritingOutcome, write
 from action_assistant.runner.robots.engine import EngineIndex
-from action_assistant.runner.sent_subgraphs import SentSubgraph
+from action_assistant.runner.runs.sent_graphs import SentSubgraph
 from action_assistant.runner.start.index_writer import IndexWriteRequest, planned
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.facts import PINNED

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from action_assistant.errors import BadInput, Conflict, NotUmrf, TooLarge
 from action_assistant.runner.runs.events import Override
-from action_assistant.runner.sent_graph import counted
-from action_assistant.runner.sent_subgraphs import SentSubgraph
+from action_assistant.runner.runs.sent_graphs import SentSubgraph, counted
 from action_assistant.runner.start.admission import (
     StartRequest,
     admit,

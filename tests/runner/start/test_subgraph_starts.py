@@ -8,7 +8,7 @@ import pytest
 from action_assistant.errors import BadInput, Conflict, TooLarge
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.runs.events import Override, Requested
-from action_assistant.runner.sent_subgraphs import SentSubgraph
+from action_assistant.runner.runs.sent_graphs import SentSubgraph
 from action_assistant.runner.start.admission import StartRequest, admit, prepared
 from action_assistant.runner.start.approvals import ApprovalRequest
 from action_assistant.umrf.digest import digest, tree_digest

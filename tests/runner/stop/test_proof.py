@@ -6,7 +6,7 @@ import anyio
 
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import Answer
-from action_assistant.runner.robots.foreign_graphs import foreign_graphs
+from action_assistant.runner.robots.engine import foreign_graphs
 from action_assistant.runner.stop.proof import RestProof, send_stop
 from runner.harness import virtual
 

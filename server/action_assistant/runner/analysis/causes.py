@@ -6,13 +6,12 @@ cause says what a later event of the run contradicts.
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Final, Literal, TypeAlias
 
 import msgspec
 
-from action_assistant.runner.analysis.failing import failing_visit
-from action_assistant.runner.analysis.levels import places_of
+from action_assistant.runner.analysis.levels import LevelPlace, places_of, within
 from action_assistant.runner.runs import refusals, stall
 from action_assistant.runner.runs.events import Overridden
 from action_assistant.runner.runs.run import Alarm, Intervention, Run, State
@@ -26,6 +25,9 @@ _TYPES: Final = re.compile(r"is an? (\w+) here and an? (\w+) in the action")
 _LONGEST: Final = 80  # characters of a value in a sentence
 _PROBLEMS: Final = frozenset({"unknown-action", "signature"})
 #: Alarms of the runner that are causes of their own kind, or of none.
+#: A visit that has ended: the moment (microseconds UTC), the full name of its action, the visit.
+EndedVisit: TypeAlias = tuple[int, str, Visit]
+
 RESTARTED: Final = "engine_restarted"
 UNCONFIRMED: Final = "stop_unconfirmed"
 
@@ -378,7 +380,7 @@ def _was_given(visit: Visit, parameter: str, value: str) -> bool:
 
 def _failures(run: Run) -> Iterator[Cause]:
     """The visit that it goes back to, however deep inside."""
-    failing = failing_visit(run)
+    failing = _failing_visit(run)
     if failing is not None:
         at, name, visit = failing
         yield ActionFailed(
@@ -388,6 +390,66 @@ def _failures(run: Run) -> Iterator[Cause]:
             inferred=visit.how == "inferred",
             quote=_said(run.actions[name], visit),
         )
+
+
+def _failing_visit(run: Run) -> EndedVisit | None:
+    """The first that ended in error; of a run that ended false, the last that did. What went wrong
+    inside of an action that ended true all the same was made good there: it is the last to be thought of."""
+    found = places_of(run)
+    ended = _ended_visits(run, found, run.actions)
+    errors = [each for each in ended if each[2].result == "error"]
+    own = {place.way: name for name, place in found.items()}
+    wrong = next((each for each in errors if not _made_good(run, found, own, each)), None)
+    if wrong is None and run.result == "on_false":
+        top = [each for each in ended if each[2].result == "false" and not found[each[1]].levels]
+        wrong = next(reversed(top), None)
+    wrong = wrong or next(iter(errors), None)
+    return wrong and _inmost(run, found, wrong)
+
+
+def _ended_visits(
+    run: Run, found: Mapping[str, LevelPlace], names: Iterable[str]
+) -> list[EndedVisit]:
+    """Visits that have ended, in that order; of what ended at one moment, the inner ones first."""
+    visits = [
+        (visit.not_after or visit.start, name, visit)
+        for name in names
+        for visit in run.actions[name].visits
+        if visit.until is not None
+    ]
+    return sorted(visits, key=lambda each: (each[0], -len(found[each[1]].levels), each[1]))
+
+
+def _made_good(
+    run: Run, found: Mapping[str, LevelPlace], own: Mapping[tuple[str, ...], str], wrong: EndedVisit
+) -> bool:
+    levels = found[wrong[1]].levels
+    around = (own.get(levels[:depth]) for depth in range(1, len(levels) + 1))
+    return any(
+        visit.result == "true" and _holds(visit, wrong[2])
+        for name in around
+        if name is not None
+        for visit in run.actions[name].visits
+    )
+
+
+def _inmost(run: Run, found: dict[str, LevelPlace], wrong: EndedVisit) -> EndedVisit:
+    """The visit inside of it that ended in the same way, and so on down."""
+    _, name, around = wrong
+    inside = [
+        each
+        for each in _ended_visits(run, found, within(found, name))
+        if each[2].result == around.result and _holds(around, each[2])
+    ]
+    if not inside:
+        return wrong
+    return _inmost(run, found, inside[0] if around.result == "error" else inside[-1])
+
+
+def _holds(around: Visit, visit: Visit) -> bool:
+    """Whether one visit can have gone on within another."""
+    ended = around.not_after
+    return visit.start >= around.not_before and (ended is None or visit.not_before <= ended)
 
 
 def _stalls(run: Run, graph: Graph | None) -> Iterator[Stalled]:

@@ -9,8 +9,14 @@ import msgspec
 from action_assistant.errors import BadInput
 from action_assistant.runner.analysis.expected_runs import Expected
 from action_assistant.runner.runs.events import Author
-from action_assistant.runner.sent_graph import SentGraph, read_sent
-from action_assistant.runner.sent_subgraphs import Inner, SentSubgraph, graphs_in, read_inside
+from action_assistant.runner.runs.sent_graphs import (
+    Inner,
+    SentGraph,
+    SentSubgraph,
+    graphs_in,
+    read_inside,
+    read_sent,
+)
 from action_assistant.safe_text import hold_names
 from action_assistant.umrf.courses.coverage import (
     ArrowCoverage,

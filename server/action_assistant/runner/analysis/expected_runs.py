@@ -17,9 +17,14 @@ from action_assistant.journal.events import Event
 from action_assistant.runner.runs.durations import of_visit
 from action_assistant.runner.runs.events import Author, RunSubgraph
 from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runs.sent_graphs import (
+    SentGraph,
+    SentSubgraph,
+    graphs_in,
+    read_inside,
+    read_sent,
+)
 from action_assistant.runner.runs.visits import ActionRun, Visit
-from action_assistant.runner.sent_graph import SentGraph, read_sent
-from action_assistant.runner.sent_subgraphs import SentSubgraph, graphs_in, read_inside
 from action_assistant.safe_text import hold_names
 from action_assistant.schema.runner_tables import expectation
 from action_assistant.umrf.files import codec

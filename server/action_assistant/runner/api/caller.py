@@ -12,14 +12,14 @@ from litestar.exceptions.http_exceptions import RequestEntityTooLarge
 
 from action_assistant.errors import Unavailable
 from action_assistant.runner.runs.events import Author
-from action_assistant.runner.sent_graph import MOST, counted
+from action_assistant.runner.runs.sent_graphs import MOST, counted
 from action_assistant.web.auth.access import person_of, session_of
 from action_assistant.web.http.problems import BODY_LIMIT_TOLD
 from action_assistant.web.network.connection_limits import ConcurrencyLimit
 
 #: Bytes of a body without a graph.
 SMALL: Final = 100_000
-#: Bytes of one with a graph: twice `sent_graph.MOST`, since as a string its text may be escaped.
+#: Bytes of one with a graph: twice `sent_graphs.MOST`, since as a string its text may be escaped.
 GRAPH_BODY: Final = 2 * MOST
 #: For `opt=` of such a route: how much of it counts.
 COUNTED: Final[dict[str, object]] = {BODY_LIMIT_TOLD: MOST}

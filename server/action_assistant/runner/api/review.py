@@ -29,7 +29,7 @@ from action_assistant.runner.review.service import (
     RunMarks,
 )
 from action_assistant.runner.review.worker_queries import WorkerQueries
-from action_assistant.runner.sent_graph import SentGraph
+from action_assistant.runner.runs.sent_graphs import SentGraph
 from action_assistant.runner.start.admission import decoded
 from action_assistant.umrf.json.embedded import UmrfGraph
 from action_assistant.web.auth.access import Needs

@@ -13,7 +13,7 @@ from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.behaviours.folder import BehaviourFolder
 from action_assistant.runner.review.service import ReviewService
 from action_assistant.runner.review.worker_queries import WorkerQueries
-from action_assistant.runner.runs.sent_views import Sent
+from action_assistant.runner.runs.sent_graphs import Sent
 from action_assistant.runner.start.index_writer import IndexWriter
 from action_assistant.web.network.connection_limits import ConcurrencyLimit, ConnectionLimits
 from action_assistant.web.workers.lanes import Lane, RunInWorker

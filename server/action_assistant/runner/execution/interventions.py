@@ -16,7 +16,7 @@ from action_assistant.runner.links.port import (
 from action_assistant.runner.robots.engine import KnownEngine
 from action_assistant.runner.runs.events import Author, Override
 from action_assistant.runner.runs.run import Run
-from action_assistant.runner.sent_graph import SentGraph
+from action_assistant.runner.runs.sent_graphs import SentGraph
 from action_assistant.runner.start.admission import StartRequest, decoded, prepared
 from action_assistant.runner.start.approvals import Approvals
 from action_assistant.runner.start.preflight import not_matched_in

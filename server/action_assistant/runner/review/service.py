@@ -22,17 +22,14 @@ from action_assistant.runner.archives import examples
 from action_assistant.runner.archives.archive_store import Archived, ArchiveStore
 from action_assistant.runner.archives.raw_messages import RawMessages, RawPut, raw_of, stream_of_raw
 from action_assistant.runner.clock import ClockUs
-from action_assistant.runner.review.keyframe_loop import KeyframeLoop
+from action_assistant.runner.review.background_loops import KeyframeLoop, SumUpLoop
 from action_assistant.runner.review.ongoing_runs import OngoingRuns, settled
-from action_assistant.runner.review.sum_up_loop import SumUpLoop
 from action_assistant.runner.robots.recordings import Recording, hours
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.events import Author, Observed, decode, said_in
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.runner.runs.run import Run
-from action_assistant.runner.runs.sent_views import Sent, sent_of
-from action_assistant.runner.sent_graph import read_sent
-from action_assistant.runner.sent_subgraphs import SentSubgraph
+from action_assistant.runner.runs.sent_graphs import Sent, SentSubgraph, read_sent, sent_of
 from action_assistant.schema.runner_tables import expectation, review, run_label, runner_event
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph

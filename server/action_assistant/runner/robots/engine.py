@@ -6,7 +6,7 @@ so that nobody asks twice.
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Collection
 from contextlib import AbstractContextManager
 from typing import Final, TypeVar
 
@@ -341,6 +341,24 @@ def read_index(actions: tuple[str, ...], graphs: tuple[str, ...]) -> EngineIndex
             whole.setdefault(graph.name, graph)
     known = {name: signature_of(action) for name, action in described.items()}
     return EngineIndex(actions=known, described=described, graphs=whole, unread=unread)
+
+
+def foreign_graphs(answer: Answer, going: Collection[str]) -> list[str]:
+    """The graphs that an engine runs and that are no runs of ours `going` on there: also those of
+    which no action has begun yet, or none moves right now. Sub-graphs are named by their graph."""
+    held = {each.graph for each in answer.graphs}
+    tops = {
+        each.graph
+        for each in answer.graphs
+        if (each.active or (each.state == "RUNNING" and not _within(each.graph, held)))
+        and (each.run is None or each.run not in going)
+    }
+    return sorted(name for name in tops if not _within(name, tops))
+
+
+def _within(name: str, graphs: Collection[str]) -> bool:
+    """Whether it is a sub-graph of one of them."""
+    return any(name.startswith(f"{each}__") for each in graphs)
 
 
 def _held(answer: Answer) -> list[tuple[str, str, str | None, bool]]:

@@ -21,8 +21,7 @@ from action_assistant.runner.links.port import (
     Registration,
     Sighting,
 )
-from action_assistant.runner.robots.engine import EngineIndex, KnownEngine
-from action_assistant.runner.robots.foreign_graphs import foreign_graphs
+from action_assistant.runner.robots.engine import EngineIndex, KnownEngine, foreign_graphs
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.robots.registration import (
     STREAM,

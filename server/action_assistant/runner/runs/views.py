@@ -12,7 +12,7 @@ from action_assistant.runner.runs.counts import VisitCount, visit_counts
 from action_assistant.runner.runs.durations import Took, of_run
 from action_assistant.runner.runs.events import AtRest, Author, Overridden, Override
 from action_assistant.runner.runs.run import Desired, Result, Run, State
-from action_assistant.runner.runs.sent_views import Sent, SubgraphShown, subgraphs_shown
+from action_assistant.runner.runs.sent_graphs import Sent, SubgraphShown, subgraphs_shown
 from action_assistant.runner.runs.visits import ActionRun, How, Outcome, Visit
 from action_assistant.safe_text import hold_names
 from action_assistant.umrf.json.embedded import UmrfGraph

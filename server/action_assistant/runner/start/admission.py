@@ -10,8 +10,14 @@ from action_assistant.errors import BadInput, Conflict, TooLarge
 from action_assistant.runner.links.port import SIMULATOR
 from action_assistant.runner.links.simulator import slowed
 from action_assistant.runner.runs.events import Override, RunSubgraph
-from action_assistant.runner.sent_graph import SentGraph, read_sent
-from action_assistant.runner.sent_subgraphs import Inner, SentSubgraph, read_inside, tree_of
+from action_assistant.runner.runs.sent_graphs import (
+    Inner,
+    SentGraph,
+    SentSubgraph,
+    read_inside,
+    read_sent,
+    tree_of,
+)
 from action_assistant.umrf.check import blocking, check, is_final
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.facts import EngineFacts

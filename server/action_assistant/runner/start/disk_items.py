@@ -17,7 +17,7 @@ from action_assistant.runner.index_folders.comparison import (
     WritableGraph,
 )
 from action_assistant.runner.index_folders.scan import scanned, shown_path
-from action_assistant.runner.sent_subgraphs import graphs_in
+from action_assistant.runner.runs.sent_graphs import graphs_in
 from action_assistant.runner.start.admission import Prepared
 from action_assistant.runner.start.built_libraries import older_libraries
 from action_assistant.runner.start.preflight import EngineView, Item, of_robot

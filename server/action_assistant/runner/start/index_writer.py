@@ -36,7 +36,7 @@ from action_assistant.runner.robots.robot_events import (
     IndexWritten,
 )
 from action_assistant.runner.runs.events import Author
-from action_assistant.runner.sent_subgraphs import SentSubgraph, read_inside
+from action_assistant.runner.runs.sent_graphs import SentSubgraph, read_inside
 from action_assistant.runner.start.admission import decoded
 from action_assistant.runner.start.subgraph_items import of_index
 from action_assistant.umrf.check import blocking, check, is_final

@@ -14,8 +14,7 @@ from action_assistant.errors import Conflict, Refused
 from action_assistant.runner.index_folders.comparison import FolderLook
 from action_assistant.runner.links.observations import Snapshot, failed_in
 from action_assistant.runner.links.port import Answer, Standing
-from action_assistant.runner.robots.engine import EngineIndex
-from action_assistant.runner.robots.foreign_graphs import foreign_graphs
+from action_assistant.runner.robots.engine import EngineIndex, foreign_graphs
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start.admission import Admitted, Prepared
 from action_assistant.safe_text import hold_names

@@ -21,8 +21,7 @@ from action_assistant.runner.robots.engine import KnownEngine
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import Overridden, Override
 from action_assistant.runner.runs.run import Run
-from action_assistant.runner.sent_graph import SentGraph
-from action_assistant.runner.sent_subgraphs import SentSubgraph
+from action_assistant.runner.runs.sent_graphs import SentGraph, SentSubgraph
 from action_assistant.runner.start import preflight
 from action_assistant.runner.start.admission import Prepared, StartRequest, decoded, prepared
 from action_assistant.runner.start.approvals import Approvals

@@ -1,26 +1,33 @@
-"""The loop that sums up runs when they have ended, those of earlier processes too."""
+"""Work on stored runs that goes on in the background: sums, keyframes, and words of older runs."""
 
 import logging
 from collections import Counter
 from collections.abc import Awaitable, Callable
-from typing import Final
+from functools import partial
+from typing import Any, Final, Protocol
 
 import anyio
-from sqlalchemy import func, select
+from sqlalchemy import Connection, func, select
 
 from action_assistant.errors import Refused, TooLarge
 from action_assistant.runner.analysis import annotations
+from action_assistant.runner.analysis.keyframes import APART
 from action_assistant.runner.archives.archive_store import ArchiveStore
 from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.review.ongoing_runs import OngoingRun, OngoingRuns
+from action_assistant.runner.runs.word_index import index_some
 from action_assistant.runner.workers import Crashed
 from action_assistant.schema.runner_tables import review, run
 
 log: Final = logging.getLogger(__name__)
 
-_TRIES: Final = 3
-_AT_ONCE: Final = 200  # runs summed up between two looks
-_CLOCK: Final = 3_600_000_000  # microseconds by which a clock may be set back
+_RETRY_S: Final = 5.0  # after which the journal is tried again
+_SUMMED_AT_ONCE: Final = 200  # runs of one query
+_TRIES: Final = 3  # of a run whose sum ends the worker that computes it
+_CLOCK_SET_BACK_US: Final = 3_600_000_000  # by which a clock may be set back
+_UNKEPT_PART: Final = 8  # one part in so many of a run may be without stored keyframes
+_INDEXED_AT_ONCE: Final = 10  # runs in one transaction, which takes milliseconds
+_PAUSE_S: Final = 0.05  # between two such transactions
 
 
 class SumUpLoop:
@@ -60,7 +67,7 @@ class SumUpLoop:
                 left = await self._some()
             except Refused as refused:
                 log.warning("runs cannot be summed up now: %s", refused.detail)
-                await anyio.sleep(5)
+                await anyio.sleep(_RETRY_S)
                 continue
             if left:
                 continue
@@ -80,13 +87,13 @@ class SumUpLoop:
             select(run.c.id)
             .where(run.c.archived_at.is_(None), run.c.ended_at > (since or 0), ~done.exists())
             .order_by(run.c.number.desc())
-            .limit(_AT_ONCE)
+            .limit(_SUMMED_AT_ONCE)
         )
         rows = await self._journal.query(query)
         for row in rows:
             await self._one(row.id)
         if not rows:
-            self._summed_up = before - _CLOCK
+            self._summed_up = before - _CLOCK_SET_BACK_US
         return bool(rows)
 
     async def _one(self, run_id: str) -> None:
@@ -102,3 +109,68 @@ class SumUpLoop:
             log.exception("run %s cannot be read; it is left out of sums", run_id)
             summed = annotations.SummedUp(self._clock_us(), {}, figures=annotations.FIGURES)
         await self._journal.append(annotations.stream_about(run_id), [annotations.draft(summed)])
+
+
+def due_after(kept: int) -> int:
+    """How many keyframes there have to be until they are kept again. All are written each time, so the
+    longer a run the more is waited for: 100,000 events write some 70 MB in all, not 200."""
+    return kept + max(1, kept // _UNKEPT_PART)
+
+
+class KeyframeLoop:
+    """Goes on until cancelled. `make` makes and keeps the keyframes of a run; it may be asked of a
+    worker."""
+
+    def __init__(self, ongoing: OngoingRuns, make: Callable[[str], Awaitable[object]]) -> None:
+        self._make = make
+        self._kept: dict[str, int] = {}  # keyframes of runs that go on
+        self._due: set[str] = set()
+        self._more = anyio.Event()
+        ongoing.watch(self._saw)
+
+    def _saw(self, opened: OngoingRun) -> None:
+        run, there = opened.run.id, opened.recorder.seq // APART
+        if opened.run.end is not None:  # it will be summed up
+            self._kept.pop(run, None)
+            self._due.discard(run)
+        elif there >= due_after(self._kept.get(run, 0)):
+            self._kept[run] = there
+            self._due.add(run)
+            self._more.set()
+
+    async def run(self) -> None:
+        """Keep keyframes of runs that go on, until cancelled."""
+        while True:
+            await self._more.wait()
+            self._more = anyio.Event()
+            while self._due:
+                run = self._due.pop()
+                try:
+                    await self._make(run)
+                except Refused as refused:  # the next ones are made with these
+                    log.warning("no keyframes of run %s were kept: %s", run, refused.detail)
+                except Exception:  # a cache: what goes on does not end for it
+                    log.exception("no keyframes of run %s were kept", run)
+
+
+class Deriving(Protocol):
+    """A journal whose tables may be added to."""
+
+    async def derive(self, work: Callable[[Connection], Any]) -> Any:
+        """Write to tables that follow from events. Raises Unavailable."""
+        ...
+
+
+async def index_words(journal: Deriving) -> None:
+    """Until the words of all runs are in the index. Raises nothing: the process goes on without."""
+    while True:
+        try:
+            if not await journal.derive(partial(index_some, most=_INDEXED_AT_ONCE)):
+                return
+        except Refused as refused:
+            log.warning("the words of runs cannot be stored now: %s", refused.detail)
+            await anyio.sleep(_RETRY_S)
+        except Exception:  # such as a damaged row; a search reads what is not in the index
+            log.exception("the words of earlier runs are not looked for until the next start")
+            return
+        await anyio.sleep(_PAUSE_S)

@@ -1,20 +1,72 @@
-"""The graphs inside of a graph that is sent: by value, as its version has them, and proven by their digests.
+"""The graphs that a start carries: as requests send them, as they are recorded and as answers show them.
 
-See docs/decisions/070-one-truth-for-sub-graphs.md.
+A graph in a body is a JSON object, or a string that holds the text of the object. JavaScript cannot put
+a JSON text into another one, and writes `5.0` as `5` after it has read it; a string passes unchanged
+(docs/decisions/048-umrf-as-text.md). Graphs inside are sent by value, as the version has them, and
+proven by their digests (docs/decisions/070-one-truth-for-sub-graphs.md).
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Any, TypeAlias
+from typing import Annotated, Any, Final, TypeAlias
 
 import msgspec
 
 from action_assistant.errors import BadInput, Conflict, NotUmrf, Refused, TooLarge
-from action_assistant.runner.runs.events import RunSubgraph
-from action_assistant.runner.sent_graph import SentGraph, read_sent
+from action_assistant.runner.links.parameter_texts import sent
+from action_assistant.runner.runs.events import Requested, RunSubgraph
 from action_assistant.umrf.digest import digest, tree_digest
 from action_assistant.umrf.files import codec
+from action_assistant.umrf.json.embedded import UmrfGraph
 from action_assistant.umrf.model import Graph
-from action_assistant.umrf.run_size import MOST_INSIDE
+from action_assistant.umrf.run_size import MOST_BYTES, MOST_INSIDE
+
+#: Bytes of a body that carries graphs: what their texts may have, and room for all else that a start says.
+MOST: Final = MOST_BYTES + 100_000
+
+SentGraph: TypeAlias = Annotated[
+    msgspec.Raw,
+    msgspec.Meta(
+        extra_json_schema={
+            "description": "The UMRF graph itself, as approved, or a string that holds its JSON text",
+            "anyOf": [{"type": "object", "additionalProperties": True}, {"type": "string"}],
+        }
+    ),
+]
+
+
+def counted(body: bytes) -> int:
+    """The length that a body has at least without the escapes of a graph that is a string."""
+    return len(body) - body.count(b"\\")
+
+
+def read_sent(umrf: bytes) -> tuple[bytes, codec.Reading]:
+    """The text of a graph, byte for byte as it was meant, and what it says. For workers.
+
+    Raises BadInput, NotUmrf with the place, TooLarge.
+    """
+    text = _text_of(umrf)
+    if len(text) > MOST_BYTES:
+        raise TooLarge(
+            f"A graph that is sent has at most {MOST_BYTES // 1_000_000} MB; this one has {len(text):,} bytes."
+        )
+    try:
+        return text, codec.read(text)
+    except codec.Unreadable as wrong:
+        where: dict[str, object] = {"path": f"/umrf{wrong.path}"}
+        if text is umrf:
+            raise NotUmrf(wrong.message, where=where) from wrong
+        kind = BadInput if wrong.code == "not-json" else NotUmrf
+        where |= {"line": wrong.line, "column": wrong.column}
+        raise kind(wrong.message, where=where) from wrong
+
+
+def _text_of(umrf: bytes) -> bytes:
+    if not umrf.startswith(b'"'):
+        return umrf
+    try:
+        return msgspec.json.decode(umrf, type=str).encode()
+    except msgspec.DecodeError as wrong:
+        raise BadInput(f"The string is no text: {wrong}", where={"path": "/umrf"}) from wrong
 
 
 class SentSubgraph(msgspec.Struct, frozen=True, kw_only=True):
@@ -99,3 +151,38 @@ def _require_tree(told: Sequence[RunSubgraph], own: str, tree: str | None) -> No
             f"together is {found[:12]}…, not {tree[:12]}…. Nothing was started.",
             where={"path": "/tree_digest"},
         )
+
+
+class SubgraphShown(msgspec.Struct, frozen=True):
+    """A graph inside of the one that was started, as it was sent along, by the name of the actions that
+    stand for it. `graph`: its id; `version`: of it, where there was one."""
+
+    name: str
+    version: str | None
+    digest: str
+    umrf: UmrfGraph
+    graph: str | None
+
+
+class Sent(msgspec.Struct, frozen=True):
+    """A graph as it was sent, and the values of its actions."""
+
+    umrf: str
+    values: dict[str, dict[str, str]]
+    subgraphs: tuple[RunSubgraph, ...] = ()
+    tree_digest: str | None = None
+
+
+def sent_of(start: Requested) -> Sent:
+    """For workers: reads the graph."""
+    return Sent(start.umrf, sent(start.umrf), start.subgraphs, start.tree_digest)
+
+
+def subgraphs_shown(start: Sent) -> list[SubgraphShown]:
+    """The graphs inside."""
+    return [
+        SubgraphShown(
+            each.name, each.version, each.digest, msgspec.Raw(each.umrf.encode()), each.graph
+        )
+        for each in start.subgraphs
+    ]

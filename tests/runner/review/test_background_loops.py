@@ -6,7 +6,7 @@ import anyio
 
 from action_assistant.errors import Unavailable
 from action_assistant.runner.analysis.keyframes import APART
-from action_assistant.runner.review.keyframe_loop import KeyframeLoop, due_after
+from action_assistant.runner.review.background_loops import KeyframeLoop, due_after
 from runner.harness import virtual
 
 
