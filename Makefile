@@ -85,6 +85,14 @@ types: .venv/.done frontend/node_modules/.done ## the page's API types, from the
 	@PYTHONPATH=tests PYTHONWARNINGS=ignore $(BIN)/python -m support.openapi frontend/src/api/schema
 	@cd frontend && ../$(NODE) node api-types.mjs
 
+.PHONY: quick
+quick: setup ## lint, types and the tests of what changed since main, in minutes (AREA=runner/stop for a folder)
+	@PYTHONPATH=tests $(BARE) $(BIN)/python -m support.quick $(AREA)
+
+.PHONY: figures
+figures: .venv/.done ## sizes and language of the code, today and at an earlier commit (AT=COMMIT)
+	@PYTHONPATH=tests $(BIN)/python -m support.figures $(AT)
+
 .PHONY: test
 test: setup ros ## every check and every test, also in a real browser
 	@# Most of these wait for processes and robots: together they take little longer than the longest.
@@ -126,7 +134,7 @@ coverage: .venv/.done ## which lines of UMRF, start, Stop and runs the tests of 
 	@$(BIN)/coverage combine --quiet && $(BIN)/coverage report
 
 .PHONY: soak
-soak: setup ## what takes longer than CI may, by the thousand (ARGS="kills images" for some of it)
+soak: setup ## tests that take longer than CI may, by the thousand (ARGS="kills images" for some of them)
 	@$(BIN)/python bench/soak.py $(ARGS)
 	@test -n "$(ARGS)" || { $(BIN)/pip install --quiet atheris && $(BIN)/python tests/fuzz/soak_umrf.py 300; }
 

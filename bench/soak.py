@@ -1,4 +1,4 @@
-"""`make soak`: what takes longer than CI may. Each part is a bigger dose of tests that CI runs too."""
+"""Run tests for longer, or with more examples, than `make test` has time for: `make soak`."""
 
 import os
 import subprocess
@@ -10,12 +10,26 @@ from typing import Final, NamedTuple
 REPOSITORY: Final = Path(__file__).parents[1]
 
 
+PYTEST: Final = (sys.executable, "-m", "pytest", "-q", "--timeout=0")
+PLAYWRIGHT: Final = (
+    "scripts/with-node",
+    "npm",
+    "--prefix",
+    "frontend",
+    "run",
+    "--silent",
+    "e2e",
+    "--",
+)
+
+
 class Part(NamedTuple):
-    """What happens so many times, and the tests that do it."""
+    """One part of the soak: a description, the doses as environment variables, and the tests."""
 
     what: str
     dose: dict[str, str]
     tests: tuple[str, ...]
+    runner: tuple[str, ...] = PYTEST
 
 
 PARTS: Final[dict[str, Part]] = {
@@ -133,6 +147,17 @@ PARTS: Final[dict[str, Part]] = {
         {"TEST_LONG": "1"},
         ("-m", "long", "tests"),
     ),
+    "documents": Part(
+        "every command of the documents that takes seconds",
+        {"TEST_LONG": "1"},
+        ("tests/docs",),
+    ),
+    "browser": Part(
+        "browser tests that CI has no time for",
+        {"TEST_LONG": "1"},
+        (),
+        PLAYWRIGHT,
+    ),
     "clients": Part(
         "stock clients in a room that is silent for a minute",
         {"TEST_IDLE_SECONDS": "61"},
@@ -142,7 +167,7 @@ PARTS: Final[dict[str, Part]] = {
 
 
 def main(names: list[str]) -> int:
-    """Exit code: 1 when a part failed, 2 for a name that is none."""
+    """Run these parts, or all; return 1 when one failed, 2 for an unknown name."""
     if unknown := [name for name in names if name not in PARTS]:
         sys.stderr.write(f"no part: {', '.join(unknown)}; there are {', '.join(PARTS)}\n")
         return 2
@@ -151,10 +176,11 @@ def main(names: list[str]) -> int:
 
 
 def passes(name: str, part: Part) -> bool:
-    """Run a part, and say how long it took."""
+    """Run one part, write how long it took, and return whether it passed."""
     start = time.monotonic()
-    command = [sys.executable, "-m", "pytest", "-q", "--timeout=0", *part.tests]
-    done = subprocess.run(command, cwd=REPOSITORY, env={**os.environ, **part.dose}, check=False)
+    done = subprocess.run(
+        [*part.runner, *part.tests], cwd=REPOSITORY, env={**os.environ, **part.dose}, check=False
+    )
     word = "passed" if done.returncode == 0 else "FAILED"
     took = time.monotonic() - start
     sys.stdout.write(f"{name}: {part.what}: {word} after {took:.0f} s\n")

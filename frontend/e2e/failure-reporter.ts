@@ -7,8 +7,7 @@ import type { FullResult, Reporter, TestCase, TestResult } from "@playwright/tes
 const LINES = 6;
 /** How reasons begin for which CI may skip a test; any other skip fails it. */
 const ACCEPTED = [
-  "takes long:", // `make e2e` elsewhere runs them
-  "longer than CI may take", // so it does with these
+  "takes long:", // `make soak ARGS=browser` runs them
   "takes pictures for the documentation:", // `make pictures`
   "takes pictures to be looked at:", // `make screens`
   "measures;", // `make performance`

@@ -27,7 +27,7 @@ from editor.process import Editor, running
 
 WRITERS: Final = 3
 KILLS: Final = 4
-SMALL_KILLS: Final = int(os.environ.get("TEST_KILLS", "80"))
+SMALL_KILLS: Final = int(os.environ.get("TEST_KILLS", "24"))
 _SHARING: Final = 5  # kills in a row that hit the same graph
 
 

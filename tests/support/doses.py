@@ -1,13 +1,13 @@
-"""How much of what is found by chance one run tries."""
+"""Decide how many generated examples one run of a property takes."""
 
 import os
 from typing import Final
 
-#: A part of the usual dose, or a multiple of it: CI takes a fifth, `make soak` twenty times as much.
-_SHARE: Final = float(os.environ.get("TEST_EXAMPLES", "1"))
+#: A factor of the number that a test asks for: `make test` takes a fifth of it, `make soak` twenty times it.
+_SHARE: Final = float(os.environ.get("TEST_EXAMPLES", "0.2"))
 _LEAST: Final = 10 if _SHARE >= 1 else 5
 
 
 def examples(usual: int) -> int:
-    """How many generated examples a property is tried on."""
+    """Return on how many generated examples a property is tried that asks for `usual` of them."""
     return max(_LEAST, round(usual * _SHARE))

@@ -3,7 +3,7 @@
 Random histories of the real runner with stand-in robots in virtual time: two engines on one path,
 reboots, freezes, starts by others, feedback that somebody made up, actions that begin after the stop
 has passed them by, messages that get lost and starts that come a minute late, answers that are old,
-crashes of the runner, a journal that fails. `TEST_HISTORIES` is how many (default 40).
+crashes of the runner, a journal that fails. `TEST_HISTORIES` is how many (default 10).
 """
 
 import asyncio
@@ -39,7 +39,7 @@ from runner.harness import (
 )
 from runner.random_steps import GRAPHS, LOADING_MS, NAME, SCRIPTS, live_through, random_steps
 
-HISTORIES = int(os.environ.get("TEST_HISTORIES", "40"))
+HISTORIES = int(os.environ.get("TEST_HISTORIES", "10"))
 #: Histories that once went wrong: a crash and a stranger's start; feedback that was made up and said
 #: that a graph with a loading action had finished; a start of ours that somebody played again while the
 #: last answer of the proof was on its way.
