@@ -57,7 +57,7 @@ class Conversation:
     async def pause(self, seconds: float) -> None:
         """Wait until more may be read."""
         await self.member.until_heard()
-        wait = seconds + self.member.toll()
+        wait = seconds + self.member.cpu_debt()
         if wait > 0:
             await anyio.sleep(wait)
 
@@ -104,7 +104,7 @@ class _Directly:
             self._failure = error
             member.close(NORMAL)
             return
-        if wait > 0 or member.far_ahead or member.owes:
+        if wait > 0 or member.far_ahead or member.is_over_cpu_budget:
             self._hold(wait)
 
     def _hold(self, seconds: float) -> None:

@@ -9,13 +9,14 @@ from typing import Final
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.rooms.colours import NOBODYS
 from action_assistant.editor.rooms.presence import PresenceNews, PresenceOwner
+from action_assistant.kit.token_bucket import TokenBucket
 from action_assistant.web.auth.keys import PersonRef
 from action_assistant.web.server.direct import framed
 
 WAITING_FRAMES: Final = 256
 WAITING_BYTES: Final = 1 << 20
-_FREE: Final = 0.1  # seconds of work that nobody waits for
-_SHARE: Final = 4.0  # a socket keeps the editor busy for a fifth of the time, at most
+_BURST_S: Final = 0.1  # processor time of the loop that edits of one socket may take at once
+_SHARE: Final = 0.2  # of the time, that they may take for long
 _UNHANDLED_EDITS: Final = 256  # that a socket may have sent ahead of the room
 
 
@@ -46,7 +47,7 @@ class Member:
         self.synced = False  # has been sent the document
         self.refused = False  # nothing more is taken from it
         self.said: str | None = None  # why, where the close code does not tell enough
-        self._spent = 0.0  # seconds of everybody that edits of this socket took
+        self._cpu: Final = TokenBucket(_BURST_S, _SHARE)  # seconds of the loop's processor time
         self.handled = 0  # edits of this socket that the room has dealt with
         self._heard = 0  # edits that the socket brought
         self._frames: list[bytes] = []
@@ -182,21 +183,18 @@ class Member:
         """The socket brought an edit."""
         self._heard += 1
 
-    def cost(self, seconds: float) -> None:
-        """An edit of this socket held the room up for so long."""
-        self._spent += seconds
-
-    def toll(self) -> float:
-        """Seconds to wait before more of this socket is read, so that others get their share."""
-        if self._spent < _FREE:
-            return 0.0
-        wait, self._spent = _SHARE * self._spent, 0.0
-        return wait
+    def used_cpu(self, seconds: float) -> None:
+        """Count the processor time that an edit of this socket took from the event loop."""
+        self._cpu.spend(seconds)
 
     @property
-    def owes(self) -> bool:
-        """Whether there is a toll."""
-        return self._spent >= _FREE
+    def is_over_cpu_budget(self) -> bool:
+        """Tell whether edits of this socket took more of the loop than their share."""
+        return self._cpu.is_overdrawn
+
+    def cpu_debt(self) -> float:
+        """Return for how many seconds the socket is not to be read, so that others get their share."""
+        return self._cpu.debt()
 
     def edit_handled(self) -> None:
         """The room has dealt with the next edit of this socket, for good."""

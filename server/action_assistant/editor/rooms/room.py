@@ -333,7 +333,7 @@ class Room:
 
     def _take_in(self, offer: Offer, taken: Taken, read: UpdateOutline | None = None) -> None:
         """Apply one edit, or refuse it."""
-        begun = time.perf_counter()
+        begun = time.thread_time()
         try:
             brought = self._brought(offer, read)
         except OBJECTIONS as error:
@@ -342,7 +342,7 @@ class Room:
             return
         finally:
             if offer.member is not None:
-                offer.member.cost(time.perf_counter() - begun)
+                offer.member.used_cpu(time.thread_time() - begun)
         if brought is None:
             return
         taken.handled.append(offer)
