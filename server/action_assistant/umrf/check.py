@@ -7,13 +7,13 @@ from collections.abc import Collection, Mapping
 
 from action_assistant.umrf.checks.flow import check_flow
 from action_assistant.umrf.checks.places import Subject
-from action_assistant.umrf.checks.scenarios import check_scenarios
 from action_assistant.umrf.checks.structure import check_structure
 from action_assistant.umrf.checks.subgraphs import (
     CERTAIN,
     Resolution,
     check_subgraphs,
 )
+from action_assistant.umrf.checks.trials import check_scenarios
 from action_assistant.umrf.checks.values import check_static, check_values
 from action_assistant.umrf.codes import FINAL, REFUSED, STRUCTURAL, rank
 from action_assistant.umrf.facts import PINNED, EngineFacts

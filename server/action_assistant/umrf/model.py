@@ -25,6 +25,8 @@ Direction: TypeAlias = Literal["right", "down"]
 ENTRY: Final = "entry"
 EXIT: Final = "exit"
 PRECONDITIONS: Final[tuple[Precondition, ...]] = ("on_true", "on_false", "on_error", "on_stopped")
+#: The outcomes with which an action can end by itself; `on_stopped` needs a stop.
+OUTCOMES: Final[tuple[Precondition, ...]] = ("on_true", "on_false", "on_error")
 RESPONSES: Final[tuple[Response, ...]] = ("run", "pause", "restart", "stop", "bypass", "ignore")
 
 

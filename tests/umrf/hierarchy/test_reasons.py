@@ -5,7 +5,7 @@ from random import Random
 import pytest
 from msgspec.structs import replace
 
-from action_assistant.umrf.hierarchy import flattening, joints, ways_out
+from action_assistant.umrf.hierarchy import flattening, joints
 from action_assistant.umrf.hierarchy.flattening import Flattened, Unflattenable, flattened
 from action_assistant.umrf.model import ENGINE_DEFAULTS, Conditions
 from umrf.hierarchy.hierarchies import Hierarchy, leaf
@@ -262,7 +262,6 @@ def test_what_is_refused_would_go_otherwise(what: str, monkeypatch: pytest.Monke
     monkeypatch.setattr(flattening, "faults", lambda _: iter(()))
     monkeypatch.setattr(joints, "_lets_through", lambda *_: True)
     monkeypatch.setattr(joints, "refuse", lambda *_: None)
-    monkeypatch.setattr(ways_out, "refuse", lambda *_: None)
     found = flattened(outer, {"S": sub})
     assert isinstance(found, Flattened)
 

@@ -1,12 +1,11 @@
-"""Whether and how a graph gets from its entry to its exit.
+"""Checks whether and how a graph gets from its entry to its exit, and what its loops do to the engine.
 
-See docs/umrf-and-the-engine.md 2.3; H2, H3, H8.
+See docs/umrf-and-the-engine.md 2.3, 2.9 and 2.10; H2, H3, H5, H8 and H9.
 """
 
 from collections import deque
-from collections.abc import Container
+from collections.abc import Callable, Collection, Container, Mapping
 
-from action_assistant.umrf.checks.loops import ENDS, check_instant_loops, check_spontaneous, loops
 from action_assistant.umrf.checks.overlaps import (
     check_endless,
     check_loading,
@@ -15,15 +14,95 @@ from action_assistant.umrf.checks.overlaps import (
 )
 from action_assistant.umrf.checks.places import Subject, more
 from action_assistant.umrf.checks.together import Together
+from action_assistant.umrf.components import components
+from action_assistant.umrf.json.text import parse_small
 from action_assistant.umrf.model import (
     ENTRY,
     EXIT,
+    OUTCOMES,
     PRECONDITIONS,
+    Action,
     Key,
     Precondition,
     Relation,
     Severity,
 )
+
+
+def check_spontaneous(subject: Subject) -> None:
+    """Spontaneous actions from which a loop can be reached."""
+    spontaneous = [action for action in subject.real if action.type == "spontaneous"]
+    if not spontaneous:
+        return
+    doomed = _leading_to(subject, set().union(*loops(subject)))
+    for action in spontaneous:
+        if action.key in doomed:
+            message = (
+                f"{action.full_name} is spontaneous and leads into a loop: at its first end the "
+                "engine recurses until it dies, with every running graph."
+            )
+            subject.report("H9", "error", message, action=action, member="/type")
+
+
+def check_instant_loops(
+    subject: Subject, runs: Collection[Key], reports: Mapping[Key, Collection[Precondition]]
+) -> None:
+    """Loops that would block the engine if they took no time. `runs`: actions that can run;
+    `reports`: with which outcomes they can end."""
+    if "H5" not in subject.facts.hazards:
+        return
+
+    def goes_round(relation: Relation) -> bool:
+        reported = reports.get(relation.parent, ())
+        answers = {relation.conditions.answer(o) for o in OUTCOMES if o in reported}
+        return relation.parent != relation.child and bool(answers & {"run", "bypass"})
+
+    for loop in loops(subject, goes_round):
+        members = [subject.actions[key] for key in loop if key in runs]
+        if len(members) < len(loop) or any(map(_takes_time, members)):
+            continue
+        names = [member.full_name for member in members]
+        shown = ", ".join(names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
+        message = (
+            f"{shown} are a loop. If all of them end at once, the engine blocks itself within "
+            "milliseconds and obeys no stop any more; let at least one take some time."
+        )
+        subject.report("H5", "warning", message, action=members[0])
+
+
+def _takes_time(action: Action) -> bool:
+    """Whether somebody has said so: `"takes_time": true` in its `gui_attributes` (decision 56)."""
+    attributes = parse_small(dict(action.extra).get("gui_attributes", "null"))
+    return isinstance(attributes, dict) and attributes.get("takes_time") is True
+
+
+def _leading_to(subject: Subject, keys: set[Key]) -> set[Key]:
+    """Everything from which there is a way to one of these, themselves included."""
+    found = set(keys)
+    stack = list(keys)
+    while stack:
+        for relation in subject.incoming.get(stack.pop(), []):
+            if relation.parent not in found:
+                found.add(relation.parent)
+                stack.append(relation.parent)
+    return found
+
+
+def loops(
+    subject: Subject, follows: Callable[[Relation], bool] = lambda _: True
+) -> list[list[Key]]:
+    """Return the actions that lie on loops, by loop or group of connected loops, along the relations that
+    `follows` accepts."""
+    number = {action.key: place for place, action in enumerate(subject.real)}
+    ways = [
+        [number[r.child] for r in subject.outgoing.get(key, []) if r.child in number and follows(r)]
+        for key in number
+    ]
+    return [
+        [subject.real[place].key for place in members]
+        for members in components(ways)
+        if len(members) > 1 or members[0] in ways[members[0]]
+    ]
 
 
 def check_flow(subject: Subject, nested: Container[str] = frozenset()) -> None:
@@ -147,7 +226,7 @@ class Reachable:
 
     def _run(self, key: Key, may_stop: bool) -> None:
         self.runs.add(key)
-        ends: set[Precondition] = set(ENDS)
+        ends: set[Precondition] = set(OUTCOMES)
         if may_stop or self._can_be_stopped(key):
             ends.add("on_stopped")
         self._report(key, ends)

@@ -12,8 +12,8 @@ import msgspec
 
 from action_assistant.umrf.checks.flow import check_flow
 from action_assistant.umrf.checks.places import Subject, more
-from action_assistant.umrf.checks.scenarios import check_scenarios, halted
 from action_assistant.umrf.checks.structure import check_structure
+from action_assistant.umrf.checks.trials import check_scenarios, halted
 from action_assistant.umrf.checks.values import check_signature, check_values
 from action_assistant.umrf.codes import FINAL, rank
 from action_assistant.umrf.facts import EngineFacts

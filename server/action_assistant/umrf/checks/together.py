@@ -12,7 +12,7 @@ from functools import cached_property
 from typing import Final
 
 from action_assistant.umrf.checks.places import Subject
-from action_assistant.umrf.courses.network import Mask, behind
+from action_assistant.umrf.components import Mask, reachable
 from action_assistant.umrf.model import ENTRY, EXIT, PRECONDITIONS, Key, Precondition, Relation
 
 #: Pairs that are looked at; where there are more the rest is not followed: any two may meet, then.
@@ -121,7 +121,7 @@ class Together:
     @cached_property
     def _after(self) -> list[Mask]:
         """What comes after each action, by arrows."""
-        return behind([self._children(key) for key in self.keys])
+        return reachable([self._children(key) for key in self.keys])
 
     @cached_property
     def _repeated(self) -> Mask:
@@ -192,7 +192,7 @@ class Together:
                 elif answer == "bypass":
                     own.append(place)
             ways.append(own)
-        return [mask >> count for mask in behind(ways)]
+        return [mask >> count for mask in reachable(ways)]
 
     def _follow(self, key: Key) -> None:
         for outcome in self._reports[key]:

@@ -1,5 +1,6 @@
-"""Trial courses of a graph: all actions end with on_true, or one of them, the first time,
-otherwise.
+"""Trial courses of a graph: every action ends with on_true, or one of them ends otherwise the first time.
+
+`check_scenarios` reports the courses after which the graph stays RUNNING for ever (H8).
 """
 
 from collections.abc import Iterator
@@ -7,11 +8,15 @@ from typing import Final
 
 import msgspec
 
+from action_assistant.umrf.checks.places import Subject, joined
 from action_assistant.umrf.courses.course import Course, Outcome
 from action_assistant.umrf.courses.deviations import Deviations, Tied
 from action_assistant.umrf.courses.network import Network
 from action_assistant.umrf.courses.whole import whole
-from action_assistant.umrf.model import Action, Graph, Precondition
+from action_assistant.umrf.fixes import with_optional_outputs
+from action_assistant.umrf.model import EXIT, Action, Graph, Key, Precondition, Relation, Severity
+from action_assistant.umrf.semantics.parts import exit_inputs, exit_owner
+from action_assistant.umrf.semantics.values import slots_of
 
 #: States that all trials of one graph may look at, so that checking takes seconds: about 2 µs each.
 BUDGET: Final = 5_000_000
@@ -116,3 +121,191 @@ class Trials:
                 if differs or (gives and outcome == "on_error"):
                     found.append((place, outcome))
         return found
+
+
+_BLOCKED: Final = {"H2", "H6", "H7", "H8", "H9", "no-entry", "ghost", "actors"}
+
+
+def check_scenarios(subject: Subject) -> Coverage:
+    """Tries every action with on_true, then one that ends otherwise at a time. What was looked at;
+    nothing where another error keeps the graph from running anyway."""
+    if not subject.real or any(
+        p.code in _BLOCKED and p.severity == "error" for p in subject.problems
+    ):
+        return Coverage()
+    trials = Trials(subject.graph)
+    waiting = _Waiting(subject, trials.net)
+    at_exit: list[Trial] = []
+    for trial in trials:
+        if trial.end.kind != "stuck":
+            continue
+        if waiting.report(trial):
+            continue
+        at_exit.append(trial)
+    _report_at_exit(subject, trials.net, at_exit)
+    coverage = trials.coverage()
+    _report_left(subject, coverage)
+    return coverage
+
+
+def _report_left(subject: Subject, coverage: Coverage) -> None:
+    if coverage.tried < coverage.ways:
+        message = (
+            f"Of {coverage.ways:,} ways through the graph (one action ends otherwise in each) "
+            f"{coverage.tried:,} were tried, which is as much as is done at once; from "
+            f"{coverage.first_left} on none was. Whether those end is not known."
+        )
+        subject.report("not-tried", "warning", message)
+
+
+class _Waiting:
+    """Who waits for ever inside the graph, each told once, with the first way that leads there."""
+
+    def __init__(self, subject: Subject, net: Network) -> None:
+        self.subject = subject
+        self.net = net
+        self.actions = {action.full_name: action for action in subject.real}
+        self._told: set[int] = set()
+        self._firsts: dict[int, int] = {}  # many ways leave the same ones waiting
+
+    def report(self, trial: Trial) -> bool:
+        """Whether it is told, or was: False for what only the exit waits for."""
+        inside = trial.end.waiting & ~(1 << self.net.exit)
+        if not inside and trial.end.waiting:
+            return False
+        place = self._first(inside) if inside else -1
+        if place in self._told:
+            return True
+        self._told.add(place)
+        words = self._words(place)
+        if words is not None:
+            action = self.actions[self.net.names[place]] if place >= 0 else trial.action
+            message = f"{trial.when}, the graph stays RUNNING for ever: {words}."
+            self.subject.report("H8", "warning", message, action=action)
+        return True
+
+    def _first(self, waiting: int) -> int:
+        """The first that waits for no other that waits."""
+        if waiting not in self._firsts:
+            for_others, rest = 0, waiting
+            while rest:
+                lowest = rest & -rest
+                for_others |= self.net.reachable[lowest.bit_length() - 1] & ~lowest
+                rest ^= lowest
+            first = waiting & ~for_others or waiting
+            self._firsts[waiting] = (first & -first).bit_length() - 1
+        return self._firsts[waiting]
+
+    def _words(self, place: int) -> str | None:
+        if place < 0:
+            return "nothing runs any more"
+        name = self.net.names[place]
+        if not self.net.wants[place] & ~self.net.has[place]:
+            return f"{name} still waits for parents that are required and did not run"
+        if any("pvf_allowed_values" in p.text for a in self.subject.real for p in a.inputs):
+            return None  # which values actions give is not known
+        if not self.net.needs[place]:
+            return f"{name} still waits for inputs"
+        return f"{name} still waits for parents that are required, or for inputs"
+
+
+# What the exit waits for
+
+
+def _report_at_exit(subject: Subject, net: Network, found: list[Trial]) -> None:
+    """Each parent that is missed and each action whose outputs are missed, once."""
+    mended = _mended(subject.graph, {name for trial in found for name in trial.end.lacking})
+    is_mend = bool(found) and _never_stuck(mended)
+    told: set[str] = set()
+    for trial in found:
+        end = trial.end
+        severity: Severity = "warning" if trial.action else "error"
+        start = f"{trial.when}, the graph stays RUNNING for ever"
+        if end.inputs and "" not in told:
+            told.add("")
+            last = net.names[end.last] if end.last >= 0 else ""
+            certain = severity == "error" and not _may_fit(subject, last)
+            _report_outputs(subject, "error" if certain else "warning", start, last)
+        for relation in _exits(subject.graph):
+            name = subject.name(relation.parent)
+            if name not in end.lacking or name in told:
+                continue
+            told.add(name)
+            message = (
+                f"{start}: the exit waits for {name}, which then does not run. Where either of them "
+                "shall end the graph, none may be waited for."
+            )
+            subject.report(
+                "H8", severity, message, relation=relation, member="/required",
+                fix="not-required" if is_mend else None,
+            )  # fmt: skip
+
+
+def _may_fit(subject: Subject, last: str) -> bool:
+    """Whether another value than the default could be what the exit takes in: only actions know what they
+    give. Those of the action whose outputs the exit takes in count if it was the `last` to end."""
+    owner = exit_owner(subject.graph)
+    limited = {
+        name: slot.type
+        for name, slot in exit_inputs(subject.graph).items()
+        if slot.required and slot.allowed
+    }
+    ends = (subject.actions[r.parent] for r in _exits(subject.graph) if r.parent in subject.actions)
+    return any(
+        slot.type == limited.get(name)
+        for action in ends
+        if action is not owner or action.full_name == last
+        for name, slot in slots_of(action.outputs).items()
+    )
+
+
+def _report_outputs(subject: Subject, severity: Severity, start: str, last: str) -> None:
+    owner = exit_owner(subject.graph)
+    if owner is None:
+        return
+    names = {p.path for p in owner.outputs}
+    message = (
+        f"{start}: the engine makes the outputs of {owner.full_name} ({joined(names)}) inputs of the "
+        f"exit, and {last or 'nobody'} does not give them. Outputs that are not required are not waited for."
+    )
+    subject.report(
+        "H8", severity, message, action=owner, member="/output_parameters", fix="outputs-optional"
+    )
+
+
+def _exits(graph: Graph) -> list[Relation]:
+    return [relation for relation in graph.relations if relation.child == EXIT]
+
+
+def _mended(graph: Graph, lacking: set[str]) -> Graph:
+    """The graph whose exit does not wait for these, nor for outputs."""
+    names = {action.key: action.full_name for action in graph.actions}
+    relations = tuple(
+        msgspec.structs.replace(r, required=r.required and names.get(r.parent) not in lacking)
+        if r.child == EXIT
+        else r
+        for r in graph.relations
+    )
+    ends: set[Key] = {r.parent for r in _exits(graph)}
+    actions = tuple(with_optional_outputs(a) if a.key in ends else a for a in graph.actions)
+    return msgspec.structs.replace(graph, relations=relations, actions=actions)
+
+
+def _never_stuck(mended: Graph) -> bool:
+    """Whether a graph then ends in every trial, and never while something runs, whichever of what
+    runs side by side is quicker."""
+    for slower_first in (False, True):
+        trials = Trials(mended, slower_first=slower_first)
+        if any(trial.end.kind == "stuck" or trial.end.early for trial in trials):
+            return False
+        if trials.coverage().tried < trials.coverage().ways:
+            return False
+    return True
+
+
+def halted(subject: Subject) -> str | None:
+    """In which case a graph ends HALTED, in words; None if no trial does."""
+    for trial in Trials(subject.graph):
+        if trial.end.kind == "halted":
+            return f"if {trial.when[3:]}" if trial.action else "in any case"
+    return None

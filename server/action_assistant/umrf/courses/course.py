@@ -4,8 +4,9 @@ from bisect import bisect_left
 from heapq import heappop, heappush
 from typing import Final, Literal, NamedTuple, TypeAlias
 
+from action_assistant.umrf.components import Mask
 from action_assistant.umrf.courses.instants import DUE, RUNS, Instant, State
-from action_assistant.umrf.courses.network import Mask, Network
+from action_assistant.umrf.courses.network import Network
 
 #: `stuck`: RUNNING for ever with nothing that runs; `endless`: laps without end, or longer than was
 #: looked at; `never`: an entry action lacks a value, so it does not start.

@@ -11,9 +11,9 @@ from bisect import bisect_left
 from heapq import heappop, heappush
 from typing import Final
 
+from action_assistant.umrf.components import Mask
 from action_assistant.umrf.courses.course import LAPS, MORE, Course, Outcome, stuck
 from action_assistant.umrf.courses.instants import ACTIVE, DUE, IDLE, RUNS, Instant, State
-from action_assistant.umrf.courses.network import Mask
 from action_assistant.umrf.model import Precondition
 
 #: Differences that are remembered with what came of them.
@@ -48,7 +48,7 @@ class Deviations:
         for place in course.touched[number]:
             if place == self.net.exit or course.state(place, number + 1).does != RUNS:
                 continue
-            if place not in self.alone and not course.came[number] & self.net.behind[place]:
+            if place not in self.alone and not course.came[number] & self.net.reachable[place]:
                 self.alone[place] = course.outcome
 
     def outcome(self, place: int, result: Precondition) -> Outcome:
@@ -269,7 +269,7 @@ class _Way:
         return self._as_before(after)
 
     def _behind(self, place: int) -> Mask:
-        return 0 if place == self.net.exit else self.net.behind[place]
+        return 0 if place == self.net.exit else self.net.reachable[place]
 
     def _drop(self, place: int) -> None:
         state = self.apart.pop(place)
@@ -297,7 +297,7 @@ class _Way:
 
     def _is_fresh(self, place: int, after: int) -> bool:
         """Whether everything behind a running action is as at the start."""
-        behind = self.net.behind[place]
+        behind = self.net.reachable[place]
         if self.course.came[after - 1] & behind & ~self.mask:
             return False
         initial = self.course.initial
@@ -320,7 +320,7 @@ class _Way:
 
     def _came_alone(self, place: int, known: Outcome, after: int) -> Outcome:
         """What is not behind the one that runs stays as it is."""
-        behind = self.net.behind[place]
+        behind = self.net.reachable[place]
         waiting = self._waiting(after) | known.waiting & behind
         if known.kind == "stuck" and not behind >> self.net.exit & 1:
             return self._quiet(after)._replace(waiting=waiting)

@@ -9,7 +9,8 @@ from collections import deque
 from collections.abc import Callable
 from typing import Final, Literal, NamedTuple, TypeAlias
 
-from action_assistant.umrf.courses.network import EdgeQuestion, Mask, Network
+from action_assistant.umrf.components import Mask
+from action_assistant.umrf.courses.network import EdgeQuestion, Network
 from action_assistant.umrf.model import Precondition
 
 #: What an action does: nothing; runs until `due`; ends a stop at `due`; is paused; was stopped while

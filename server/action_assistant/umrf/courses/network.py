@@ -7,8 +7,9 @@ a double: sums are compared.
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Final, NamedTuple, TypeAlias
+from typing import Final, NamedTuple
 
+from action_assistant.umrf.components import Mask, reachable
 from action_assistant.umrf.model import PRECONDITIONS, Graph, Precondition
 from action_assistant.umrf.semantics.parts import RESERVED, Edge, Node, Running, build
 from action_assistant.umrf.semantics.script import Behaviour
@@ -26,8 +27,6 @@ ROUND_MS: Final = 1_000.0
 STEP_MS: Final = 1 / 16
 STOP_MS: Final = 50.0
 
-Mask: TypeAlias = int
-
 
 class EdgeQuestion(NamedTuple):
     """One edge as an end of its parent asks it. `link`: its bit among the child's required parents.
@@ -41,7 +40,7 @@ class EdgeQuestion(NamedTuple):
 
 
 class Network:
-    """`behind[place]`: all places to which a way of arrows leads from there. `needs`: required parents,
+    """`needs`: required parents,
     `wants`: required inputs, `has`: inputs that have a value from the start. `able`: whether the
     engine runs it at all. `late`: its place in a round; `rounds_ms`: how long one is."""
 
@@ -89,9 +88,9 @@ class Network:
         return (now_ms // self.round_ms + 1) * self.round_ms + self.late[place]
 
     @cached_property
-    def behind(self) -> list[Mask]:
-        """See the class."""
-        return behind([[e.child for e in row if e is not None] for row in self.edges])
+    def reachable(self) -> list[Mask]:
+        """Return for each place all places to which a path of arrows leads from there."""
+        return reachable([[e.child for e in row if e is not None] for row in self.edges])
 
     @cached_property
     def circling(self) -> dict[str, Mask]:
@@ -153,7 +152,7 @@ class Network:
         ]
         if not any(ways):
             return 0
-        return sum(1 << place for place, mask in enumerate(behind(ways)) if mask >> place & 1)
+        return sum(1 << place for place, mask in enumerate(reachable(ways)) if mask >> place & 1)
 
 
 def _bits(node: Node) -> dict[str, Mask]:
@@ -203,60 +202,3 @@ def _copy(slot: Slot) -> Slot:
     same = Slot(slot.name, {"pvf_type": slot.type})
     same.value, same.updatable, same.allowed = slot.value, slot.updatable, slot.allowed
     return same
-
-
-def behind(ways: Sequence[Sequence[int]]) -> list[Mask]:
-    """What is reached from each place, itself only by a loop (Tarjan's components, iterative)."""
-    found = [0] * len(ways)
-    index = [-1] * len(ways)
-    low = [0] * len(ways)
-    stack: list[int] = []
-    held = [False] * len(ways)
-    counter = 0
-    for root in range(len(ways)):
-        if index[root] >= 0:
-            continue
-        work = [(root, iter(ways[root]))]
-        index[root] = low[root] = counter
-        counter += 1
-        stack.append(root)
-        held[root] = True
-        while work:
-            place, children = work[-1]
-            for child in children:
-                if child >= len(ways):
-                    continue
-                if index[child] < 0:
-                    index[child] = low[child] = counter
-                    counter += 1
-                    stack.append(child)
-                    held[child] = True
-                    work.append((child, iter(ways[child])))
-                    break
-                if held[child]:
-                    low[place] = min(low[place], index[child])
-            else:
-                work.pop()
-                if work:
-                    low[work[-1][0]] = min(low[work[-1][0]], low[place])
-                if low[place] == index[place]:
-                    _close(place, stack, held, ways, found)
-    return found
-
-
-def _close(
-    first: int, stack: list[int], held: list[bool], ways: Sequence[Sequence[int]], found: list[Mask]
-) -> None:
-    """One component is whole: all of it reaches the same."""
-    members = [stack.pop()]
-    while members[-1] != first:
-        members.append(stack.pop())
-    own = sum(1 << place for place in members)
-    mask = own if len(members) > 1 or first in ways[first] else 0
-    for place in members:
-        held[place] = False
-        for child in ways[place]:
-            if not own >> child & 1:
-                mask |= 1 << child | (found[child] if child < len(ways) else 0)
-    for place in members:
-        found[place] = mask

@@ -17,7 +17,7 @@ from action_assistant.umrf.courses.coverage import OutcomeArrow, taken
 from action_assistant.umrf.courses.instants import DUE, GIVING_UP, IDLE, RUNS, STOPS, Instant, State
 from action_assistant.umrf.courses.network import EdgeQuestion, Network
 from action_assistant.umrf.facts import SIMULATED
-from action_assistant.umrf.model import ENTRY, EXIT, PRECONDITIONS, Graph, Precondition
+from action_assistant.umrf.model import ENTRY, EXIT, OUTCOMES, Graph, Precondition
 from action_assistant.umrf.semantics.script import Behaviour, Script
 from action_assistant.umrf.semantics.simulate import DAY_MS, simulate
 from action_assistant.umrf.semantics.steps import MOST
@@ -26,7 +26,6 @@ from action_assistant.umrf.semantics.steps import MOST
 BUDGET: Final = 2_000_000
 #: Between two ends; far less than what a stop may take.
 _GAP_S: Final = 0.1
-_RESULTS: Final[tuple[Precondition, ...]] = ("on_true", "on_false", "on_error")
 _FAR: Final = 1 << 30
 
 
@@ -193,9 +192,9 @@ class _Search:
         """The results of an action that can make a difference: a failed one gives nothing and may
         begin anew, and a bypass hands on the result itself."""
         if any(edge is None or "bypass" in edge.responses.values() for edge in row):
-            return list(_RESULTS)
+            return list(OUTCOMES)
         found: dict[tuple[object, ...], Precondition] = {}
-        for result in _RESULTS:
+        for result in OUTCOMES:
             answers = tuple(edge.responses[result] for edge in row if edge is not None)
             own = result if result in {"on_error", self._wanted[2]} else ""
             found.setdefault((own, *answers), result)
@@ -292,6 +291,3 @@ def _nearer(far: list[int], place: int, child: int) -> bool:
         return False
     far[place] = far[child] + 1
     return True
-
-
-assert set(_RESULTS) < set(PRECONDITIONS)

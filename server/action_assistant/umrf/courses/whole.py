@@ -4,8 +4,9 @@ What `deviations` finds by differences is found here the plain way: for graphs w
 which stop others as they please, and to hold the two together.
 """
 
+from action_assistant.umrf.components import Mask
 from action_assistant.umrf.courses.course import LAPS, MORE, Kind, Outcome
-from action_assistant.umrf.courses.network import Mask, Network
+from action_assistant.umrf.courses.network import Network
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics.engine import Engine
 from action_assistant.umrf.semantics.graphs import GraphRefused

@@ -6,8 +6,7 @@ See docs/umrf-and-the-engine.md 1.5.
 from collections.abc import Iterator
 from typing import Final
 
-from action_assistant.umrf.files.notes import Notes
-from action_assistant.umrf.files.origins import origin
+from action_assistant.umrf.files.origins import Notes, origin
 from action_assistant.umrf.json.text import Json, Number, pointer
 from action_assistant.umrf.model import Problem, Severity, Where
 

@@ -18,7 +18,7 @@ from action_assistant.umrf.files.fields import (
     position_of,
     text_of,
 )
-from action_assistant.umrf.files.notes import Notes
+from action_assistant.umrf.files.origins import Notes
 from action_assistant.umrf.files.waypoints import with_waypoints
 from action_assistant.umrf.json.text import Json, dump, pointer
 from action_assistant.umrf.model import (

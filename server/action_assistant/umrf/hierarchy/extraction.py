@@ -12,14 +12,16 @@ from typing import Final, TypeAlias
 
 import msgspec
 
-from action_assistant.umrf.hierarchy.borders import (
+from action_assistant.umrf.hierarchy.cutting import (
     Border,
+    Cut,
+    Plan,
     between,
     border_of,
+    cut,
     ways_in_differ,
     ways_out_differ,
 )
-from action_assistant.umrf.hierarchy.cutting import Cut, Plan, cut
 from action_assistant.umrf.hierarchy.flattening import Flattened, flattened
 from action_assistant.umrf.hierarchy.inlining import under_keys
 from action_assistant.umrf.hierarchy.likeness import unlike

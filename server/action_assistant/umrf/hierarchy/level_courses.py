@@ -10,11 +10,10 @@ from typing import Final, Literal, NamedTuple, TypeAlias
 
 from action_assistant.umrf.courses.instants import RUNS, Instant, State
 from action_assistant.umrf.courses.network import EdgeQuestion, Network
-from action_assistant.umrf.model import Graph, Key, Precondition
+from action_assistant.umrf.model import OUTCOMES, Graph, Key, Precondition
 
 #: Places of states that are looked at for one hierarchy: about two seconds.
 BUDGET: Final = 2_000_000
-_RESULTS: Final[tuple[Precondition, ...]] = ("on_true", "on_false", "on_error")
 
 #: `halts`, `waits`: the graph does not reach its exit. `unready`: the exit lacks outputs. `early`: something runs when it does, `beside`:
 #: who reaches it asks others as well. `ends`: it reaches it while this sub-graph runs. `again`:
@@ -130,7 +129,7 @@ class _Watched(Instant):
         ahead = 0
         for place, state in enumerate(states[:-1]):
             if state.does == RUNS:
-                ahead |= self._net.behind[place] | 1 << place
+                ahead |= self._net.reachable[place] | 1 << place
         nothing = State()
         kept = tuple(state if ahead >> place & 1 else nothing for place, state in enumerate(states))
         return _LevelState(kept, self.running, self.active, self.begun & ahead)
@@ -166,7 +165,7 @@ class _Courses:
         self.key = {net.place[action.full_name]: action.key for action in graph.actions}
         self.watched = sum(1 << place for place, key in self.key.items() if key in inside)
         self.ends = [
-            self._telling(place, inside.get(self.key[place], frozenset(_RESULTS)), is_top=is_top)
+            self._telling(place, inside.get(self.key[place], frozenset(OUTCOMES)), is_top=is_top)
             for place in range(len(net.nodes))
         ]
         self.results: set[Precondition] = set()
@@ -183,10 +182,10 @@ class _Courses:
         told = [edge for edge in self.net.edges[place] if edge is not None]
         ending = any(edge.child == self.net.exit for edge in told) and not is_top
         if ending or any("bypass" in edge.responses.values() for edge in told):
-            return [result for result in _RESULTS if result in results]
+            return [result for result in OUTCOMES if result in results]
         gives = bool(self.net.nodes[place].outputs) or any(e.child == place for e in told)
         found: dict[tuple[object, ...], Precondition] = {}
-        for result in _RESULTS:
+        for result in OUTCOMES:
             if result in results:
                 answers = tuple(edge.responses[result] for edge in told)
                 found.setdefault((gives and result == "on_error", *answers), result)

@@ -10,7 +10,7 @@ from math import inf
 from msgspec.structs import replace
 
 from action_assistant.umrf.facts import EngineFacts
-from action_assistant.umrf.model import Graph
+from action_assistant.umrf.model import OUTCOMES, Graph
 from action_assistant.umrf.semantics.clock import Clock, Task
 from action_assistant.umrf.semantics.parts import (
     HELD,
@@ -29,7 +29,7 @@ from action_assistant.umrf.semantics.performing import (
     Performer,
     Returned,
 )
-from action_assistant.umrf.semantics.script import OUTCOMES, Script
+from action_assistant.umrf.semantics.script import Script
 from action_assistant.umrf.semantics.trace import (
     Dispatch,
     EdgeEval,
@@ -44,10 +44,7 @@ INSTANT_LAPS = 3
 #: So many bypasses at one instant, and ten for each action, are a circle.
 BYPASSES = 1_000
 
-_OUTCOMES: dict[str, Outcome] = {
-    "on_true": "on_true", "on_false": "on_false", "on_error": "on_error",
-}  # fmt: skip
-assert set(_OUTCOMES) == set(OUTCOMES)
+_OUTCOMES: dict[str, Outcome] = {outcome: outcome for outcome in OUTCOMES}
 
 
 class Core(Clock):

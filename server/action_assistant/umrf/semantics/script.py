@@ -5,7 +5,8 @@ from typing import Annotated, Any, Final
 
 import msgspec
 
-OUTCOMES: Final = ("on_true", "on_false", "on_error")
+from action_assistant.umrf.model import OUTCOMES
+
 _OUTCOME: Final = msgspec.Meta(extra_json_schema={"enum": list(OUTCOMES)})
 #: Describes a field that `script_from` reads; the route names `Script` beside its body.
 SCRIPT: Final = msgspec.Meta(extra_json_schema={"$ref": "#/components/schemas/Script"})
