@@ -26,7 +26,7 @@ from action_assistant.runner.runs import views
 from action_assistant.runner.runs.events import decode
 from action_assistant.runner.runs.fold import replay
 from action_assistant.runner.runs.run import Run
-from action_assistant.runner.start.start_checks import GroupRequest
+from action_assistant.runner.start.admission import GroupRequest
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph, Parameter
 from action_assistant.umrf.semantics import script_from

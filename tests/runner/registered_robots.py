@@ -22,8 +22,8 @@ from action_assistant.runner.links.port import (
     Standing,
 )
 from action_assistant.runner.robots.registry import Robots
+from action_assistant.runner.start.admission import GroupRequest
 from action_assistant.runner.start.preflight import Preflight
-from action_assistant.runner.start.start_checks import GroupRequest
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Action, Graph, Parameter

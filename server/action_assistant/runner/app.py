@@ -28,6 +28,7 @@ from action_assistant.runner.archives.archive_store import ArchiveStore
 from action_assistant.runner.archives.retention import Retention
 from action_assistant.runner.clock import utc_us
 from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.execution.start_pipeline import StartSources
 from action_assistant.runner.links.behaviours.folder import BehaviourFolder
 from action_assistant.runner.links.port import Reach
 from action_assistant.runner.links.ros2.availability import ros2_reach
@@ -38,7 +39,6 @@ from action_assistant.runner.review.worker_queries import StoragePaths, WorkerQu
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.start.index_writer import IndexWriter, folder_trouble
-from action_assistant.runner.start.start_checks import StartSources
 from action_assistant.runner.workers import RunnerWorkers
 from action_assistant.settings import ARCHIVE, Keep, RunnerSettings
 from action_assistant.web.auth.caller import BackgroundTasks

@@ -16,7 +16,7 @@ __all__ = ["Crashed", "Lane", "RunnerWorkers", "child"]
 
 #: What the server process has imported before it forks anybody.
 _PRELOADED: Final = (
-    "action_assistant.runner.start.start_checks",
+    "action_assistant.runner.execution.start_pipeline",
     "action_assistant.runner.links.simulated",
     "action_assistant.runner.review.worker_queries",
 )

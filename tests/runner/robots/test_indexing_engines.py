@@ -7,10 +7,10 @@ from pathlib import Path
 import anyio
 
 from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.execution.start_pipeline import StartSources
 from action_assistant.runner.links.port import Answer, Registration
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.start.index_writer import IndexWriter
-from action_assistant.runner.start.start_checks import StartSources
 from runner.harness import ANN, Harness, at_once, clock_us, sequence, until, virtual
 from runner.index_folders.folders import wish
 from runner.registered_robots import Open, RegisteredRobots, group

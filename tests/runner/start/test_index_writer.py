@@ -9,12 +9,12 @@ import pytest
 
 from action_assistant.errors import Conflict, NotFound, Unavailable
 from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.execution.start_pipeline import StartSources
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.robots.robot_events import IndexWriteAsked, IndexWritten
 from action_assistant.runner.start.index_writer import IndexWriter
 from action_assistant.runner.start.preflight import Item
-from action_assistant.runner.start.start_checks import StartSources
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.model import Graph
 from runner.harness import ANN, Harness, at_once, clock_us, ended, sequence, until, virtual

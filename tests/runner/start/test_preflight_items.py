@@ -12,10 +12,10 @@ from action_assistant.runner.start.admission import Admitted
 from action_assistant.runner.start.preflight import (
     EngineView,
     Item,
-    of_graph,
-    of_refusal,
-    of_robot,
-    summed,
+    graph_item,
+    refusal_item,
+    robot_items,
+    with_verdict,
 )
 from action_assistant.umrf.check import STRUCTURAL
 from action_assistant.umrf.facts import PINNED
@@ -50,7 +50,7 @@ def proof(**standing: Any) -> Item:
         index=EngineIndex(),
         took_ms=1.0,
     )
-    (found,) = [each for each in of_robot(sight, sequence()) if each.code == "proof"]
+    (found,) = [each for each in robot_items(sight, sequence()) if each.code == "proof"]
     return found
 
 
@@ -75,12 +75,12 @@ def test_a_start_needs_an_engine_whose_stop_could_be_proven(
 
 
 def test_problems_of_a_graph_warn_and_overridden_ones_stay_named() -> None:
-    assert of_graph(admitted()).verdict == "passed"
+    assert graph_item(admitted()).verdict == "passed"
     possible = problem("loop", "warning")
-    warned = of_graph(admitted(possible))
+    warned = graph_item(admitted(possible))
     assert (warned.verdict, warned.problems) == ("warned", (possible,))
     certain = problem("one-sided", "error")
-    over = of_graph(admitted(certain, possible))
+    over = graph_item(admitted(certain, possible))
     assert over.verdict == "warned"
     assert over.problems == (certain, possible)
     assert "overridden" in over.text
@@ -90,9 +90,9 @@ def test_a_refusal_is_overridable_if_it_names_problems_of_which_none_is_structur
     structural = min(STRUCTURAL)
     for codes, overridable in (((), False), (("x",), True), (("x", structural), False)):
         where = {"problems": msgspec.to_builtins([problem(code, "error") for code in codes])}
-        item = of_refusal("graph", Conflict("No.", where=where if codes else None))
+        item = refusal_item("graph", Conflict("No.", where=where if codes else None))
         assert (item.verdict, item.overridable) == ("blocked", overridable)
         assert set(item.codes) == set(codes)
-        look = summed("David", [item])
+        look = with_verdict("David", [item])
         assert look.never != overridable
         assert look.override == (item.codes if overridable else ())

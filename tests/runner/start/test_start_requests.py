@@ -5,8 +5,7 @@ import pytest
 
 from action_assistant.errors import BadInput, TooLarge
 from action_assistant.runner.runs.events import Override
-from action_assistant.runner.start.admission import admit, prepared
-from action_assistant.runner.start.start_checks import read_group
+from action_assistant.runner.start.admission import admit, prepared, read_group
 from action_assistant.umrf.facts import PINNED, SIMULATED
 from runner.harness import order, sequence
 from runner.start.test_admission import one_sided

@@ -26,6 +26,7 @@ from action_assistant.runner.robots.robot_events import (
     StopWasProven,
 )
 from action_assistant.runner.runs import views
+from action_assistant.runner.start.admission import GroupRequest, read_group
 from action_assistant.runner.start.index_writer import (
     IndexWriteAnswer,
     IndexWriter,
@@ -33,7 +34,6 @@ from action_assistant.runner.start.index_writer import (
     read_index_write,
 )
 from action_assistant.runner.start.preflight import Preflight
-from action_assistant.runner.start.start_checks import GroupRequest, read_group
 from action_assistant.safe_text import hold_names
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.files.action_files import write_action

@@ -4,51 +4,40 @@ All of it lives on one event loop. Runs that are not over are in memory; the jou
 """
 
 import logging
-from collections.abc import AsyncIterator, Callable, Sequence
-from contextlib import AsyncExitStack, asynccontextmanager
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
 from typing import Any, Final
 
 import anyio
 from sqlalchemy import Row
 
-from action_assistant.errors import BadInput, Conflict, NotFound, Refused
-from action_assistant.logs.context import begin
-from action_assistant.random_ids import random_id
+from action_assistant.errors import Conflict, NotFound
 from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.execution import interventions
+from action_assistant.runner.execution.open_runs import OpenRuns
 from action_assistant.runner.execution.run_loop import OpenRun
-from action_assistant.runner.links.port import SIMULATOR, ForeignCommand, Link, Order, Registration
+from action_assistant.runner.execution.start_pipeline import (
+    NO_SOURCES,
+    Grouped,
+    Started,
+    StartPipeline,
+    StartSources,
+)
+from action_assistant.runner.links.port import ForeignCommand, Registration
 from action_assistant.runner.links.simulator import Simulator, in_this_process
-from action_assistant.runner.links.unreachable import UnreachableLink
 from action_assistant.runner.robots.engine import KnownEngine
 from action_assistant.runner.robots.registration import Robot, registration_of
 from action_assistant.runner.robots.registry import RegistryContext, Robots
 from action_assistant.runner.robots.robot_events import Commanded
 from action_assistant.runner.runs import queries
-from action_assistant.runner.runs.events import Author, Ended, MovesAgain
+from action_assistant.runner.runs.events import Author, Ended
 from action_assistant.runner.runs.history import Past, RunHistory, RunnerJournal
 from action_assistant.runner.runs.run import Run
-from action_assistant.runner.start.admission import StartRequest
+from action_assistant.runner.start.admission import GroupRequest, StartRequest
 from action_assistant.runner.start.approvals import Approvals
-from action_assistant.runner.start.idempotency import IdempotentStarts, StopOrder, booked
-from action_assistant.runner.start.preflight import (
-    Preflight,
-    Settled,
-    check_items,
-    stands_in_the_way,
-)
-from action_assistant.runner.start.start_checks import (
-    NO_SOURCES,
-    Cleared,
-    Grouped,
-    GroupRequest,
-    StartChecks,
-    Started,
-    StartSources,
-)
+from action_assistant.runner.start.idempotency import StopOrder
+from action_assistant.runner.start.preflight import Preflight
 from action_assistant.runner.stop.foreign_stop import ForeignStopLoop, StoppedAll
-from action_assistant.runner.stop.late_activity import LateActivity
-from action_assistant.runner.stop.loading import LoadingTimes
 from action_assistant.web.auth.caller import BackgroundTasks
 from action_assistant.web.workers.lanes import RunInWorker
 
@@ -77,33 +66,32 @@ class ExecutionService:
     ) -> None:
         self.robots = robots
         self.history = RunHistory(journal, past)
-        self.open: dict[str, OpenRun] = {}
+        self.approvals: Final = Approvals(journal, clock_us)
         self._journal, self._clock_us = journal, clock_us
         self._tasks, self._run_in_worker = tasks, run_in_worker
-        self._watchers: list[Callable[[OpenRun], None]] = []
-        self._news = anyio.Event()
-        self._places: dict[str, anyio.Lock] = {}
-        self._idempotent_starts = IdempotentStarts(journal, tasks, clock_us)
-        self.under_way: Final = self._idempotent_starts.under_way
-        self.approvals: Final = Approvals(journal, clock_us)
-        self._starting = StartChecks(
+        self._robot_watchers: list[Callable[[], None]] = []
+        self._stops = StopOrder()
+        self._runs = OpenRuns(
+            journal,
             robots,
-            approvals=self.approvals,
+            self.history,
             clock_us=clock_us,
+            tasks=tasks,
             run_in_worker=run_in_worker,
-            taken=self._taken,
-            going=self._going,
-            settled=self._settled_on,
+        )
+        self.open: Final = self._runs.by_id
+        self._starts = StartPipeline(
+            self._runs,
+            robots,
+            journal,
+            approvals=self.approvals,
+            stops=self._stops,
+            clock_us=clock_us,
+            tasks=tasks,
+            run_in_worker=run_in_worker,
             simulator=simulator,
             sources=sources,
         )
-        self._late_activity = LateActivity(
-            self.open, self.history, robots, self._tasks, clock_us=clock_us, reopen=self._reopen
-        )
-        self._robot_watchers: list[Callable[[], None]] = []
-        self._settled: dict[str, Settled] = {}
-        self._loading_times = LoadingTimes()
-        self._number, self._stops = 0, StopOrder()
 
     @classmethod
     @asynccontextmanager
@@ -139,8 +127,8 @@ class ExecutionService:
                 tasks.cancel_scope.cancel()
 
     def watch(self, watcher: Callable[[OpenRun], None]) -> None:
-        """Be told, at once, of every run that has changed."""
-        self._watchers.append(watcher)
+        """Call `watcher` with every run that has changed, at once and on the event loop."""
+        self._runs.watch(watcher)
 
     def watch_robots(self, watcher: Callable[[], None]) -> None:
         """Be told, at once, when a robot is not as it was."""
@@ -152,158 +140,31 @@ class ExecutionService:
 
     # --- start --------------------------------------------------------------------------------
 
-    async def start(self, asked: StartRequest, author: Author) -> Started:
-        """Carry out a start, at most once per request. Raises Refused of many kinds; then nothing
-        was sent. Returns after the one message has left."""
-        stops = self._stops.count
-        async with self._idempotent_starts.once(asked.request_id):
-            known = await self._known(asked)
-            if known is not None:
-                return Started(known, fresh=False)
-            async with AsyncExitStack() as places:
-                if asked.engine != SIMULATOR:
-                    await places.enter_async_context(self._place(asked.engine))
-                cleared = await self._starting.cleared(asked, author.id)
-                run = await self._begin(asked, cleared, author, stops)
-            return Started(run, fresh=True)
+    async def start(self, request: StartRequest, author: Author) -> Started:
+        """Carry out a start, at most once per request. Returns after the one message has left. Raises
+        Refused of many kinds; then nothing was sent."""
+        return await self._starts.start(request, author)
 
-    async def start_group(self, asked: GroupRequest, author: Author) -> Grouped:
-        """Start one version on several robots: all are looked at before the first message leaves.
+    async def start_group(self, group: GroupRequest, author: Author) -> Grouped:
+        """Start one version on several robots: each start is accepted before the first message leaves.
         Raises Refused; then nothing was sent to any of them."""
-        stops = self._stops.count
-        starts = [asked.of(engine) for engine in sorted(asked.engines)]
-        if not asked.request_id or SIMULATOR in asked.engines:
-            where = "/engines" if asked.request_id else "/request_id"
-            raise BadInput("A group has a request_id, and robots only.", where={"path": where})
-        async with self._idempotent_starts.once(asked.request_id):
-            found = [await self._known(each) for each in starts]
-            if known := [run for run in found if run is not None]:
-                missing = [each.engine for each, run in zip(starts, found, strict=True) if not run]
-                failed = dict.fromkeys(missing, "It was not started with the others.")
-                return Grouped(known[0].group or "", known, failed, fresh=False)
-            async with AsyncExitStack() as places:
-                for each in starts:  # in the order of their names, so that no two groups wait
-                    await places.enter_async_context(self._place(each.engine))
-                cleared = await self._starting.all_cleared(starts, author.id)
-                return await self._begin_group(starts, cleared, author, stops)
+        return await self._starts.start_group(group, author)
 
-    async def _begin_group(
-        self,
-        starts: Sequence[StartRequest],
-        cleared: Sequence[Cleared],
-        author: Author,
-        stops: int,
-    ) -> Grouped:
-        group = random_id()
-        runs: list[Run] = []
-        failed: dict[str, str] = {}
-        for each, clear in zip(starts, cleared, strict=True):
-            try:
-                runs.append(await self._begin(each, clear, author, stops, group))
-            except Refused as why:
-                failed[each.engine] = why.detail
-        return Grouped(group, runs, failed, fresh=True)
+    async def look(self, group: GroupRequest, starter: str = "") -> list[Preflight]:
+        """Return the pre-flight of a start by this person on each engine. Sends nothing but a get."""
+        return await self._starts.look(group, starter)
 
-    async def look(self, asked: GroupRequest, starter: str = "") -> list[Preflight]:
-        """What stands between a graph and its start on each engine by this person. Sends nothing but
-        a get."""
-        return await self._starting.look(asked, starter)
-
-    def _place(self, engine: str) -> anyio.Lock:
-        """One start at a time for each robot, and none while it is registered anew."""
-        return self._places.setdefault(engine, anyio.Lock())
-
-    async def _known(self, asked: StartRequest) -> Run | None:
-        run = await self._idempotent_starts.run_of(asked)
-        return None if run is None else await self.find(run)
-
-    def _taken(self, engine: str, graph_name: str = "") -> Run | None:
-        """Return the run that keeps an engine from another one, of a graph of this name: rather one that
-        goes on than one of which an action may still be loading."""
-        going = (each.run for each in self._going(engine).values())
-        return min(
-            going, key=lambda run: (bool(run.loading), run.graph_name != graph_name), default=None
-        )
-
-    def _settled_on(self, engine: str) -> list[Settled]:
-        """What somebody has seen at rest there since this process began. A start that others have
-        played again is theirs, and was not seen."""
-        found = [each for each in self._settled.values() if each.engine == engine]
-        return [each for each in found if not self._late_activity.is_of_others(engine, each.run)]
-
-    def _going(self, engine: str) -> dict[str, OpenRun]:
-        """The runs that go on there. Whatever else carries the mark of one was sent by others."""
-        found = self.open.items()
-        return {run: it for run, it in found if it.run.engine == engine and it.run.end is None}
-
-    async def _begin(
-        self,
-        asked: StartRequest,
-        cleared: Cleared,
-        author: Author,
-        stops: int,
-        group: str | None = None,
-    ) -> Run:
-        number, at = self.next_number(), self._clock_us()
-        requested, order = booked(asked, cleared, author, at=at, number=number, group=group)
-        overridden = asked.override.codes if asked.override else ()
-        name = cleared.ready.name
-        if not cleared.own:  # a run that was over may have moved again since it was looked at
-            check_items([self._starting.free(asked.engine, name)], overridden)
-        with anyio.CancelScope(shield=True):
-            run = await self._idempotent_starts.store(requested)
-            free = None if cleared.own else self._starting.free(asked.engine, name)
-            opened = self._opened(run, cleared.link, own=cleared.own, seq=1)
-            if free is not None and stands_in_the_way(free, overridden):
-                opened.end("refused", free.text)
-            if pressed := self._stops.since(stops, asked.engine, group or ""):
-                opened.stop(*pressed)
-            self._tasks.start_soon(self._drive, opened, order, cleared.incarnation)
-        await opened.published.wait()
-        return opened.run
+    def under_way(self, request_id: str) -> bool:
+        """Return whether this start, or start of a group, is being carried out at this moment."""
+        return self._starts.is_under_way(request_id)
 
     def next_number(self) -> int:
-        """A number for one more run."""
-        self._number += 1
-        return self._number
-
-    def _opened(self, run: Run, link: Link, *, own: bool, seq: int) -> OpenRun:
-        opened = OpenRun(
-            run,
-            link=link,
-            owns_link=own,
-            store=self._journal,
-            seq=seq,
-            clock_us=self._clock_us,
-            run_in_worker=self._run_in_worker,
-            changed=self._changed,
-            loading_times=self._loading_times,
-        )
-        self.open[run.id] = opened
-        self._changed(opened)
-        return opened
-
-    async def _drive(self, opened: OpenRun, order: Order | None, incarnation: str = "") -> None:
-        begin({"run": opened.run.id})
-        await opened.drive(order, incarnation)
-        self.open.pop(opened.run.id, None)
-        self._late_activity.ended(opened.run, opened.recorder.seq)
-        self._news.set()
-        self._news = anyio.Event()
-
-    def _changed(self, opened: OpenRun) -> None:
-        self._news.set()
-        self._news = anyio.Event()
-        engine = self.robots.link(opened.run.engine)
-        if engine is not None and opened.run.end is not None:
-            engine.look_closely()
-        for watcher in self._watchers:
-            watcher(opened)
+        """Return the number of one more run; each is given once."""
+        return self._runs.next_number()
 
     async def change(self, run: str, revision: int) -> None:
-        """Wait until an open run is not at this revision any more, or is over and stored."""
-        while run in self.open and self.open[run].revision == revision:
-            await self._news.wait()
+        """Wait until an open run has another revision than this one, or is over and stored."""
+        await self._runs.change(run, revision)
 
     # --- stop, pause, resume ------------------------------------------------------------------
 
@@ -311,14 +172,14 @@ class ExecutionService:
         """Want everything stopped; what this concerns. Never waits."""
         self._stops.note("", author, stop_id)
         runs = [run for run in tuple(self.open) if self._stop(run, author, stop_id)]
-        self.robots.silence(author, self._going)
+        self.robots.silence(author, self._runs.on)
         return StoppedAll(runs, self.robots.foreign_stops.graphs(), self.robots.unheard())
 
     def stop_robot(self, name: str, author: Author) -> tuple[list[str], list[str]]:
         """Want whatever a robot runs stopped: runs of ours, graphs of others. Raises NotFound."""
-        graphs = self.robots.silence(author, self._going, name)
+        graphs = self.robots.silence(author, self._runs.on, name)
         self._stops.note(name, author)
-        return [run for run in self._going(name) if self._stop(run, author, "")], graphs
+        return [run for run in self._runs.on(name) if self._stop(run, author, "")], graphs
 
     async def stop(self, run: str, author: Author, stop_id: str = "") -> list[str]:
         """Want one run stopped, or all of a group; nothing when it is over. Waits for nothing unless
@@ -366,7 +227,7 @@ class ExecutionService:
         BadInput, Conflict."""
         opened = await self._movable(run)
         told = interventions.confirm_rest(opened, asked, author)
-        self._settled[run] = Settled(told.engine, run, told.incarnation or "", opened.failed)
+        self._runs.settle(told, opened.failed)
         return told
 
     async def _movable(self, run: str) -> OpenRun:
@@ -380,10 +241,7 @@ class ExecutionService:
 
     async def find(self, run: str) -> Run:
         """A run, open or over. Raises NotFound."""
-        opened = self.open.get(run)
-        if opened is not None:
-            return opened.run
-        return await self.history.run(run)
+        return await self._runs.find(run)
 
     async def simulates(self, run: str) -> bool:
         """Whether nothing moves in the world because of a run. Raises NotFound."""
@@ -401,18 +259,18 @@ class ExecutionService:
 
     async def register(self, asked: Registration, author: Author) -> Robot:
         """Take a robot into the registry, or change it. Raises BadInput, Conflict, Unavailable."""
-        async with self._place(asked.name):
+        async with self._starts.turn(asked.name):
             self._check_unused(asked.name)
             return await self.robots.register(asked, author)
 
     async def remove(self, robot: str, author: Author) -> None:
         """Take a robot out of the registry. Raises NotFound, Conflict, Unavailable."""
-        async with self._place(robot):
+        async with self._starts.turn(robot):
             self._check_unused(robot)
             await self.robots.remove(robot, author)
 
     def _check_unused(self, robot: str) -> None:
-        run = self._taken(robot)
+        run = self._runs.occupying(robot)
         if run is not None:
             raise Conflict(
                 f"Run {run.number} goes on {robot}; stop it first. Its Stop would get lost.",
@@ -425,8 +283,8 @@ class ExecutionService:
 
     def _foreign(self, engine: KnownEngine, command: ForeignCommand) -> Commanded:
         """Somebody else has told a robot something: which run of ours that concerns."""
-        self._late_activity.sent_by_others(command)
-        runs = [each.run for each in self._going(engine.registration.name).values()]
+        self._runs.late_activity.sent_by_others(command)
+        runs = [each.run for each in self._runs.on(engine.registration.name).values()]
         for each in runs:
             self.open[each.id].hear_of(command)
         run = min(runs, key=lambda each: each.graph_name != command.graph, default=None)
@@ -445,7 +303,7 @@ class ExecutionService:
 
     async def _take_up(self) -> None:
         """Adopt what an earlier process left: pending stops first of all; nothing is started."""
-        self._number = (await self._journal.query(queries.last_number()))[0][0]
+        self._runs.last_number = (await self._journal.query(queries.last_number()))[0][0]
         ground = RegistryContext(
             self._journal,
             self._tasks,
@@ -453,10 +311,10 @@ class ExecutionService:
             self._run_in_worker,
             self._robots_changed,
             self._foreign,
-            self._late_activity.shows,
+            self._runs.late_activity.shows,
             ForeignStopLoop,
         )
-        self._tasks.start_soon(self._late_activity.run)
+        self._tasks.start_soon(self._runs.late_activity.run)
         self.robots.open(ground)
         for row in await self._journal.query(queries.all_robots()):
             self.robots.add(registration_of(row))
@@ -468,23 +326,13 @@ class ExecutionService:
             self._adopt(run, seq, is_whole=is_whole)
         await self.robots.take_up_stops()
 
-    def _reopen(self, run: Run, seq: int, event: MovesAgain) -> None:
-        """A run that was over and stored moves again."""
-        link = self.robots.link(run.engine) or UnreachableLink(
-            "there is no link to this robot any more"
-        )
-        opened = self._opened(run, link, own=False, seq=seq)
-        opened.tell(event)
-        self._tasks.start_soon(self._drive, opened, None)
-
     def _adopt(self, run: Run, seq: int, *, is_whole: bool) -> None:
-        link = self.robots.link(run.engine) or UnreachableLink(
-            "there is no link to this robot any more"
-        )
-        opened = self._opened(run, link, own=False, seq=seq)
+        """Follow a run that an earlier process left; nothing of it is started."""
+        link = self.robots.link(run.engine)
+        opened = self._runs.open(run, link, owns_link=False, seq=seq)
         if run.simulated:
             opened.tell(Ended(self._clock_us(), "lost", None, _LOST))
         elif not is_whole:
             log.error("run %s: some of its events cannot be read", run.id)
             opened.lose("Some of what was recorded of this run cannot be read.")
-        self._tasks.start_soon(self._drive, opened, None)
+        self._runs.drive(opened)

@@ -29,7 +29,10 @@ from action_assistant.umrf.semantics import SCRIPT, Script, script_from
 
 T = TypeVar("T")
 
+_Name = Annotated[str, msgspec.Meta(min_length=1, max_length=100)]
+
 _SHOWN: Final = 20  # problems in an answer
+_MOST_ENGINES: Final = 20  # of one group
 _KEPT: Final = 40  # problems of a kind that somebody could be shown
 
 
@@ -54,6 +57,39 @@ class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     behaviours: bool = False
     subgraphs: tuple[SentSubgraph, ...] = ()
     tree_digest: str | None = None
+
+
+class GroupRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """One version for several robots at once. Without version, digest and `request_id` it can only
+    be looked at."""
+
+    umrf: SentGraph
+    version: str = ""
+    digest: str = ""
+    engines: Annotated[tuple[_Name, ...], msgspec.Meta(min_length=1, max_length=_MOST_ENGINES)]
+    request_id: Annotated[str, msgspec.Meta(max_length=200)] = ""
+    graph: str | None = None
+    override: Override | None = None
+    like: str | None = None
+    behaviours: bool = False
+    subgraphs: tuple[SentSubgraph, ...] = ()
+    tree_digest: str | None = None
+
+    def for_engine(self, engine: str) -> StartRequest:
+        """Return the start on one of these engines; its `request_id` is made of this one and the engine."""
+        return StartRequest(
+            version=self.version,
+            digest=self.digest,
+            umrf=self.umrf,
+            engine=engine,
+            request_id=f"{self.request_id}/{engine}",
+            graph=self.graph,
+            override=self.override,
+            like=self.like if engine == SIMULATOR else None,
+            behaviours=self.behaviours and engine == SIMULATOR,
+            subgraphs=self.subgraphs,
+            tree_digest=self.tree_digest,
+        )
 
 
 class Admitted(msgspec.Struct, frozen=True, kw_only=True):
@@ -93,6 +129,14 @@ class Prepared(msgspec.Struct, frozen=True, kw_only=True):
 def read_request(body: bytes) -> StartRequest:
     """The body of a start. Raises BadInput with the place."""
     return decoded(body, StartRequest)
+
+
+def read_group(body: bytes) -> GroupRequest:
+    """The body of a start on several robots, or of a look. Raises BadInput with the place."""
+    group = decoded(body, GroupRequest)
+    if len(set(group.engines)) < len(group.engines):
+        raise BadInput("A robot is named twice.", where={"path": "/engines"})
+    return group
 
 
 def decoded(body: bytes, kind: type[T]) -> T:

@@ -9,7 +9,6 @@ import anyio
 from action_assistant.errors import Conflict, Refused, Unavailable
 from action_assistant.journal.events import Draft
 from action_assistant.runner.clock import ClockUs
-from action_assistant.runner.links.port import GraphOutline, Order
 from action_assistant.runner.runs import queries
 from action_assistant.runner.runs.events import Author, Ended, Requested, encode
 from action_assistant.runner.runs.fold import begin
@@ -17,51 +16,7 @@ from action_assistant.runner.runs.history import RunnerJournal
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start.admission import StartRequest
-from action_assistant.runner.start.start_checks import Cleared
 from action_assistant.web.auth.caller import BackgroundTasks
-
-
-def booked(
-    asked: StartRequest,
-    cleared: Cleared,
-    author: Author,
-    *,
-    at: int,
-    number: int,
-    group: str | None,
-) -> tuple[Requested, Order]:
-    """What will be stored of a start, and what will be sent."""
-    ready = cleared.ready
-    requested = Requested(
-        at=at,
-        run=ready.run,
-        number=number,
-        request_id=asked.request_id,
-        author=author,
-        graph=ready.graph_id,
-        graph_name=ready.name,
-        version=asked.version,
-        digest=ready.digest,
-        engine=asked.engine,
-        simulated=cleared.own,
-        actions=ready.actions,
-        umrf=ready.umrf,
-        script=ready.script,
-        override=asked.override,
-        despite=cleared.despite,
-        group=group,
-        like=asked.like,
-        behaviours=asked.behaviours,
-        laps=ready.laps,
-        inner_laps=ready.inner_laps,
-        subgraphs=ready.subgraphs,
-        tree_digest=ready.tree_digest if asked.subgraphs or asked.tree_digest else None,
-    )
-    targets = () if cleared.own else (asked.engine,)
-    graph = GraphOutline(ready.name, ready.actions)
-    inside = tuple(each.umrf for each in ready.subgraphs)
-    order = Order(run=ready.run, graph=graph, umrf=ready.umrf, targets=targets, inside=inside)
-    return requested, order
 
 
 class StopOrder:

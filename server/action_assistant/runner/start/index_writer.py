@@ -38,7 +38,7 @@ from action_assistant.runner.robots.robot_events import (
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.sent_graphs import SentSubgraph, read_inside
 from action_assistant.runner.start.admission import decoded
-from action_assistant.runner.start.subgraph_items import of_index
+from action_assistant.runner.start.preflight import folder_state
 from action_assistant.umrf.check import blocking, check, is_final
 from action_assistant.umrf.facts import EngineFacts, facts_of
 from action_assistant.umrf.files import codec
@@ -110,7 +110,7 @@ def planned(
         _require_sound(place, graph, graphs, facts)
     digests = {each.name: each.digest for each in told}
     files = scanned(folder, graphs.keys())
-    states = {name: of_index(each, files, index, facts) for name, each in graphs.items()}
+    states = {name: folder_state(each, files, index, facts) for name, each in graphs.items()}
     _require_free(states, asked.replace, folder)
     new: list[NewFile] = []
     asked_for: list[AskedGraph] = []

@@ -4,19 +4,34 @@ The page shows the items, a start refuses by the same ones: nobody is told somet
 then happens.
 """
 
-from collections.abc import Collection, Sequence
+import os
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Final, Literal, TypeAlias
 
 import msgspec
 
 from action_assistant.errors import Conflict, Refused
-from action_assistant.runner.index_folders.comparison import FolderLook
+from action_assistant.runner.analysis.course_checks import CheckedCourses
+from action_assistant.runner.index_folders.comparison import (
+    Differing,
+    FileState,
+    FolderLook,
+    Hindered,
+    Lacking,
+    There,
+    WritableGraph,
+    held_against,
+    same_to_engine,
+)
+from action_assistant.runner.index_folders.scan import IndexedFiles, scanned, shown_path
 from action_assistant.runner.links.observations import Snapshot, failed_in
 from action_assistant.runner.links.port import Answer, Standing
 from action_assistant.runner.robots.engine import EngineIndex, foreign_graphs
 from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runs.sent_graphs import graphs_in
 from action_assistant.runner.start.admission import Admitted, Prepared
+from action_assistant.runner.start.built_libraries import older_libraries
 from action_assistant.safe_text import hold_names
 from action_assistant.umrf.check import check, is_final
 from action_assistant.umrf.codes import QUIET
@@ -33,6 +48,7 @@ _OF_INDEX: Final = frozenset(
 #: Those that no index makes better: the engine refuses the graph whatever a person says.
 _REFUSED: Final = frozenset({"recursion", "subgraph-twice"})
 _SHOWN: Final = 20
+_NAMED: Final = 3  # names in one sentence
 
 
 class Item(msgspec.Struct, frozen=True, kw_only=True):
@@ -90,7 +106,7 @@ class EngineView(msgspec.Struct, frozen=True, kw_only=True):
     index_folder: Path | None = None
 
 
-def summed(engine: str, items: Sequence[Item], digest: str = "", tree: str = "") -> Preflight:
+def with_verdict(engine: str, items: Sequence[Item], digest: str = "", tree: str = "") -> Preflight:
     """The items of one engine with what follows from them."""
     blocked = [item for item in items if item.verdict == "blocked"]
     codes = sorted({code for item in blocked if item.overridable for code in item.codes})
@@ -103,7 +119,7 @@ def with_items(look: Preflight, more: Sequence[Item]) -> Preflight:
     return msgspec.structs.replace(look, items=(*look.items, *more))
 
 
-def of_refusal(code: str, refused: Refused) -> Item:
+def refusal_item(code: str, refused: Refused) -> Item:
     """A refusal as an item. Problems that a person may answer for stay so."""
     where = refused.where or {}
     found = where.get("problems")
@@ -119,7 +135,7 @@ def of_refusal(code: str, refused: Refused) -> Item:
     )
 
 
-def of_graph(admitted: Admitted | Prepared) -> Item:
+def graph_item(admitted: Admitted | Prepared) -> Item:
     """The graph has been admitted; what warns does not stand in the way."""
     warned = tuple(each for each in admitted.problems if each.severity == "warning")[:_SHOWN]
     over = tuple(each for each in admitted.problems if each.severity == "error")[:_SHOWN]
@@ -136,7 +152,7 @@ def of_graph(admitted: Admitted | Prepared) -> Item:
     return Item(code="graph", verdict="passed", text="No hazard is known.")
 
 
-def of_taken(
+def free_item(
     engine: str,
     other: Run | None,
     graph_name: str = "",
@@ -175,7 +191,7 @@ def _is_only_loading(run: Run) -> bool:
     return bool(run.loading) and is_known and not run.active
 
 
-def of_answer(view: EngineView) -> Item:
+def answer_item(view: EngineView) -> Item:
     """It has answered a get sent now."""
     return Item(
         code="answers",
@@ -184,16 +200,16 @@ def of_answer(view: EngineView) -> Item:
     )
 
 
-def of_silence(engine: str, why: str) -> Item:
+def silence_item(engine: str, why: str) -> Item:
     """It has not."""
     text = f"{engine} does not answer, so a stop could not be confirmed either. Nothing was sent. {why}"
     return Item(code="answers", verdict="blocked", text=text.rstrip())
 
 
-def of_robot(view: EngineView, graph: Graph) -> tuple[Item, ...]:
+def robot_items(view: EngineView, graph: Graph) -> tuple[Item, ...]:
     """All that an answering robot is looked at for."""
     return (
-        of_answer(view),
+        answer_item(view),
         _proof(view),
         _actions(view, graph),
         _again(view, graph),
@@ -204,10 +220,10 @@ def of_robot(view: EngineView, graph: Graph) -> tuple[Item, ...]:
     )
 
 
-def check_items(items: Sequence[Item], overridden: Collection[str]) -> None:
+def require_clear(items: Sequence[Item], overridden: Collection[str]) -> None:
     """Refuse a start that an item stands in the way of. Raises Conflict."""
     for item in items:
-        if not stands_in_the_way(item, overridden):
+        if not is_blocking(item, overridden):
             continue
         rule = " A person may override this with a reason." if item.overridable else ""
         raise Conflict(
@@ -216,7 +232,7 @@ def check_items(items: Sequence[Item], overridden: Collection[str]) -> None:
         )
 
 
-def stands_in_the_way(item: Item, overridden: Collection[str]) -> bool:
+def is_blocking(item: Item, overridden: Collection[str]) -> bool:
     """Return whether an item blocks a start that somebody answers for with these codes."""
     is_answered = item.overridable and set(item.codes) <= set(overridden)
     return item.verdict == "blocked" and not is_answered
@@ -408,6 +424,154 @@ def _actors(view: EngineView, graph: Graph) -> Item:
         "synchronise with others: it refuses the graph."
     )
     return Item(code="actors", verdict="blocked", text=text, codes=("actors",), overridable=True)
+
+
+def subgraph_items(view: EngineView, pinned: Mapping[str, Graph]) -> tuple[Item, ...]:
+    """Whether it has indexed the graphs that were sent along; nothing where there are none. Pure."""
+    if not pinned:
+        return ()
+    index = view.index
+    if not index.actions and not index.graphs:
+        text = (
+            f"{view.name} names no graphs, so whether it runs {_listed(sorted(pinned))} as this version "
+            "has it cannot be said."
+        )
+        return (Item(code="subgraphs", verdict="warned", text=text),)
+    lacking, other = differing_subgraphs(view, pinned)
+    if not lacking and not other:
+        text = f"{view.name} has indexed {_listed(sorted(pinned))} as this version has it."
+        return (Item(code="subgraphs", verdict="passed", text=text),)
+    told: list[str] = []
+    if lacking:
+        told.append(f"{view.name} has not indexed {_listed(lacking)}, and so refuses the graph.")
+    if other:
+        told.append(
+            f"{view.name} has indexed {_listed(other)} otherwise than this version has it, and would "
+            "run what it has."
+        )
+    codes = (*(["subgraph-differs"] if other else []), *(["unknown-action"] if lacking else []))
+    item = Item(
+        code="subgraphs", verdict="blocked", text=" ".join(told), codes=codes, overridable=True
+    )
+    return (item,)
+
+
+def differing_subgraphs(
+    view: EngineView, pinned: Mapping[str, Graph]
+) -> tuple[list[str], list[str]]:
+    """The names of graphs that the engine has not indexed, and of those that it has otherwise."""
+    index = view.index
+    lacking = [each for each in sorted(pinned) if not _is_known(each, index)]
+    other = [
+        name
+        for name, graph in sorted(pinned.items())
+        if _is_known(name, index) and not _is_same(name, graph, index, view.facts)
+    ]
+    return lacking, other
+
+
+def folder_state(
+    graph: Graph, files: IndexedFiles, index: EngineIndex, facts: EngineFacts
+) -> FileState:
+    """How a graph is in the folder of an engine that has named this index."""
+    return held_against(graph, files, facts, actions=index.actions, graphs=index.graphs)
+
+
+def _is_known(name: str, index: EngineIndex) -> bool:
+    return name in index.graphs or name in index.actions
+
+
+def _is_same(name: str, graph: Graph, index: EngineIndex, facts: EngineFacts) -> bool:
+    """Whether the engine would run just this; an action of that name comes before a graph."""
+    if name in index.actions:
+        return False
+    return same_to_engine(graph, index.graphs[name], facts)
+
+
+def engine_items(view: EngineView, ready: Prepared, prefixes: Sequence[Path]) -> tuple[Item, ...]:
+    """Every item of this start. `prefixes`: of the workspace that is sourced here."""
+    graph, pinned = codec.read(ready.umrf).graph, graphs_in(ready.subgraphs)
+    return (
+        *robot_items(view, graph),
+        *_built(view, graph, prefixes),
+        *(_with_folder(each, view, pinned) for each in subgraph_items(view, pinned)),
+    )
+
+
+def _built(view: EngineView, graph: Graph, prefixes: Sequence[Path]) -> tuple[Item, ...]:
+    """No library of its actions is older than its source, as far as this computer has the workspace."""
+    older = older_libraries(graph, prefixes)
+    if not older:
+        return ()
+    first = older[0]
+    more = f" (and {len(older) - 1} more)" if len(older) > 1 else ""
+    text = (
+        f"{first.library.name} in the workspace that is sourced here is older than "
+        f"{first.source.name}{more}: {view.name} would run {first.action} as it was before. Call "
+        "`colcon build` and restart its engine."
+    )
+    codes = ("older-library",)
+    return (Item(code="built", verdict="blocked", text=text, codes=codes, overridable=True),)
+
+
+def _with_folder(item: Item, view: EngineView, pinned: Mapping[str, Graph]) -> Item:
+    """The item with what could be done about it where the runner has the folder itself."""
+    if item.verdict != "blocked" or view.index_folder is None:
+        return item
+    folder = view.index_folder
+    lacking, other = differing_subgraphs(view, pinned)
+    files = scanned(folder, pinned.keys())
+    writable: list[WritableGraph] = []
+    waiting: list[str] = []
+    hindered: dict[str, str] = {}
+    for name in sorted(pinned):  # all of them are written or none
+        match folder_state(pinned[name], files, view.index, view.facts):
+            case There():
+                waiting += [name] if name in lacking or name in other else []
+            case Lacking():
+                writable.append(WritableGraph(name))
+            case Differing(file):
+                writable.append(WritableGraph(name, file.shown))
+            case Hindered(why):
+                hindered[name] = why
+    if writable and not os.access(folder, os.W_OK | os.X_OK):
+        why = f"The runner may not write into {shown_path(str(folder))}."
+        hindered |= {each.graph: why for each in writable}
+        writable = []
+    look = FolderLook(
+        path=shown_path(str(folder)),
+        writable=tuple(writable),
+        waiting=tuple(waiting),
+        hindered=hindered,
+    )
+    return msgspec.structs.replace(item, folder=look)
+
+
+def course_items(found: CheckedCourses) -> tuple[Item, ...]:
+    """Whether the graph goes as it is expected to; nothing where nothing is expected."""
+    courses = found.courses
+    if not courses:
+        return ()
+    other = [each for each in courses if each.same is False]
+    unknown = sum(each.same is None for each in courses)
+    if not other and not unknown:
+        text = f"It goes as expected: {_count(len(courses), 'expected course')}."
+        return (Item(code="courses", verdict="passed", text=text),)
+    told = [f"{each.name}: {each.why}" for each in other[:_NAMED]]
+    if len(other) > _NAMED:
+        told.append(f"{len(other) - _NAMED} more go another way.")
+    if unknown:
+        told.append(f"{_count(unknown, 'expected course')} could not be looked at in time.")
+    if other:
+        of = _count(len(courses), "expected course")
+        told.insert(0, f"It does not go as expected, in {len(other)} of {of}.")
+    return (Item(code="courses", verdict="warned", text=" ".join(told)),)
+
+
+def unknown_courses_item(why: str) -> Item:
+    """Whether it goes as expected is not known."""
+    text = f"Whether it goes as expected is not known. {why}"
+    return Item(code="courses", verdict="warned", text=text)
 
 
 def _count(number: int, what: str) -> str:

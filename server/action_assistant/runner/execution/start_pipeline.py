@@ -1,0 +1,517 @@
+"""A start as one pipeline: claim, read, check, ask the engine, decide, store, hand over.
+
+Each stage takes the values of the stages before it and returns the next one:
+
+    claim            StartRequest            the run that this request has become, if any
+    read             StartRequest            Prepared: the graph as it will be sent
+    check            Prepared                approval, free robot; refuses
+    ask the engine   KnownEngine             EngineView: the answer to a get that was sent now
+    decide           Prepared, EngineView    AcceptedStart; refuses
+    store            AcceptedStart           Run: `run.requested.v1` is in the journal
+    hand over        Run, Order              OpenRun, which sends one start message
+
+A start happens at most once: it is never retried and never queued. A refusal before `store` leaves
+nothing behind, and a start that cannot be stored is not sent.
+"""
+
+import os
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from contextlib import AsyncExitStack
+from functools import partial
+from pathlib import Path
+from typing import Final, TypeAlias
+
+import anyio
+import msgspec
+
+from action_assistant.errors import BadInput, Conflict, Refused, Unavailable
+from action_assistant.random_ids import random_id
+from action_assistant.ros_workspace import Workspace
+from action_assistant.runner.analysis.course_checks import CheckedCourses
+from action_assistant.runner.clock import ClockUs
+from action_assistant.runner.execution.open_runs import OpenRuns
+from action_assistant.runner.links.behaviours.folder import BehaviourFolder
+from action_assistant.runner.links.port import (
+    SIMULATOR,
+    Answer,
+    GraphOutline,
+    Link,
+    NoAnswer,
+    Order,
+)
+from action_assistant.runner.links.simulator import Simulator
+from action_assistant.runner.robots.engine import KnownEngine
+from action_assistant.runner.robots.registry import Robots
+from action_assistant.runner.runs.events import Author, Overridden, Requested
+from action_assistant.runner.runs.history import RunnerJournal
+from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runs.sent_graphs import SentSubgraph
+from action_assistant.runner.start import preflight
+from action_assistant.runner.start.admission import (
+    GroupRequest,
+    Prepared,
+    StartRequest,
+    prepared,
+)
+from action_assistant.runner.start.approvals import Approvals
+from action_assistant.runner.start.idempotency import IdempotentStarts, StopOrder
+from action_assistant.runner.start.preflight import EngineView, Item, Preflight
+from action_assistant.umrf.facts import SIMULATED, EngineFacts, facts_of
+from action_assistant.web.auth.caller import BackgroundTasks
+from action_assistant.web.workers.lanes import RunInWorker
+
+#: Facts of the simulator when it plays no robot: there a paused run can be stopped.
+_SIMULATOR_FACTS: Final = msgspec.structs.replace(SIMULATED, pauses_safely=True)
+_GET_S: Final = 2.0
+_COURSES_S: Final = 5.0  # a pre-flight waits at most so long for expected courses
+_MOST_OVERRIDDEN: Final = 40  # overridden problems that are stored with a run
+
+#: Checks the expected courses of a graph, by its id, against a text of it and the graphs inside.
+CoursesOf: TypeAlias = Callable[[str, bytes, Sequence[SentSubgraph]], Awaitable[CheckedCourses]]
+
+
+class StartSources(msgspec.Struct, frozen=True):
+    """Where starts find what robots do not tell: the folder of Python `behaviours`, the check of expected
+    `courses`, and the folders that robots index, by the names of the robots."""
+
+    behaviours: BehaviourFolder | None = None
+    courses: CoursesOf | None = None
+    index_folders: Mapping[str, Path] = {}
+
+
+NO_SOURCES: Final = StartSources()
+
+
+class AcceptedStart(msgspec.Struct, frozen=True, kw_only=True):
+    """A start that nothing stands in the way of. It goes over `link`, which the run owns when it is
+    simulated, to the life `incarnation` of the engine. `despite`: problems that a person overrides."""
+
+    request: StartRequest
+    prepared: Prepared
+    link: Link
+    is_simulated: bool
+    incarnation: str
+    despite: tuple[Overridden, ...] = ()
+
+    @property
+    def overridden(self) -> tuple[str, ...]:
+        """The codes of problems that the starter overrides."""
+        return self.request.override.codes if self.request.override else ()
+
+
+class Started(msgspec.Struct, frozen=True):
+    """The answer to a start. `fresh` is false when the request had been carried out before."""
+
+    run: Run
+    fresh: bool
+
+
+class Grouped(msgspec.Struct, frozen=True):
+    """The answer to the start of a group. `failed`: the engines that nothing was sent to, and why."""
+
+    group: str
+    runs: list[Run]
+    failed: dict[str, str]
+    fresh: bool
+
+
+class StartPipeline:
+    """Carries out starts and pre-flights. `stops` tells which Stops were pressed since a start was
+    asked for; `turns` of robots are shared with whatever must not happen during a start."""
+
+    def __init__(
+        self,
+        runs: OpenRuns,
+        robots: Robots,
+        journal: RunnerJournal,
+        *,
+        approvals: Approvals,
+        stops: StopOrder,
+        clock_us: ClockUs,
+        tasks: BackgroundTasks,
+        run_in_worker: RunInWorker,
+        simulator: Simulator,
+        sources: StartSources,
+    ) -> None:
+        self._runs = runs
+        self._robots = robots
+        self._approvals = approvals
+        self._stops = stops
+        self._clock_us = clock_us
+        self._run_in_worker = run_in_worker
+        self._simulator = simulator
+        self._sources = sources
+        self._claims = IdempotentStarts(journal, tasks, clock_us)
+        self._turns: dict[str, anyio.Lock] = {}
+        self._prefixes = Workspace.of(os.environ).prefixes
+
+    async def start(self, request: StartRequest, author: Author) -> Started:
+        """Carry out a start, at most once per request. Returns after the one message has left. Raises
+        Refused of many kinds; then nothing was sent."""
+        stops = self._stops.count
+        async with self._claims.once(request.request_id):
+            known = await self._known(request)
+            if known is not None:
+                return Started(known, fresh=False)
+            async with AsyncExitStack() as turns:
+                if request.engine != SIMULATOR:
+                    await turns.enter_async_context(self.turn(request.engine))
+                accepted = await self._accept(request, author.id)
+                run = await self._store_and_hand_over(accepted, author, stops)
+            return Started(run, fresh=True)
+
+    async def start_group(self, group: GroupRequest, author: Author) -> Grouped:
+        """Start one version on several robots: each start is accepted before the first message leaves.
+        Raises Refused; then nothing was sent to any of them."""
+        stops = self._stops.count
+        requests = [group.for_engine(engine) for engine in sorted(group.engines)]
+        if not group.request_id or SIMULATOR in group.engines:
+            where = "/engines" if group.request_id else "/request_id"
+            raise BadInput("A group has a request_id, and robots only.", where={"path": where})
+        async with self._claims.once(group.request_id):
+            found = [await self._known(each) for each in requests]
+            if known := [run for run in found if run is not None]:
+                missing = [
+                    each.engine for each, run in zip(requests, found, strict=True) if not run
+                ]
+                failed = dict.fromkeys(missing, "It was not started with the others.")
+                return Grouped(known[0].group or "", known, failed, fresh=False)
+            async with AsyncExitStack() as turns:
+                for each in requests:  # in the order of their names, so that no two groups wait
+                    await turns.enter_async_context(self.turn(each.engine))
+                accepted = await self._accept_all(requests, author.id)
+                return await self._hand_over_group(accepted, author, stops)
+
+    async def look(self, group: GroupRequest, starter: str) -> list[Preflight]:
+        """Return the pre-flight of a start by this person on each engine. Never raises Refused; nothing
+        is stored, and nothing but a get is sent."""
+        found: dict[str, Preflight] = {}
+        courses: list[Item] = []
+
+        async def look(engine: str) -> None:
+            found[engine] = await self._look(group.for_engine(engine), starter)
+
+        async def check_courses() -> None:
+            courses.extend(await self._course_items(group))
+
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(check_courses)
+            for engine in group.engines:
+                tasks.start_soon(look, engine)
+        return [preflight.with_items(found[engine], courses) for engine in group.engines]
+
+    # --- claim --------------------------------------------------------------------------------
+
+    def turn(self, engine: str) -> anyio.Lock:
+        """Return the lock of a robot: one start at a time, and none while it is registered anew."""
+        return self._turns.setdefault(engine, anyio.Lock())
+
+    def is_under_way(self, request_id: str) -> bool:
+        """Return whether this start, or start of a group, is being carried out at this moment."""
+        return self._claims.under_way(request_id)
+
+    async def _known(self, request: StartRequest) -> Run | None:
+        """Return the run that this request has become already. Raises Conflict for another start."""
+        run = await self._claims.run_of(request)
+        return None if run is None else await self._runs.find(run)
+
+    # --- read, check, ask the engine, decide ----------------------------------------------------
+
+    async def _accept(self, request: StartRequest, starter: str) -> AcceptedStart:
+        """Take a request through the stages that may refuse it. Raises Refused of many kinds."""
+        if request.engine == SIMULATOR:
+            return await self._accept_simulation(request)
+        robot = self._robots.reachable(request.engine)
+        if request.like is not None:
+            raise BadInput("Only the simulator plays a robot.", where={"path": "/like"})
+        if request.behaviours:
+            raise BadInput("Only the simulator runs behaviours.", where={"path": "/behaviours"})
+        ready = await self._run_in_worker(prepared, request, robot.facts, random_id())
+        await self._check(request, ready, robot, starter)
+        try:
+            view = await self._ask(robot)
+        except NoAnswer as nothing:
+            silence = preflight.silence_item(request.engine, str(nothing))
+            raise Unavailable(silence.text, where={"path": "/engine", "item": "answers"}) from (
+                nothing
+            )
+        return await self._decide(request, ready, robot, view)
+
+    async def _accept_all(
+        self, requests: Sequence[StartRequest], starter: str
+    ) -> list[AcceptedStart]:
+        """Accept the starts on several engines side by side. Raises Conflict, with all reasons, when one
+        of them is refused."""
+        accepted: dict[str, AcceptedStart] = {}
+        refused: dict[str, Refused] = {}
+
+        async def accept(each: StartRequest) -> None:
+            try:
+                accepted[each.engine] = await self._accept(each, starter)
+            except Refused as why:
+                refused[each.engine] = why
+
+        async with anyio.create_task_group() as tasks:
+            for each in requests:
+                tasks.start_soon(accept, each)
+        if refused:
+            reasons = " ".join(f"{name}: {why.detail}" for name, why in sorted(refused.items()))
+            engines = {name: why.where or {} for name, why in refused.items()}
+            raise Conflict(
+                f"Nothing was started. {reasons}", where={"path": "/engines", "engines": engines}
+            )
+        return [accepted[each.engine] for each in requests]
+
+    async def _accept_simulation(self, request: StartRequest) -> AcceptedStart:
+        facts = self._simulated_facts(request)
+        ready = await self._run_in_worker(prepared, request, facts, random_id())
+        behaviours = await self._behaviours_for(ready) if request.behaviours else None
+        link = self._simulator(facts, ready.script, self._clock_us, behaviours)
+        return AcceptedStart(
+            request=request,
+            prepared=ready,
+            link=link,
+            is_simulated=True,
+            incarnation=link.standing.incarnation,
+            despite=_overridden(ready, ()),
+        )
+
+    async def _check(
+        self, request: StartRequest, ready: Prepared, robot: KnownEngine, starter: str
+    ) -> None:
+        """Refuse what can be refused before the engine is asked. Raises Conflict."""
+        await self._approvals.require(robot.registration, ready.tree_digest, starter)
+        overridden = request.override.codes if request.override else ()
+        preflight.require_clear([self._free_item(request.engine, ready.name)], overridden)
+        if self._robots.foreign_stops.going(request.engine):
+            raise Conflict(
+                f"Something is being stopped on {request.engine}; a start would be stopped with it.",
+                where={"path": "/engine", "item": "quiet"},
+            )
+
+    async def _ask(self, robot: KnownEngine) -> EngineView:
+        """Ask an engine with a get that is sent now, on the path that would confirm a Stop, after it has
+        read what was just written for it. Raises NoAnswer."""
+        await robot.indexed()
+        name, began = robot.registration.name, anyio.current_time()
+        open_runs = frozenset(self._runs.on(name))  # before the get: a run may move again meanwhile
+        answer: Answer
+        try:
+            with anyio.fail_after(_GET_S):
+                answer = await robot.get()
+        except TimeoutError as late:
+            raise NoAnswer(f"Asked for {_GET_S:.0f} s. {robot.standing.why}") from late
+        took_ms = 1000 * (anyio.current_time() - began)
+        return EngineView(
+            name=name,
+            facts=robot.facts,
+            standing=robot.standing,
+            answer=answer,
+            index=await robot.index(self._run_in_worker),
+            took_ms=took_ms,
+            open_runs=open_runs,
+            settled=self._runs.settled_on(name),
+            index_folder=self._sources.index_folders.get(name),
+        )
+
+    async def _decide(
+        self, request: StartRequest, ready: Prepared, robot: KnownEngine, view: EngineView
+    ) -> AcceptedStart:
+        """Accept a start that no item stands in the way of. Raises Conflict."""
+        items = await self._run_in_worker(preflight.engine_items, view, ready, self._prefixes)
+        free = self._free_item(request.engine, ready.name)  # again: time has passed
+        accepted = AcceptedStart(
+            request=request,
+            prepared=ready,
+            link=robot,
+            is_simulated=False,
+            incarnation=view.answer.incarnation,
+            despite=_overridden(ready, (free, *items)),
+        )
+        preflight.require_clear([free], accepted.overridden)
+        preflight.require_clear(items, accepted.overridden)
+        return accepted
+
+    def _free_item(self, engine: str, graph_name: str) -> Item:
+        """Return whether another run keeps a robot from the start of a graph of this name."""
+        longest_ms = self._robots.reachable(engine).facts.longest_loading_ms
+        other = self._runs.occupying(engine, graph_name)
+        return preflight.free_item(engine, other, graph_name, longest_ms, self._clock_us())
+
+    async def _behaviours_for(self, ready: Prepared) -> BehaviourFolder:
+        """Return the folder of behaviours, after every behaviour of a graph was found to be usable.
+        Raises Conflict."""
+        where: dict[str, object] = {"path": "/behaviours"}
+        folder = self._sources.behaviours
+        if folder is None:
+            raise Conflict(
+                "This runner has no behaviours: whoever starts it names their folder.", where=where
+            )
+        own = {each.rpartition("_")[0] for each in ready.actions}
+        names = sorted(own | set(ready.inner))
+        found = await self._run_in_worker(folder.listed, names)
+        if found.problem or found.refused:
+            reasons = " ".join([found.problem, *found.refused.values()]).strip()
+            raise Conflict(f"{reasons} Nothing was started.", where=where)
+        return folder
+
+    def _simulated_facts(self, request: StartRequest) -> EngineFacts:
+        """Return the facts of the simulator, or of the robot that it plays. Raises NotFound."""
+        if request.like is None:
+            return _SIMULATOR_FACTS
+        facts = facts_of(self._robots.registration(request.like).profile)
+        return msgspec.structs.replace(facts, simulated=True)
+
+    # --- store, hand over -----------------------------------------------------------------------
+
+    async def _store_and_hand_over(
+        self, accepted: AcceptedStart, author: Author, stops: int, group: str | None = None
+    ) -> Run:
+        """Store a start, then have its run send the one message; wait until it has left. A Stop that was
+        pressed after the first `stops` ones is in force before anything is sent. Raises Conflict,
+        Unavailable; then nothing was sent."""
+        number, at = self._runs.next_number(), self._clock_us()
+        requested, order = _to_store(accepted, author, at=at, number=number, group=group)
+        engine, name = accepted.request.engine, accepted.prepared.name
+        if not accepted.is_simulated:  # a run that was over may have moved again since the check
+            preflight.require_clear([self._free_item(engine, name)], accepted.overridden)
+        with anyio.CancelScope(shield=True):
+            run = await self._claims.store(requested)
+            free = None if accepted.is_simulated else self._free_item(engine, name)
+            opened = self._runs.open(run, accepted.link, owns_link=accepted.is_simulated, seq=1)
+            if free is not None and preflight.is_blocking(free, accepted.overridden):
+                opened.end("refused", free.text)
+            if pressed := self._stops.since(stops, engine, group or ""):
+                opened.stop(*pressed)
+            self._runs.drive(opened, order, accepted.incarnation)
+        await opened.published.wait()
+        return opened.run
+
+    async def _hand_over_group(
+        self, starts: Sequence[AcceptedStart], author: Author, stops: int
+    ) -> Grouped:
+        """Store and hand over accepted starts one after the other; one that fails leaves the others."""
+        group = random_id()
+        runs: list[Run] = []
+        failed: dict[str, str] = {}
+        for each in starts:
+            try:
+                runs.append(await self._store_and_hand_over(each, author, stops, group))
+            except Refused as why:
+                failed[each.request.engine] = why.detail
+        return Grouped(group, runs, failed, fresh=True)
+
+    # --- pre-flight -----------------------------------------------------------------------------
+
+    async def _look(self, request: StartRequest, starter: str) -> Preflight:
+        """Return the items of one engine; a stage that refuses becomes an item, and the next one goes on."""
+        items: list[Item] = []
+        robot: KnownEngine | None = None
+        ready: Prepared | None = None
+        try:
+            if request.engine == SIMULATOR:
+                facts = self._simulated_facts(request)
+            else:
+                robot = self._robots.reachable(request.engine)
+                facts = robot.facts
+        except Refused as refused:
+            return preflight.with_verdict(request.engine, [preflight.refusal_item("link", refused)])
+        try:
+            ready = await self._run_in_worker(partial(prepared, approved=False), request, facts, "")
+            items.append(preflight.graph_item(ready))
+            if request.behaviours:
+                await self._behaviours_for(ready)
+        except Refused as refused:
+            items.append(preflight.refusal_item("graph", refused))
+        if robot is not None:
+            items.append(self._free_item(request.engine, ready.name if ready is not None else ""))
+            items += await self._engine_items(robot, ready)
+            items += await self._approval_items(robot, ready, starter)
+        digests = (ready.digest, ready.tree_digest) if ready is not None else ("", "")
+        return preflight.with_verdict(request.engine, items, *digests)
+
+    async def _engine_items(self, robot: KnownEngine, ready: Prepared | None) -> list[Item]:
+        try:
+            view = await self._ask(robot)
+        except NoAnswer as nothing:
+            return [preflight.silence_item(robot.registration.name, str(nothing))]
+        if ready is None:
+            return [preflight.answer_item(view)]
+        return list(await self._run_in_worker(preflight.engine_items, view, ready, self._prefixes))
+
+    async def _approval_items(
+        self, robot: KnownEngine, ready: Prepared | None, starter: str
+    ) -> list[Item]:
+        if ready is None:
+            return []
+        item = await self._approvals.item(robot.registration, ready.tree_digest, starter)
+        return [] if item is None else [item]
+
+    async def _course_items(self, group: GroupRequest) -> Sequence[Item]:
+        """Return whether the graph takes its expected courses. This warns and never blocks a start, not
+        even when it cannot be found out."""
+        if self._sources.courses is None or group.graph is None:
+            return ()
+        try:
+            with anyio.fail_after(_COURSES_S):
+                found = await self._sources.courses(group.graph, bytes(group.umrf), group.subgraphs)
+                return preflight.course_items(found)
+        except TimeoutError:
+            why = f"That takes longer than {_COURSES_S:.0f} s."
+            return (preflight.unknown_courses_item(why),)
+        except Refused as refused:
+            return (preflight.unknown_courses_item(refused.detail),)
+
+
+def _to_store(
+    accepted: AcceptedStart, author: Author, *, at: int, number: int, group: str | None
+) -> tuple[Requested, Order]:
+    """Return the event that stores a start, and the order that is handed to the link."""
+    request, ready = accepted.request, accepted.prepared
+    requested = Requested(
+        at=at,
+        run=ready.run,
+        number=number,
+        request_id=request.request_id,
+        author=author,
+        graph=ready.graph_id,
+        graph_name=ready.name,
+        version=request.version,
+        digest=ready.digest,
+        engine=request.engine,
+        simulated=accepted.is_simulated,
+        actions=ready.actions,
+        umrf=ready.umrf,
+        script=ready.script,
+        override=request.override,
+        despite=accepted.despite,
+        group=group,
+        like=request.like,
+        behaviours=request.behaviours,
+        laps=ready.laps,
+        inner_laps=ready.inner_laps,
+        subgraphs=ready.subgraphs,
+        tree_digest=ready.tree_digest if request.subgraphs or request.tree_digest else None,
+    )
+    targets = () if accepted.is_simulated else (request.engine,)
+    graph = GraphOutline(ready.name, ready.actions)
+    inside = tuple(each.umrf for each in ready.subgraphs)
+    order = Order(run=ready.run, graph=graph, umrf=ready.umrf, targets=targets, inside=inside)
+    return requested, order
+
+
+def _overridden(ready: Prepared, items: Sequence[Item]) -> tuple[Overridden, ...]:
+    """Return the problems that a person overrides: those of the graph, and those that block on the robot."""
+    problems = [each for each in ready.problems if each.severity == "error"]
+    found: list[Overridden] = []
+    for item in items:
+        if item.verdict != "blocked":
+            continue
+        problems += item.problems
+        if not item.problems:
+            found.append(Overridden(code=item.code, text=item.text))
+    found += [
+        Overridden(code=each.code, text=each.message, aid=each.where.aid, path=each.where.path)
+        for each in problems
+    ]
+    return tuple(found[:_MOST_OVERRIDDEN])
