@@ -14,6 +14,7 @@ from action_assistant.web.workers.lanes import Lane, kept_warm
 _PRELOADED: Final = (
     "action_assistant.web.workers.child_process",
     "action_assistant.editor.crdt.folding",
+    "action_assistant.editor.crdt.updates.update_pieces",
     "action_assistant.editor.interchange.importing",
     "action_assistant.editor.interchange.rehearsal",
     "action_assistant.editor.interchange.edited_text",

@@ -40,7 +40,7 @@ class GraphReader:
             return self._moments.get((graph, newest)) or await self._loaded(graph, newest)
         found = await room.look(
             lambda replica, seq: (
-                self._moments.get((graph, seq)) or GraphAtSeq(graph, seq, replica.doc.get_update())
+                self._moments.get((graph, seq)) or GraphAtSeq(graph, seq, replica.state())
             )
         )
         return self._moments.put((graph, found.seq), found)

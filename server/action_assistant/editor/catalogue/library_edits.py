@@ -230,7 +230,7 @@ class LibraryEdits:
 
 
 async def _now(room: Room, document: str) -> GraphAtSeq:
-    return await room.look(lambda replica, seq: GraphAtSeq(document, seq, replica.doc.get_update()))
+    return await room.look(lambda replica, seq: GraphAtSeq(document, seq, replica.state()))
 
 
 async def _seen(room: Room, moment: GraphMoment) -> GraphAtSeq:

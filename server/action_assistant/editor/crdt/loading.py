@@ -6,11 +6,14 @@ from typing import Final
 
 import msgspec
 
+from action_assistant.editor.crdt.applying import Panicked
 from action_assistant.editor.crdt.event_columns import EventColumns
 from action_assistant.editor.crdt.folding import Folded, StreamDamage, fold, fold_sound
 from action_assistant.editor.crdt.log_tail import LogTail
+from action_assistant.editor.crdt.messages import Malformed
 from action_assistant.editor.crdt.replica import Replica, ReplicaState
-from action_assistant.errors import Unavailable
+from action_assistant.editor.crdt.updates.update_pieces import PIECE_BYTES, pieces_of
+from action_assistant.errors import Refused, Unavailable
 from action_assistant.journal.events import StreamSnapshot
 from action_assistant.journal.journal import Journal
 from action_assistant.web.workers.lanes import Crashed, OutOfTime, RunInWorker, run_here
@@ -55,15 +58,44 @@ async def load(
     """
     learn = upto is None if learn is None else learn
     found = await stored(journal, stream, upto, learn=learn, run_in_worker=run_in_worker)
-    replica = ReplicaState.replica(found.document) if found.document else Replica()
+    replica = await _opened(found.document, run_in_worker)
     if replica is None:  # a snapshot that cannot be read, and nothing after it
         found = await _followed(
             journal, stream, None, upto, learn=learn, run_in_worker=run_in_worker
         )
-        replica = ReplicaState.replica(found.document) if found.document else Replica()
+        replica = await _opened(found.document, run_in_worker)
     if replica is None:
         raise Unavailable(f"{stream} reads otherwise each time.")
     return Loaded(replica, found.seq, found.kept, found.damaged)
+
+
+async def _opened(document: bytes, run_in_worker: RunInWorker) -> Replica | None:
+    """Make the document of a snapshot, a large one in pieces with turns of the loop between them. Return an
+    empty one where nothing was stored, and None when these bytes are no snapshot of ours."""
+    if not document:
+        return Replica()
+    kept = ReplicaState.read(document)
+    if kept is None:
+        return None
+    replica = Replica()
+    try:
+        for piece in await _pieces(kept.state, run_in_worker):
+            replica.open_piece(piece)
+            await asyncio.sleep(0)
+        replica.go_on(kept, kept.state)
+    except (Malformed, Panicked):
+        return None
+    return replica
+
+
+async def _pieces(state: bytes, run_in_worker: RunInWorker) -> list[bytes]:
+    if run_in_worker is run_here or len(state) <= PIECE_BYTES:
+        return [state]
+    try:
+        return await run_in_worker(pieces_of, state)
+    except Refused as error:
+        log.warning("a document of %d bytes is opened at once: %s", len(state), error.detail)
+        return [state]
 
 
 async def stored(

@@ -54,6 +54,7 @@ MOST_ENTRIES: Final = (
     2_000  # of an awareness message: one is the sender's own, the others are echoes
 )
 NOTHING_NEW: Final = b"\x00\x00"  # an update without structs and deletions
+NO_CLOCKS: Final = b"\x00"  # the state vector of an empty document
 
 
 class Malformed(Exception):

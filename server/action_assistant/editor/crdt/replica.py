@@ -13,7 +13,7 @@ from pycrdt import Doc
 from action_assistant.editor.crdt.applying import Panicked, apply_updates, applying
 from action_assistant.editor.crdt.document_quota import DocumentQuota
 from action_assistant.editor.crdt.event_columns import EventColumns, Told
-from action_assistant.editor.crdt.messages import NOTHING_NEW, ByteReader, Malformed
+from action_assistant.editor.crdt.messages import NO_CLOCKS, NOTHING_NEW, ByteReader, Malformed
 from action_assistant.editor.crdt.nesting import Nesting
 from action_assistant.editor.crdt.opening_time import OpeningTime
 from action_assistant.editor.crdt.sound_updates import Clients, check_nothing_is_missing, lies_deep
@@ -37,6 +37,7 @@ log: Final = logging.getLogger(__name__)
 
 WAITING_BYTES: Final = 4 << 20  # of one author, for something that may never come
 WAITING_UPDATES: Final = 256
+_KEPT_BYTES: Final = 256 * 1024
 
 
 class UpdateEffect(Enum):
@@ -73,6 +74,10 @@ class Replica:
         self._known: dict[int, int] = {}
         self._waiting: dict[bytes, tuple[UpdateOutline, str]] = {}
         self._released: list[bytes] = []
+        self._opening_s = 0.0  # processor time that applying a snapshot took
+        self._state: bytes | None = (
+            None  # the document as bytes, where it is large and they were asked for
+        )
 
     def take(
         self,
@@ -169,18 +174,36 @@ class Replica:
 
     def begin(self, kept: "ReplicaState") -> None:
         """Take up where a snapshot was made. Raises Malformed, Panicked."""
+        self.open_piece(kept.state)
+        self.go_on(kept, kept.state)
+
+    def open_piece(self, piece: bytes) -> None:
+        """Apply the next piece of the document of a snapshot. Raises Malformed, Panicked."""
         begun = time.thread_time()
-        self._apply(kept.state)
-        self.opening.opened(time.thread_time() - begun, len(kept.state))
-        self._quota.took(len(kept.state))
+        self._apply(piece)
+        self._opening_s += time.thread_time() - begun
+
+    def go_on(self, kept: "ReplicaState", state: bytes) -> None:
+        """Take up the rest of a snapshot, whose document `state` was applied in pieces. Raises Malformed."""
+        self._state = state if len(state) > _KEPT_BYTES else None
+        self.opening.opened(self._opening_s, len(state))
+        self._quota.took(len(state))
         self.owners, self.nesting = kept.owners, Nesting(kept.spans)
-        self.paired = PairedTexts(
-            paired_texts_in(kept.state) if kept.paired is None else kept.paired
-        )
+        self.paired = PairedTexts(paired_texts_in(state) if kept.paired is None else kept.paired)
         self._known = clocks(self.doc.get_state())
         self._waiting = {
             update: (stored_outline(update), author) for update, author in kept.waiting
         }
+
+    def state(self) -> bytes:
+        """Return the whole document as one update. A large one is kept until the next change, since making
+        its bytes takes 4 ms for each MB."""
+        if self._state is not None:
+            return self._state
+        state: bytes = self.doc.get_update()
+        if len(state) > _KEPT_BYTES:
+            self._state = state
+        return state
 
     def _replay_one_by_one(self, events: Iterable[Told]) -> None:
         together: list[bytes] = []
@@ -268,6 +291,7 @@ class Replica:
     def _applied(self, update: bytes, read: UpdateOutline) -> bool:
         """Apply what is ready; whether it changed anything."""
         known = self._known
+        self._state = None
         depths = self.nesting.depths(read.placed, known)
         if any(end > known.get(client, 0) for client, _, end in read.brings):
             with applying():
@@ -320,6 +344,7 @@ class Replica:
     def _apply(self, *updates: bytes) -> None:
         if not updates:
             return
+        self._state = None
         with applying():
             if len(updates) == 1:  # of a document that may be watched
                 self.doc.apply_update(updates[0])
@@ -330,6 +355,8 @@ class Replica:
         """What somebody with this state vector lacks. Raises Malformed, Panicked."""
         if ByteReader(state).number() * 2 > len(state):
             raise Malformed("more clients than bytes")
+        if state == NO_CLOCKS:
+            return self.state()
         with applying():
             return self.doc.get_update(state)
 
@@ -353,7 +380,7 @@ class ReplicaState(msgspec.Struct, frozen=True, array_like=True):
     @classmethod
     def of(cls, replica: Replica) -> bytes:
         """As bytes."""
-        state = replica.doc.get_update()
+        state = replica.state()
         spans, waiting = replica.nesting.spans, replica.held_back()
         kept = cls("with what waits", replica.owners, spans, state, waiting, replica.paired.all())
         return msgspec.msgpack.encode(kept)
@@ -361,7 +388,7 @@ class ReplicaState(msgspec.Struct, frozen=True, array_like=True):
     @classmethod
     def replica(cls, kept: bytes) -> Replica | None:
         """The document again; None when these bytes are none of ours."""
-        found = cls._read(kept)
+        found = cls.read(kept)
         if found is None:
             return None
         replica = Replica()
@@ -374,16 +401,17 @@ class ReplicaState(msgspec.Struct, frozen=True, array_like=True):
     @classmethod
     def is_form_of(cls, kept: bytes) -> bool:
         """Whether these bytes look like a snapshot of ours."""
-        return cls._read(kept) is not None
+        return cls.read(kept) is not None
 
     @classmethod
     def state_of(cls, kept: bytes) -> bytes:
         """The document alone, as one update; nothing new for what is no snapshot."""
-        found = cls._read(kept)
+        found = cls.read(kept)
         return NOTHING_NEW if found is None else found.state
 
     @classmethod
-    def _read(cls, kept: bytes) -> "ReplicaState | None":
+    def read(cls, kept: bytes) -> "ReplicaState | None":
+        """Decode a snapshot; None when these bytes are none of ours."""
         try:
             return msgspec.msgpack.decode(kept, type=cls)
         except (msgspec.DecodeError, UnicodeDecodeError):

@@ -157,7 +157,7 @@ async def tried_first(offer: Offer, replica: Replica, tried: RunInWorker) -> Upd
     small = read is not None and freed <= LARGE
     if small and not replica.opening.is_doubtful_with(len(offer.update) + freed):
         return read
-    state = replica.doc.get_update()
+    state = replica.state()
     waiting = replica.waiting if read is None else released
     found = await tried_for(offer.author, tried, state, offer.update, waiting)
     replica.opening.opened(found.opening, len(state))

@@ -80,7 +80,7 @@ class Comparisons:
         replica = await self._room.quiet()
         seq = self._room.seq
         if self._fingerprint is None or self._fingerprint[0] != seq:
-            state = replica.doc.get_update()
+            state = replica.state()
             self._fingerprint = seq, await self._run_in_worker(shown, state)
         return self._fingerprint
 

@@ -40,7 +40,7 @@ class MeasuredAhead:
 
     async def _measure(self, replica: Replica) -> None:
         begin_room_task(self._stream)
-        came, state = replica.opening.came, replica.doc.get_update()
+        came, state = replica.opening.came, replica.state()
         try:
             found = await self._run_in_worker(tried, state, NOTHING_NEW, ())
         except (Refused, Malformed, Panicked, TooSlow) as error:

@@ -38,7 +38,7 @@ def stored_outline(update: bytes) -> UpdateOutline:
 def scanned(update: bytes, *, stored: bool = False) -> UpdateOutline:
     """Read an update of any kind: `outline` without its short cut, or `stored_outline`. Raises
     Malformed."""
-    scan = _Scan(ByteReader(update), stored=stored)
+    scan = Scan(ByteReader(update), stored=stored)
     scan.whole()
     return scan.outline()
 
@@ -46,7 +46,7 @@ def scanned(update: bytes, *, stored: bool = False) -> UpdateOutline:
 def places_parted(update: bytes) -> list[tuple[int, int]]:
     """The clocks of clients before which applying an update parts a text, if there is one. Raises
     Malformed."""
-    scan = _Scan(ByteReader(update), stored=True)
+    scan = Scan(ByteReader(update), stored=True)
     scan.whole()
     return scan.parted
 
@@ -54,7 +54,7 @@ def places_parted(update: bytes) -> list[tuple[int, int]]:
 def cut_items(update: bytes, known: Mapping[int, int]) -> list[int]:
     """The clients of which the first part of an item is known, where there are so many clocks of each.
     Raises Malformed."""
-    scan = _Scan(ByteReader(update), stored=True)
+    scan = Scan(ByteReader(update), stored=True)
     scan.whole()
     return [c for c, start, end in scan.items if start < known.get(c, 0) < end]
 
@@ -68,7 +68,7 @@ _FIELD: Final = "field"
 _ACTION: Final = "action"
 
 
-class _Scan:
+class Scan:
     """What was read so far."""
 
     def __init__(self, reader: ByteReader, *, stored: bool) -> None:

@@ -1,0 +1,127 @@
+"""Splits one large update into small ones that can be applied one after the other. For workers.
+
+The CRDT library applies an update in one call that holds the interpreter, 45 ms for each MB. Between two small ones
+the event loop does something else. Yjs update format, version 1: the bytes of a struct say the same in any update.
+"""
+
+from collections.abc import Iterator
+from typing import Final
+
+from action_assistant.editor.crdt.messages import ByteReader, Malformed, number
+from action_assistant.editor.crdt.updates.update_scan import Scan
+
+PIECE_BYTES: Final = 256 * 1024
+_SKIP: Final = 10
+
+
+class _Structs:
+    """The structs of one client: `ends` in clocks, `offsets` in bytes, and the clocks that each builds on."""
+
+    def __init__(self, start: int, offset: int) -> None:
+        self.ends: Final = [start]
+        self.offsets: Final = [offset]
+        self.needs: Final[list[tuple[tuple[int, int], ...]]] = []
+        self.given = 0  # how many of them are in the pieces so far
+
+    @property
+    def reached(self) -> int:
+        """The clock up to which the pieces so far go."""
+        return self.ends[self.given]
+
+
+class _Splitter(Scan):
+    """Notes where each struct of an update lies, and what it builds on. Raises Malformed for one with gaps."""
+
+    def __init__(self, update: bytes) -> None:
+        self._bytes_reader = ByteReader(update)
+        super().__init__(self._bytes_reader, stored=True)
+        self._size = len(update)
+        self.of: Final[dict[int, _Structs]] = {}
+        self.deletions = 0  # the offset of the deletions
+
+    def _client_structs(self) -> None:
+        reader = self._bytes_reader
+        count, client, clock = reader.number(), reader.number(), reader.number()
+        structs = self.of[client] = _Structs(clock, self._offset)
+        for _ in range(count):
+            info = reader.byte()
+            if info & 31 == _SKIP:
+                raise Malformed("an update with a gap")
+            needs: dict[int, int] = {}
+            size, _, _ = self._struct(info, needs)
+            structs.ends.append(structs.ends[-1] + size)
+            structs.offsets.append(self._offset)
+            structs.needs.append(tuple(needs.items()))
+
+    def _deletions(self) -> None:
+        self.deletions = self._offset
+        super()._deletions()
+
+    @property
+    def _offset(self) -> int:
+        return self._size - self._bytes_reader.left
+
+
+def pieces_of(update: bytes, size: int = PIECE_BYTES) -> list[bytes]:
+    """Return updates of about `size` bytes that bring the same, each built on those before it only. An update
+    that is small, or that cannot be split, is returned as it is."""
+    if len(update) <= size:
+        return [update]
+    try:
+        found = _Splitter(update)
+        found.whole()
+        pieces = list(_packed(update, found.of, size))
+    except Malformed:
+        return [update]
+    return [*pieces, b"\0" + update[found.deletions :]]
+
+
+def _packed(update: bytes, of: dict[int, _Structs], size: int) -> Iterator[bytes]:
+    """Yield pieces, each with a run of structs of every client that it brings something of."""
+    begun: dict[int, int] = {}  # the first struct of each client in this piece
+    held = 0
+    for client in _in_order(of):
+        structs = of[client]
+        last = structs.given - 1
+        begun.setdefault(client, last)
+        held += structs.offsets[last + 1] - structs.offsets[last]
+        if held >= size:
+            yield _piece(update, of, begun)
+            begun, held = {}, 0
+    if begun:
+        yield _piece(update, of, begun)
+
+
+def _in_order(of: dict[int, _Structs]) -> Iterator[int]:
+    """Give out every struct after those that it builds on: yield its client. Raises Malformed for a circle."""
+    for first in of:
+        wanted = [(first, of[first].ends[-1])]  # clients, each up to a clock; the last one first
+        while wanted:
+            client, upto = wanted[-1]
+            structs = of[client]
+            if structs.reached >= upto:
+                wanted.pop()
+            elif (missing := _missing(of, client, structs)) is None:
+                structs.given += 1
+                yield client
+            elif missing in wanted:
+                raise Malformed("structs that build on each other")
+            else:
+                wanted.append(missing)
+
+
+def _missing(of: dict[int, _Structs], client: int, structs: _Structs) -> tuple[int, int] | None:
+    """Return what has to come before the next of these structs, as a client and a clock; None where all is there."""
+    for other, clock in structs.needs[structs.given]:
+        if other != client and other in of and of[other].reached < clock <= of[other].ends[-1]:
+            return other, clock
+    return None
+
+
+def _piece(update: bytes, of: dict[int, _Structs], begun: dict[int, int]) -> bytes:
+    parts = [number(len(begun))]
+    for client, first in begun.items():
+        structs = of[client]
+        parts += [number(structs.given - first), number(client), number(structs.ends[first])]
+        parts.append(update[structs.offsets[first] : structs.offsets[structs.given]])
+    return b"".join((*parts, b"\0"))
