@@ -8,7 +8,7 @@ import { newestRun, openRuns } from "../api/live/open-runs";
 import { useLive } from "../api/live/use-live";
 import { type Run, useLastRun } from "../api/runs";
 import { useMay, usePerson } from "../api/use-person";
-import { levelsOf } from "../canvas/levels/level-path";
+import { levelsOf } from "../canvas/level-path";
 import { serverNow } from "../clock/server-clock";
 import { useSeed } from "../editor/dry-run/use-seed";
 import { Editor, type Shown } from "../editor/editor";

@@ -20,16 +20,14 @@ import {
   useOpenThreadCount,
 } from "./card-highlights";
 import { CardLines } from "./card-lines";
-import { useChangeMark } from "./changes/change-marks";
-import { ChangeTag } from "./changes/change-tag";
-import { SinceSpot } from "./changes/since-marks";
 import type { CardNode } from "./elements";
 import { CARD_LINES, cardSize } from "./geometry/arrange";
-import { useExpandedCard } from "./levels/expanded-graphs";
-import { InsideSpot } from "./levels/graphs-inside";
+import { InsideSpot, useExpandedCard } from "./graphs-inside";
+import { ChangeTag, useChangeMark } from "./marks/change-marks";
+import { ProblemBadge } from "./marks/problem-marks";
+import { SinceSpot } from "./marks/since-marks";
 import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "./outcome";
-import { ProblemBadge } from "./problem-badge";
-import { STATE_LETTER } from "./zoom/detail";
+import { STATE_LETTER } from "./zoom-detail";
 
 /** What it says of a run. */
 export function CardState({ progress }: { progress: Progress }) {

@@ -23,9 +23,9 @@ import { type Bundle, bundlesOf, pillSizeOf } from "./arrows/bundles";
 import { gridOffset, type Scene, type SceneCard } from "./arrows/scene";
 import { expectedCard, expectedEnd } from "./card-handles";
 import { cardSize, type Positions, pillSize, type Sizes } from "./geometry/arrange";
+import { type ProblemMark, type ProblemMarks, problemMarkWords } from "./marks/problem-marks";
 import { type FoldedNode, type NoteNode, noteNodes } from "./notes/note-nodes";
 import { OUTCOMES, outcomeWord } from "./outcome";
-import { type ProblemMark, type ProblemMarks, problemMarkWords } from "./problem-marks";
 
 export type CardNode = Node<
   {

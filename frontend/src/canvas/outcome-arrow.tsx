@@ -7,17 +7,16 @@ import { pillWord } from "./arrows/bundles";
 import { PILL_PLAY } from "./arrows/docks";
 import { behindPill, pathOf } from "./arrows/line-path";
 import { LineEditingContext, useIsOpen, useLine } from "./arrows/line-store";
-import type { DraggedOutcome } from "./arrows/outcome-drag";
 import type { Point } from "./arrows/scene";
 import type { RoutedLine } from "./arrows/simple-lines";
 import { useUntakenOutcomes } from "./card-highlights";
-import { useChangeMark } from "./changes/change-marks";
-import { ChangeSign } from "./changes/change-tag";
-import { SinceSpot } from "./changes/since-marks";
 import type { Arrow } from "./elements";
+import { ChangeSign, useChangeMark } from "./marks/change-marks";
+import { ProblemBadge } from "./marks/problem-marks";
+import { SinceSpot } from "./marks/since-marks";
 import { type Outcome, OutcomeSign, outcomeColor } from "./outcome";
 import style from "./outcome-arrow.module.css";
-import { ProblemBadge } from "./problem-badge";
+import type { DraggedOutcome } from "./outcome-handles";
 
 const OutcomeHandles = lazyPart(() =>
   import("./outcome-handles").then((part) => part.OutcomeHandles),

@@ -1,9 +1,71 @@
-/** Handles of the outcomes of a chosen arrow, on its pill: each can be led to another card. */
-
+/** Handles of the outcomes on the pill of a selected arrow; each outcome can be dragged to another card. */
+import { useReactFlow } from "@xyflow/react";
+import { type PointerEvent, useEffect, useRef, useState } from "react";
+import type { Precondition } from "../graph/model";
 import { keyOf } from "../ui/keys";
-import { useOutcomeDrag } from "./arrows/outcome-drag";
+import type { Bundle } from "./arrows/bundles";
+import type { LineEditing } from "./arrows/line-store";
+import type { Point } from "./arrows/scene";
 import { OutcomeSign, outcomeColor, outcomeWord } from "./outcome";
 import style from "./outcome-arrow.module.css";
+
+const STILL = 3; // px on the screen that a press may move
+
+/** An outcome on its way to another card. */
+export interface DraggedOutcome {
+  readonly outcome: Precondition;
+  /** On the canvas. */
+  readonly at: Point;
+}
+
+interface Dragging {
+  bundle: Bundle;
+  editing: LineEditing;
+  onDrag: (dragged: DraggedOutcome | null) => void;
+}
+
+function useOutcomeDrag({ bundle, editing, onDrag }: Dragging) {
+  const { screenToFlowPosition } = useReactFlow();
+  const press = useRef<Point | null>(null);
+  const [dragged, setDragged] = useState<Precondition | null>(null);
+  const stop = () => {
+    press.current = null;
+    setDragged(null);
+    onDrag(null);
+  };
+  useEffect(() => {
+    if (dragged === null) return;
+    const onKey = (event: KeyboardEvent) => {
+      if (keyOf(event) !== "Escape") return;
+      event.stopPropagation();
+      stop();
+    };
+    window.addEventListener("keydown", onKey, { capture: true });
+    return () => window.removeEventListener("keydown", onKey, { capture: true });
+  });
+  return {
+    dragged,
+    stop,
+    start: (event: PointerEvent<HTMLElement>) => {
+      if (event.button !== 0) return;
+      event.currentTarget.setPointerCapture(event.pointerId);
+      press.current = [event.clientX, event.clientY];
+    },
+    move: ({ clientX: x, clientY: y }: PointerEvent, outcome: Precondition) => {
+      if (!press.current) return;
+      const [fromX, fromY] = press.current;
+      if (dragged === null && Math.hypot(x - fromX, y - fromY) <= STILL) return;
+      setDragged(outcome);
+      const at = screenToFlowPosition({ x, y }, { snapToGrid: false });
+      onDrag({ outcome, at: [at.x, at.y] });
+    },
+    drop: ({ clientX, clientY }: PointerEvent) => {
+      const outcome = dragged;
+      stop();
+      if (outcome !== null) editing.drop(bundle, outcome, [clientX, clientY]);
+    },
+  };
+}
 
 export function OutcomeHandles(props: Parameters<typeof useOutcomeDrag>[0]) {
   const { bundle, editing } = props;

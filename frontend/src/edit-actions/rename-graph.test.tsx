@@ -5,7 +5,7 @@ import { createRoot } from "react-dom/client";
 import { afterEach, expect, test, vi } from "vitest";
 import * as Y from "yjs";
 import { queryKeys } from "../api/graphs";
-import { graphsInside } from "../canvas/levels/graphs-inside";
+import { graphsInside } from "../canvas/graphs-inside";
 import { setGraphName } from "../graph/edit";
 import { graphIn } from "../testing/edited-graph";
 import type { EditorContext, Overlay } from "./editor-context";

@@ -1,8 +1,7 @@
 /** Another name for the open graph, and the question whether others that run it follow. */
 import { useSyncExternalStore } from "react";
 import { useLibrary } from "../api/documents/library";
-import { graphsInside } from "../canvas/levels/graphs-inside";
-import { usedIn } from "../canvas/levels/used-in";
+import { graphsInside, usedIn } from "../canvas/graphs-inside";
 import { setGraphName } from "../graph/edit";
 import type { EditorContext } from "./editor-context";
 

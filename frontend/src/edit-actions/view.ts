@@ -17,7 +17,7 @@ import {
   IconZoomIn,
   IconZoomOut,
 } from "@tabler/icons-react";
-import { graphsInside } from "../canvas/levels/graphs-inside";
+import { graphsInside } from "../canvas/graphs-inside";
 import { ENTRY, type Key } from "../graph/model";
 import type { EditAction } from "./edit-action";
 import { type EditorContext, selectedActions, selectedRelations } from "./editor-context";

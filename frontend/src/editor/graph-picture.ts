@@ -1,5 +1,5 @@
 /** A picture of the canvas: SVG or PNG. */
-import { svgPictureOf } from "../canvas/views/svg-picture";
+import { svgPictureOf } from "../canvas/svg-picture";
 import type { EditorContext } from "../edit-actions/editor-context";
 
 const LARGEST = 8_000; // px of a PNG's longer side; browsers refuse much more

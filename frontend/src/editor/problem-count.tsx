@@ -2,8 +2,8 @@
 import { IconAlertTriangle, IconPencil } from "@tabler/icons-react";
 import { useEffect, useMemo, useRef } from "react";
 import { useProblems } from "../api/graphs";
-import { toldOnCanvas } from "../canvas/levels/problems-inside";
-import { problemMarksOf } from "../canvas/problem-marks";
+import { toldOnCanvas } from "../canvas/graphs-inside";
+import { problemMarksOf } from "../canvas/marks/problem-marks";
 import { useEditorContext } from "../edit-actions/editor-context";
 import type { Graph } from "../graph/model";
 import { countsOf } from "../graph/problems/problem-kinds";

@@ -18,7 +18,7 @@ import {
   useSyncExternalStore,
 } from "react";
 import type { Problem } from "../api/graphs";
-import { expandedGraphs } from "../canvas/levels/expanded-graphs";
+import { expandedGraphs } from "../canvas/graphs-inside";
 import { printedKeys } from "../edit-actions/edit-action";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { Tooltip } from "../ui/floating/tooltip";

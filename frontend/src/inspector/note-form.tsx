@@ -2,9 +2,8 @@
 import { Button } from "@mantine/core";
 import { IconTrash } from "@tabler/icons-react";
 import { useRef } from "react";
-import { LinkNames } from "../canvas/notes/link-names";
-import { noteColor } from "../canvas/notes/note-colors";
-import { isMarkedUp, NoteText } from "../canvas/notes/note-text";
+import { noteColor } from "../canvas/notes/note-nodes";
+import { isMarkedUp, LinkNames, NoteText } from "../canvas/notes/note-text";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { removeNotes } from "../graph/edit";
 import { changeNote, NOTE_COLORS, type Note, type NoteColor } from "../graph/edit/notes";

@@ -3,7 +3,7 @@ import { ActionIcon, Button } from "@mantine/core";
 import { IconCircleCheck, IconLink, IconStairsDown, IconTool } from "@tabler/icons-react";
 import { useMemo } from "react";
 import type { Problems } from "../api/graphs";
-import { graphsInside } from "../canvas/levels/graphs-inside";
+import { graphsInside } from "../canvas/graphs-inside";
 import { copyLinkTo } from "../edit-actions/clipboard";
 import { type EditorContext, useEditorContext } from "../edit-actions/editor-context";
 import { linkToProblem } from "../edit-actions/graph-links";

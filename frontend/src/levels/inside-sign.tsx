@@ -1,7 +1,7 @@
 /** On the card of an action that stands for a graph: the way into it, and that graph in place. */
 import { IconArrowsDiagonal, IconStairsDown } from "@tabler/icons-react";
 import type { MouseEvent } from "react";
-import { graphsInside, type InsideSignProps } from "../canvas/levels/graphs-inside";
+import { graphsInside, type InsideSignProps } from "../canvas/graphs-inside";
 import { isolated } from "../words/isolated";
 import style from "./levels.module.css";
 

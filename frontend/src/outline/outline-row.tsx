@@ -11,7 +11,7 @@ import {
 import { memo, type ReactNode, useId, useState } from "react";
 import { checkedColor } from "../api/people";
 import { useOpenThreadCount } from "../canvas/card-highlights";
-import { noteColor } from "../canvas/notes/note-colors";
+import { noteColor } from "../canvas/notes/note-nodes";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../canvas/outcome";
 import type { Note } from "../graph/edit/notes";
 import { spokenNote } from "../graph/note-links";

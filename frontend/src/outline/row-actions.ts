@@ -1,6 +1,6 @@
 /** What can be done to a row of the outline, with its key. */
 
-import { graphsInside } from "../canvas/levels/graphs-inside";
+import { graphsInside } from "../canvas/graphs-inside";
 import type { EditorContext } from "../edit-actions/editor-context";
 import { relationId } from "../graph/document-keys";
 import {

@@ -3,7 +3,7 @@ import { Button } from "@mantine/core";
 import { IconHistory } from "@tabler/icons-react";
 import { useEffect, useLayoutEffect, useMemo, useSyncExternalStore } from "react";
 import { errorText } from "../api/http";
-import type { ChangeMarks } from "../canvas/changes/change-marks";
+import type { ChangeMarks } from "../canvas/marks/change-marks";
 import {
   type EditorContext,
   type PastPlace,

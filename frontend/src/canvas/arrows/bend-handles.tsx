@@ -1,15 +1,144 @@
-/** Handles by which the line of a chosen arrow is bent: with a mouse, a finger, or keys. */
-import { EdgeLabelRenderer, useStore } from "@xyflow/react";
-import { type KeyboardEvent, use, useContext, useEffect, useRef } from "react";
+/** Handles that bend the line of a selected arrow by mouse, touch or keys. */
+
+import { EdgeLabelRenderer, useReactFlow, useStore } from "@xyflow/react";
+import {
+  type KeyboardEvent,
+  type PointerEvent,
+  use,
+  useContext,
+  useEffect,
+  useRef,
+  useState,
+} from "react";
 import { MOST_WAYPOINTS } from "../../graph/waypoints";
 import { keyOf } from "../../ui/keys";
-import { type BendHandle, useBendDrag, withBend } from "./bend-drag";
 import style from "./bend-handles.module.css";
-import { middlesOf } from "./bend-places";
 import type { Bundle } from "./bundles";
 import { LineContext, type LineEditing, LineEditingContext } from "./line-store";
 import { type Point, STEP } from "./scene";
 import type { RoutedLine } from "./simple-lines";
+
+/** The middle of a piece; a waypoint that is made there has this place among the others. */
+interface PieceMiddle {
+  readonly index: number;
+  readonly at: Point;
+}
+
+const PILL = 24; // px of a line that its pill covers, on either side of its middle
+
+const between = (a: Point, b: Point) => Math.abs(a[0] - b[0]) + Math.abs(a[1] - b[1]);
+
+/** How far along a line its corners are. */
+function lengthsOf(points: readonly Point[]): number[] {
+  let length = 0;
+  return points.map((point, i) => {
+    length += i === 0 ? 0 : between(points[i - 1] ?? point, point);
+    return length;
+  });
+}
+
+/** How far along the line a place is, not before `from`; null where the line does not come by. */
+function placeOn(
+  points: readonly Point[],
+  lengths: readonly number[],
+  place: Point,
+  from: number,
+): number | null {
+  for (let i = 1; i < points.length; i += 1) {
+    const [a, b] = [points[i - 1] ?? place, points[i] ?? place];
+    const here = (lengths[i - 1] ?? 0) + between(a, place);
+    if (between(a, place) + between(place, b) === between(a, b) && here >= from) return here;
+  }
+  return null;
+}
+
+/** The middles of pieces between corners, waypoints and the pill that are at least so long. */
+export function middlesOf({ points, via, pill }: RoutedLine, least: number): PieceMiddle[] {
+  const lengths = lengthsOf(points);
+  const [start] = points;
+  const first = start && pill ? (placeOn(points, lengths, pill, 0) ?? -PILL) + PILL : 0;
+  let passed = first;
+  const stops = via.flatMap((place, i) => {
+    const at = placeOn(points, lengths, place, passed);
+    if (at === null) return [];
+    passed = at;
+    return [{ at, index: i + 1 }];
+  });
+  const cuts = [...new Set([first, ...lengths, ...stops.map(({ at }) => at)])]
+    .filter((at) => at >= first)
+    .sort((a, b) => a - b);
+  const pieces = cuts.slice(1).map((end, i) => ({ begin: cuts[i] ?? end, end }));
+  const longest = Math.max(...pieces.map(({ begin, end }) => end - begin));
+  // A line that nobody has bent yet can be taken somewhere, however short it is.
+  const enough = via.length > 0 ? least : Math.min(least, longest);
+  return pieces.flatMap(({ begin, end }) => {
+    if (end - begin < enough) return [];
+    const index = stops.filter(({ at }) => at <= begin).at(-1)?.index ?? 0;
+    return [{ index, at: pointAt(points, lengths, (begin + end) / 2) }];
+  });
+}
+
+function pointAt(points: readonly Point[], lengths: readonly number[], at: number): Point {
+  const i = Math.max(
+    1,
+    lengths.findIndex((length) => length >= at),
+  );
+  const [a, b] = [points[i - 1] ?? [0, 0], points[i] ?? [0, 0]];
+  const [before, after] = [lengths[i - 1] ?? 0, lengths[i] ?? 0];
+  const share = after === before ? 0 : (at - before) / (after - before);
+  return [a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share];
+}
+
+/** A waypoint, or the middle of a piece, where there can be one. */
+interface BendHandle {
+  readonly id: string;
+  readonly kind: "bend" | "middle";
+  /** Its place among the waypoints. */
+  readonly index: number;
+  readonly at: Point;
+}
+
+const STILL = 3; // px on the screen that a press may move
+
+/** The waypoints with this one at a place. */
+const withBend = (via: readonly Point[], { kind, index }: BendHandle, at: Point): Point[] => [
+  ...via.slice(0, index),
+  at,
+  ...via.slice(kind === "bend" ? index + 1 : index),
+];
+
+function useBendDrag(
+  bundle: string,
+  via: readonly Point[],
+  done: (via: Point[], handle: BendHandle) => void,
+) {
+  const lines = useContext(LineContext);
+  const { screenToFlowPosition } = useReactFlow();
+  const [dragged, setDragged] = useState<BendHandle | null>(null);
+  const press = useRef<Point | null>(null);
+  const start = (event: PointerEvent<HTMLElement>) => {
+    if (event.button !== 0) return;
+    event.currentTarget.setPointerCapture(event.pointerId);
+    press.current = [event.clientX, event.clientY];
+  };
+  const move = ({ clientX: x, clientY: y }: PointerEvent, handle: BendHandle) => {
+    if (!press.current) return;
+    const [fromX, fromY] = press.current;
+    if (dragged === null && Math.hypot(x - fromX, y - fromY) <= STILL) return;
+    const to = screenToFlowPosition({ x, y }, { snapToGrid: false });
+    const at = lines.snapped([to.x, to.y]);
+    setDragged({ ...handle, at });
+    lines.lead(bundle, withBend(via, handle, at));
+  };
+  const end = (keep: boolean) => {
+    press.current = null;
+    if (dragged === null) return;
+    setDragged(null);
+    if (keep) done(withBend(via, dragged, dragged.at), dragged);
+    lines.settle(keep);
+  };
+  return { dragged, start, move, end };
+}
 
 const WAYS: Readonly<Record<string, Point>> = {
   ArrowLeft: [-1, 0],
@@ -20,14 +149,14 @@ const WAYS: Readonly<Record<string, Point>> = {
 const FAR = 4; // steps with Shift, as of cards
 const LEAST = 48; // px on the screen of a piece that has a handle of its own
 
-interface Props {
+interface BendHandlesProps {
   /** The arrow that draws the line. */
   arrow: string;
   bundle: Bundle;
   line: RoutedLine;
 }
 
-export function BendHandles(props: Props) {
+export function BendHandles(props: BendHandlesProps) {
   const editing = use(LineEditingContext);
   return editing && <Handles {...props} editing={editing} />;
 }
@@ -60,7 +189,7 @@ function useFocusAfter(count: number, arrow: string) {
   return { buttons, wanted };
 }
 
-function Handles({ arrow, bundle, line, editing }: Props & { editing: LineEditing }) {
+function Handles({ arrow, bundle, line, editing }: BendHandlesProps & { editing: LineEditing }) {
   const lines = useContext(LineContext);
   const zoom = useStore(({ transform }) => transform[2]);
   const { buttons, wanted } = useFocusAfter(line.via.length, arrow);

@@ -13,7 +13,7 @@ import {
 import { sceneOf } from "../elements";
 import { fromUmrf } from "../from-umrf";
 import type { Positions } from "../geometry/arrange";
-import { NO_PROBLEM_MARKS } from "../problem-marks";
+import { NO_PROBLEM_MARKS } from "../marks/problem-marks";
 import { bundlesOf, pillSizeOf, pillWord } from "./bundles";
 
 const relation = (more: Partial<Relation>): Relation => ({

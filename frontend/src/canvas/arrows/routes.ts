@@ -1,8 +1,7 @@
 /** The lines of a scene: routed as a whole, or only where something has moved. Pure. */
 import { type Dock, DockPlan } from "./docks";
-import { freeCells, routeThrough } from "./legs";
 import { BLOCKED, FREE, NEAR, Raster } from "./raster";
-import { Router, straightened } from "./router";
+import { freeCells, Router, routeThrough, straightened } from "./router";
 import { BoxIndex, boxOf, type FlowBox, type Point, type Scene, STEP } from "./scene";
 import {
   arriving,

@@ -1,15 +1,15 @@
 /** A folded frame: one block with its title, how many actions it hides, and how these are. */
 import { Handle, type NodeProps, Position } from "@xyflow/react";
 import { memo, use } from "react";
-import { FoldButton, FoldFrameContext } from "../notes/fold-button";
+import { ProblemBadge } from "../marks/problem-marks";
+import { FoldButton, FoldFrameContext } from "../notes/note-buttons";
 import { NoteEditingContext, NoteField, NoteTools } from "../notes/note-card";
-import { noteColor } from "../notes/note-colors";
 import type { FoldedNode, FrameBlock } from "../notes/note-nodes";
+import { noteColor } from "../notes/note-nodes";
 import { OUTCOMES } from "../outcome";
-import { ProblemBadge } from "../problem-badge";
-import { STATE_LETTER } from "../zoom/detail";
-import { actionsWord } from "./folded-drawing";
+import { STATE_LETTER } from "../zoom-detail";
 import style from "./folded-frame.module.css";
+import { actionsWord } from "./folding";
 
 /** Arrows need something to hold on to; where they do is for the router to say. */
 function Ports({ direction }: Pick<FrameBlock, "direction">) {

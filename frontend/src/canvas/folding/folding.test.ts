@@ -11,8 +11,16 @@ import { bundlesOf } from "../arrows/bundles";
 import { edgesOf, nodesOf, sceneOf, surroundingsOf } from "../elements";
 import { positionsOf } from "../geometry/arrange";
 import { notePlaces } from "../notes/note-nodes";
-import { foldedArrows, foldedNodes, foldedScene } from "./folded-drawing";
-import { type Folding, foldingOf, hiding, isInside, statesOf } from "./folding";
+import {
+  type Folding,
+  foldedArrows,
+  foldedNodes,
+  foldedScene,
+  foldingOf,
+  hiding,
+  isInside,
+  statesOf,
+} from "./folding";
 
 const NONE = new Set<string>();
 

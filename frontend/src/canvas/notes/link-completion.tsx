@@ -4,8 +4,8 @@ import { type RefObject, use, useEffect, useId, useMemo, useRef, useState } from
 import { linkText, type OpenLink, openLink } from "../../graph/note-links";
 import { keyOf } from "../../ui/keys";
 import { matching, OptionList, optionId } from "../../ui/pick-list";
-import { NoteLinksContext } from "./action-link";
 import style from "./link-completion.module.css";
+import { NoteLinksContext } from "./note-buttons";
 
 const MOST = 50; // options
 const GAP = 4; // px

@@ -1,8 +1,8 @@
 import fc from "fast-check";
 import { renderToStaticMarkup } from "react-dom/server";
 import { expect, test } from "vitest";
-import { NoteLinksContext } from "./action-link";
 import Markdown, { safeAddress } from "./markdown";
+import { NoteLinksContext } from "./note-buttons";
 
 const shown = (text: string) =>
   renderToStaticMarkup(

@@ -8,7 +8,7 @@ import type { Nodes } from "mdast";
 import { fromMarkdown } from "mdast-util-from-markdown";
 import { type ReactNode, useMemo } from "react";
 import { linkPieces } from "../../graph/note-links";
-import { ActionLink } from "./action-link";
+import { ActionLink } from "./note-buttons";
 import style from "./note-text.module.css";
 
 /** Where a note was plain text before, spaces at the start of a line are no code. */

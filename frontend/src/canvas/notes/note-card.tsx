@@ -7,14 +7,12 @@ import { type NewNote, NOTE_COLORS, type Note } from "../../graph/edit/notes";
 import { useDraft } from "../../ui/drafts/use-draft";
 import { Tooltip } from "../../ui/floating/tooltip";
 import { keyOf } from "../../ui/keys";
-import { useChangeMark } from "../changes/change-marks";
-import { ChangeTag } from "../changes/change-tag";
-import { FoldButton } from "./fold-button";
-import { LinkNames } from "./link-names";
+import { ChangeTag, useChangeMark } from "../marks/change-marks";
+import { FoldButton } from "./note-buttons";
 import style from "./note-card.module.css";
-import { noteColor } from "./note-colors";
 import type { NoteNode } from "./note-nodes";
-import { NoteText } from "./note-text";
+import { noteColor } from "./note-nodes";
+import { LinkNames, NoteText } from "./note-text";
 
 /** How notes are changed; without one they are only shown. */
 export interface NoteEditing {

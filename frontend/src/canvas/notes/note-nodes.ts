@@ -1,11 +1,21 @@
-/** Notes and frames as nodes of the canvas. */
+/** Notes and frames as nodes of the canvas, and their colours. */
+
 import type { Node } from "@xyflow/react";
-import { type Note, notesOf } from "../../graph/edit/notes";
+import { type Note, type NoteColor, notesOf } from "../../graph/edit/notes";
 import type { Direction, Graph, Key } from "../../graph/model";
 import { spokenNote } from "../../graph/note-links";
 import type { ProblemCounts } from "../../graph/problems/problem-kinds";
 import type { Tone } from "../../status/progress";
 import type { Positions } from "../geometry/arrange";
+
+export const noteColor: Readonly<Record<NoteColor, string>> = {
+  grey: "var(--ink3)",
+  amber: "var(--false)",
+  green: "var(--true)",
+  blue: "var(--run)",
+  violet: "var(--stopped)",
+  red: "var(--error)",
+};
 
 export type NoteNode = Node<{ note: Note }, "note">;
 

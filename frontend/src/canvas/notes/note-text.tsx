@@ -1,6 +1,8 @@
-/** The text of a note: plain until the reader of Markdown is there, and wherever it is too odd for that. */
-import { lazy, Suspense } from "react";
+/** The text of a note, and the completion of links in its field; both load their larger half late. */
+import { type ComponentProps, lazy, Suspense } from "react";
 import { spokenNote } from "../../graph/note-links";
+import { lazyPart } from "../../ui/parts/lazy-part";
+import { PartBoundary } from "../../ui/parts/part-boundary";
 import style from "./note-text.module.css";
 
 const Markdown = lazy(() => import("./markdown"));
@@ -20,5 +22,18 @@ export function NoteText({ text }: { text: string }) {
     <Suspense fallback={plain}>
       <Markdown text={text} />
     </Suspense>
+  );
+}
+
+const LinkCompletion = lazyPart(() =>
+  import("./link-completion").then((part) => part.LinkCompletion),
+);
+const nothing = () => null;
+
+export function LinkNames(props: ComponentProps<typeof LinkCompletion>) {
+  return (
+    <PartBoundary frame={nothing} waiting={null}>
+      <LinkCompletion {...props} />
+    </PartBoundary>
   );
 }

@@ -1,7 +1,7 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
 import { CARD } from "../../canvas/geometry/arrange";
-import { expandedGraphs, type PartOnCard } from "../../canvas/levels/expanded-graphs";
+import { expandedGraphs, type PartOnCard } from "../../canvas/graphs-inside";
 import type { Progress } from "../../status/progress";
 import { followedBox, followingViewport, runningInside, runningKeys } from "./follow-run";
 

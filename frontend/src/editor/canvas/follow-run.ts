@@ -5,7 +5,7 @@ import { type RefObject, useCallback, useEffect, useRef, useState } from "react"
 import type { Arrow, CanvasNode } from "../../canvas/elements";
 import type { Positions, Sizes } from "../../canvas/geometry/arrange";
 import { type Bounds, boundsOf } from "../../canvas/geometry/viewport";
-import { expandedGraphs } from "../../canvas/levels/expanded-graphs";
+import { expandedGraphs } from "../../canvas/graphs-inside";
 import { tick } from "../../clock/server-clock";
 import type { Key } from "../../graph/model";
 import type { Progress } from "../../status/progress";

@@ -1,7 +1,10 @@
 /** The context of the editor; where the links of its notes lead, and how its frames are folded. */
 import { type ReactNode, useMemo } from "react";
-import { type NoteLinks, NoteLinksContext } from "../../canvas/notes/action-link";
-import { FoldFrameContext } from "../../canvas/notes/fold-button";
+import {
+  FoldFrameContext,
+  type NoteLinks,
+  NoteLinksContext,
+} from "../../canvas/notes/note-buttons";
 import { type EditorContext, EditorReactContext } from "../../edit-actions/editor-context";
 import { foldFrames } from "../../edit-actions/folding";
 import { linkableNames, linkedAction } from "../../graph/note-links";

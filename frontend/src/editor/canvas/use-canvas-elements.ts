@@ -29,13 +29,19 @@ import {
   sceneOf,
   surroundingsOf,
 } from "../../canvas/elements";
-import { foldedArrows, foldedNodes, foldedScene } from "../../canvas/folding/folded-drawing";
-import { type Folding, foldingOf, wholeSizes } from "../../canvas/folding/folding";
+import {
+  type Folding,
+  foldedArrows,
+  foldedNodes,
+  foldedScene,
+  foldingOf,
+  wholeSizes,
+} from "../../canvas/folding/folding";
 import { type PlaceMap, useSpread } from "../../canvas/folding/spread";
 import { type Positions, positionsOf, unplaced } from "../../canvas/geometry/arrange";
-import { expandedGraphs } from "../../canvas/levels/expanded-graphs";
+import { expandedGraphs } from "../../canvas/graphs-inside";
+import type { ProblemMarks } from "../../canvas/marks/problem-marks";
 import { notePlaces } from "../../canvas/notes/note-nodes";
-import type { ProblemMarks } from "../../canvas/problem-marks";
 import { asOneEdit, insertInto, moveActions } from "../../graph/edit";
 import { type Note, notesOf, placeNotes, withContents } from "../../graph/edit/notes";
 import type { Graph, Key, Position } from "../../graph/model";

@@ -1,7 +1,7 @@
 /** Lays out a graph in which nothing stands anywhere yet, and writes that down as one edit. */
 import { useEffect, useLayoutEffect, useRef, useState } from "react";
 import { arrange, isUnplaced, type Positions } from "../../canvas/geometry/arrange";
-import { LAYOUT_PATIENCE_MS } from "../../canvas/geometry/use-laid-out";
+import { LAYOUT_PATIENCE_MS } from "../../canvas/geometry/layout";
 import type { EditorContext } from "../../edit-actions/editor-context";
 import { freshPlaces } from "../../edit-actions/layout";
 import { placeFirst } from "../../graph/edit";

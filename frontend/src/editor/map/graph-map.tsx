@@ -16,7 +16,7 @@ import {
   useSyncExternalStore,
 } from "react";
 import type { Arrow, CanvasNode } from "../../canvas/elements";
-import { expandedGraphs } from "../../canvas/levels/expanded-graphs";
+import { expandedGraphs } from "../../canvas/graphs-inside";
 import { onMac } from "../../edit-actions/edit-action";
 import { runOnCanvas } from "../../status/progress-inside";
 import { isWithin, MAP_SIZE, type MapArea, mapFrame, mapMarks, seenArea } from "./map-drawing";

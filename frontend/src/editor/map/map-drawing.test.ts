@@ -1,7 +1,7 @@
 /** The map shows everything, each in its colour, and what is seen. */
 import { expect, test } from "vitest";
 import type { CanvasNode } from "../../canvas/elements";
-import type { PartOnCard } from "../../canvas/levels/expanded-graphs";
+import type { PartOnCard } from "../../canvas/graphs-inside";
 import type { Action } from "../../graph/model";
 import { isWithin, mapFrame, mapMarks, seenArea } from "./map-drawing";
 

@@ -1,8 +1,8 @@
 /** The map of the canvas as paths: one for each colour, and what part of the graph the map shows. */
 import type { Viewport } from "@xyflow/react";
 import type { CanvasNode } from "../../canvas/elements";
-import type { PartOnCard } from "../../canvas/levels/expanded-graphs";
-import { noteColor } from "../../canvas/notes/note-colors";
+import type { PartOnCard } from "../../canvas/graphs-inside";
+import { noteColor } from "../../canvas/notes/note-nodes";
 import type { Key } from "../../graph/model";
 import { toneColor } from "../../status/state-label";
 import { colorOfName } from "../../ui/name-colors";

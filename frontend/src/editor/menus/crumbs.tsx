@@ -1,6 +1,6 @@
 /** Where one is: the graphs, those around this one, this one, and what of it is chosen. */
-import { NameOfGraph } from "../../canvas/levels/graphs-inside";
-import { addressAround, levelsOf } from "../../canvas/levels/level-path";
+import { NameOfGraph } from "../../canvas/graphs-inside";
+import { addressAround, levelsOf } from "../../canvas/level-path";
 import type { EditorContext } from "../../edit-actions/editor-context";
 import { endName } from "../../graph/relation-words";
 import type { Crumb } from "../../ui/top-bar";

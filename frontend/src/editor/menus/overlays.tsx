@@ -1,7 +1,7 @@
 /** What opens over the editor, one at a time: menus, the palette, dialogs of single edit actions. */
 
 import { useEffect } from "react";
-import { graphsInside } from "../../canvas/levels/graphs-inside";
+import { graphsInside } from "../../canvas/graphs-inside";
 import type { EditorContext, Overlay } from "../../edit-actions/editor-context";
 import type { NewAction } from "../../graph/edit";
 import { lazyPart } from "../../ui/parts/lazy-part";
@@ -25,7 +25,7 @@ const UnpackDialog = lazyPart(() =>
   import("../../levels/unpack-dialog").then((part) => part.UnpackDialog),
 );
 const RenamedUses = lazyPart(() =>
-  import("../../canvas/levels/renamed-uses").then((part) => part.RenamedUses),
+  import("../../canvas/renamed-uses").then((part) => part.RenamedUses),
 );
 const GraphPrint = lazyPart(() => import("./graph-print").then((part) => part.GraphPrint));
 const PackagesDialog = lazyPart(() =>

@@ -1,7 +1,11 @@
 /** What is wrong in graphs that are drawn inside of others: marks for what is drawn there. */
 import { useSyncExternalStore } from "react";
-import { toldOnCanvas } from "../../canvas/levels/problems-inside";
-import { type ProblemMark, type ProblemMarks, problemMarksOf } from "../../canvas/problem-marks";
+import { toldOnCanvas } from "../../canvas/graphs-inside";
+import {
+  type ProblemMark,
+  type ProblemMarks,
+  problemMarksOf,
+} from "../../canvas/marks/problem-marks";
 import type { ToldProblem } from "../../graph/problems/told-problems";
 
 let last: { told: readonly ToldProblem[]; marks: ProblemMarks } | null = null;

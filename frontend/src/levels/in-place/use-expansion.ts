@@ -1,7 +1,7 @@
 /** Keeps known what is expanded: to the canvas, which makes room, and to what draws it. */
 import { useEffect, useMemo, useRef, useState, useSyncExternalStore } from "react";
 import { spreading } from "../../canvas/folding/spread";
-import { expandedGraphs, type PartOnCard } from "../../canvas/levels/expanded-graphs";
+import { expandedGraphs, type PartOnCard } from "../../canvas/graphs-inside";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import type { Graph, Key } from "../../graph/model";
 import { runOnCanvas } from "../../status/progress-inside";

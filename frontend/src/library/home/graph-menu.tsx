@@ -17,7 +17,7 @@ import {
 import { errorText } from "../../api/http";
 import { serverPath } from "../../api/page-url";
 import { useMay } from "../../api/use-person";
-import { usedIn } from "../../canvas/levels/used-in";
+import { usedIn } from "../../canvas/graphs-inside";
 import { lazyPart } from "../../ui/parts/lazy-part";
 import { OverlayBoundary } from "../../ui/parts/part-boundary";
 import { isolated } from "../../words/isolated";
@@ -70,7 +70,7 @@ function offerBack(client: QueryClient, graph: GraphSummary): void {
 const RenameDialog = lazyPart(() => import("./rename-dialog").then((part) => part.RenameDialog));
 
 const RenamedUses = lazyPart(() =>
-  import("../../canvas/levels/renamed-uses").then((part) => part.RenamedUses),
+  import("../../canvas/renamed-uses").then((part) => part.RenamedUses),
 );
 
 type Renamed = Pick<ComponentProps<typeof RenamedUses>, "before" | "name" | "uses">;

@@ -2,7 +2,7 @@
 import { ActionIcon } from "@mantine/core";
 import { IconChevronLeft, IconChevronRight } from "@tabler/icons-react";
 import { useEffect, useRef, useState } from "react";
-import { CHANGE_SIGNS } from "../../canvas/changes/change-marks";
+import { CHANGE_SIGNS } from "../../canvas/marks/change-marks";
 import { type EditorContext, useEditorContext } from "../../edit-actions/editor-context";
 import { useSingleKeys } from "../../edit-actions/keys/shortcuts";
 import { endsOf } from "../../graph/document-keys";

@@ -1,6 +1,6 @@
 /** Everything that differs between the two moments, field by field; each leads to its place. */
 import { memo, useMemo } from "react";
-import { CHANGE_SIGNS } from "../../canvas/changes/change-marks";
+import { CHANGE_SIGNS } from "../../canvas/marks/change-marks";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import { useStableCallback } from "../../ui/hooks/use-stable-callback";
 import { isolated } from "../../words/isolated";

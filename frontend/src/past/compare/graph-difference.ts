@@ -1,5 +1,5 @@
 /** What differs between two moments of a graph, as things to mark, to list and to walk through. Pure. */
-import type { ChangeMark, ChangeMarks } from "../../canvas/changes/change-marks";
+import type { ChangeMark, ChangeMarks } from "../../canvas/marks/change-marks";
 import { relationId } from "../../graph/document-keys";
 import { notesOf, readNote } from "../../graph/edit/notes";
 import { isEqual } from "../../graph/equal";

@@ -1,8 +1,8 @@
 /** The earlier of two moments on a canvas of its own, whose view is that of the later one. */
 import { ReactFlowProvider, useReactFlow, useStoreApi } from "@xyflow/react";
 import { useLayoutEffect } from "react";
-import { ChangeMarked } from "../../canvas/changes/change-marks";
-import { GraphView } from "../../canvas/views/graph-view";
+import { GraphView } from "../../canvas/graph-view";
+import { ChangeMarked } from "../../canvas/marks/change-marks";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import type { Progress } from "../../status/progress";
 import style from "./side.module.css";

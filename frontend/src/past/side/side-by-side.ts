@@ -1,9 +1,9 @@
 /** Two moments beside each other, as what two canvases show. Pure. */
 import type { ReactFlowInstance } from "@xyflow/react";
 import type { ComponentType } from "react";
-import type { ChangeMarks } from "../../canvas/changes/change-marks";
 import type { Arrow, CanvasNode } from "../../canvas/elements";
 import { type Positions, positionsOf } from "../../canvas/geometry/arrange";
+import type { ChangeMarks } from "../../canvas/marks/change-marks";
 import { notePlaces } from "../../canvas/notes/note-nodes";
 import type { Graph } from "../../graph/model";
 import type { GraphChanges } from "../compare/graph-difference";

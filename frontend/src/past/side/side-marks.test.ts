@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import type { ChangeMark } from "../../canvas/changes/change-marks";
+import type { ChangeMark } from "../../canvas/marks/change-marks";
 import { sideMarks } from "./side-marks";
 
 const mark = (change: ChangeMark["change"], values: Record<string, string> = {}): ChangeMark => ({

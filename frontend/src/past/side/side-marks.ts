@@ -1,5 +1,5 @@
 /** Marks on two canvases beside each other: each says what it is, and not what the other one shows. Pure. */
-import type { ChangeMark, ChangeMarks } from "../../canvas/changes/change-marks";
+import type { ChangeMark, ChangeMarks } from "../../canvas/marks/change-marks";
 
 const NO_VALUES: ReadonlyMap<string, string> = new Map();
 

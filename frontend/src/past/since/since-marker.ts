@@ -1,5 +1,5 @@
 /** What of a graph is another thing than at an earlier moment. What stays the same is compared once. Pure. */
-import type { SinceMark } from "../../canvas/changes/since-marks";
+import type { SinceMark } from "../../canvas/marks/since-marks";
 import { relationId } from "../../graph/document-keys";
 import type { Action, Graph, Relation } from "../../graph/model";
 import { type FieldChange, linesOf } from "../../history/difference-words";

@@ -6,7 +6,7 @@ import { useVersions } from "../../api/graphs";
 import { newestRun } from "../../api/live/open-runs";
 import { useLive } from "../../api/live/use-live";
 import { listRuns, NO_FILTER } from "../../api/review";
-import { sinceMarks } from "../../canvas/changes/since-marks";
+import { sinceMarks } from "../../canvas/marks/since-marks";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import { mapsFrom } from "../../graph/document-keys";
 import { readGraph } from "../../graph/read";

@@ -1,8 +1,8 @@
 /** At a card or an arrow that changed since a run went well: a quiet sign, which says what on asking. */
 import { useBlame } from "../../api/documents/history";
 import { authorName } from "../../api/graphs";
-import { CHANGE_SIGNS } from "../../canvas/changes/change-marks";
-import type { SinceMark, SinceMarks, SinceSignProps } from "../../canvas/changes/since-marks";
+import { CHANGE_SIGNS } from "../../canvas/marks/change-marks";
+import type { SinceMark, SinceMarks, SinceSignProps } from "../../canvas/marks/since-marks";
 import { Tooltip } from "../../ui/floating/tooltip";
 import style from "./since-sign.module.css";
 

@@ -6,7 +6,7 @@ import type { Comparison } from "../../api/review";
 import type { Run } from "../../api/runs";
 import { CardStateContext } from "../../canvas/card-highlights";
 import { fromUmrf } from "../../canvas/from-umrf";
-import { GraphView } from "../../canvas/views/graph-view";
+import { GraphView } from "../../canvas/graph-view";
 import type { Tone } from "../../status/progress";
 import { StateLabel } from "../../status/state-label";
 import { useProgress } from "../../status/use-progress";

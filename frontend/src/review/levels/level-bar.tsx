@@ -1,7 +1,7 @@
 /** On which level of a run one is: the way out, the way further in, and to the graph as it is now. */
 import { IconExternalLink, IconStairsDown } from "@tabler/icons-react";
 import { Link } from "wouter";
-import { addressInside } from "../../canvas/levels/level-path";
+import { addressInside } from "../../canvas/level-path";
 import { fullName } from "../../graph/model";
 import { spaced } from "../../status/level-words";
 import style from "./level-bar.module.css";

@@ -1,7 +1,7 @@
 /** The graphs inside of a run as they were sent along with it, and the ways through them. Pure. */
 import type { Run } from "../../api/runs";
 import { fromUmrf } from "../../canvas/from-umrf";
-import { type Level, levelsOf } from "../../canvas/levels/level-path";
+import { type Level, levelsOf } from "../../canvas/level-path";
 import { fullName, type Graph, type Key } from "../../graph/model";
 
 export interface SentLevel {

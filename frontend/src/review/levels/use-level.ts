@@ -1,7 +1,7 @@
 /** Which level of a run is shown, and which of its actions is chosen. */
 import { useMemo, useState } from "react";
 import type { Run } from "../../api/runs";
-import type { Level } from "../../canvas/levels/level-path";
+import type { Level } from "../../canvas/level-path";
 import { fullName, type Graph, type Key } from "../../graph/model";
 import { placesOf } from "../../status/level-places";
 import { factOf } from "../../status/level-words";

@@ -12,7 +12,7 @@ import { useCurrentName } from "../../api/people";
 import { useRunsOfSameStart } from "../../api/review";
 import { type Run, useRun } from "../../api/runs";
 import { fromUmrf } from "../../canvas/from-umrf";
-import { GraphView } from "../../canvas/views/graph-view";
+import { GraphView } from "../../canvas/graph-view";
 import { serverTimeOf } from "../../clock/server-clock";
 import { type Lane, lanesOf, useLanes } from "../../status/lanes/lanes";
 import { Timeline, type Track } from "../../status/lanes/timeline";

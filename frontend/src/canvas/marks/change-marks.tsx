@@ -1,4 +1,4 @@
-/** What differs between two moments of a graph, as marks on what is drawn: came, went, or is otherwise. */
+/** Marks on cards, notes and arrows that were added, removed or changed between two moments of a graph. */
 import {
   createContext,
   type ReactNode,
@@ -7,6 +7,7 @@ import {
   useState,
   useSyncExternalStore,
 } from "react";
+import style from "./change-marks.module.css";
 
 export interface ChangeMark {
   readonly change: "added" | "removed" | "changed";
@@ -66,14 +67,14 @@ class ChangeMarkStore {
 
 const ChangeMarksContext = createContext<ChangeMarkStore>(new ChangeMarkStore());
 
-interface Props {
+interface ChangeMarkedProps {
   /** Null: nothing is compared. */
   marks: ChangeMarks | null;
   children: ReactNode;
 }
 
 /** A canvas whose cards and arrows have marks. */
-export function ChangeMarked({ marks, children }: Props) {
+export function ChangeMarked({ marks, children }: ChangeMarkedProps) {
   const [store] = useState(() => new ChangeMarkStore());
   useLayoutEffect(() => store.set(marks), [store, marks]);
   return <ChangeMarksContext value={store}>{children}</ChangeMarksContext>;
@@ -84,4 +85,32 @@ export const CHANGE_SIGNS = { added: "+", removed: "−", changed: "△" } as co
 export function useChangeMark(key: string): ChangeMark | undefined {
   const { subscribe, get } = use(ChangeMarksContext);
   return useSyncExternalStore(subscribe, () => get(key));
+}
+
+/** `beside`: there is another tag at its place. */
+export function ChangeTag({ mark, beside = false }: { mark: ChangeMark; beside?: boolean }) {
+  const { change, by } = mark;
+  return (
+    <span className={style.tag} data-change={change} data-beside={beside || undefined}>
+      <i aria-hidden>{CHANGE_SIGNS[change]}</i>
+      {by === null ? (
+        change
+      ) : (
+        <>
+          <span className="visually-hidden">{change} by </span>
+          <bdi>{by}</bdi>
+        </>
+      )}
+    </span>
+  );
+}
+
+/** In the pill of an arrow: the sign alone. */
+export function ChangeSign({ mark: { change } }: { mark: ChangeMark }) {
+  return (
+    <b className={style.sign} data-change={change}>
+      <span aria-hidden>{CHANGE_SIGNS[change]}</span>
+      <span className="visually-hidden">{change}</span>
+    </b>
+  );
 }

@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { middlesOf } from "./bend-places";
+import { middlesOf } from "./bend-handles";
 import type { Point } from "./scene";
 
 const line = (points: readonly Point[], via: readonly Point[] = [], pill: Point | null = null) => ({

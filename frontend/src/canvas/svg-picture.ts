@@ -1,20 +1,20 @@
 /** A graph as one SVG picture, drawn from the same elements as the canvas. Pure. */
 
-import { type Note, notesOf } from "../../graph/edit/notes";
-import type { Direction, Graph, Key, Position, Precondition } from "../../graph/model";
-import { spokenNote } from "../../graph/note-links";
-import { cardRows } from "../../graph/parameters/card-rows";
-import { colorOfName } from "../../ui/name-colors";
-import { type Bundle, bundlesOf, pillWord } from "../arrows/bundles";
-import { pathOf } from "../arrows/line-path";
-import { routed } from "../arrows/routes";
-import type { PillSize, Scene } from "../arrows/scene";
-import type { LineMap, RoutedLine } from "../arrows/simple-lines";
-import { type CanvasNode, nodesOf, sceneOf } from "../elements";
-import { CARD, CARD_LINES, pillSize, type Sizes } from "../geometry/arrange";
-import { noteColor } from "../notes/note-colors";
-import { OUTCOMES, outcomeColor } from "../outcome";
-import { NO_PROBLEM_MARKS } from "../problem-marks";
+import { type Note, notesOf } from "../graph/edit/notes";
+import type { Direction, Graph, Key, Position, Precondition } from "../graph/model";
+import { spokenNote } from "../graph/note-links";
+import { cardRows } from "../graph/parameters/card-rows";
+import { colorOfName } from "../ui/name-colors";
+import { type Bundle, bundlesOf, pillWord } from "./arrows/bundles";
+import { pathOf } from "./arrows/line-path";
+import { routed } from "./arrows/routes";
+import type { PillSize, Scene } from "./arrows/scene";
+import type { LineMap, RoutedLine } from "./arrows/simple-lines";
+import { type CanvasNode, nodesOf, sceneOf } from "./elements";
+import { CARD, CARD_LINES, pillSize, type Sizes } from "./geometry/arrange";
+import { NO_PROBLEM_MARKS } from "./marks/problem-marks";
+import { noteColor } from "./notes/note-nodes";
+import { OUTCOMES, outcomeColor } from "./outcome";
 
 export interface SvgPicture {
   readonly svg: string;

@@ -1,5 +1,8 @@
-/** A link from a note to an action: chosen and shown by a click, a tap or Enter. */
+/** Buttons within notes: a link to an action, and the button that folds a frame. */
+
+import { IconChevronDown, IconChevronRight } from "@tabler/icons-react";
 import { createContext, use } from "react";
+import type { Note } from "../../graph/edit/notes";
 import type { Key } from "../../graph/model";
 import type { NoteLink } from "../../graph/note-links";
 import { isolated } from "../../words/isolated";
@@ -39,6 +42,33 @@ export function ActionLink({ link }: { link: NoteLink }) {
       onDoubleClick={(event) => event.stopPropagation()}
     >
       {target.label}
+    </button>
+  );
+}
+
+/** How frames are folded; without it they are shown as they are. */
+type FoldFrame = (key: string, folded: boolean) => void;
+
+export const FoldFrameContext = createContext<FoldFrame | null>(null);
+
+export function FoldButton({ note, folded }: { note: Note; folded: boolean }) {
+  const fold = use(FoldFrameContext);
+  if (fold === null) return null;
+  const Sign = folded ? IconChevronRight : IconChevronDown;
+  return (
+    <button
+      type="button"
+      className={`${style.fold} nodrag`}
+      aria-label={`Contents of ${note.text || "the frame"}`}
+      aria-expanded={!folded}
+      title={folded ? "Unfold" : "Fold"}
+      onClick={(event) => {
+        event.stopPropagation(); // the frame is chosen by what comes of it
+        fold(note.key, !folded);
+      }}
+      onDoubleClick={(event) => event.stopPropagation()}
+    >
+      <Sign aria-hidden />
     </button>
   );
 }

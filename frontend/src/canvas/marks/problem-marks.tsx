@@ -1,7 +1,9 @@
-/** What is wrong or still to fill in, by where it is drawn: marks for cards and arrows. Pure. */
-import { countsOf, countWords, type ProblemCounts } from "../graph/problems/problem-kinds";
-import type { ToldProblem } from "../graph/problems/told-problems";
-import { otherPlaces } from "../graph/problems/told-problems";
+/** Problems by the card or arrow at which they are drawn, and the badge that shows their counts. */
+
+import { IconAlertTriangleFilled } from "@tabler/icons-react";
+import { countsOf, countWords, type ProblemCounts } from "../../graph/problems/problem-kinds";
+import { otherPlaces, type ToldProblem } from "../../graph/problems/told-problems";
+import style from "./problem-marks.module.css";
 
 /** The problems of one card or arrow. */
 export interface ProblemMark extends ProblemCounts {
@@ -38,4 +40,32 @@ export function problemMarksOf(told: readonly ToldProblem[]): ProblemMarks {
 export function problemMarkWords(mark: ProblemMark | null | undefined): string {
   if (!mark) return "";
   return `. ${countWords(mark).join(", ")}. ${mark.reasons.replaceAll("\n", " ")}`;
+}
+
+export function ProblemBadge({ mark, on }: { mark: ProblemMark; on: "card" | "arrow" }) {
+  const { wrong, fillIn, warnings } = mark;
+  return (
+    <span className={style.badges} data-on={on} title={mark.reasons}>
+      <span aria-hidden className={style.badges}>
+        {wrong > 0 && (
+          <span className={style.badge} data-kind="wrong">
+            {on === "card" ? `${wrong} wrong` : <IconAlertTriangleFilled size={10} />}
+          </span>
+        )}
+        {fillIn > 0 && (
+          <span className={style.badge} data-kind="fill-in">
+            {fillIn}
+          </span>
+        )}
+        {wrong === 0 && warnings > 0 && (
+          <span className={style.badge} data-kind="warning">
+            <IconAlertTriangleFilled size={10} /> {warnings}
+          </span>
+        )}
+      </span>
+      <span className="visually-hidden">
+        {countWords(mark).join(", ")}. {mark.reasons}
+      </span>
+    </span>
+  );
 }

@@ -1,6 +1,6 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
-import { detailAt, unitAt } from "./detail";
+import { detailAt, unitAt } from "./zoom-detail";
 
 const ORDER = ["sign", "far", "middle", "near"];
 const zoom = fc.double({ min: 0.08, max: 2, noNaN: true });

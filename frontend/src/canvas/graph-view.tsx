@@ -1,16 +1,16 @@
 /** A graph to look at: the canvas of the run page and of previews. */
 import { Background, BackgroundVariant, ReactFlow, type Viewport } from "@xyflow/react";
 import { type ReactNode, useEffect, useMemo, useState } from "react";
-import type { Graph, Key } from "../../graph/model";
-import type { Progress } from "../../status/progress";
-import { LineContext, LineStore } from "../arrows/line-store";
-import { type CanvasNode, edgesOf, nodesOf, sceneOf, surroundingsOf } from "../elements";
-import { useLaidOut } from "../geometry/use-laid-out";
-import { edgeTypes, nodeTypes } from "../node-types";
-import { notePlaces } from "../notes/note-nodes";
-import { ArrowTips } from "../outcome-arrow";
-import { NO_PROBLEM_MARKS } from "../problem-marks";
-import { ZoomDetail } from "../zoom/zoom-detail";
+import type { Graph, Key } from "../graph/model";
+import type { Progress } from "../status/progress";
+import { LineContext, LineStore } from "./arrows/line-store";
+import { type CanvasNode, edgesOf, nodesOf, sceneOf, surroundingsOf } from "./elements";
+import { useLaidOut } from "./geometry/layout";
+import { NO_PROBLEM_MARKS } from "./marks/problem-marks";
+import { edgeTypes, nodeTypes } from "./node-types";
+import { notePlaces } from "./notes/note-nodes";
+import { ArrowTips } from "./outcome-arrow";
+import { ZoomDetail } from "./zoom-detail";
 
 const NONE: ReadonlySet<string> = new Set();
 

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
-import type { Problem } from "../api/graphs";
-import { toldProblems } from "../graph/problems/told-problems";
+import type { Problem } from "../../api/graphs";
+import { toldProblems } from "../../graph/problems/told-problems";
 import { problemMarksOf, problemMarkWords } from "./problem-marks";
 
 const problem = (

@@ -1,5 +1,5 @@
 /** Through which actions one came into a graph, in its address: `?in=GRAPH~ACTION`, outermost first. Pure. */
-import type { Key } from "../../graph/model";
+import type { Key } from "../graph/model";
 
 /** The action `action` of the graph `graph` was entered. */
 export interface Level {

@@ -1,11 +1,16 @@
-/** Entry and exit of a graph. */
+/** The components that draw nodes and edges of a canvas, with those of its entry and exit. */
 import { IconFlag, IconPlayerPlayFilled } from "@tabler/icons-react";
-import { Handle, type NodeProps, Position } from "@xyflow/react";
+import { type EdgeTypes, Handle, type NodeProps, type NodeTypes, Position } from "@xyflow/react";
 import { memo } from "react";
+import { ActionCard } from "./action-card";
 import type { EndNode } from "./elements";
-import style from "./end-pill.module.css";
+import style from "./node-types.module.css";
+import { NoteCard } from "./notes/note-card";
+import { OutcomeArrow } from "./outcome-arrow";
+import "@xyflow/react/dist/style.css";
+import "./canvas.css";
 
-export const EndPill = memo(function EndPill({
+const EndPill = memo(function EndPill({
   data,
   selected,
   isConnectable,
@@ -35,3 +40,6 @@ export const EndPill = memo(function EndPill({
     </div>
   );
 });
+
+export const nodeTypes: NodeTypes = { action: ActionCard, end: EndPill, note: NoteCard };
+export const edgeTypes: EdgeTypes = { outcome: OutcomeArrow };

@@ -2,12 +2,12 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
 import * as Y from "yjs";
-import { mapsOf } from "../../graph/document-keys";
-import { addAction, connect, setEntry, setExit } from "../../graph/edit";
-import { writeNote } from "../../graph/edit/notes";
-import { setWaypoints } from "../../graph/edit/waypoints";
-import { readGraph } from "../../graph/read";
-import { positionsOf } from "../geometry/arrange";
+import { mapsOf } from "../graph/document-keys";
+import { addAction, connect, setEntry, setExit } from "../graph/edit/index";
+import { writeNote } from "../graph/edit/notes";
+import { setWaypoints } from "../graph/edit/waypoints";
+import { readGraph } from "../graph/read";
+import { positionsOf } from "./geometry/arrange";
 import { svgPictureOf } from "./svg-picture";
 
 function drawn(name: string, robot: string, text: string) {

@@ -1,6 +1,6 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
-import { pagesOf } from "./print-pages";
+import { pagesOf } from "./graph-print";
 
 test("a picture that fits is one page, and is never blown up", () => {
   expect(pagesOf(600, 300)).toEqual({

@@ -1,8 +1,12 @@
-/** How much is shown at which zoom: less is said far away, and never smaller. Pure. */
-import type { Tone } from "../../status/progress";
+/** Chooses how much of each card is drawn at a zoom, and tells the style sheets without rendering a card. */
+
+import { useStoreApi } from "@xyflow/react";
+import { useLayoutEffect } from "react";
+import type { Tone } from "../status/progress";
+import "./zoom-detail.css";
 
 /** `sign`: too far for names, the state alone is left. */
-export type Detail = "near" | "middle" | "far" | "sign";
+type Detail = "near" | "middle" | "far" | "sign";
 
 /** From this zoom on; below the last one there is nothing less to show. */
 const FROM: readonly (readonly [Detail, number])[] = [
@@ -45,3 +49,27 @@ export const STATE_LETTER: Readonly<Record<Tone, string>> = {
   done: "✓",
   unknown: "?",
 };
+
+export function ZoomDetail() {
+  const store = useStoreApi();
+  useLayoutEffect(() => {
+    let [detail, unit]: [Detail | null, number] = [null, 0];
+    const tell = () => {
+      const {
+        transform: [, , zoom],
+        domNode,
+      } = store.getState();
+      if (domNode === null) return;
+      const [nextDetail, nextUnit] = [detailAt(zoom, detail), unitAt(zoom)];
+      if (nextDetail !== detail) domNode.dataset.detail = nextDetail;
+      if (nextUnit !== unit) {
+        domNode.style.setProperty("--unit", `${nextUnit}px`);
+        domNode.style.setProperty("--out", String(nextUnit));
+      }
+      [detail, unit] = [nextDetail, nextUnit];
+    };
+    tell();
+    return store.subscribe(tell);
+  }, [store]);
+  return null;
+}
