@@ -52,7 +52,7 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
     "convert": CommandEntry("files", "print a file of any dialect as canonical UMRF"),
     "simulate": CommandEntry("files", "run a file in the simulator, without a server or a robot"),
     "flatten": CommandEntry(
-        "hierarchy.flatten",
+        "flatten",
         "make one graph of a graph and its sub-graphs; exit 1 if it would not do the same",
         described=True,
     ),
@@ -60,7 +60,7 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
         "packages.package", "write C++ packages of actions, as the engine loads them"
     ),
     "builds": CommandEntry(
-        "builds.builds",
+        "builds",
         "show errors of the last `colcon build` at the actions of the library; exit 1 if any failed",
         described=True,
     ),

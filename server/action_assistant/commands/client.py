@@ -4,20 +4,80 @@ import argparse
 import contextlib
 import os
 import re
+import secrets
 import socket
 import ssl
 import sys
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+import httpx
 import msgspec
 
 from action_assistant import paths, settings
 from action_assistant.errors import CannotStart
-from action_assistant.web.auth.keys import Keys
+from action_assistant.web.auth.keys import Keys, ServerProof
 from action_assistant.web.network.certificate import Certificate
+
+_API: Final = "/api/"
+
+
+class AfterProof(httpx.Auth):
+    """Adds the token, once whoever answers at an address has answered a challenge.
+
+    Whoever listens where we only suppose our server (`supposed`) might pass the challenge on to it: so
+    it has to name the very address that we are connected to, which it cannot for another's.
+    """
+
+    requires_response_body = True
+
+    def __init__(self, keys: Keys, *, supposed: bool) -> None:
+        self._keys = keys
+        self._supposed = supposed
+        self._proven: set[str] = set()
+
+    def auth_flow(self, request: httpx.Request) -> Generator[httpx.Request, httpx.Response, None]:
+        """As httpx asks. Raises CannotStart."""
+        base = str(request.url).partition(_API)[0]
+        if base not in self._proven:
+            challenge = secrets.token_urlsafe(32)
+            url = f"{base}{_API}server?challenge={challenge}"
+            answer = yield httpx.Request("GET", url, extensions=request.extensions)
+            if not self._holds(challenge, answer):
+                raise CannotStart(_why(base, supposed=self._supposed))
+            self._proven.add(base)
+        request.headers["authorization"] = f"Bearer {self._keys.token}"
+        yield request
+
+    def _holds(self, challenge: str, answer: httpx.Response) -> bool:
+        try:
+            proof = msgspec.json.decode(answer.content, type=ServerProof)
+        except msgspec.DecodeError:
+            return False
+        at = _peer(answer) if self._supposed else None
+        return self._keys.proven(challenge, proof, at=at)
+
+
+def _peer(answer: httpx.Response) -> str:
+    """To whom we are connected."""
+    try:
+        host, port, *_ = answer.extensions["network_stream"].get_extra_info("server_addr")
+    except (OSError, KeyError, TypeError, ValueError):
+        return ""
+    return f"{host}:{port}"
+
+
+def _why(base: str, *, supposed: bool) -> str:
+    said = (
+        f"What answers at {base} does not know the token of this data folder, so nothing was sent to "
+        "it: it is another program, another server of ours, or one of before this check."
+    )
+    if supposed:
+        said += " Name the folder with --data, or with --url the place where your server is."
+    return said
+
 
 if TYPE_CHECKING:  # slow to load, and most commands do not need it
     import httpx
@@ -137,7 +197,7 @@ def running(options: argparse.Namespace) -> Iterator[Server]:
 def reach(options: argparse.Namespace) -> dict[str, Any]:
     """What a client of httpx is made of that speaks to the server of a command and sends it the token,
     but only after its proof. Raises CannotStart."""
-    from action_assistant.commands.token_proof import AfterProof
+    from action_assistant.commands.client import AfterProof
 
     data = options.data.resolve()
     trust = Certificate(data).trusting_too()

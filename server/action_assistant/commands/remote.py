@@ -9,7 +9,6 @@ from typing import Any, Final, TypeAlias
 
 import msgspec
 
-from action_assistant.commands import archives, since
 from action_assistant.commands.client import (
     No,
     Server,
@@ -20,6 +19,7 @@ from action_assistant.commands.client import (
     running,
 )
 from action_assistant.commands.databases import runs_copy
+from action_assistant.commands.runs import add_archives, add_since
 from action_assistant.errors import CannotStart
 from action_assistant.safe_text import one_line, told
 
@@ -61,9 +61,9 @@ def _add_runs(runs: argparse.ArgumentParser) -> None:
     rests.add_argument("run", metavar="RUN", help="id of the run")
     rests.add_argument("--how", required=True, help="how you have seen that nothing moves")
     rests.set_defaults(handler=_at_rest)
-    archives.add_to(more)
+    add_archives(more)
     runs_copy.add_to(more)
-    since.add_to(more)
+    add_since(more)
     brought = command(
         more,
         "examples",

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from action_assistant.commands.backups.rotation import keeping, name_at, superfluous
+from action_assistant.commands.backups.options import keeping, name_at, superfluous
 
 NOW = datetime(2026, 11, 24, 12, tzinfo=UTC)
 

@@ -14,7 +14,7 @@ import pytest
 from sqlalchemy import select, text
 
 from action_assistant.commands.backups.progress import Progress
-from action_assistant.commands.databases import equality
+from action_assistant.commands.databases.move import differences
 from action_assistant.editor.log import database_location
 from action_assistant.editor.log import graph_events as h
 from action_assistant.journal.databases import ask_once, database_of
@@ -202,8 +202,8 @@ def test_where_nothing_can_be_moved_to_is_said(tmp_path: Path, to: str, told: st
 def test_every_row_counts_whatever_the_order(tmp_path: Path) -> None:
     one, other = made(tmp_path / "one", 2), made(tmp_path / "two", 2)
     urls = [f"sqlite:///{each / 'editor.db'}" for each in (one, other)]
-    assert equality.differences(urls[0], urls[0], Progress()) == []
-    assert len(equality.differences(*urls, Progress())) == 2  # times, and so chains
+    assert differences(urls[0], urls[0], Progress()) == []
+    assert len(differences(*urls, Progress())) == 2  # times, and so chains
 
 
 @pytest.mark.timeout(0)

@@ -10,7 +10,7 @@ import pytest
 
 from action_assistant.cli import main
 from action_assistant.commands.processes import add_serve_options
-from action_assistant.commands.services import systemd
+from action_assistant.commands.services import unit as units
 from action_assistant.commands.services.service import _FLAGS, _VALUES
 from action_assistant.commands.services.unit import is_untouched
 
@@ -196,7 +196,7 @@ def test_what_cannot_be_meant_is_refused_before_anything_is_written(
 def test_without_systemd_it_says_so_and_still_shows_the_unit(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(systemd, "_BOOTED", tmp_path / "nothing")
+    monkeypatch.setattr(units, "_BOOTED", tmp_path / "nothing")
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
     assert main(["service", "install", "--user"]) == 2
     assert "systemd does not run this computer" in capsys.readouterr().err

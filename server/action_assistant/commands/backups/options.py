@@ -3,10 +3,77 @@ them elsewhere."""
 
 import argparse
 import re
+from collections.abc import Iterable
+from datetime import UTC, datetime
+from pathlib import Path
 from typing import Final
 
+import msgspec
+
 from action_assistant import settings
-from action_assistant.commands.backups.rotation import DEFAULT, keeping
+
+#: As scheduled backups are named; others in the folder are nobody's business here.
+_NAME: Final = re.compile(r"action-assistant-(\d{8}-\d{6})Z\.zip")
+_STAMP: Final = "%Y%m%d-%H%M%S"
+_PART: Final = re.compile(r"(\d{1,4})([dwm])")
+DEFAULT: Final = "7d,4w,6m"
+
+
+class Keeping(msgspec.Struct, frozen=True):
+    """How many days, weeks and months of which there is a backup keep their newest one. All None: every
+    backup stays."""
+
+    days: int | None = 0
+    weeks: int | None = 0
+    months: int | None = 0
+
+
+def keeping(text: str) -> Keeping:
+    """`7d,4w,6m`, or `all`. Raises ValueError."""
+    if text == "all":
+        return Keeping(None, None, None)
+    counts = {"d": 0, "w": 0, "m": 0}
+    for part in text.split(","):
+        found = _PART.fullmatch(part.strip())
+        if found is None:
+            raise ValueError(text)
+        counts[found[2]] = int(found[1])
+    if not any(counts.values()):
+        raise ValueError(text)
+    return Keeping(counts["d"], counts["w"], counts["m"])
+
+
+def name_at(moment: datetime) -> str:
+    """What a backup of that moment is called."""
+    return f"action-assistant-{moment.astimezone(UTC).strftime(_STAMP)}Z.zip"
+
+
+def moment_of(path: Path) -> datetime | None:
+    """When a scheduled backup was begun; None for what is not named as one."""
+    found = _NAME.fullmatch(path.name)
+    try:
+        return found and datetime.strptime(found[1], _STAMP).replace(tzinfo=UTC)
+    except ValueError:  # such as the 99th of a month
+        return None
+
+
+def superfluous(paths: Iterable[Path], keep: Keeping, now: datetime) -> list[Path]:
+    """Those that may go. The newest one always stays; so do those of a clock that was wrong, after `now`,
+    and none goes for them."""
+    if keep.days is None:
+        return []
+    moments = ((moment_of(path), path) for path in paths)
+    dated = [(at, path) for at, path in moments if at is not None and at <= now]
+    dated.sort(reverse=True)
+    stays = {path for _, path in dated[:1]}
+    periods = ((keep.days, "%Y-%m-%d"), (keep.weeks, "%G-%V"), (keep.months, "%Y-%m"))
+    for count, form in periods:
+        newest: dict[str, Path] = {}
+        for moment, path in dated:
+            newest.setdefault(moment.strftime(form), path)
+        stays |= set(list(newest.values())[:count])
+    return [path for _, path in dated if path not in stays]
+
 
 _SPAN: Final = re.compile(r"(\d+(?:\.\d+)?)([smhd])")
 _SECONDS: Final = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86_400.0}

@@ -20,8 +20,8 @@ import msgspec
 from action_assistant.commands.backups.backup_file import FILES, Package
 from action_assistant.commands.backups.data_folder import sweep
 from action_assistant.commands.backups.making import WORK, FinishedBackup, make_backup
+from action_assistant.commands.backups.options import keeping, moment_of, name_at, superfluous
 from action_assistant.commands.backups.progress import Progress
-from action_assistant.commands.backups.rotation import keeping, moment_of, name_at, superfluous
 from action_assistant.errors import CannotStart
 from action_assistant.journal.copies import backup_state
 from action_assistant.journal.copies.backup_state import BackupSchedule, OffSite

@@ -10,13 +10,10 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Final, TypeAlias
 
 from action_assistant.commands.doctor import (
-    backup_checks,
     database_checks,
     folder_checks,
     machine_checks,
     process_checks,
-    proxy_checks,
-    setting_checks,
 )
 from action_assistant.commands.doctor.installation import Installation
 from action_assistant.system.diagnostics import Diagnostic, found
@@ -26,18 +23,18 @@ Check: TypeAlias = Callable[[Installation], Iterable[Diagnostic]]
 PATIENCE_S: Final = 10.0  # for all together; each has bounds of its own, which are lower
 CHECKS: Final[tuple[Check, ...]] = (
     machine_checks.program,
-    setting_checks.settings_mean_something,
+    machine_checks.settings_mean_something,
     machine_checks.page_is_built,
     folder_checks.folder_is_ours,
     folder_checks.token_is_there,
     folder_checks.nothing_was_interrupted,
     folder_checks.archive_is_usable,
     folder_checks.disk_has_room,
-    backup_checks.backups_are_made,
+    folder_checks.backups_are_made,
     database_checks.graphs_are_there,
     database_checks.runs_are_there,
     process_checks.processes_fit,
-    proxy_checks.proxy_leads_here,
+    process_checks.proxy_leads_here,
     machine_checks.descriptors_suffice,
     machine_checks.clock_is_possible,
     machine_checks.shared_memory_is_there,

@@ -1,20 +1,263 @@
 """The editor and the runner, as far as they run: whether they are ours, of one version and one token."""
 
+import socket
 import ssl
+import time
 from collections.abc import Iterator
+from datetime import UTC, datetime
+from email.utils import parsedate_to_datetime
 from typing import Final
+from urllib.parse import urlsplit
 
-from action_assistant.commands.doctor.answers import ProcessAnswer, at_port, listens
-from action_assistant.commands.doctor.certificate_checks import certificate_fits
+import httpx
+import msgspec
+from cryptography import x509
+
 from action_assistant.commands.doctor.database_checks import span
 from action_assistant.commands.doctor.installation import Installation
 from action_assistant.errors import CannotStart
 from action_assistant.journal import lock
+from action_assistant.settings import reached
 from action_assistant.share_links import is_ours
 from action_assistant.system.diagnostics import Diagnostic, fine, found
 from action_assistant.version import VERSION
+from action_assistant.web.auth.access import REFUSED_SOCKET
 from action_assistant.web.auth.keys import Keys
 from action_assistant.web.network.certificate import Certificate
+
+_PATIENCE_S: Final = 3.0
+
+
+class ProcessAnswer(msgspec.Struct, frozen=True, kw_only=True):
+    """What came back from `/healthz`. `base` is with its scheme; `version` is "" for other programs;
+    `clock_s`: by how many seconds its clock is ahead of ours, if it says so."""
+
+    base: str
+    status: int
+    text: str = ""
+    version: str = ""
+    clock_s: float | None = None
+
+
+class _Health(msgspec.Struct):
+    """The part of the answer that says who it is."""
+
+    version: str
+
+
+def listens(host: str, port: int) -> bool:
+    """Whether anything takes connections there."""
+    try:
+        socket.create_connection((_reached(host), port), _PATIENCE_S).close()
+    except OSError:
+        return False
+    return True
+
+
+def at_port(host: str, port: int) -> ProcessAnswer | None:
+    """What answers at a port, by http or https; None when nothing answers as a web server does."""
+    shown = _reached(host)
+    shown = f"[{shown}]" if ":" in shown else shown
+    for scheme in ("http", "https"):
+        try:
+            # A certificate that is wrong is told by itself; nothing secret is sent.
+            with client(verify=False) as asking:
+                return health(asking, f"{scheme}://{shown}:{port}")
+        except httpx.HTTPError:
+            continue
+    return None
+
+
+def client(verify: ssl.SSLContext | bool) -> httpx.Client:
+    """One that asks directly, and not for long."""
+    return httpx.Client(verify=verify, timeout=_PATIENCE_S, trust_env=False)
+
+
+def health(asking: httpx.Client, base: str) -> ProcessAnswer:
+    """What `/healthz` answers. Raises httpx.HTTPError."""
+    answer = asking.get(f"{base}/healthz")
+    now = time.time()
+    try:
+        version = msgspec.json.decode(answer.content, type=_Health).version
+    except msgspec.DecodeError:
+        version = ""
+    return ProcessAnswer(
+        base=base,
+        status=answer.status_code,
+        text=answer.text[:2000],
+        version=version if answer.status_code == 200 else "",
+        clock_s=_ahead(answer.headers.get("date", ""), now),
+    )
+
+
+def _ahead(date: str, now: float) -> float | None:
+    try:
+        return parsedate_to_datetime(date).timestamp() - now
+    except ValueError:
+        return None
+
+
+def _reached(host: str) -> str:
+    """Where a process that listens everywhere is reached from here."""
+    return "127.0.0.1" if host in {"*", "0.0.0.0", "::", "localhost"} else host
+
+
+_HANDSHAKE_S: Final = 2.0
+_EXPIRED: Final = 10  # X509_V_ERR_CERT_HAS_EXPIRED
+_OTHER_NAME: Final = (62, 64)  # X509_V_ERR_HOSTNAME_MISMATCH, …IP_ADDRESS_MISMATCH
+
+
+def certificate_fits(where: str, url: str, trust: ssl.SSLContext) -> Iterator[Diagnostic]:
+    """What is wrong with the certificate at an address; nothing where nobody answers."""
+    host, port = urlsplit(url).hostname or "", urlsplit(url).port or 443
+    try:
+        _shake(host, port, trust)
+    except ssl.SSLCertVerificationError as error:
+        yield _wrong(where, host, error, _shown_certificate(host, port))
+    except OSError:  # told by whoever asks there
+        return
+
+
+def _wrong(
+    where: str, host: str, error: ssl.SSLCertVerificationError, shown: x509.Certificate | None
+) -> Diagnostic:
+    ends = shown.not_valid_after_utc if shown is not None else None
+    if error.verify_code == _EXPIRED or (ends is not None and ends < datetime.now(UTC)):
+        on = f" on {ends:%Y-%m-%d}" if ends is not None else ""
+        return found(
+            "certificate-expired",
+            where,
+            f"The certificate expired{on}: browsers refuse the page, or the clock here is ahead.",
+            "Renew it (certbot, or the proxy's own way) and reload the proxy; that of --tls is renewed "
+            "when the program starts again.",
+        )
+    if error.verify_code in _OTHER_NAME:
+        return found(
+            "certificate-names",
+            where,
+            f"The certificate is not for {host}, but for {_names(shown)}.",
+            "Come by one of these names, or get a certificate for this one; that of --tls is for the "
+            "names in ACTION_ASSISTANT_HOSTS, too, once the program starts again.",
+        )
+    return found(
+        "certificate-untrusted",
+        where,
+        f"The certificate is not trusted here: {error.verify_message}.",
+        "Let the proxy send the whole chain, or trust its authority (SSL_CERT_FILE); of --tls that is "
+        "tls/ca.pem in the data folder.",
+    )
+
+
+def _names(shown: x509.Certificate | None) -> str:
+    if shown is None:
+        return "other names"
+    try:
+        held = shown.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+    except x509.ExtensionNotFound:
+        return "no name at all"
+    return ", ".join(str(each.value) for each in held) or "no name at all"
+
+
+def _shake(host: str, port: int, trust: ssl.SSLContext) -> bytes | None:
+    """The certificate that is shown. Raises OSError, ssl.SSLCertVerificationError."""
+    with (
+        socket.create_connection((host, port), _HANDSHAKE_S) as wire,
+        trust.wrap_socket(wire, server_hostname=host) as secured,
+    ):
+        return secured.getpeercert(binary_form=True)
+
+
+def _shown_certificate(host: str, port: int) -> x509.Certificate | None:
+    context = ssl.create_default_context()
+    context.check_hostname = False
+    context.verify_mode = ssl.CERT_NONE
+    try:
+        raw = _shake(host, port, context)
+        return x509.load_der_x509_certificate(raw) if raw else None
+    except (OSError, ValueError):
+        return None
+
+
+_FILES: Final = "docs/proxy has the files for nginx and Caddy."
+_REPLACED: Final = "wrong-host"
+_UPGRADE: Final = {
+    "connection": "Upgrade",
+    "upgrade": "websocket",
+    "sec-websocket-version": "13",
+    "sec-websocket-key": "dGhlIHNhbXBsZSBub25jZQ==",
+}
+
+
+def proxy_leads_here(place: Installation) -> Iterator[Diagnostic]:
+    """What the public address shows. Nothing secret is sent."""
+    try:
+        public = reached(place.public_url, None).public
+    except CannotStart as error:
+        if place.public_url is not None:  # that of the environment is told with the settings
+            yield found("setting-wrong", "--public-url", str(error), "Correct it.")
+        return
+    if public is None:
+        return
+    trust = Certificate(place.data).trusting_too()
+    if public.is_secure:
+        problems = [*certificate_fits(public.page, public.origin, trust)]
+        yield from problems
+        if problems:
+            return
+    # As a browser comes: by the page's origin.
+    headers = {**_UPGRADE, "origin": public.origin}
+    with client(verify=trust) as asking:
+        yield _shown(asking, "page", public.page, headers)
+        yield _shown(asking, "runner", public.runner, headers)
+
+
+def _shown(asking: httpx.Client, name: str, url: str, headers: dict[str, str]) -> Diagnostic:
+    try:
+        answer = health(asking, url)
+        live = asking.get(f"{url}/api/live", headers=headers) if answer.version else None
+    except httpx.HTTPError as error:
+        return found(
+            "proxy-unreachable",
+            url,
+            f"The public address does not answer: {error}.",
+            f"Start the proxy, or correct the address or its name's entry. {_FILES}",
+        )
+    if live is None or _REPLACED in live.text:
+        return _led_astray(name, url, answer.text if live is None else live.text, answer.status)
+    if REFUSED_SOCKET[0].decode() not in live.headers:
+        return found(
+            "proxy-sockets",
+            url,
+            f"The proxy passes no WebSockets on to the {name}: nobody sees what others do, and Stop "
+            "takes its slower way.",
+            f"nginx: pass on the headers Upgrade and Connection, with HTTP/1.1. {_FILES}",
+        )
+    return fine(url, f"The public address leads to the {name}, and passes WebSockets on.")
+
+
+def _led_astray(name: str, url: str, said: str, status: int) -> Diagnostic:
+    if _REPLACED in said:
+        return found(
+            "proxy-host",
+            url,
+            f"The {name} is asked by a name that it does not have: the proxy replaces the Host header.",
+            "nginx: `proxy_set_header Host $http_host`; Apache: `ProxyPreserveHost On`; and the server "
+            f"needs the same --public-url. {_FILES}",
+        )
+    if name == "runner" and ("misrouted" in said or status == 401):
+        return found(
+            "proxy-path",
+            url,
+            "The proxy leads what is below runner/ to the editor: Stop would not reach the runner.",
+            f"Lead it to the runner's port, before the rest goes to the editor's. {_FILES}",
+        )
+    return found(
+        "proxy-target",
+        url,
+        f"What answers there is not the {name} (status {status}).",
+        f"Start the {name}, and lead the address to its port, with the path as it is. {_FILES}",
+    )
+
 
 _CLOCK_S: Final = 5.0
 

@@ -1,8 +1,9 @@
 """The command `package`: C++ packages of the actions that a file describes, or that a library has."""
 
 import argparse
+import difflib
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -10,22 +11,114 @@ from action_assistant.commands.client import No, add_server, refused, running
 from action_assistant.commands.packages import workspace
 from action_assistant.commands.packages.folder import write_all
 from action_assistant.commands.packages.planning import PackagesPlan, plan
-from action_assistant.commands.packages.telling import (
-    print_difference,
-    tell_changes,
-    tell_notes,
-    tell_refusals,
-    tell_refused,
-)
 from action_assistant.errors import CannotStart
 from action_assistant.safe_text import one_line
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.files.action_files import ACTION_DIALECTS
 from action_assistant.umrf.model import Action
+from action_assistant.umrf.packages.bases import BASE_NAME
 from action_assistant.umrf.packages.bundling import bundle_files
 from action_assistant.umrf.packages.choosing import disagreements, distinct_actions
-from action_assistant.umrf.packages.generating import ImpossiblePackage, package_files
+from action_assistant.umrf.packages.generating import ImpossiblePackage, is_source, package_files
 from action_assistant.umrf.packages.naming import NameRefusal, check_names, snake_case
+from action_assistant.umrf.packages.regenerating import GeneratedChange
+
+
+def tell_refusals(root: Path, plan: PackagesPlan) -> None:
+    """What stands against writing, each with its place."""
+    for path, reason in plan.barred.items():
+        _tell(f"{root / path}: {reason}.")
+    for folder, each in plan.regenerations.items():
+        for path in each.differing:
+            _tell(
+                f"{root / folder / path}: is there and differs; nobody knows what it was made from."
+            )
+        for path, conflicts in each.conflicts.items():
+            for conflict in conflicts:
+                _tell(
+                    f"{root / folder / path}:{conflict.line}: what was changed here by hand and what is "
+                    "generated now overlap."
+                )
+        for path, reason in each.broken.items():
+            _tell(
+                f"{root / folder / path}: what was changed by hand and what is generated now make no "
+                f"readable file together: {reason}"
+            )
+
+
+def tell_refused(plan: PackagesPlan) -> None:
+    """The end of a call that could not write."""
+    _tell("Nothing was written.")
+    if any(each.conflicts or each.broken for each in plan.regenerations.values()):
+        _tell("Take over by hand what `--diff` shows for these files, and call again.")
+
+
+def tell_changes(root: Path, plan: PackagesPlan) -> None:
+    """What a call would do."""
+    for path in plan.writes:
+        _tell(f"{root / path}: {'would change' if path in plan.there else 'is not there'}.")
+    for path in plan.removals:
+        _tell(f"{root / path}: is no longer generated, and would be removed.")
+
+
+def tell_notes(root: Path, plan: PackagesPlan, with_lines: bool) -> None:
+    """What stays as it is, although it is generated otherwise or no longer. `with_lines`: also how, since
+    once it is written nothing else knows what was generated before."""
+    for folder, each in plan.regenerations.items():
+        for path in each.kept:
+            _tell(
+                f"{root / folder / path}: is no longer generated; it stays, since it was changed."
+            )
+        for path, change in each.by_hand.items():
+            if not is_source(path):
+                continue
+            _tell(
+                f"{root / folder / path}: is yours and stays; what is generated for it is new, to be "
+                f"taken over by hand{':' if with_lines else ' (`--diff` shows it).'}"
+            )
+            if with_lines:
+                sys.stderr.writelines(_by_hand(f"{folder}/{path}", change))
+
+
+def print_difference(plan: PackagesPlan) -> None:
+    """As `diff -u` prints it: what would be written after merging, or stands against it, but the base,
+    whose changes are those of the other files; then what would not be written, but has to be taken over by hand."""
+    shown: dict[str, bytes | None] = {**plan.writes, **dict.fromkeys(plan.removals)}
+    for folder, each in plan.regenerations.items():
+        shown |= {f"{folder}/{path}": content for path, content in each.differing.items()}
+    for path in sorted(path for path in shown if not path.endswith(f"/{BASE_NAME}")):
+        there, content = plan.there.get(path), shown[path]
+        sys.stdout.writelines(
+            _lines(
+                there or b"",
+                content or b"",
+                "/dev/null" if there is None else f"a/{path}",
+                "/dev/null" if content is None else f"b/{path}",
+            )
+        )
+    for folder, each in plan.regenerations.items():
+        for path, change in each.by_hand.items():
+            sys.stdout.writelines(_by_hand(f"{folder}/{path}", change))
+
+
+def _tell(sentence: str) -> None:
+    print(sentence, file=sys.stderr)
+
+
+def _by_hand(path: str, change: GeneratedChange) -> Iterator[str]:
+    return _lines(change.last, change.now, f"{path} as generated last", f"{path} as generated now")
+
+
+def _lines(before: bytes, after: bytes, old: str, new: str) -> Iterator[str]:
+    found = difflib.unified_diff(
+        before.decode(errors="replace").splitlines(keepends=True),
+        after.decode(errors="replace").splitlines(keepends=True),
+        old,
+        new,
+    )
+    return (
+        line if line.endswith("\n") else f"{line}\n\\ No newline at end of file\n" for line in found
+    )
 
 
 def _add_package(package: argparse.ArgumentParser) -> None:

@@ -10,11 +10,11 @@ from typing import Final
 
 from action_assistant import paths, settings
 from action_assistant.commands.processes import add_serve_options, reached
-from action_assistant.commands.services.systemd import Systemd
 from action_assistant.commands.services.unit import (
     NAME,
     SOURCED,
     ServicePlan,
+    Systemd,
     is_untouched,
     options_of,
     text_of,

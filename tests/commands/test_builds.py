@@ -7,8 +7,7 @@ from typing import Any
 
 import pytest
 
-from action_assistant.commands.builds.builds import of_actions
-from action_assistant.commands.builds.colcon_log import errors_of, last_builds
+from action_assistant.commands.builds import errors_of, last_builds, of_actions
 from action_assistant.errors import CannotStart
 from support.product import Product, running
 

@@ -1,1 +1,0 @@
-"""What colcon said of the packages of actions."""

@@ -1,1 +1,0 @@
-"""Commands on files of graphs that have sub-graphs."""

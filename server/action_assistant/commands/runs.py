@@ -1,0 +1,189 @@
+"""Commands for archives of runs: `runs archive`, `runs restore`."""
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from action_assistant import paths, settings
+from action_assistant.commands.client import No, Server, command, print_json, refused, running
+from action_assistant.errors import CannotStart, Refused
+from action_assistant.safe_text import one_line
+from action_assistant.umrf.difference import Difference
+from action_assistant.umrf.difference_text import lines, without_looks
+
+
+def add_since(runs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """The command below `runs`."""
+    since = command(
+        runs,
+        "since",
+        "which edit made a run's graph go another way than it went before, with what the actions of that "
+        "run did; exit 1 if an edit did",
+        "RUN",
+    )
+    since.add_argument("run", metavar="RUN", help="id of the run that went wrong")
+    since.add_argument(
+        "--good",
+        type=int,
+        metavar="CHANGE",
+        help="of the graph, when it still went well (default: that of the last run before that did)",
+    )
+    since.add_argument("--json", action="store_true", help="as JSON, for programs")
+    since.set_defaults(handler=_since)
+
+
+def _since(options: argparse.Namespace) -> int:
+    with running(options) as server:
+        try:
+            run = server.runner("GET", f"/api/runs/{options.run}").json()
+            graph, bad = run["graph"], _seq(server, run)
+            good = options.good or _last_good(server, run)
+            script = server.runner("GET", f"/api/runs/{options.run}/script").json()
+            asked = {"good": good, "bad": bad, "script": {"behaviours": script["behaviours"]}}
+            found = server.editor("POST", f"/api/graphs/{graph}/since", json=asked).json()
+            query = {"from": good, "to": bad}
+            answer = server.editor("GET", f"/api/graphs/{graph}/diff", params=query)
+        except No as error:
+            return refused(error)
+    if options.json:
+        print_json(found)
+    else:
+        _tell(found, msgspec.json.decode(answer.content, type=Difference))
+    return 1 if found["partings"] else 0
+
+
+def _seq(server: Server, run: dict[str, Any]) -> int:
+    """The change of the graph that a run had. Raises No."""
+    if run["graph"] is None or run["version"] is None:
+        raise No("This run is of no version of a graph here.")
+    version = server.editor("GET", f"/api/versions/{run['version']}").json()
+    seq: int = version["seq"]
+    return seq
+
+
+def _last_good(server: Server, run: dict[str, Any]) -> int:
+    """The change of the last run before that went well. Raises No."""
+    query = {"graph": run["graph"]}
+    for each in server.runner("GET", "/api/runs", params=query).json():
+        went_well = each["state"] == "finished" and each["result"] in {None, "on_true"}
+        if each["number"] < run["number"] and went_well and each["version"] is not None:
+            return _seq(server, each)
+    raise No("No run before it went well; name a change of the graph with --good.")
+
+
+def _tell(found: dict[str, Any], difference: Difference) -> None:
+    for each in found["partings"]:
+        who = each["author"]["name"] or each["author"]["id"]
+        verb = "goes another way" if each["parts"] else "goes the first way again"
+        print(one_line(f"since change {each['seq']} of {who}, {each['at'][:16]}, it {verb}:"))
+        changes = {"before": 0, "after": 0, "fields": [], "actions": [], "relations": []}
+        told = msgspec.convert(changes | each["changes"], Difference)
+        for line in lines(told):
+            print(one_line(f"    {line}"))
+        was, now = each["before"], each["after"]
+        print(one_line(f"    step {each['place']}: {was} before, {now} after"))
+    if not found["partings"]:
+        print("No edit explains it: with what its actions did, the graph goes the same way.")
+        for line in lines(without_looks(difference)):
+            print(one_line(line))
+    if not found["exact"]:
+        print(f"Only {found['looked']} moments were looked at; there may be further places.")
+
+
+def add_archives(runs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the commands of this module to `runs`."""
+    archive = command(
+        runs,
+        "archive",
+        "put what is old into archives, prove them, and delete it here; pinned runs stay",
+        "--runs 90 --raw 14",
+    )
+    archive.add_argument("--runs", type=_days, metavar="DAYS", help="runs that ended longer ago")
+    archive.add_argument("--raw", type=_days, metavar="DAYS", help="raw messages of robots")
+    archive.add_argument(
+        "--check", action="store_true", help="only prove every archive of the folder; no server"
+    )
+    archive.set_defaults(handler=_archive)
+
+    restore = runs.add_parser(
+        "restore",
+        help="prove archives of runs and put them where the runner looks for them",
+        epilog="example: action-assistant runs restore run-000042-AbC.jsonl.gz --data ./data",
+    )
+    restore.add_argument("files", type=Path, nargs="+", metavar="FILE")
+    restore.add_argument(
+        "--data", type=Path, default=paths.data(), metavar="DIR", help="default: %(default)s"
+    )
+    restore.set_defaults(handler=_restore)
+
+
+def _days(text: str) -> float:
+    days = float(text)
+    if not 0 <= days < 1e6:
+        raise ValueError
+    return days
+
+
+def _archive(options: argparse.Namespace) -> int:
+    if options.check:
+        return _check(settings.keep(options.data.resolve()).folder)
+    if options.runs is None and options.raw is None:
+        raise CannotStart("Say how old what goes may be: --runs DAYS, --raw DAYS, or both.")
+    with running(options) as server:
+        try:
+            return _sweep(server, {"runs": options.runs, "raw": options.raw})
+        except No as error:
+            return refused(error)
+
+
+def _sweep(server: Server, ages: dict[str, float | None]) -> int:
+    runs = hours = 0
+    problems: dict[str, None] = {}
+    more = True
+    while more:
+        told = server.runner("POST", "/api/archive", json=ages).json()
+        runs, hours, more = runs + told["runs"], hours + told["raw"], told["more"]
+        problems |= dict.fromkeys(told["problems"])
+        if more:
+            print(f"{runs} runs so far", file=sys.stderr)
+    print(f"{runs} runs and {hours} hours of raw messages are in archives now")
+    for problem in problems:
+        print(problem, file=sys.stderr)
+    return 1 if problems else 0
+
+
+def _check(folder: Path) -> int:
+    from action_assistant.runner.archives import archive_file
+
+    found = sorted(folder.glob("runs/**/*.jsonl.gz"))
+    damaged = 0
+    for path in found:
+        try:
+            for _ in archive_file.read(path):
+                pass
+        except (Refused, OSError) as error:
+            damaged += 1
+            print(error.detail if isinstance(error, Refused) else f"{path}: {error.strerror}")
+    print(f"{len(found) - damaged} archives in {folder} are sound, {damaged} are not")
+    return 1 if damaged else 0
+
+
+def _restore(options: argparse.Namespace) -> int:
+    from action_assistant.runner.archives import archive_file
+
+    folder = settings.keep(options.data.resolve()).folder
+    code = 0
+    for path in options.files:
+        try:
+            place = archive_file.title_of(path).place
+            events = sum(1 for _ in archive_file.read(path))
+            archive_file.put(path, folder / place)
+        except (Refused, OSError) as error:
+            text = error.detail if isinstance(error, Refused) else f"{path}: {error.strerror}"
+            code = refused(No(text))
+            continue
+        print(f"{place}: {events} events, all of them sound")
+    return code
