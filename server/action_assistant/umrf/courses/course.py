@@ -5,8 +5,9 @@ from heapq import heappop, heappush
 from typing import Final, Literal, NamedTuple, TypeAlias
 
 from action_assistant.umrf.components import Mask
-from action_assistant.umrf.courses.instants import DUE, RUNS, Instant, State
+from action_assistant.umrf.courses.instants import DUE, Instant, State
 from action_assistant.umrf.courses.network import Network
+from action_assistant.umrf.semantics.transitions import RUNS
 
 #: `stuck`: RUNNING for ever with nothing that runs; `endless`: laps without end, or longer than was
 #: looked at; `never`: an entry action lacks a value, so it does not start.

@@ -13,8 +13,9 @@ from typing import Final
 
 from action_assistant.umrf.components import Mask
 from action_assistant.umrf.courses.course import LAPS, MORE, Course, Outcome, stuck
-from action_assistant.umrf.courses.instants import ACTIVE, DUE, IDLE, RUNS, Instant, State
+from action_assistant.umrf.courses.instants import DUE, Instant, State
 from action_assistant.umrf.model import Precondition
+from action_assistant.umrf.semantics.transitions import ACTIVE, IDLE, RUNS
 
 #: Differences that are remembered with what came of them.
 _FEW: Final = 8

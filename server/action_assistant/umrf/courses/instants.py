@@ -1,8 +1,9 @@
-"""What one end of an action sets in motion at its instant, over states that are plain values.
+"""Follows what one end of an action causes at its instant, over states that are plain values.
 
-The rules are those of `core` (docs/umrf-and-the-engine.md 2.3 to 2.7); a property test holds the two
-together. Only what matters later is kept: whether an action goes on, and until when; which required
-parents have reported; which inputs hold a value; whether outputs do.
+The rules are those of `semantics.core` (docs/umrf-and-the-engine.md 2.3 to 2.7): effects of responses are looked up
+in the same table, a property test compares the two, and another test compares them with recordings. A state keeps
+only what matters later: what the action is doing and until when, which required parents have reported, which inputs
+hold a value, and whether its outputs do.
 """
 
 from collections import deque
@@ -11,17 +12,19 @@ from typing import Final, Literal, NamedTuple, TypeAlias
 
 from action_assistant.umrf.components import Mask
 from action_assistant.umrf.courses.network import EdgeQuestion, Network
-from action_assistant.umrf.model import Precondition
+from action_assistant.umrf.model import Precondition, Response
+from action_assistant.umrf.semantics.transitions import (
+    ACTIVE,
+    EFFECTS,
+    GIVING_UP,
+    IDLE,
+    PAUSED,
+    RUNS,
+    STOPS,
+    THREAD_LEFT,
+)
 
-#: What an action does: nothing; runs until `due`; ends a stop at `due`; is paused; was stopped while
-#: it was paused and is given up at `due`; is given up, its thread never ends.
-IDLE: Final = 0
-RUNS: Final = 1
-STOPS: Final = 2
-PAUSED: Final = 3
-GIVING_UP: Final = 4
-GIVEN_UP: Final = 5
-ACTIVE: Final = frozenset({RUNS, STOPS, PAUSED, GIVING_UP})
+#: Activities that end by themselves, at `State.due`.
 DUE: Final = frozenset({RUNS, STOPS, GIVING_UP})
 #: After so long the engine gives up on a paused action that it stops.
 GIVING_UP_MS: Final = 5_000.0
@@ -85,7 +88,7 @@ class Instant:
             case 2:
                 self._returns(place, state, "on_stopped")
             case _:
-                self._put(place, state._replace(does=GIVEN_UP, due=0.0))
+                self._put(place, state._replace(does=THREAD_LEFT, due=0.0))
                 self._inform(place, "on_error", self._net.edges[place])
         self._settle()
 
@@ -200,26 +203,22 @@ class Instant:
         own = place == self._returning >= 0 and self._state(place).does in ACTIVE
         self.early = self.active > own
 
-    def _dispatch(self, child: int, state: State, response: str) -> None:
-        does = state.does
-        match response:
-            case "run":
-                if does == RUNS or not self._net.able[child]:
-                    return
-                if does != IDLE:
-                    self.end = "crashed"
-                    return
+    def _dispatch(self, child: int, state: State, response: Response) -> None:
+        if response == "run" and not self._net.able[child]:
+            return
+        match EFFECTS[response][state.does]:
+            case "runs":
                 due = self._net.due(child, self._now)
                 self._put(child, state._replace(does=RUNS, due=due))
-            case "stop" if does in (STOPS, GIVING_UP):
-                self.end = "crashed"
-            case "stop" if does == RUNS:
-                due = min(state.due, self._now + self._net.stopping_ms[child])
-                self._put(child, state._replace(does=STOPS, due=due))
-            case "stop" if does == PAUSED:
+            case "stops" if state.does == PAUSED:
                 due = self._now + GIVING_UP_MS
                 self._put(child, state._replace(does=GIVING_UP, due=due))
-            case "pause" if does == RUNS:
+            case "stops":
+                due = min(state.due, self._now + self._net.stopping_ms[child])
+                self._put(child, state._replace(does=STOPS, due=due))
+            case "pauses":
                 self._put(child, state._replace(does=PAUSED, due=0.0))
-            case _:
+            case "aborts":
+                self.end = "crashed"
+            case "nothing":
                 pass

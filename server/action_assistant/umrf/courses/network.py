@@ -10,7 +10,7 @@ from functools import cached_property
 from typing import Final, NamedTuple
 
 from action_assistant.umrf.components import Mask, reachable
-from action_assistant.umrf.model import PRECONDITIONS, Graph, Precondition
+from action_assistant.umrf.model import PRECONDITIONS, Graph, Precondition, Response
 from action_assistant.umrf.semantics.parts import RESERVED, Edge, Node, Running, build
 from action_assistant.umrf.semantics.script import Behaviour
 from action_assistant.umrf.semantics.values import (
@@ -34,7 +34,7 @@ class EdgeQuestion(NamedTuple):
     None where the renaming kills the engine."""
 
     child: int
-    responses: dict[str, str]
+    responses: dict[Precondition, Response]
     link: Mask
     given: tuple[Mask, Mask] | None
 
@@ -173,7 +173,7 @@ def _asked(
     if edge.child is None or link is None:
         return None
     child = places[id(edge.child)]
-    responses: dict[str, str] = {o: link.conditions.answer(o) for o in PRECONDITIONS}
+    responses = {o: link.conditions.answer(o) for o in PRECONDITIONS}
     bit = bits[child].get(parent.full_name, 0)
     try:
         found = renamed(parent.outputs, edge.remap, edge.child.inputs)

@@ -14,13 +14,14 @@ import msgspec
 
 from action_assistant.safe_text import hold_names
 from action_assistant.umrf.courses.coverage import OutcomeArrow, taken
-from action_assistant.umrf.courses.instants import DUE, GIVING_UP, IDLE, RUNS, STOPS, Instant, State
+from action_assistant.umrf.courses.instants import DUE, Instant, State
 from action_assistant.umrf.courses.network import EdgeQuestion, Network
 from action_assistant.umrf.facts import SIMULATED
 from action_assistant.umrf.model import ENTRY, EXIT, OUTCOMES, Graph, Precondition
 from action_assistant.umrf.semantics.script import Behaviour, Script
 from action_assistant.umrf.semantics.simulate import DAY_MS, simulate
 from action_assistant.umrf.semantics.steps import MOST
+from action_assistant.umrf.semantics.transitions import GIVING_UP, IDLE, RUNS, STOPS
 
 #: Places of states that one search may look at: about two seconds.
 BUDGET: Final = 2_000_000

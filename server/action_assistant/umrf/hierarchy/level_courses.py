@@ -8,9 +8,10 @@ once, in any order. A sub-graph ends with what its own courses end with.
 from collections.abc import Iterator, Mapping
 from typing import Final, Literal, NamedTuple, TypeAlias
 
-from action_assistant.umrf.courses.instants import RUNS, Instant, State
+from action_assistant.umrf.courses.instants import Instant, State
 from action_assistant.umrf.courses.network import EdgeQuestion, Network
 from action_assistant.umrf.model import OUTCOMES, Graph, Key, Precondition
+from action_assistant.umrf.semantics.transitions import RUNS
 
 #: Places of states that are looked at for one hierarchy: about two seconds.
 BUDGET: Final = 2_000_000

@@ -37,6 +37,7 @@ from action_assistant.umrf.semantics.trace import (
     NodeResultEvent,
     NotReady,
 )
+from action_assistant.umrf.semantics.transitions import EFFECTS
 from action_assistant.umrf.semantics.values import RemapUnknown, fill_outputs, hand_over
 
 #: A node that starts so often at one instant runs in a loop without time.
@@ -200,13 +201,14 @@ class Core(Clock):
         return node.type == "spontaneous" and node.state in ("RUNNING", "ERROR")
 
     def _run(self, graph: Running, node: Node) -> None:
-        if node.state == "RUNNING" or node.name in RESERVED:
+        effect = EFFECTS["run"][node.activity(self.now)]
+        if effect == "nothing" or node.name in RESERVED:
             return
         if node.subgraph is None and not node.loaded and node.state != "UNINITIALIZED":
             if not node.failed_to_load:
                 self._soon(partial(self._run_unloaded, graph, node))
                 return
-        elif node.active or node.loading or node.busy_until > self.now:
+        elif effect == "aborts":
             message = (
                 f"“run” reaches {node.full_name}, whose thread still lives: the engine aborts."
             )
@@ -356,13 +358,14 @@ class Core(Clock):
     # Stop and pause of one action
 
     def _stop_node(self, graph: Running, node: Node) -> None:
-        if node.state == "STOPPING":
+        effect = EFFECTS["stop"][node.activity(self.now)]
+        if effect == "aborts":
             message = (
                 f"“stop” reaches {node.full_name}, which is stopping already: the engine aborts."
             )
             self._crash(graph, "H4", message, node)
             return
-        if not node.active:
+        if effect == "nothing":
             return
         if not node.loaded and node.subgraph is None:
             self._state(graph, node, "STOPPING")
@@ -461,7 +464,7 @@ class Core(Clock):
 
     def _pause_node(self, graph: Running, node: Node) -> bool:
         """Whether the action is paused, or was not running."""
-        if node.state != "RUNNING":
+        if EFFECTS["pause"][node.activity(self.now)] == "nothing":
             return True
         self._state(graph, node, "PAUSE_REQUESTED")
         if node.subgraph is not None or not node.call.pauses:

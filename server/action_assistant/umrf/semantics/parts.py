@@ -18,6 +18,7 @@ from action_assistant.umrf.model import (
     Remap,
 )
 from action_assistant.umrf.semantics.script import Behaviour
+from action_assistant.umrf.semantics.transitions import IDLE, PAUSED, RUNS, STOPS, THREAD_LEFT
 from action_assistant.umrf.semantics.values import Slot, slots_of
 
 ENTRY_NODE = "graph_entry_0"
@@ -123,13 +124,25 @@ class Node:
 
     @property
     def active(self) -> bool:
-        """Whether it holds a thread."""
+        """Whether the engine counts the action as active: it runs, is paused or stops."""
         return self.state in ACTIVE
 
+    def activity(self, at_ms: float) -> int:
+        """Return what the action does at this time, as a number of `transitions`."""
+        match self.state:
+            case "RUNNING":
+                return RUNS
+            case "STOPPING":
+                return STOPS
+            case "PAUSED" | "PAUSE_REQUESTED":
+                return PAUSED
+            case _:
+                return THREAD_LEFT if self.loading or self.busy_until > at_ms else IDLE
+
     def holds_thread(self, at_ms: float) -> bool:
-        """Whether a thread of its has not ended by then: also of one that was given up as ERROR, and of
-        one that still loads."""
-        return self.active or self.loading or self.busy_until > at_ms
+        """Return whether a thread of the action lives at this time, also one that the engine has given up as
+        ERROR and one that still loads."""
+        return self.activity(at_ms) != IDLE
 
     def link(self, parent: str, link: NodeLink) -> None:
         """Adds a parent, unless an earlier listing has it."""
