@@ -96,7 +96,7 @@ def _questions(journal: Journal, middle: str) -> list[Callable[[], Awaitable[Any
             among = None if text is None else await numbers_with(text, journal.query)
             rows = await journal.query(queries.listed(queries.Filter(**wanted), 200, among))
             await journal.query(queries.labels_of([row.id for row in rows]))
-            msgspec.json.encode([views.listed(views.summary_of_row(r), r, []) for r in rows])
+            msgspec.json.encode([views.list_entry(views.summary_of_row(r), r, []) for r in rows])
 
         return ask
 
@@ -237,7 +237,7 @@ async def _after_a_death(journal: Journal, events: list[Any]) -> str:
         await journal.append(stream, drafts[i : i + APART])
     started = time.perf_counter()
     key = (await KeyframeStore(journal, _ASIDE).keyframes(run)).keys[-1]
-    msgspec.json.encode(views.whole(key.run, Sent("{}", {})))
+    msgspec.json.encode(views.whole_view(key.run, Sent("{}", {})))
     return seconds(time.perf_counter() - started)
 
 
@@ -247,7 +247,7 @@ async def _opening(journal: Journal, asked: WorkerQueries, run: str, size: int) 
 
     async def opened(keyframe_store: KeyframeStore) -> None:
         key = (await keyframe_store.keyframes(run)).keys[-1]
-        msgspec.json.encode(views.whole(key.run, Sent("{}", {})))
+        msgspec.json.encode(views.whole_view(key.run, Sent("{}", {})))
 
     with contextlib.suppress(NotFound):
         await asked.text(ReviewService.whole, "none")  # the worker is there

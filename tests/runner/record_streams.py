@@ -217,7 +217,7 @@ def expected(events: list[Event]) -> Any:
 
 def as_told(run: Run) -> Any:
     """A run as people and programs see it, and the lines of its engine."""
-    return msgspec.to_builtins(views.shown(run))
+    return msgspec.to_builtins(views.run_view(run))
 
 
 def recorded() -> Iterator[tuple[str, list[Event]]]:

@@ -85,7 +85,7 @@ def asked(name: str = "David", **more: Any) -> Any:
 
 def shown(control: ExecutionService, run: str) -> Any:
     """A run as the API and the page show it."""
-    return views.shown(control.open[run].run)
+    return views.run_view(control.open[run].run)
 
 
 async def confirm_lost(control: ExecutionService) -> None:

@@ -76,7 +76,7 @@ def graph_of(told: Lived) -> Graph:
 
 def shown_spans(run: Run) -> Iterator[tuple[str, float, float]]:
     """What the page shows of each visit that is over: of which action, least and most seconds."""
-    for name, shown in views.shown(run).actions.items():
+    for name, shown in views.run_view(run).actions.items():
         for visit in shown.visits:
             if visit.until is not None and visit.not_after is not None:
                 least = (visit.until - visit.start).total_seconds()

@@ -107,7 +107,7 @@ def test_replay_at_any_event_equals_the_fold_of_the_events_up_to_it(drawn: Any) 
         for upto in range(1, len(events) + 1):
             run = replay(events[:upto])
             assert run is not None
-            whole = msgspec.to_builtins(views.shown(run))
+            whole = msgspec.to_builtins(views.run_view(run))
             shown = played(keyframes, upto)
             assert shown["head"]["state"] == whole["state"]
             assert shown["head"].get("unknown_since") == whole["unknown_since"]
@@ -141,7 +141,7 @@ async def test_the_pages_of_a_long_film_join_without_a_gap() -> None:
     assert seqs == list(range(1, len(events) + 1))
     run = replay(events[:APART])
     assert run is not None
-    assert second.base == views.shown(run)
+    assert second.base == views.run_view(run)
 
 
 @virtual

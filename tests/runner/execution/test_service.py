@@ -353,6 +353,6 @@ async def test_where_the_simulator_plays_a_robot_it_pauses_only_as_safely_as_tha
         await anyio.sleep(1)
         with pytest.raises(Conflict, match="not safe"):
             await control.pause(run, ANN)
-        assert views.shown(control.open[run].run).like == "David"
+        assert views.run_view(control.open[run].run).like == "David"
         control.stop_all(BEN)
         assert await ended(control, run) == "stopped"

@@ -125,8 +125,10 @@ def test_nothing_is_shown_that_was_not_seen_and_live_is_as_it_is_told_later(
             assert visit.inputs is None or f"Work_{number}" in witness.active
             failed = call["result"] == "on_error"
             assert visit.result in {None, "stopped", *(["error"] if failed else [])}
-    live = [views.shown(shown) for _, shown in witness.place.harness.shown]
-    later = [views.shown(found) for n in range(1, len(events) + 1) if (found := replay(events[:n]))]
+    live = [views.run_view(shown) for _, shown in witness.place.harness.shown]
+    later = [
+        views.run_view(found) for n in range(1, len(events) + 1) if (found := replay(events[:n]))
+    ]
     assert list(_changes(live)) == list(_changes(later))
 
 

@@ -96,7 +96,7 @@ def test_statistics_pages_and_exports_say_at_least() -> None:
     run = seen_in_a_loop(5)
     summed = annotations.sum_of(run, None, 1).actions["Work_0"]
     assert (summed.visits, summed.at_least, summed.inferred) == (5, True, 5)
-    shown = views.shown(run).actions["Work_0"]
+    shown = views.run_view(run).actions["Work_0"]
     assert (shown.count, shown.at_least) == (5, True)
     lines = exports.intervals(run).decode().splitlines()
     assert lines[0].endswith(",missed")

@@ -63,7 +63,7 @@ def test_a_thinned_history_is_the_same_history(items: list[Any], together: int) 
         some = tuple(seen[first : first + together])
         thinned = follow(thinned, Observed(0, thin(thinned, some)))
         full = follow(full, Observed(0, some))
-        assert views.shown(thinned) == views.shown(full)
+        assert views.run_view(thinned) == views.run_view(full)
 
 
 def test_what_a_run_of_a_large_graph_stores_grows_with_what_happens_in_it() -> None:

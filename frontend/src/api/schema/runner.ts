@@ -27,8 +27,8 @@ export interface RunnerApi {
     };
     /**
      * ActionShown
-     * @description One action of a run. `older` visits are not listed. It ran `count` times; `at_least`: or more
-     *     often, since visits of it may have been missed.
+     * @description One action of a run. `older` visits are not listed. The action ran `count` times; with
+     *     `at_least` perhaps more often, since visits of it may have been missed.
      */
     ActionShown: {
         aid: string | null;
@@ -118,7 +118,7 @@ export interface RunnerApi {
     };
     /**
      * ArchivedShown
-     * @description Since when the events of a run are in an archive, and in which file of its folder.
+     * @description The moment at which the events of a run went to an archive, and the file in its folder.
      */
     ArchivedShown: {
         /** Format: date-time */
@@ -153,8 +153,8 @@ export interface RunnerApi {
     };
     /**
      * AtRestShown
-     * @description How rest was seen where no answer of the engine could prove it: by whom (null: the runner saw the
-     *     engine's process end), when, and how.
+     * @description How rest was seen where no answer of the engine could prove it: by whom (null: the runner saw
+     *     the end of the engine's process), when, and how.
      */
     AtRestShown: {
         by: RunnerApi["Author"] | null;
@@ -648,8 +648,8 @@ export interface RunnerApi {
     };
     /**
      * Listed
-     * @description A run of the list, with what people noted about it, and in one sentence why it did not end
-     *     well, as far as that is recorded.
+     * @description A run of the list, with the marks that people gave it. `cause`: in one sentence why it did
+     *     not end well, as far as that is recorded.
      */
     Listed: {
         id: string;
@@ -728,7 +728,7 @@ export interface RunnerApi {
     };
     /**
      * MessageShown
-     * @description What an action had to say.
+     * @description A message of an action, or a line of the engine's log.
      */
     MessageShown: {
         /** Format: date-time */
@@ -1288,8 +1288,9 @@ export interface RunnerApi {
     };
     /**
      * RunSummary
-     * @description A run as a list shows it. `took`: from `started_at` to when nothing of it moved any more, as far
-     *     as that was seen, which is before `ended_at`, when that was proven; null where that is not known.
+     * @description A run as a list shows it. `took`: from `started_at` to when nothing of it moved any more, as
+     *     far as that was seen, which is before `ended_at`, when that was proven; null where that is not
+     *     known.
      */
     RunSummary: {
         id: string;
@@ -1325,8 +1326,9 @@ export interface RunnerApi {
     /**
      * RunWhole
      * @description A run with the graph as it was sent. `sent`: the values of its actions, by full name and flat
-     *     name, written as in `inputs` of visits. `subgraphs`: all graphs inside of it, as they were sent along;
-     *     `tree_digest`: of it together with them, null where whoever started it did not tell.
+     *     name, written as in `inputs` of visits. `subgraphs`: all graphs inside of it, as they were sent
+     *     along; `tree_digest`: of the graph together with them, null where the starter did not send
+     *     it.
      */
     RunWhole: {
         id: string;
@@ -1470,8 +1472,8 @@ export interface RunnerApi {
     };
     /**
      * StartShown
-     * @description What has become of a start. `under_way`: it is being carried out at this moment. Without that
-     *     and without runs nothing of it has arrived here so far.
+     * @description The state of a start. `under_way`: it is being carried out at this moment. Where that is
+     *     false and `runs` is empty, nothing of the start has arrived here so far.
      */
     StartShown: {
         request_id: string;
@@ -1591,7 +1593,7 @@ export interface RunnerApi {
     /**
      * VisitShown
      * @description One visit of an action. It began between `not_before` and `from`, and ended between `until`
-     *     (null: no end was seen) and `not_after` (null: it may go on still); where `until` lies before
+     *     (null: no end was seen) and `not_after` (null: it may go on still). Where `until` lies before
      *     `from`, no moment is known at which it went on for certain. `inputs`: values that the engine
      *     reported for it, by flat name, as JSON texts (a long one is cut and ends with an ellipsis); null
      *     when nobody saw them.

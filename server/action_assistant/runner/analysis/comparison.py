@@ -229,8 +229,8 @@ def _steps(a: Run, b: Run, twins: Sequence["_Twins"], missed: Missed) -> Iterato
                 name=pair.place.name,
                 aid=(right or left or ActionRun()).aid,
                 visit=number,
-                a=views.visit(one) if one else None,
-                b=views.visit(other) if other else None,
+                a=views.visit_view(one) if one else None,
+                b=views.visit_view(other) if other else None,
                 relation=missed.relation(pair, _relation(one, other)),
                 slower=_slower(one, other),
             )

@@ -101,7 +101,7 @@ async def run_replay(keyframe_store: KeyframeStore, run: str, *, after: int) -> 
         run=run,
         after=base.seq if base else 0,
         newest=keyframes.keys[-1].seq,
-        base=views.shown(base.run) if base else None,
+        base=views.run_view(base.run) if base else None,
         frames=frames,
         chapters=chapters,
         marks=[_shown(mark) for mark in keyframes.marks],
@@ -204,6 +204,6 @@ def _changed(before: ActionRun | None, after: ActionRun) -> ActionFrame:
         aid=after.aid,
         state=after.state,
         first=first,
-        visits=[views.visit(each) for each in after.visits[first - after.older :]],
+        visits=[views.visit_view(each) for each in after.visits[first - after.older :]],
         messages=[views.MessageShown(views.time(each.at), each.text) for each in fresh],
     )

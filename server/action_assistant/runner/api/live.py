@@ -126,7 +126,7 @@ class Hub:
         self.clock_us = clock_us
         self.boxes: set[Outbox] = set()
         self._frames: WeakKeyDictionary[OpenRun, EncodedRun] = WeakKeyDictionary()
-        self._memos: WeakKeyDictionary[OpenRun, views.Memo] = WeakKeyDictionary()
+        self._view_caches: WeakKeyDictionary[OpenRun, views.ActionViewCache] = WeakKeyDictionary()
         self._engines: str | None = None
         control.watch(self._changed)
         control.watch_robots(self._robots_changed)
@@ -182,16 +182,16 @@ class Hub:
 
     async def work_out(self, opened: OpenRun) -> None:
         """Make sure that showing a run takes little time now."""
-        await work_out(opened.run, self.memo(opened))
+        await work_out(opened.run, self.view_cache(opened))
 
-    def memo(self, opened: OpenRun) -> views.Memo:
+    def view_cache(self, opened: OpenRun) -> views.ActionViewCache:
         """What was shown of a run so far."""
-        return self._memos.setdefault(opened, views.Memo())
+        return self._view_caches.setdefault(opened, views.ActionViewCache())
 
     def shown(self, opened: OpenRun) -> views.RunShown:
         """A run as it is now."""
         recorded = opened.recorder.recorded
-        return views.shown(opened.run, recorded=recorded, memo=self.memo(opened))
+        return views.run_view(opened.run, recorded=recorded, cache=self.view_cache(opened))
 
     async def follow(self, text: str, author: Author) -> str:
         """Do what a page says; the answer."""
@@ -211,9 +211,9 @@ class Hub:
         return _text(Stopping(stop_id, runs))
 
 
-async def work_out(run: Run, memo: views.Memo) -> None:
+async def work_out(run: Run, cache: views.ActionViewCache) -> None:
     """Know how a run is shown, without doing nothing else meanwhile."""
-    for _ in memo.work_out(run, _AT_ONCE):
+    for _ in cache.prepare(run, _AT_ONCE):
         await anyio.lowlevel.checkpoint()
 
 

@@ -298,7 +298,7 @@ def _starts(services: RobotServices) -> list[ControllerRouterHandler]:
     async def start(request: _Asking) -> Response[GroupShown]:
         async with body_of(request, services.body_limit) as body:
             grouped = await services.control.start_group(read_group(body), author_of(request))
-        runs = [views.shown(run) for run in grouped.runs]
+        runs = [views.run_view(run) for run in grouped.runs]
         shown = GroupShown(id=grouped.group, runs=runs, failed=grouped.failed)
         return Response(shown, status_code=201 if grouped.fresh else 200)
 

@@ -130,7 +130,7 @@ def _moves(services: RunnerServices) -> list[ControllerRouterHandler]:
     )
     async def pause(run: str, request: _Asking) -> views.RunShown:
         await _require_hand_on(services, run, request)
-        return views.shown(await services.control.pause(run, author_of(request)))
+        return views.run_view(await services.control.pause(run, author_of(request)))
 
     @post(
         "/api/runs/{run:str}/resume",
@@ -140,7 +140,7 @@ def _moves(services: RunnerServices) -> list[ControllerRouterHandler]:
     )
     async def resume(run: str, request: _Asking) -> views.RunShown:
         await _require_hand_on(services, run, request)
-        return views.shown(await services.control.resume(run, author_of(request)))
+        return views.run_view(await services.control.resume(run, author_of(request)))
 
     @post(
         "/api/runs/{run:str}/modify",
@@ -153,7 +153,7 @@ def _moves(services: RunnerServices) -> list[ControllerRouterHandler]:
     async def modify(run: str, request: _Asking) -> views.RunShown:
         await _require_hand_on(services, run, request)
         async with body_of(request, services.body_limit) as body:
-            return views.shown(await services.control.modify(run, body, author_of(request)))
+            return views.run_view(await services.control.modify(run, body, author_of(request)))
 
     @post(
         "/api/runs/{run:str}/at_rest",
@@ -164,7 +164,7 @@ def _moves(services: RunnerServices) -> list[ControllerRouterHandler]:
     )
     async def at_rest(run: str, request: _Asking) -> views.RunShown:
         asked = decoded(await request.body(), RestRequest)
-        return views.shown(await services.control.confirm_rest(run, asked, author_of(request)))
+        return views.run_view(await services.control.confirm_rest(run, asked, author_of(request)))
 
     return [stop_all, stop, pause, resume, modify, at_rest]
 
@@ -222,11 +222,11 @@ def _reads(services: RunnerServices) -> list[ControllerRouterHandler]:
             services.sent[opened] = await services.asked.value(ReviewService.sent, run)
         opened = services.control.open.get(run, opened)
         await services.hub.work_out(opened)
-        whole = views.whole(
+        whole = views.whole_view(
             opened.run,
             services.sent[opened],
             recorded=opened.recorder.recorded,
-            memo=services.hub.memo(opened),
+            cache=services.hub.view_cache(opened),
         )
         return json_of(msgspec.json.encode(whole), views.RunWhole)
 
@@ -291,9 +291,9 @@ async def _shown(services: RunnerServices, run: Run) -> views.RunShown:
     if opened is not None:
         await services.hub.work_out(opened)
         return services.hub.shown(opened)
-    memo = views.Memo()
-    await work_out(run, memo)
-    return views.shown(run, memo=memo)
+    cache = views.ActionViewCache()
+    await work_out(run, cache)
+    return views.run_view(run, cache=cache)
 
 
 def _states(asked: str | None) -> tuple[str, ...]:

@@ -35,7 +35,9 @@ async def listed(
     rows = await review_service.rows(queries.listed(wanted, limit, among))
     labels = await _labels(review_service, rows)
     shown = (
-        views.listed(going.get(row.id) or views.summary_of_row(row), row, labels.get(row.id, []))
+        views.list_entry(
+            going.get(row.id) or views.summary_of_row(row), row, labels.get(row.id, [])
+        )
         for row in rows
     )
     return [each for each in shown if not wanted.states or each.state in wanted.states]

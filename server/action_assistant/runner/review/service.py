@@ -153,13 +153,13 @@ class ReviewService:
         """A run that is over, and the graph as it was sent. Raises NotFound."""
         sent = await self.sent(run_id)
         found, place = await self.known(run_id), await self.place(run_id)
-        return views.whole(found, sent, place=place)
+        return views.whole_view(found, sent, place=place)
 
     async def followed(self, run_id: str, robots_too: bool) -> tuple[Run, int]:
         """A run and the seq of its last event; with few visits unless it has to go on exactly.
         Raises NotFound."""
         key = (await self.keyframe_store.keyframes(run_id)).keys[-1]
-        return (key.run if robots_too else views.thinned(key.run)), key.seq
+        return (key.run if robots_too else views.with_newest_visits(key.run)), key.seq
 
     async def known(self, run_id: str) -> Run:
         """A run, open or over. Raises NotFound."""

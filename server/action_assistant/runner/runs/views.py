@@ -20,12 +20,27 @@ from action_assistant.umrf.json.embedded import UmrfGraph
 _LIVE: Final = 3_000  # visits in one live message, over all actions
 _WHOLE: Final = 20_000
 _LINES: Final = 20  # of the engine's log in one live message
+#: Fields of a summary that a run and its row in the table have under the same names; of these, times.
+_SAME: Final = (
+    "id",
+    "number",
+    "graph",
+    "graph_name",
+    "version",
+    "digest",
+    "engine",
+    "simulated",
+    "state",
+    "desired",
+    "result",
+)
+_SAME_TIMES: Final = ("requested_at", "started_at", "ended_at")
 _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 
 
 class VisitShown(msgspec.Struct, frozen=True, rename={"start": "from"}):
     """One visit of an action. It began between `not_before` and `from`, and ended between `until`
-    (null: no end was seen) and `not_after` (null: it may go on still); where `until` lies before
+    (null: no end was seen) and `not_after` (null: it may go on still). Where `until` lies before
     `from`, no moment is known at which it went on for certain. `inputs`: values that the engine
     reported for it, by flat name, as JSON texts (a long one is cut and ends with an ellipsis); null
     when nobody saw them."""
@@ -40,15 +55,15 @@ class VisitShown(msgspec.Struct, frozen=True, rename={"start": "from"}):
 
 
 class MessageShown(msgspec.Struct, frozen=True):
-    """What an action had to say."""
+    """A message of an action, or a line of the engine's log."""
 
     at: datetime
     text: str
 
 
 class ActionShown(msgspec.Struct, frozen=True, omit_defaults=True):
-    """One action of a run. `older` visits are not listed. It ran `count` times; `at_least`: or more
-    often, since visits of it may have been missed."""
+    """One action of a run. `older` visits are not listed. The action ran `count` times; with
+    `at_least` perhaps more often, since visits of it may have been missed."""
 
     aid: str | None
     state: str
@@ -71,8 +86,8 @@ class AlarmShown(msgspec.Struct, frozen=True):
 
 
 class AtRestShown(msgspec.Struct, frozen=True):
-    """How rest was seen where no answer of the engine could prove it: by whom (null: the runner saw the
-    engine's process end), when, and how."""
+    """How rest was seen where no answer of the engine could prove it: by whom (null: the runner saw
+    the end of the engine's process), when, and how."""
 
     by: Author | None
     at: datetime
@@ -80,8 +95,9 @@ class AtRestShown(msgspec.Struct, frozen=True):
 
 
 class RunSummary(msgspec.Struct, frozen=True, kw_only=True):
-    """A run as a list shows it. `took`: from `started_at` to when nothing of it moved any more, as far
-    as that was seen, which is before `ended_at`, when that was proven; null where that is not known."""
+    """A run as a list shows it. `took`: from `started_at` to when nothing of it moved any more, as
+    far as that was seen, which is before `ended_at`, when that was proven; null where that is not
+    known."""
 
     id: str
     number: int
@@ -115,15 +131,15 @@ class RunSummary(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class ArchivedShown(msgspec.Struct, frozen=True):
-    """Since when the events of a run are in an archive, and in which file of its folder."""
+    """The moment at which the events of a run went to an archive, and the file in its folder."""
 
     at: datetime
     file: str
 
 
 class Listed(RunSummary, frozen=True, kw_only=True):
-    """A run of the list, with what people noted about it, and in one sentence why it did not end
-    well, as far as that is recorded."""
+    """A run of the list, with the marks that people gave it. `cause`: in one sentence why it did
+    not end well, as far as that is recorded."""
 
     cause: str
     pinned: bool
@@ -144,8 +160,9 @@ class RunShown(RunSummary, frozen=True, kw_only=True):
 
 class RunWhole(RunShown, frozen=True, kw_only=True):
     """A run with the graph as it was sent. `sent`: the values of its actions, by full name and flat
-    name, written as in `inputs` of visits. `subgraphs`: all graphs inside of it, as they were sent along;
-    `tree_digest`: of it together with them, null where whoever started it did not tell."""
+    name, written as in `inputs` of visits. `subgraphs`: all graphs inside of it, as they were sent
+    along; `tree_digest`: of the graph together with them, null where the starter did not send
+    it."""
 
     umrf: UmrfGraph
     override: Override | None
@@ -157,8 +174,8 @@ class RunWhole(RunShown, frozen=True, kw_only=True):
 
 
 class StartShown(msgspec.Struct, frozen=True, kw_only=True):
-    """What has become of a start. `under_way`: it is being carried out at this moment. Without that
-    and without runs nothing of it has arrived here so far."""
+    """The state of a start. `under_way`: it is being carried out at this moment. Where that is
+    false and `runs` is empty, nothing of the start has arrived here so far."""
 
     request_id: str
     under_way: bool
@@ -166,33 +183,34 @@ class StartShown(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def time(us: int) -> datetime:
-    """Microseconds UTC as a moment."""
+    """Convert microseconds UTC to a datetime."""
     return _EPOCH + timedelta(microseconds=us)
 
 
 def summary(run: Run, *, recorded: bool = True) -> RunSummary:
-    """A run without its actions."""
+    """Return a run without its actions. `recorded`: all of its events are stored."""
     return RunSummary(**_fields(run, recorded))
 
 
-class Memo:
-    """What was shown of each action of a run, for as long as it is as it was: of thousands of them
-    few change between two looks."""
+class ActionViewCache:
+    """Caches the views of the actions of one run. Of thousands of actions few change between two
+    views, and a view is valid for as long as its `ActionRun` is the same object."""
 
     def __init__(self) -> None:
         self._known: dict[str, tuple[ActionRun, int, VisitCount, ActionShown]] = {}
 
     def action(self, name: str, action: ActionRun, most: int, count: VisitCount) -> ActionShown:
-        """An action with its newest visits."""
+        """Return the view of an action with at most `most` of its newest visits."""
         known = self._known.get(name)
         if known is not None and known[0] is action and known[1:3] == (most, count):
             return known[3]
-        found = _action(action, most, count)
+        found = _action_view(action, most, count)
         self._known[name] = action, most, count, found
         return found
 
-    def work_out(self, run: Run, at_once: int) -> Iterator[None]:
-        """Know all that `shown` will ask for, so many actions at a time."""
+    def prepare(self, run: Run, at_once: int) -> Iterator[None]:
+        """Fill the cache for `run_view`; yield after each `at_once` actions, so that the event loop
+        can do other work in between."""
         most, counts = _most(run, _LIVE), visit_counts(run)
         for number, (name, action) in enumerate(run.actions.items(), 1):
             self.action(name, action, most, counts[name])
@@ -200,29 +218,28 @@ class Memo:
                 yield
 
 
-def shown(run: Run, *, recorded: bool = True, memo: Memo | None = None) -> RunShown:
-    """A run with its actions and their newest visits."""
-    actions = _actions(run, _LIVE, memo)
-    fields = _fields(run, recorded)
+def run_view(run: Run, *, recorded: bool = True, cache: ActionViewCache | None = None) -> RunShown:
+    """Return a run with its actions and their newest visits, as live messages carry it."""
     return RunShown(
-        **fields,
+        **_fields(run, recorded),
         like=run.like,
         behaviours=run.behaviours,
-        actions=actions,
+        actions=_actions(run, _LIVE, cache),
         log=_log(run, _LINES),
     )
 
 
-def whole(
+def whole_view(
     run: Run,
     graph: Sent,
     *,
     recorded: bool = True,
     place: Row[Any] | None = None,
-    memo: Memo | None = None,
+    cache: ActionViewCache | None = None,
 ) -> RunWhole:
-    """All there is; with a `memo` no more visits than `shown` shows."""
-    actions = _actions(run, _WHOLE if memo is None else _LIVE, memo)
+    """Return a run with all visits and its graph; with a `cache` no more visits than in `run_view`.
+    `place` is the row of the run's archive, None when its events are here."""
+    actions = _actions(run, _WHOLE if cache is None else _LIVE, cache)
     return RunWhole(
         **_fields(run, recorded),
         like=run.like,
@@ -240,32 +257,20 @@ def whole(
 
 
 def summary_of_row(row: Row[Any]) -> RunSummary:
-    """A run that is over, from its row."""
+    """Return the summary of a run that is over, from its row. It equals `summary` of the run, but that
+    `took` is null until the run has been summed up."""
     more = row.summary
-    stopped_by = more.get("stopped_by")
+    stopped_by, took, at_rest = more.get("stopped_by"), more.get("took"), more.get("at_rest")
     return RunSummary(
-        id=row.id,
-        number=row.number,
-        graph=row.graph,
-        graph_name=row.graph_name,
-        version=row.version,
-        digest=row.digest,
-        engine=row.engine,
-        simulated=row.simulated,
+        **_fields_of_row_and_run(row),
         author=Author(row.author_id, row.author_name),
-        state=row.state,
-        desired=row.desired,
-        result=row.result,
         proof_at=_time(more.get("proof_at")),
         unknown_since=_time(more.get("unknown_since")) if row.state == "lost" else None,
         unconfirmed=None,
-        at_rest=_at_rest(msgspec.convert(more["at_rest"], AtRest) if more.get("at_rest") else None),
+        at_rest=_at_rest(msgspec.convert(at_rest, AtRest) if at_rest else None),
         moves_again_at=None,
         group=more.get("group"),
-        requested_at=time(row.requested_at),
-        started_at=_time(row.started_at),
-        ended_at=_time(row.ended_at),
-        took=_took(more.get("took")),
+        took=Took(least=took["least"], most=took["most"]) if took else None,
         stopped_by=Author(**stopped_by) if stopped_by else None,
         detail=more.get("detail", ""),
         alarms=[
@@ -275,8 +280,8 @@ def summary_of_row(row: Row[Any]) -> RunSummary:
     )
 
 
-def thinned(run: Run) -> Run:
-    """The run without the visits that `shown` leaves out."""
+def with_newest_visits(run: Run) -> Run:
+    """Return the run without the visits that `run_view` leaves out."""
     most = _most(run, _LIVE)
     actions = {
         name: replace(
@@ -289,8 +294,8 @@ def thinned(run: Run) -> Run:
     return replace(run, actions=actions)
 
 
-def listed(found: RunSummary, row: Row[Any], labels: list[str]) -> Listed:
-    """A summary with the marks of its row."""
+def list_entry(found: RunSummary, row: Row[Any], labels: list[str]) -> Listed:
+    """Return a summary with the marks that its row carries."""
     fields = {name: getattr(found, name) for name in RunSummary.__struct_fields__}
     return Listed(
         **fields,
@@ -303,35 +308,28 @@ def listed(found: RunSummary, row: Row[Any], labels: list[str]) -> Listed:
 
 
 def archived(row: Row[Any] | None) -> ArchivedShown | None:
-    """Where the events of a run are, from its row; None when they are here."""
+    """Return where the events of a run are, from its row; None when they are not in an archive."""
     if row is None or row.archived_at is None:
         return None
     return ArchivedShown(time(row.archived_at), row.archived_as)
 
 
+def _fields_of_row_and_run(source: Run | Row[Any]) -> dict[str, Any]:
+    """Return the fields of a summary that a run and its row have under the same names."""
+    plain = {name: getattr(source, name) for name in _SAME}
+    return plain | {name: _time(getattr(source, name)) for name in _SAME_TIMES}
+
+
 def _fields(run: Run, recorded: bool) -> dict[str, Any]:
     return {
-        "id": run.id,
-        "number": run.number,
-        "graph": run.graph,
-        "graph_name": run.graph_name,
-        "version": run.version,
-        "digest": run.digest,
-        "engine": run.engine,
-        "simulated": run.simulated,
+        **_fields_of_row_and_run(run),
         "author": run.author,
-        "state": run.state,
-        "desired": run.desired,
-        "result": run.result,
         "proof_at": _time(run.proof_at),
         "unknown_since": _time(run.unknown_since),
         "unconfirmed": run.lost or run.doubt or None,
         "at_rest": _at_rest(run.at_rest),
         "moves_again_at": _time(run.moves_again_at),
         "group": run.group,
-        "requested_at": time(run.requested_at),
-        "started_at": _time(run.started_at),
-        "ended_at": _time(run.ended_at),
         "took": of_run(run),
         "stopped_by": run.stopped_by,
         "detail": run.detail or run.lost or run.doubt,
@@ -344,8 +342,8 @@ def _at_rest(seen: AtRest | None) -> AtRestShown | None:
     return None if seen is None else AtRestShown(seen.by, time(seen.at), seen.how)
 
 
-def visit(each: Visit) -> VisitShown:
-    """One execution of an action."""
+def visit_view(each: Visit) -> VisitShown:
+    """Return one visit with its times as datetimes."""
     return VisitShown(
         time(each.start),
         time(each.not_before),
@@ -358,19 +356,20 @@ def visit(each: Visit) -> VisitShown:
 
 
 def _most(run: Run, visits: int) -> int:
-    """Visits of one action. Encoding holds up everything else, so very many are not shown."""
+    """Return how many visits of each action a view may carry: encoding blocks the event loop, so a
+    view has about `visits` of them over all actions."""
     return max(1, visits // max(1, len(run.actions)))
 
 
-def _actions(run: Run, visits: int, memo: Memo | None = None) -> dict[str, ActionShown]:
-    memo, most, counts = memo or Memo(), _most(run, visits), visit_counts(run)
+def _actions(run: Run, visits: int, cache: ActionViewCache | None = None) -> dict[str, ActionShown]:
+    cache, most, counts = cache or ActionViewCache(), _most(run, visits), visit_counts(run)
     return {
-        name: memo.action(name, action, most, counts[name]) for name, action in run.actions.items()
+        name: cache.action(name, action, most, counts[name]) for name, action in run.actions.items()
     }
 
 
-def _action(action: ActionRun, most: int, count: VisitCount) -> ActionShown:
-    visits = [visit(each) for each in action.visits[-most:]]
+def _action_view(action: ActionRun, most: int, count: VisitCount) -> ActionShown:
+    visits = [visit_view(each) for each in action.visits[-most:]]
     messages = [MessageShown(time(each.at), each.text) for each in action.messages]
     older = action.older + len(action.visits) - len(visits)
     return ActionShown(
@@ -380,10 +379,6 @@ def _action(action: ActionRun, most: int, count: VisitCount) -> ActionShown:
 
 def _log(run: Run, most: int) -> list[MessageShown]:
     return [MessageShown(time(each.at), each.text) for each in run.log[-most:]]
-
-
-def _took(kept: dict[str, Any] | None) -> Took | None:
-    return None if kept is None else Took(least=kept["least"], most=kept["most"])
 
 
 def _time(us: int | None) -> datetime | None:
