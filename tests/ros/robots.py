@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,7 +17,7 @@ import msgspec
 from action_assistant.runner.emulator.engine import EmulatedEngine
 from action_assistant.runner.emulator.messages import EngineTraits, Said
 from action_assistant.runner.emulator.node import EmulatorNode
-from action_assistant.umrf.facts import PINNED
+from action_assistant.umrf.facts import PINNED, EngineFacts
 from action_assistant.umrf.semantics import script_from
 
 _FOREIGN_START = Path(__file__).parents[2] / "frontend" / "e2e" / "foreign_start.py"
@@ -41,6 +42,19 @@ def started_by_others(domain: int, graph: dict[str, Any], robot: str = "David") 
         other.wait(10)
 
 
+class LateToServe(EmulatorNode):
+    """An engine that hears commands for `gap_s` before it serves its get. Between the two it takes
+    nothing in."""
+
+    def __init__(self, *given: Any, gap_s: float, **more: Any) -> None:
+        self._gap_s = gap_s
+        super().__init__(*given, **more)
+
+    def _listen(self, facts: EngineFacts, depth: int) -> None:
+        super()._listen(facts, depth)
+        time.sleep(self._gap_s)
+
+
 @contextmanager
 def robot(
     domain: int,
@@ -51,9 +65,10 @@ def robot(
     quirks: EngineTraits = EngineTraits(),  # noqa: B008 - frozen
     seed: int = 0,
     told: Callable[[Said], None] = lambda _: None,
+    gap_s: float = 0.0,
 ) -> Iterator[EmulatorNode]:
     """A robot on a thread."""
-    node = EmulatorNode(
+    node = LateToServe(
         lambda epoch_ms: EmulatedEngine(
             name,
             script=script_from({"behaviours": script or {}}),
@@ -65,6 +80,7 @@ def robot(
         facts=PINNED,
         namespace=namespace,
         told=told,
+        gap_s=gap_s,
     )
     thread = threading.Thread(target=node.spin, daemon=True)
     thread.start()

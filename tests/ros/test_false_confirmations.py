@@ -115,13 +115,23 @@ class Story:
         self.journal = MemoryJournal()
         self.runs: dict[Execution, str] = {}
 
-    def robot(self) -> None:
-        """An engine comes up."""
+    def robot(self, gap_s: float = 0.0) -> None:
+        """An engine comes up, and serves its get `gap_s` after it has begun to hear."""
         stack = ExitStack()
         node = stack.enter_context(
-            robot(self.domain, self.script, quirks=self.quirks, seed=self.chance.getrandbits(32))
+            robot(
+                self.domain,
+                self.script,
+                quirks=self.quirks,
+                seed=self.chance.getrandbits(32),
+                gap_s=gap_s,
+            )
         )
         self.robots.append((node, stack))
+
+    async def grow(self) -> None:
+        """A second engine comes up while everything goes on."""
+        await anyio.to_thread.run_sync(self.robot, self.chance.choice([0.0, 0.0, 1.0, 2.5]))
 
     async def live(self) -> None:
         """All steps; then somebody stops everything."""
@@ -140,6 +150,7 @@ class Story:
                     while robots.robot("David").state != "answering":  # noqa: ASYNC110
                         await anyio.sleep(0.05)
                 async with anyio.create_task_group() as tasks:
+                    self.tasks = tasks
                     tasks.start_soon(self.watch_the_truth)
                     for _ in range(self.chance.randint(4, 9)):
                         await self.step(control, stranger)
@@ -181,7 +192,7 @@ class Story:
                         with suppress(Refused):
                             confirm_rest(opened, RestRequest("I stand beside it."), BEN)
             case "second" if len(self.robots) < 2:
-                await anyio.to_thread.run_sync(self.robot)
+                self.tasks.start_soon(self.grow)
             case "reboot" if self.robots:
                 node, stack = self.robots.pop(0)
                 node.robot.kill()
@@ -220,6 +231,25 @@ class Story:
             self.compare()
 
 
+class SecondEngine(Story):
+    """A run begins while a second engine hears starts and does not serve its get yet."""
+
+    async def step(self, control: ExecutionService, stranger: Stranger) -> None:
+        if len(self.robots) > 1:
+            return
+        self.quirks = EngineTraits(loading_ms=1_500.0)
+        self.tasks.start_soon(anyio.to_thread.run_sync, self.robot, 2.5)
+        await anyio.sleep(0.5)
+        run = (
+            await control.start(order(GRAPHS["one"], engine="David", override=KNOWINGLY), ANN)
+        ).run.id
+        await anyio.sleep(0.3)
+        await control.stop(run, BEN)
+        await anyio.sleep(6)
+        assert self.moving() == {run}
+        assert control.open[run].run.proof_at is None
+
+
 def lived(seed: int, domain: int, told: Callable[[Story], None]) -> None:
     """One history, on a loop of its own."""
     story = Story(seed, domain)
@@ -250,3 +280,11 @@ def test_nothing_is_called_stopped_or_finished_that_moves(domains: list[int]) ->
     assert len(stories) == HISTORIES
     confirmed = sum(len(each.judged) for each in stories)
     assert confirmed >= HISTORIES // 4, confirmed
+
+
+@pytest.mark.timeout(60)
+def test_no_stop_is_proven_while_a_second_engine_is_coming_up(domain: int) -> None:
+    story = SecondEngine(1, domain)
+    story.script, story.quirks = {"*": [{"never": True}]}, EngineTraits(loading_ms=1.0)
+    asyncio.run(story.live())
+    assert (story.false, story.judged) == ([], set())

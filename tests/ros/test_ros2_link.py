@@ -16,6 +16,13 @@ pytest.importorskip(
     "rclpy", reason="rclpy is not here; `make ros-test` brings it", exc_type=ImportError
 )
 
+import rclpy
+from rclpy.context import Context
+from rclpy.node import Node
+from temoto_msgs.msg import UmrfGraphFeedback, UmrfGraphStart
+from temoto_msgs.srv import UmrfGraphGet
+
+from action_assistant.runner.emulator.messages import NODE
 from action_assistant.runner.links.port import (
     EngineChanged,
     EngineLog,
@@ -48,6 +55,20 @@ def engine(domain: int, **options: Any) -> Iterator[EchoEngine]:
         yield made
     finally:
         made.end()
+
+
+@contextmanager
+def listener(domain: int, name: str) -> Iterator[Node]:
+    """A node that hears starts and does nothing else."""
+    context = Context()
+    context.init(domain_id=domain)
+    node = rclpy.create_node(name, context=context)
+    node.create_subscription(UmrfGraphStart, "/umrf_graph_start", lambda _: None, 1)
+    try:
+        yield node
+    finally:
+        node.destroy_node()
+        context.try_shutdown()
 
 
 @asynccontextmanager
@@ -235,6 +256,27 @@ async def test_two_engines_on_one_path_prove_nothing(domain: int) -> None:
                 assert link.standing.state == "busy"
             await eventually(lambda: link.standing.servers == 1)
             await link.get()
+
+
+async def test_who_hears_starts_and_does_not_serve_may_be_a_second_engine(domain: int) -> None:
+    """One by one: what listens as an engine, what only watches, and what serves in the end."""
+    with engine(domain), engine(domain, namespace="r2"):
+        async with robot(domain) as link:
+            await answering(link)
+            await eventually(lambda: link.standing.newcomers == ())
+            with listener(domain, NODE) as rising:
+                await eventually(lambda: link.standing.newcomers == (NODE,))
+                assert (link.standing.servers, (await link.get()).graphs) == (1, ())
+                assert f"{NODE} hears starts and does not answer gets" in link.standing.doubt
+                rising.create_service(UmrfGraphGet, "umrf_graph_get", lambda _, it: it)
+                await eventually(lambda: link.standing.servers == 2)
+            await eventually(lambda: link.standing.doubt == "")
+            with listener(domain, "recorder") as recorder:
+                await eventually(lambda: link.standing.newcomers == ("recorder",))
+                recorder.create_subscription(
+                    UmrfGraphFeedback, "/umrf_graph_feedback", lambda _: None, 1
+                )
+                await eventually(lambda: link.standing.doubt == "")
 
 
 async def test_engines_with_paths_of_their_own_are_told_apart(domain: int) -> None:

@@ -21,8 +21,9 @@ from action_assistant.runner.links.port import (
     Standing,
     unwatched,
 )
+from action_assistant.runner.links.ros2.newcomers import Newcomers
 from action_assistant.runner.links.ros2.ros_values import LogLine, OverheardCommand
-from runner.fake_network import HASH, FakeNetwork
+from runner.fake_network import HASH, FakeNetwork, now
 from runner.harness import clock_us
 
 
@@ -39,12 +40,14 @@ class FakeLink:
         self._path = path
         self._known = ""
         self._subscribers = Listeners[Report]()
+        self._newcomers = Newcomers()
         self._told: tuple[str, str] = ("", "")
 
     @property
     def standing(self) -> Standing:
         """As discovery shows it now."""
-        servers = self._network.servers(self._path)
+        network = self._network
+        servers = network.servers(self._path)
         if len(servers) == 1:
             self._known = servers[0].gid
         return Standing(
@@ -54,7 +57,10 @@ class FakeLink:
             generation="older" if any(e.type_hash != HASH for e in servers) else "current",
             servers=len(servers),
             listeners=dict.fromkeys(("start", "stop"), len(servers)),
-            others=len(self._network.publishers("start")),
+            others=len(network.publishers("start")),
+            newcomers=self._newcomers.among(
+                network.listeners("start"), servers, lambda: network.bystanders(self._path), now()
+            ),
         )
 
     async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
@@ -119,12 +125,15 @@ class FakeLink:
         """Look every second who is there."""
         with self._network.hearing(self._hear):
             while True:
-                now = self.standing
-                if self._told != (now.state, now.incarnation):
-                    self._told = now.state, now.incarnation
+                seen = self.standing
+                if self._told != (seen.state, seen.incarnation):
+                    self._told = seen.state, seen.incarnation
                     self._subscribers.tell(
                         EngineChanged(
-                            at=clock_us(), state=now.state, incarnation=now.incarnation, why=now.why
+                            at=clock_us(),
+                            state=seen.state,
+                            incarnation=seen.incarnation,
+                            why=seen.why,
                         )
                     )
                 await anyio.sleep(1)

@@ -66,7 +66,12 @@ class Node:
     """An engine node in the fake network: an emulator and what discovery knows of it."""
 
     def __init__(
-        self, network: "FakeNetwork", robot: EmulatedEngine, path: str, lag_s: float
+        self,
+        network: "FakeNetwork",
+        robot: EmulatedEngine,
+        path: str,
+        lag_s: float,
+        gap_s: float,
     ) -> None:
         network.born += 1
         self.network = network
@@ -76,6 +81,7 @@ class Node:
         self.type_hash = HASH
         self.matched_at = now() + 0.02  # hears from then on
         self.seen_at = self.matched_at + lag_s  # and is known to be there a little later
+        self.serves_at = self.matched_at + gap_s  # and answers gets from then on
         self.unseen_at = float("inf")
         self.call: asyncio.TimerHandle | None = None  # when it has something to say again
 
@@ -88,6 +94,11 @@ class Node:
     def seen(self) -> bool:
         """Whether discovery shows it, rightly or not."""
         return self.seen_at <= now() < self.unseen_at
+
+    @property
+    def serves(self) -> bool:
+        """Whether it answers gets, as far as discovery knows."""
+        return self.seen and now() >= self.serves_at
 
     def end(self, of: str) -> Endpoint:
         """One of its ends."""
@@ -184,10 +195,14 @@ class FakeNetwork:
     # --- nodes --------------------------------------------------------------------------------
 
     def join(
-        self, robot: EmulatedEngine, path: str = "/umrf_graph_get", lag_s: float = 0.0
+        self,
+        robot: EmulatedEngine,
+        path: str = "/umrf_graph_get",
+        lag_s: float = 0.0,
+        gap_s: float = 0.0,
     ) -> Node:
-        """A node comes up."""
-        node = Node(self, robot, path, lag_s)
+        """A node comes up; it hears starts and does not serve its get for `gap_s`."""
+        node = Node(self, robot, path, lag_s, gap_s)
         self.nodes.append(node)
         self.stir(node)
         return node
@@ -261,7 +276,7 @@ class FakeNetwork:
             self._overhear(message, stranger)
 
     def _ask(self, node: Node, ticket: int) -> None:
-        if node.hears:
+        if node.hears and now() >= node.serves_at:
             node.robot.ask(ticket, now_ms())
             self.stir(node)
 
@@ -331,11 +346,16 @@ class FakeNetwork:
 
     def servers(self, path: str) -> tuple[Endpoint, ...]:
         """Who answers on a path, as far as discovery knows."""
-        return tuple(each.end("get") for each in self.nodes if each.seen and each.path == path)
+        return tuple(each.end("get") for each in self.nodes if each.serves and each.path == path)
 
     def listeners(self, topic: str) -> tuple[Endpoint, ...]:
         """Who listens, as far as discovery knows."""
         return tuple(each.end(topic) for each in self.nodes if each.seen)
+
+    def bystanders(self, path: str) -> frozenset[str]:
+        """Who serves another path, or publishes starts."""
+        others = [each.end("get") for each in self.nodes if each.serves and each.path != path]
+        return frozenset(each.process for each in (*others, *self.publishers("start")))
 
     def publishers(self, topic: str) -> tuple[Endpoint, ...]:
         """Who publishes feedback, or commands beside us."""
@@ -345,7 +365,7 @@ class FakeNetwork:
 
     def paths(self) -> tuple[str, ...]:
         """Every path that somebody serves."""
-        return tuple(sorted({each.path for each in self.nodes if each.seen}))
+        return tuple(sorted({each.path for each in self.nodes if each.serves}))
 
     def hearing(self, subscriber: Callable[[RosValue], None]) -> AbstractContextManager[None]:
         """Be told what comes by itself."""

@@ -50,8 +50,8 @@ class RobotsInNetwork:
         self.harness = Harness(dict(links))
         self.nodes = {name: self.robot(name) for name in self.names}
 
-    def robot(self, name: str) -> Node:
-        """An engine comes up."""
+    def robot(self, name: str, gap_s: float = 0.0) -> Node:
+        """An engine comes up, and serves its get `gap_s` after it has begun to hear."""
         stand_in = EmulatedEngine(
             name,
             script=script_from({"behaviours": self.script}),
@@ -59,7 +59,7 @@ class RobotsInNetwork:
             seed=self.chance.getrandbits(32),
             born_ms=now_ms(),
         )
-        return self.network.join(stand_in, PATHS[name])
+        return self.network.join(stand_in, PATHS[name], gap_s=gap_s)
 
     @asynccontextmanager
     async def played(self) -> AsyncIterator[ExecutionService]:

@@ -10,6 +10,7 @@ import asyncio
 import json
 import os
 import random
+import traceback
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
@@ -45,6 +46,8 @@ HISTORIES = int(os.environ.get("TEST_HISTORIES", "10"))
 #: last answer of the proof was on its way.
 KNOWN = (601, 621, 3378)
 FIRST = int(os.environ.get("TEST_HISTORIES_FROM", "0"))
+#: For how long an engine that comes up later hears starts before it serves its get.
+GAPS_S = (0.0, 0.0, 0.3, 3.0, 8.0)
 #: Ends that say that nothing moves any more.
 STILL: frozenset[State] = ENDED - {"lost"}
 EVERYTHING = Override(
@@ -62,6 +65,7 @@ class Story:
     ):
         self.chance = random.Random(seed)
         self.seed = seed
+        self.gaps = random.Random(f"{seed}: gaps")
         self.network = FakeNetwork(self.chance)
         self.script = script_from({"behaviours": self.chance.choice(SCRIPTS)})
         self.quirks = EngineTraits(loading_ms=self.chance.choice(LOADING_MS))
@@ -84,7 +88,8 @@ class Story:
             seed=self.chance.getrandbits(32),
             born_ms=now_ms(),
         )
-        return self.network.join(robot, lag_s=self.chance.choice([0.0, 0.005, 0.08]))
+        gap_s = self.gaps.choice(GAPS_S) if self.network.nodes and self.seed not in KNOWN else 0.0
+        return self.network.join(robot, lag_s=self.chance.choice([0.0, 0.005, 0.08]), gap_s=gap_s)
 
     async def live(self) -> None:
         """All steps, then everything is well again and has to come to rest."""
@@ -290,6 +295,13 @@ class Story:
         return any(each.robot._engine.locked for each in self.network.nodes if not each.robot.gone)
 
 
+def _fault(told: dict[str, Any]) -> str:
+    """Return what went wrong in a callback of the loop, with the place."""
+    error = told.get("exception")
+    trace = "".join(traceback.format_exception(error)) if error else ""
+    return f"a fault: {told['message']}\n{trace}"
+
+
 def lived(
     seed: int, link: Callable[[FakeNetwork], Link] = lambda network: FakeLink(network, NAME)
 ) -> Story:
@@ -300,7 +312,7 @@ def lived(
         story = Story(seed, link)
         stories.append(story)
         loop = asyncio.get_running_loop()
-        loop.set_exception_handler(lambda _, told: story.false.append(f"a fault: {told}"))
+        loop.set_exception_handler(lambda _, told: story.false.append(_fault(told)))
         await story.live()
 
     run_in_virtual_time(main)

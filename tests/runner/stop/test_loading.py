@@ -21,6 +21,7 @@ from runner.harness import ANN, BEN, GO_ON, at_once, order, sequence, until, vir
 from runner.robots_in_network import LOOKED, OTHER, PATROL, RobotsInNetwork, asked, shown
 
 SECOND = {"*": [{"after_s": 1.0}]}
+KNOWINGLY = Override(codes=("proof",), reason="it is a test")
 NAME = "Work_0 is still loading; it may move when it has loaded"
 
 
@@ -344,6 +345,28 @@ async def test_what_an_engine_showed_that_stood_beside_it_for_a_moment_proves_no
         await until(lambda: first.moving == ("patrol",))
         await until(lambda: run not in control.open)
         assert (first.moving, (await control.find(run)).state) == ((), "stopped")
+
+
+@virtual
+async def test_no_stop_is_proven_while_a_second_engine_hears_starts_and_is_not_seen_to_serve() -> (
+    None
+):
+    """Both take up the start. Discovery shows one server, whose answers say nothing of the other."""
+    here = scene(0.001, {"*": [{"never": True}]}, loss=0.0)
+    async with here.played() as control:
+        here.script = {"*": [{"never": True, "ignores_stop": True}]}
+        second = here.robot("David", gap_s=4.0)
+        await anyio.sleep(0.3)
+        run = (await control.start(asked(override=KNOWINGLY), ANN)).run.id
+        await until(lambda: second.robot.moving == ("patrol",))
+        await control.stop(run, BEN)
+        await until(lambda: here.nodes["David"].robot.moving == ())
+        await until(lambda: second.serves)
+        assert second.robot.moving == ("patrol",)
+        assert shown(control, run).proof_at is None
+        assert "may be a second engine" in shown(control, run).alarms[-1].text
+        await anyio.sleep(5)
+        assert shown(control, run).proof_at is None
 
 
 @virtual

@@ -37,9 +37,7 @@ _APPEAR_S: Final = 3.0  # until a started graph must show in answers
 _ABSENT_S: Final = 1.0  # for which answers must lack what the engine has said it refused
 _GIVEN_UP_S: Final = 30.0  # until a stopped run that never showed is believed to have never begun
 _LOADING_TOLD_S: Final = 1.5  # what feedback has still to tell has come by then
-_SEVERAL: Final = (
-    "{servers} engines are seen on the path of its answers, so that none proves anything"
-)
+_NO_PROOF: Final = "{doubt}, so that no answer proves anything"
 
 
 class MonitoredRun(Protocol):
@@ -189,11 +187,12 @@ class Monitor:
             self._it.observe(tuple(replace(each, since_asked=asked) for each in news))
 
     def _is_alone(self) -> bool:
-        """Return whether one engine serves the path, in the life that the run was sent to. If not, nobody
-        knows which of them sent feedback, now or before discovery showed it: all of it is forgotten."""
+        """Return whether one engine alone can have taken up starts, in the life that the run was sent to.
+        If not, nobody knows who sent feedback, now or before discovery showed it: all of it is
+        forgotten."""
         now = self._link.standing
         lives = {self._it.run.incarnation, now.incarnation} - {None, ""}
-        if now.servers == 1 and len(lives) <= 1:
+        if not now.doubt and len(lives) <= 1:
             return True
         self._loading.forget()
         return False
@@ -245,10 +244,10 @@ class Monitor:
                 self._it.lose("The engine was restarted while the run went on.")
             return
         own = next((each for each in answer.graphs if each.graph == name), None)
-        servers = self._link.standing.servers
+        standing = self._link.standing
         if own is None or own.run != self._it.run.id:
-            if servers > 1:
-                self._hear_nothing(_SEVERAL.format(servers=servers))
+            if standing.doubt and standing.servers:
+                self._hear_nothing(_NO_PROOF.format(doubt=standing.doubt))
                 return
             self._heard_at = anyio.current_time()
             if order >= self._begun:
@@ -264,12 +263,13 @@ class Monitor:
         shown = [own, *(part for part in parts if part.run in {None, self._it.run.id})]
         ours = [own, *self._parts.ours(own, shown[1:])]
         self._note(ours)
-        if servers == 1:
+        if standing.doubt:
+            self._is_alone()
+            self._rest.forget()
+            self.trouble = _NO_PROOF.format(doubt=standing.doubt)
+        else:
             self._loading.see(ours)
             self._conclude(shown, ours, answer, order, asked)
-        else:
-            self._is_alone()
-            self.trouble = _SEVERAL.format(servers=servers or "no")
 
     def _compare(self, answer: Answer, order: int) -> None:
         """Once: whether the engine has what was sent. It is never stopped for that by itself."""
@@ -338,7 +338,7 @@ class Monitor:
     def _refused_and_absent(self) -> bool:
         """Whether the engine has taken the start in, has refused it, and has not held it for a while
         since: then nothing of it has begun, and nothing of it is left that could begin."""
-        if not self._start.words or self._link.standing.servers != 1:
+        if not self._start.words or self._link.standing.doubt:
             self._absent = None
             return False
         self._absent = self._absent if self._absent is not None else anyio.current_time()

@@ -20,6 +20,7 @@ from action_assistant.umrf.model import Graph
 
 #: The engine that is always there.
 SIMULATOR: Final = "simulator"
+_NAMED: Final = 3
 
 
 EngineState: TypeAlias = Literal["answering", "busy", "gone", "restarted"]
@@ -88,6 +89,8 @@ class Standing(msgspec.Struct, frozen=True, kw_only=True):
     """What is known of an engine at this moment without asking it.
 
     `servers`: how many answer on the path of its get; only one of them makes answers a proof.
+    `newcomers`: names of nodes that hear starts and may be a second engine of this path, which does
+    not serve its get yet.
     `listeners`: matched subscriptions by command (`start`, `stop` …). `others`: publishers of starts
     that are not ours. `actor`: what its feedback calls itself, "" until it said something.
     `process`: of the engine, where it is one of this computer.
@@ -102,6 +105,21 @@ class Standing(msgspec.Struct, frozen=True, kw_only=True):
     others: int = 0
     actor: str = ""
     process: EngineProcess | None = None
+    newcomers: tuple[str, ...] = ()
+
+    @property
+    def doubt(self) -> str:
+        """Return why an answer of this engine is no proof, as a clause; "" when it is one."""
+        if self.servers != 1:
+            return f"{self.servers or 'no'} engines are seen on the path of its answers"
+        if not self.newcomers:
+            return ""
+        is_one = len(self.newcomers) == 1
+        return (
+            f"{', '.join(self.newcomers[:_NAMED])} {'hears starts and does' if is_one else 'hear starts and do'} "
+            f"not answer gets, so that {'it' if is_one else 'one of them'} may be a second engine that is "
+            "coming up"
+        )
 
 
 class Transitions(msgspec.Struct, frozen=True, kw_only=True):

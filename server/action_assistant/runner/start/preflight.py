@@ -259,6 +259,9 @@ def _proof(view: EngineView) -> Item:
         )
         text += ", so no answer would prove a stop. Give each engine a domain of its own."
         return Item(code="proof", verdict="blocked", text=text, codes=("proof",), overridable=True)
+    if standing.doubt:
+        text = f"For {name}, {standing.doubt}: no answer would prove a stop. Wait, or end it."
+        return Item(code="proof", verdict="blocked", text=text, codes=("proof",), overridable=True)
     if standing.generation == "unknown":
         text = (
             f"One engine answers for {name}; which generation of messages it speaks is not known."

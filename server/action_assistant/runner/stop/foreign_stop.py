@@ -144,10 +144,10 @@ class ForeignStopLoop:
         for (robot, graph), it in self._going.items():
             if robot != engine.registration.name:
                 continue
-            if engine.standing.servers == 1:
-                it.loading.see(_parts_of(snapshots, graph))
-            else:
+            if engine.standing.doubt:
                 it.loading.meddle()
+            else:
+                it.loading.see(_parts_of(snapshots, graph))
 
     def _begin(self, it: _ForeignStop, engine: KnownEngine | None) -> None:
         self._going[it.robot, it.graph] = it
@@ -223,8 +223,9 @@ class ForeignStopLoop:
             return why or engine.why or "the engine does not answer"
         if len({it.life, answer.incarnation} - {""}) > 1:
             return self._unproven(it, _RESTARTED)
-        if engine.standing.servers != 1:
-            return f"{engine.standing.servers} engines are seen on the path of its answers"
+        if doubt := engine.standing.doubt:
+            it.rest.forget()
+            return doubt
         if disturbed:
             return "somebody has just set it going again"
         if doubt := it.doubts.look(_shown(answer, it.graph)):

@@ -153,8 +153,7 @@ class Domain:
 
     def servers(self, path: str) -> tuple[Endpoint, ...]:
         """Who answers on a path."""
-        absolute = path if path.startswith("/") else f"/{path}"
-        raw = self._node.get_subscriptions_info_by_topic(f"rq{absolute}Request", True)
+        raw = self._node.get_subscriptions_info_by_topic(f"rq{_absolute(path)}Request", True)
         return self._others(raw)
 
     def listeners(self, topic: str) -> tuple[Endpoint, ...]:
@@ -169,6 +168,16 @@ class Domain:
         """Every path on which something answers as engines do."""
         found = self._node.get_service_names_and_types()
         return tuple(name for name, kinds in found if _KIND in kinds and self.servers(name))
+
+    def bystanders(self, path: str) -> frozenset[str]:
+        """Return the processes that do what no engine of a path does while it comes up: they serve
+        another path, publish starts, or hear feedback."""
+        own = _absolute(path)
+        ends = [*self.publishers(self.topics.start), *self.listeners(self.topics.feedback)]
+        for each in self.paths():
+            if each != own:
+                ends += self.servers(each)
+        return frozenset(each.process for each in ends)
 
     def _others(self, found: list[TopicEndpointInfo]) -> tuple[Endpoint, ...]:
         ends = (_endpoint(info) for info in found)
@@ -271,6 +280,10 @@ class Domain:
                 self._executor.spin_once()
             except Exception:
                 log.exception("domain %d: a message could not be taken in", self.number)
+
+
+def _absolute(path: str) -> str:
+    return path if path.startswith("/") else f"/{path}"
 
 
 def _endpoint(info: TopicEndpointInfo) -> Endpoint:

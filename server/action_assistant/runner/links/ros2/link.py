@@ -33,6 +33,7 @@ from action_assistant.runner.links.port import (
     unwatched,
 )
 from action_assistant.runner.links.ros2.domain import Domain
+from action_assistant.runner.links.ros2.newcomers import Newcomers
 from action_assistant.runner.links.ros2.outlets import Topics
 from action_assistant.runner.links.ros2.peers import (
     OLDER,
@@ -88,6 +89,7 @@ class Ros2Link:
         self._restarted = False
         self._unanswered_since: float | None = None
         self._asked_at = 0.0
+        self._newcomers = Newcomers()
         self._standing = Standing(state="gone", why="it is not being looked for yet")
 
     @property
@@ -283,6 +285,12 @@ class Ros2Link:
                 others=len(domain.publishers(self._topics.start)),
                 actor=self._actor(domain),
                 process=process,
+                newcomers=self._newcomers.among(
+                    domain.listeners(self._topics.start),
+                    servers,
+                    lambda: domain.bystanders(self._path),
+                    time.monotonic(),
+                ),
             )
         )
 

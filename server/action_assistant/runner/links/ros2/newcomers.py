@@ -1,0 +1,68 @@
+"""Newcomers: nodes that hear starts and may be an engine that does not serve its get yet. Pure.
+
+An engine subscribes to starts first and serves its get last. In between, and for as long as discovery
+takes to show the service, a second engine of a path looks like somebody who merely listens. It may
+have taken up a start all the same, and the answers of the first engine say nothing of that.
+"""
+
+from collections.abc import Callable
+from typing import Final
+
+from action_assistant.runner.links.ros2.ros_values import Endpoint
+
+_WATCHED_S: Final = 10.0
+#: What the middleware calls a node whose name it has not learnt yet.
+_NAMELESS: Final = "_NODE_NAME_UNKNOWN_"
+
+
+class Newcomers:
+    """Tells which listeners to starts may be a second engine of one path.
+
+    A listener is known to be something else when its process is shown doing what an engine that comes up
+    does not do (`others`). One of another node name than the engine's is also taken for something else
+    once it has served no get for 10 s. One of the engine's own node name, or of a name that is not known
+    yet, never is: no time tells how long an engine takes to come up.
+    """
+
+    def __init__(self) -> None:
+        self._since: dict[str, float] = {}  # when a listener was first seen, by its gid
+        self._known: set[str] = set()  # gids of listeners that are something else
+
+    def among(
+        self,
+        listeners: tuple[Endpoint, ...],
+        servers: tuple[Endpoint, ...],
+        others: Callable[[], frozenset[str]],
+        at: float,
+    ) -> tuple[str, ...]:
+        """Return the names of the nodes among `listeners` that may be a second engine.
+
+        `servers` serve the path. `others` gives the processes that serve another path, publish starts
+        or hear feedback; it is called only where there is a listener to be judged. `at` is now, in
+        seconds of a clock that never goes back.
+        """
+        present = {each.gid for each in listeners}
+        self._known &= present
+        self._since = {gid: since for gid, since in self._since.items() if gid in present}
+        serving = {each.process for each in servers}
+        unknown = [
+            each
+            for each in listeners
+            if each.process not in serving and each.gid not in self._known
+        ]
+        if not unknown:
+            return ()
+        engines = {_name(each) for each in servers} | {_NAMELESS}
+        elsewhere, found = others(), set[str]()
+        for each in unknown:
+            age = at - self._since.setdefault(each.gid, at)
+            is_stranger = _name(each) not in engines and age >= _WATCHED_S
+            if each.process in elsewhere or is_stranger:
+                self._known.add(each.gid)
+            else:
+                found.add(_name(each))
+        return tuple(sorted(found))
+
+
+def _name(end: Endpoint) -> str:
+    return end.logger.rpartition(".")[2]
