@@ -1,14 +1,131 @@
-/** The list of all actions: searched, filtered, and how to begin. */
+/** The list of all actions, with search, filters and keys. */
+
 import { Button, Kbd, TextInput } from "@mantine/core";
-import { IconFileImport, IconPlus, IconSearch } from "@tabler/icons-react";
-import { type ReactNode, useDeferredValue, useMemo, useRef, useState } from "react";
+import { IconAlertTriangle, IconFileImport, IconPlus, IconSearch } from "@tabler/icons-react";
+import {
+  memo,
+  type ReactNode,
+  type RefObject,
+  useDeferredValue,
+  useEffect,
+  useMemo,
+  useRef,
+  useState,
+} from "react";
+import { useLocation, useRouter } from "wouter";
 import { useMay } from "../api/use-person";
 import { useSearchKey } from "../ui/hooks/use-search-key";
+import { keyOf } from "../ui/keys";
+import { LongList } from "../ui/long-list";
 import { isolated } from "../words/isolated";
-import { ActionRows } from "./action-rows";
 import style from "./actions-page.module.css";
-import { type ActionFilter, foundActions, type ListedAction } from "./listing";
-import { useRowKeys, useRowPresses } from "./use-rows";
+import { type ActionFilter, addressOf, foundActions, type ListedAction } from "./listing";
+
+/** Up and down go from row to row, and from the search into the list. */
+function useRowKeys(list: RefObject<HTMLElement | null>): void {
+  useEffect(() => {
+    const element = list.current;
+    const walk = (event: KeyboardEvent) => {
+      const step = { ArrowDown: 1, ArrowUp: -1 }[keyOf(event)];
+      if (step === undefined || element === null) return;
+      const rows = [...element.querySelectorAll<HTMLElement>("[data-row], [data-search]")];
+      const at = rows.findIndex((row) => row.contains(document.activeElement));
+      if (at < 0) return;
+      event.preventDefault();
+      rows[Math.max(0, Math.min(rows.length - 1, at + step))]?.focus();
+    };
+    element?.addEventListener("keydown", walk);
+    return () => element?.removeEventListener("keydown", walk);
+  }, [list]);
+}
+
+/** A plain press of a link inside goes there without loading the page anew. */
+function useRowPresses(list: RefObject<HTMLElement | null>): void {
+  const { base } = useRouter();
+  const [, go] = useLocation();
+  useEffect(() => {
+    const element = list.current;
+    const press = (event: MouseEvent) => {
+      const { target, button, metaKey, ctrlKey, shiftKey, altKey } = event;
+      if (button !== 0 || metaKey || ctrlKey || shiftKey || altKey) return;
+      const link = target instanceof Element ? target.closest("a[data-row]") : null;
+      const to = link?.getAttribute("href");
+      if (!to) return;
+      event.preventDefault();
+      go(to.slice(base.length));
+    };
+    element?.addEventListener("click", press);
+    return () => element?.removeEventListener("click", press);
+  }, [list, base, go]);
+}
+
+interface ActionRowProps {
+  listed: ListedAction;
+  base: string;
+  current: boolean;
+}
+
+/** Where it comes from, when that is not the library. */
+function source({ action }: ListedAction): string {
+  if (action === null) return "on a robot";
+  return action.document === null ? "only in graphs" : "";
+}
+
+const Row = memo(function Row({ listed, base, current }: ActionRowProps) {
+  const { name, summary, action } = listed;
+  const uses = action?.used_in.length ?? 0;
+  const older = action?.differs_in.length ?? 0;
+  const from = source(listed);
+  return (
+    <a
+      href={base + addressOf(listed)}
+      className={style.row}
+      aria-current={current ? "page" : undefined}
+      data-row
+    >
+      <span className={style.name}>
+        <bdi>{name || "Without a name"}</bdi>
+        {older > 0 && (
+          <span className={style.older} title={`Older parameters in ${older}`}>
+            <IconAlertTriangle size={13} aria-hidden />
+            <span className="visually-hidden"> older parameters in {older}</span>
+          </span>
+        )}
+        {uses > 0 && (
+          <span className={style.count} title={`Used in ${uses}`}>
+            <span className="visually-hidden"> used in </span>
+            {uses}×
+          </span>
+        )}
+      </span>
+      <span className={style.sub}>
+        {from !== "" && <i>{from}</i>}
+        {summary}
+      </span>
+    </a>
+  );
+});
+
+interface ActionRowsProps {
+  actions: readonly ListedAction[];
+  current: string | null;
+}
+
+function ActionRows({ actions, current }: ActionRowsProps) {
+  const { base } = useRouter();
+  return (
+    <LongList rowHeight={3}>
+      {actions.map((listed) => (
+        <Row
+          key={listed.name}
+          listed={listed}
+          base={base}
+          current={addressOf(listed) === current}
+        />
+      ))}
+    </LongList>
+  );
+}
 
 interface Props {
   actions: readonly ListedAction[];

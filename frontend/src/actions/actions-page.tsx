@@ -1,5 +1,5 @@
-/** The page of actions: the list at the left, the chosen one beside it; on a phone one after the other. */
-import { Button, Skeleton } from "@mantine/core";
+/** The page of actions: the list at the left and the selected action beside it; a phone shows one of the two. */
+import { Button, Group, Modal, Skeleton, TextInput } from "@mantine/core";
 import { IconAlertTriangle, IconArrowLeft, IconBolt } from "@tabler/icons-react";
 import { useMemo, useState } from "react";
 import { Link, useLocation, useSearch } from "wouter";
@@ -12,10 +12,57 @@ import { useIsPhone } from "../ui/hooks/use-screen-size";
 import { ActionList } from "./action-list";
 import style from "./actions-page.module.css";
 import { addressOf, type ListedAction, listedActions } from "./listing";
-import { NewActionDialog } from "./new-action-dialog";
-import { type BarSlots, OpenAction } from "./open/open-action";
+import { type BarSlots, OpenAction } from "./open-action";
 import { UnlistedAction } from "./unlisted-action";
 import { useNewActions } from "./use-new-actions";
+
+interface NewActionProps {
+  /** What it is called unless somebody says otherwise; null: nobody asks. */
+  name: string | null;
+  busy: boolean;
+  /** Why there is none; empty: nothing stands against it. */
+  wrong: string;
+  onClose: () => void;
+  onMake: (name: string) => void;
+}
+
+function Ask({ name: first, busy, wrong, onClose, onMake }: NewActionProps) {
+  const [name, setName] = useState(first ?? "");
+  return (
+    <form
+      onSubmit={(event) => {
+        event.preventDefault();
+        if (name.trim() !== "") onMake(name.trim());
+      }}
+    >
+      <TextInput
+        label="Name"
+        description="As a C++ class: CloseValve, LocateObject"
+        placeholder="CloseValve"
+        value={name}
+        error={wrong || undefined}
+        data-autofocus
+        maxLength={200}
+        onFocus={(event) => event.currentTarget.select()}
+        onChange={(event) => setName(event.currentTarget.value)}
+      />
+      <Group justify="flex-end" mt="md">
+        <Button onClick={onClose}>Cancel</Button>
+        <Button type="submit" variant="filled" loading={busy} disabled={name.trim() === ""}>
+          Make it
+        </Button>
+      </Group>
+    </form>
+  );
+}
+
+function NewActionDialog(props: NewActionProps) {
+  return (
+    <Modal opened={props.name !== null} onClose={props.onClose} title="New action">
+      <Ask {...props} />
+    </Modal>
+  );
+}
 
 interface Props {
   /** The document that is open; null: none. */

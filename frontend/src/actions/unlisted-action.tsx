@@ -3,11 +3,9 @@ import { Button } from "@mantine/core";
 import { IconPlus } from "@tabler/icons-react";
 import { useMay } from "../api/use-person";
 import { type RobotAction, type RobotsKnowledge, robotTemplate } from "../library/robot-actions";
-import { ActionOverview } from "./details/action-overview";
-import { OnRobots } from "./details/on-robots";
-import { UsedIn } from "./details/used-in";
+import { ActionOverview, OnRobots, UsedIn } from "./action-overview";
 import type { ListedAction } from "./listing";
-import style from "./open/open.module.css";
+import style from "./open-action.module.css";
 
 interface Props {
   listed: ListedAction;

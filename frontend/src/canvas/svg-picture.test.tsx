@@ -3,7 +3,7 @@ import fc from "fast-check";
 import { expect, test } from "vitest";
 import * as Y from "yjs";
 import { mapsOf } from "../graph/document-keys";
-import { addAction, connect, setEntry, setExit } from "../graph/edit/index";
+import { addAction, connect, setEntry, setExit } from "../graph/edit";
 import { writeNote } from "../graph/edit/notes";
 import { setWaypoints } from "../graph/edit/waypoints";
 import { readGraph } from "../graph/read";

@@ -1,8 +1,20 @@
-/** The editor of one graph: list, canvas, details and run strip, arranged for the screen at hand. */
+/** The editor of one graph: canvas, lists, details and run strip, arranged for the size of the screen. */
+
 import { useLocalStorage } from "@mantine/hooks";
-import { type ComponentProps, memo, type ReactNode, useEffect, useState } from "react";
+import {
+  type ComponentProps,
+  type ComponentType,
+  memo,
+  type ReactNode,
+  useEffect,
+  useMemo,
+  useState,
+} from "react";
 import { useSearch } from "wouter";
 import type { Script } from "../api/dry-runs";
+import { NameOfGraph } from "../canvas/graphs-inside";
+import { addressAround, levelsOf } from "../canvas/level-path";
+import { FoldFrameContext, type NoteLinks, NoteLinksContext } from "../canvas/notes/note-buttons";
 import { useOpenThreadsOnCards, useThreads } from "../comments/use-threads";
 import { scriptOf } from "../dry-run/script";
 import type { DryRunSeed } from "../dry-run/seed";
@@ -10,30 +22,31 @@ import {
   type AddRequest,
   addActionAt,
   type EditorContext,
+  EditorReactContext,
   freePosition,
   type Panel,
   useEditorContext,
 } from "../edit-actions/editor-context";
+import { foldFrames } from "../edit-actions/folding";
 import { useShortcuts } from "../edit-actions/keys/shortcuts";
 import { useRenameGraph } from "../edit-actions/rename-graph";
 import type { NewAction } from "../graph/edit";
 import type { Graph, Key } from "../graph/model";
+import { linkableNames, linkedAction } from "../graph/note-links";
 import type { ToldProblem } from "../graph/problems/told-problems";
+import { endName } from "../graph/relation-words";
 import { People } from "../people/people";
 import type { Progress } from "../status/progress";
 import type { RoomLink } from "../sync/room-connection";
 import { useThrottledLink } from "../sync/use-room";
 import { useIsPhone, useIsWide } from "../ui/hooks/use-screen-size";
+import { useStableCallback } from "../ui/hooks/use-stable-callback";
 import { lazyPart } from "../ui/parts/lazy-part";
 import { PartBoundary } from "../ui/parts/part-boundary";
 import type { Crumb } from "../ui/top-bar";
-import { EditorContextProvider } from "./canvas/note-links";
 import { CanvasPane } from "./canvas-pane";
-import { crumbsOf } from "./menus/crumbs";
-import { DryRunButton } from "./menus/dry-run-button";
 import { Overlays } from "./menus/overlays";
-import { DesktopLayout, PhoneLayout } from "./panels/layouts";
-import { QuietParts } from "./panels/quiet-parts";
+import { DesktopLayout, DryRunButton, PhoneLayout } from "./panels/layouts";
 import { usePanels } from "./panels/use-panels";
 import { blockWords, ProblemCount, useToldProblems } from "./problem-count";
 import { RoomNotices } from "./room-notices";
@@ -41,6 +54,93 @@ import { SaveStatus } from "./save-status";
 import { useRemoteEditAnnouncements, useRunAnnouncements } from "./use-announcements";
 import { useEditor } from "./use-editor";
 import { type Past, usePast } from "./use-past";
+
+interface ProviderProps {
+  context: EditorContext;
+  children: ReactNode;
+}
+
+function EditorContextProvider({ context, children }: ProviderProps) {
+  const { graph, select, view } = context;
+  const links = useMemo<NoteLinks>(
+    () => ({
+      target(link) {
+        const action = linkedAction(graph.actions, link);
+        return action && { key: action.key, label: `${action.name} ${action.instanceId}` };
+      },
+      open(key) {
+        select([key]);
+        view.show([key]);
+        view.focus(key);
+      },
+      names: () => linkableNames(graph.actions),
+    }),
+    [graph.actions, select, view],
+  );
+  const fold = useStableCallback((key: string, folded: boolean) =>
+    foldFrames(context, [key], folded),
+  );
+  return (
+    <EditorReactContext value={context}>
+      <NoteLinksContext value={links}>
+        <FoldFrameContext value={fold}>{children}</FoldFrameContext>
+      </NoteLinksContext>
+    </EditorReactContext>
+  );
+}
+
+function crumbsOf(
+  context: EditorContext,
+  search: string,
+  rename: (name: string) => boolean,
+): Crumb[] {
+  const [only, ...others] = context.selection;
+  const action = context.graph.actions.find(({ key }) => key === only);
+  return [
+    { label: "Graphs", to: "/" },
+    ...levelsOf(search).map(({ graph }, n) => ({
+      label: <NameOfGraph id={graph} />,
+      to: addressAround(search, n) ?? "/",
+    })),
+    {
+      label: context.graph.name || "Untitled",
+      ...(context.mayEdit && { rename }),
+    },
+    ...(action && others.length === 0
+      ? [{ label: endName(context.graph, action.key), part: true }]
+      : []),
+  ];
+}
+
+const loadLevels = () => import("../levels/levels").then((part) => part.Levels);
+const loadSinceMarks = () => import("../past/since/since-marks").then((part) => part.SinceMarks);
+
+const loadLostDrafts = () => import("./panels/lost-drafts").then((part) => part.LostDrafts);
+
+function QuietPart({ load }: { load: () => Promise<ComponentType> }) {
+  const [Part, setPart] = useState<ComponentType | null>(null);
+  useEffect(() => {
+    let gone = false;
+    load().then(
+      (part) => !gone && setPart(() => part),
+      () => {},
+    );
+    return () => {
+      gone = true;
+    };
+  }, [load]);
+  return Part === null ? null : <Part />;
+}
+
+function QuietParts() {
+  return (
+    <>
+      <QuietPart load={loadLevels} />
+      <QuietPart load={loadSinceMarks} />
+      <QuietPart load={loadLostDrafts} />
+    </>
+  );
+}
 
 const FindBar = lazyPart(() => import("../find/find-bar").then((part) => part.FindBar));
 const QuickAdd = lazyPart(() => import("./canvas/quick-add").then((part) => part.QuickAdd));

@@ -22,11 +22,11 @@ import { Say } from "./room-notice";
 import style from "./room-notices.module.css";
 
 const ChangedTwiceNotice = lazyPart(() =>
-  import("./changed-twice-notice").then((part) => part.ChangedTwiceNotice),
+  import("./changed-twice").then((part) => part.ChangedTwiceNotice),
 );
-const OthersDialog = lazyPart(() => import("./others-dialog").then((part) => part.OthersDialog));
+const OthersDialog = lazyPart(() => import("./stranded-edits").then((part) => part.OthersDialog));
 const StrandedEditsDialog = lazyPart(() =>
-  import("./stranded-edits-dialog").then((part) => part.StrandedEditsDialog),
+  import("./stranded-edits").then((part) => part.StrandedEditsDialog),
 );
 
 const words: Record<ConnectionNotice, string> = {

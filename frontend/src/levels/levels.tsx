@@ -1,20 +1,78 @@
-/** Keeps known which actions stand for graphs, and the way through which one came here. */
+/** Finds the graphs for which actions stand, and opens, expands and leaves them. */
+import { IconArrowsDiagonal, IconStairsDown } from "@tabler/icons-react";
 import { useQueryClient } from "@tanstack/react-query";
-import { useCallback, useEffect, useMemo } from "react";
+import { type MouseEvent, useCallback, useEffect, useMemo } from "react";
 import { useLocation, useSearch } from "wouter";
 import { useGraphsAsActions, useLibrary } from "../api/documents/library";
 import { refreshLibrary } from "../api/graphs";
-import { graphsInside, type InnerStep } from "../canvas/graphs-inside";
+import { graphsInside, type InnerStep, type InsideSignProps } from "../canvas/graphs-inside";
 import { addressAround, addressInside, type Level, levelsOf } from "../canvas/level-path";
 import { useEditorContext } from "../edit-actions/editor-context";
 import type { Graph } from "../graph/model";
 import { announcer } from "../ui/announcer";
 import { useStableCallback } from "../ui/hooks/use-stable-callback";
 import { isolated } from "../words/isolated";
-import { expansion } from "./in-place/expansion";
-import { useExpansion } from "./in-place/use-expansion";
-import { InsideSign } from "./inside-sign";
-import { useFlatLink } from "./use-flat-link";
+import { expansion } from "./level-graph";
+import style from "./levels.module.css";
+import { useExpansion } from "./use-expansion";
+
+interface SignProps {
+  title: string;
+  label: string;
+  Sign: typeof IconStairsDown;
+  onClick: () => void;
+}
+
+function SignButton({ title, label, Sign, onClick }: SignProps) {
+  return (
+    <button
+      type="button"
+      className={`${style.inside} nodrag`}
+      title={title}
+      aria-label={label}
+      onClick={(event: MouseEvent) => {
+        event.stopPropagation(); // else the card would be chosen
+        onClick();
+      }}
+      onDoubleClick={(event) => event.stopPropagation()}
+    >
+      <Sign size={14} aria-hidden />
+    </button>
+  );
+}
+
+function InsideSign({ of, name }: InsideSignProps) {
+  return (
+    <span className={style.signs} data-signs>
+      <SignButton
+        title="Expand the graph inside  }"
+        label={`Expand the graph inside ${isolated(name)}`}
+        Sign={IconArrowsDiagonal}
+        onClick={() => graphsInside.now()?.expand.toggle(of)}
+      />
+      <SignButton
+        title="Open the graph inside  ]"
+        label={`Open the graph inside ${isolated(name)}`}
+        Sign={IconStairsDown}
+        onClick={() => graphsInside.now()?.enter(of)}
+      />
+    </span>
+  );
+}
+
+function useFlatLink(): void {
+  const { openOverlay } = useEditorContext();
+  const asked = new URLSearchParams(useSearch()).has("flat");
+  const answer = useStableCallback(() => {
+    openOverlay({ kind: "flat" });
+    const answered = new URL(window.location.href);
+    answered.searchParams.delete("flat");
+    window.history.replaceState(window.history.state, "", answered);
+  });
+  useEffect(() => {
+    if (asked) answer();
+  }, [asked, answer]);
+}
 
 const NONE: readonly never[] = [];
 

@@ -45,7 +45,7 @@ import { useContextMenu } from "./use-context-menu";
 import { useLineEditing } from "./use-line-editing";
 import { usePinch, ZOOM } from "./use-pinch";
 
-const GraphMap = lazyPart(() => import("../map/graph-map").then((part) => part.GraphMap));
+const GraphMap = lazyPart(() => import("./graph-map").then((part) => part.GraphMap));
 
 // What React Flow gets anew, it hands on to all that is drawn.
 const SNAP_GRID: [number, number] = [GRID, GRID];

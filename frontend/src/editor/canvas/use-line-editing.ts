@@ -1,14 +1,34 @@
-/** How lines are bent, and outcomes led elsewhere, on the canvas itself; null for who may not edit. */
+/** Bends lines and leads arrows or single outcomes to other actions. */
+import { notifications } from "@mantine/notifications";
 import { useMemo } from "react";
 import { pillWord } from "../../canvas/arrows/bundles";
 import type { LineEditing } from "../../canvas/arrows/line-store";
 import type { PlaceMap } from "../../canvas/folding/spread";
 import { type EditorContext, nudging } from "../../edit-actions/editor-context";
+import { moveRelation, retarget } from "../../graph/edit";
 import { setWaypoints } from "../../graph/edit/waypoints";
+import type { Key, Precondition } from "../../graph/model";
 import { endName } from "../../graph/relation-words";
 import { useStableCallback } from "../../ui/hooks/use-stable-callback";
 import { nodeAt } from "./hit-test";
-import { leadElsewhere } from "./lead-elsewhere";
+
+/** `outcome`: the one that goes alone; null: all that the arrow says goes together. */
+export function leadElsewhere(
+  { doc, select }: Pick<EditorContext, "doc" | "select">,
+  relation: string,
+  outcome: Precondition | null,
+  to: { readonly parent?: Key; readonly child?: Key },
+): void {
+  const moved = outcome ? retarget(doc, relation, outcome, to) : moveRelation(doc, relation, to);
+  if (moved !== null) select([moved]);
+  else {
+    notifications.show({
+      color: "red",
+      title: "The arrow stays",
+      message: "These two are tied already, or no arrow can lead there.",
+    });
+  }
+}
 
 /** `toDocument`: where something stands that is drawn there. */
 export function useLineEditing(context: EditorContext, toDocument: PlaceMap): LineEditing | null {

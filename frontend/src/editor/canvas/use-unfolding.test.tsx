@@ -11,7 +11,7 @@ import { addAction, moveActions } from "../../graph/edit";
 import { graphNow } from "../../graph/edit/document-writes";
 import { writeNote } from "../../graph/edit/notes";
 import type { Key } from "../../graph/model";
-import { useUnfolding } from "./use-unfolding";
+import { useUnfolding } from "./use-viewport";
 
 vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);
 

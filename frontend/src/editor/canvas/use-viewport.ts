@@ -1,8 +1,10 @@
-/** The view of the canvas: what is seen at first, what Fit shows, and how it follows a run. */
+/** The view of the canvas: its first view, Fit, showing single actions, and following a run. */
+
 import type { ReactFlowInstance } from "@xyflow/react";
 import { type RefObject, useCallback, useEffect, useMemo, useRef } from "react";
 import type { LineStore } from "../../canvas/arrows/line-store";
 import type { Arrow, CanvasNode } from "../../canvas/elements";
+import { type Folding, hiding } from "../../canvas/folding/folding";
 import type { PlaceMap } from "../../canvas/folding/spread";
 import { CARD, type Positions, pillSize, type Sizes } from "../../canvas/geometry/arrange";
 import {
@@ -17,10 +19,38 @@ import {
   viewportShowing,
   wholeViewport,
 } from "../../canvas/geometry/viewport";
-import type { CanvasView } from "../../edit-actions/editor-context";
+import type { CanvasView, EditorContext } from "../../edit-actions/editor-context";
 import { type Direction, ENTRY, EXIT, type Key, type Position } from "../../graph/model";
 import type { Progress } from "../../status/progress";
+import { useStableCallback } from "../../ui/hooks/use-stable-callback";
 import { useFollowRun } from "./follow-run";
+
+interface FoldedCanvas {
+  readonly folding: Folding | null;
+  readonly places: Positions;
+  readonly sizes: Sizes;
+}
+
+/** Unfolds the frames that hide any of these. */
+export function useUnfolding(context: EditorContext, canvas: FoldedCanvas) {
+  const { graph, folded, fold, selection } = context;
+  const { folding, places, sizes } = canvas;
+  const unfoldRound = useStableCallback((keys: readonly Key[]) => {
+    if (folding === null) return;
+    const frames = hiding(graph, folded, keys, places, sizes);
+    if (frames.length > 0) fold(frames, false);
+  });
+  // What a person has chosen and adds or moves into a block would be gone from under their hands.
+  const before = useRef({ folded, folding });
+  useEffect(() => {
+    const was = before.current;
+    before.current = { folded, folding };
+    if (folding === null || was.folded !== folded) return;
+    const isGone = (key: string) => folding.blockOf.has(key) && !was.folding?.blockOf.has(key);
+    unfoldRound([...selection].filter(isGone));
+  }, [folded, folding, selection, unfoldRound]);
+  return { blockOf: folding?.blockOf, unfoldRound };
+}
 
 interface ViewportInput {
   flow: ReactFlowInstance<CanvasNode, Arrow>;

@@ -1,7 +1,8 @@
-/** The bar of a dry-run: where one is, what happens, how it shall go on. */
-import { ActionIcon, Button, Menu, Select } from "@mantine/core";
+/** The bar of a dry-run: its moment, its controls, and the choice of how an action ends. */
+import { ActionIcon, Button, Menu, Popover, Select } from "@mantine/core";
 import {
   IconBolt,
+  IconHistory,
   IconPlayerPauseFilled,
   IconPlayerPlayFilled,
   IconPlayerSkipBack,
@@ -15,18 +16,90 @@ import { OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
 import { KeepDryRun } from "../../courses/keep-dry-run";
 import type { RunningAction } from "../../dry-run/playback";
 import { type DecidedFaultKind, faultWords } from "../../dry-run/script";
+import type { SeedDoubt } from "../../dry-run/seed";
 import { DRY_RUN_SPEEDS, type DryRun } from "../../dry-run/use-dry-run";
 import * as editActions from "../../edit-actions/dry-run-actions";
-import type { EditAction } from "../../edit-actions/edit-action";
-import { labelOf } from "../../edit-actions/edit-action";
+import { type EditAction, labelOf } from "../../edit-actions/edit-action";
 import { type EditorContext, selectedActions } from "../../edit-actions/editor-context";
 import { FirstShortcut } from "../../edit-actions/keys/shortcut-keys";
 import { fullName } from "../../graph/model";
 import { endName } from "../../graph/relation-words";
 import { Tooltip } from "../../ui/floating/tooltip";
+import { stopwatch } from "../../ui/times";
 import { isolated } from "../../words/isolated";
 import style from "./dry-run-bar.module.css";
-import { SeedEnd, SeedNote } from "./dry-run-seed";
+
+const MOST = 12; // lines of each list
+
+function Doubt({ doubt: { node, text } }: { doubt: SeedDoubt }) {
+  return (
+    <li>
+      {node !== "" && <b>{node}</b>} {text}.
+    </li>
+  );
+}
+
+function SeedNote({ run }: { run: DryRun }) {
+  const { seed, doubts } = run;
+  if (seed === null) return null;
+  const unknown = doubts.length === 1 ? "1 thing not known" : `${doubts.length} things not known`;
+  return (
+    <Popover position="top-start" width={380} withinPortal>
+      <Popover.Target>
+        <Button
+          size="compact-sm"
+          variant="light"
+          color={doubts.length > 0 ? "orange" : "blue"}
+          leftSection={<IconHistory size={14} aria-hidden />}
+        >
+          From run {seed.number} at {stopwatch(seed.at)}
+          {doubts.length > 0 && ` · ${unknown}`}
+        </Button>
+      </Popover.Target>
+      <Popover.Dropdown className={style.seed ?? ""}>
+        <p>
+          It begins as run {seed.number} was {stopwatch(seed.at)} after its start. What went on then
+          waits for you: decide how it ends.
+        </p>
+        {seed.values.length > 0 && (
+          <dl aria-label="Values at that moment">
+            {seed.values.slice(0, MOST).map(({ node, name, text }) => (
+              <div key={`${node} ${name}`}>
+                <dt>
+                  {node} {name}
+                </dt>
+                <dd>{text}</dd>
+              </div>
+            ))}
+          </dl>
+        )}
+        {doubts.length > 0 && (
+          <>
+            <h3>Not known, or not as it was</h3>
+            <ul>
+              {doubts.slice(0, MOST).map((doubt) => (
+                <Doubt key={`${doubt.node} ${doubt.text}`} doubt={doubt} />
+              ))}
+              {doubts.length > MOST && <li>and {doubts.length - MOST} more</li>}
+            </ul>
+          </>
+        )}
+      </Popover.Dropdown>
+    </Popover>
+  );
+}
+
+/** How what is decided next ended in the run. */
+function SeedEnd({ run, node }: { run: DryRun; node: string }) {
+  const { seed } = run;
+  const end = seed?.ends.get(node);
+  if (!seed || end === undefined) return null;
+  return (
+    <span className={style.how}>
+      (in run {seed.number}: <b>{end}</b>)
+    </span>
+  );
+}
 
 const CHOICES = ["on_true", "on_false", "on_error"] as const;
 

@@ -1,26 +1,31 @@
-/** Drawing an arrow without a pointer: from what, after which outcome, to what. */
+/** Dialogs that draw an arrow, or lead one to another action, by keyboard. */
 import { Button, Modal } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconFlag, IconPlayerPlay, IconPlus, IconSquareRounded } from "@tabler/icons-react";
 import { useEffect, useRef, useState } from "react";
 import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
 import { addActionAt, type EditorContext, freePosition } from "../../edit-actions/editor-context";
+import { relationId } from "../../graph/document-keys";
 import { asOneEdit, connect, type NewAction } from "../../graph/edit";
-import { ENTRY, EXIT, type Key, type Precondition } from "../../graph/model";
+import {
+  ENTRY,
+  EXIT,
+  type Key,
+  type Precondition,
+  type Relation,
+  spokenOutcomes,
+} from "../../graph/model";
 import { endName } from "../../graph/relation-words";
 import { keyOf, typedCharacter } from "../../ui/keys";
 import { colorOfName } from "../../ui/name-colors";
 import { matching, type Option, PickList } from "../../ui/pick-list";
 import { isolated } from "../../words/isolated";
 import { candidates } from "../canvas/quick-add";
+import { leadElsewhere } from "../canvas/use-line-editing";
 import style from "./arrow-dialog.module.css";
 
 /** Everything an arrow can lead from or to, those that are near first. */
-export function ends(
-  context: EditorContext,
-  end: typeof ENTRY | typeof EXIT,
-  near: Key | null,
-): Option[] {
+function ends(context: EditorContext, end: typeof ENTRY | typeof EXIT, near: Key | null): Option[] {
   const places = context.positions();
   const [x0, y0] = (near === null ? null : places.get(near)) ?? context.view.middle();
   const far = (key: Key) => {
@@ -180,7 +185,7 @@ function useEarlyKeys(onOutcome: (outcome: Precondition) => void): () => string 
   return () => early.current;
 }
 
-interface Props {
+interface ArrowDialogProps {
   context: EditorContext;
   /** Actions of other graphs, found by their names as where one is added. */
   known: readonly NewAction[];
@@ -246,7 +251,7 @@ interface SentenceProps {
 
 /** Draws it, also to an action that is made for it, and selects it. */
 function draw(
-  { context, known, onClose }: Pick<Props, "context" | "known" | "onClose">,
+  { context, known, onClose }: Pick<ArrowDialogProps, "context" | "known" | "onClose">,
   parent: Key,
   child: Key,
   when: Precondition,
@@ -262,7 +267,7 @@ function draw(
   else notifications.show({ color: "red", message: "No arrow can lead there." });
 }
 
-export function ArrowDialog(props: Props) {
+export function ArrowDialog(props: ArrowDialogProps) {
   const { context, known, from: given, to, onClose } = props;
   const [from, setFrom] = useState(given);
   const [outcome, setOutcome] = useState<Precondition>("on_true");
@@ -321,6 +326,120 @@ export function ArrowDialog(props: Props) {
           />
         </>
       )}
+    </Modal>
+  );
+}
+
+type RelationEnd = "parent" | "child";
+
+interface RetargetProps {
+  context: EditorContext;
+  relation: string;
+  /** The one that is led alone; all of them go together without it. */
+  outcome?: Precondition;
+  onClose: () => void;
+}
+
+/** Whether all outcomes of an arrow go together, or one alone. */
+function OutcomeChoice({ of, value, onPick }: OutcomeChoiceProps) {
+  return (
+    // biome-ignore lint/a11y/useSemanticElements: a fieldset cannot be laid out as a row everywhere
+    <div role="group" aria-label="What is led elsewhere" className={style.outcomes}>
+      <Button
+        variant={value === null ? "light" : "default"}
+        aria-pressed={value === null}
+        onClick={() => onPick(null)}
+      >
+        All of it
+      </Button>
+      {of.map((outcome) => (
+        <Button
+          key={outcome}
+          variant={value === outcome ? "light" : "default"}
+          aria-pressed={value === outcome}
+          leftSection={<OutcomeSign outcome={outcome} />}
+          style={{ color: outcomeColor[outcome] }}
+          onClick={() => onPick(outcome)}
+        >
+          {outcomeWord[outcome]}
+        </Button>
+      ))}
+    </div>
+  );
+}
+
+interface OutcomeChoiceProps {
+  of: readonly Precondition[];
+  value: Precondition | null;
+  onPick: (outcome: Precondition | null) => void;
+}
+
+/** Which of its two ends is led elsewhere. */
+function EndChoice({ context, relation: { parent, child }, end, onPick }: EndChoiceProps) {
+  const button = (which: RelationEnd, label: string) => (
+    <Button
+      variant={end === which ? "light" : "default"}
+      aria-pressed={end === which}
+      onClick={() => onPick(which)}
+    >
+      {label}
+    </Button>
+  );
+  return (
+    <div className={style.outcomes}>
+      {button("child", `to another than ${isolated(endName(context.graph, child))}`)}
+      {parent !== ENTRY &&
+        button("parent", `from another than ${isolated(endName(context.graph, parent))}`)}
+    </div>
+  );
+}
+
+interface EndChoiceProps {
+  context: EditorContext;
+  relation: Relation;
+  end: RelationEnd;
+  onPick: (end: RelationEnd) => void;
+}
+
+/** Where that end can be led. */
+function placesFor(context: EditorContext, relation: Relation, end: RelationEnd): Option[] {
+  const now = relation[end];
+  return ends(context, end === "child" ? EXIT : ENTRY, now).filter(
+    ({ id }) => id !== now && (id === EXIT || id !== ENTRY || relation.parent === ENTRY),
+  );
+}
+
+export function RetargetDialog({ context, relation: id, outcome, onClose }: RetargetProps) {
+  const [end, setEnd] = useState<RelationEnd>("child");
+  const [alone, setAlone] = useState<Precondition | null>(outcome ?? null);
+  const relation = context.graph.relations.find((each) => relationId(each) === id);
+  if (relation === undefined) return null;
+  const outcomes = relation.parent === ENTRY ? [] : spokenOutcomes(relation.conditions);
+  const lead = (key: Key) => {
+    onClose();
+    leadElsewhere(context, id, alone, { [end]: key });
+  };
+  return (
+    <Modal
+      opened
+      onClose={onClose}
+      title="Lead the arrow elsewhere"
+      yOffset="14vh"
+      centered={false}
+      transitionProps={{ duration: 80 }}
+      overlayProps={{ backgroundOpacity: 0.3 }}
+    >
+      {outcomes.length > 1 && <OutcomeChoice of={outcomes} value={alone} onPick={setAlone} />}
+      <EndChoice context={context} relation={relation} end={end} onPick={setEnd} />
+      <PickList
+        key={end}
+        label={end === "child" ? "To" : "From"}
+        placeholder={end === "child" ? "What follows instead?" : "After which action instead?"}
+        find={(search) => matching(placesFor(context, relation, end), search)}
+        onPick={lead}
+        none="No action is called so."
+        take="lead there"
+      />
     </Modal>
   );
 }

@@ -8,9 +8,7 @@ import { lazyPart } from "../../ui/parts/lazy-part";
 import { OverlayBoundary, PartBoundary } from "../../ui/parts/part-boundary";
 
 const ArrowDialog = lazyPart(() => import("./arrow-dialog").then((part) => part.ArrowDialog));
-const RetargetDialog = lazyPart(() =>
-  import("./retarget-dialog").then((part) => part.RetargetDialog),
-);
+const RetargetDialog = lazyPart(() => import("./arrow-dialog").then((part) => part.RetargetDialog));
 const CommandPalette = lazyPart(() =>
   import("./command-palette").then((part) => part.CommandPalette),
 );
@@ -19,10 +17,10 @@ const FlatDialog = lazyPart(() =>
   import("../../levels/flat-dialog").then((part) => part.FlatDialog),
 );
 const ExtractDialog = lazyPart(() =>
-  import("../../levels/extract-dialog").then((part) => part.ExtractDialog),
+  import("../../levels/sub-graph-dialogs").then((part) => part.ExtractDialog),
 );
 const UnpackDialog = lazyPart(() =>
-  import("../../levels/unpack-dialog").then((part) => part.UnpackDialog),
+  import("../../levels/sub-graph-dialogs").then((part) => part.UnpackDialog),
 );
 const RenamedUses = lazyPart(() =>
   import("../../canvas/renamed-uses").then((part) => part.RenamedUses),

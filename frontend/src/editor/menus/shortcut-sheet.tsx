@@ -1,14 +1,130 @@
-/** Every shortcut on one sheet: each can be changed, but for STOP's. */
-import { Button, Modal, Switch } from "@mantine/core";
+/** The sheet of all keyboard shortcuts; each except that of STOP can be changed. */
+import { ActionIcon, Button, Modal, Switch } from "@mantine/core";
+import { IconPencil } from "@tabler/icons-react";
 import { useState } from "react";
 import { EDIT_ACTIONS } from "../../edit-actions/all";
-import type { EditActionGroup } from "../../edit-actions/edit-action";
-import { keepOwn, useOwnShortcuts } from "../../edit-actions/keys/own-shortcuts";
+import { type EditAction, type EditActionGroup, printedKeys } from "../../edit-actions/edit-action";
+import {
+  assigned,
+  isChangeable,
+  keepOwn,
+  type OwnShortcuts,
+  refusalOf,
+  shortcutOf,
+  takenBy,
+  useOwnShortcuts,
+  withOwn,
+} from "../../edit-actions/keys/own-shortcuts";
 import { ShortcutKeys } from "../../edit-actions/keys/shortcut-keys";
 import { useSingleKeys } from "../../edit-actions/keys/shortcuts";
 import { HelpLink } from "../../status/help-link";
-import { ShortcutRow } from "./shortcut-row";
+import { keyOf } from "../../ui/keys";
+import { isolated } from "../../words/isolated";
 import style from "./shortcut-sheet.module.css";
+
+interface Props {
+  /** As it comes, without what was changed on this device. */
+  editAction: EditAction;
+  own: OwnShortcuts;
+  /** Keys are being asked for, of this one. */
+  changing: boolean;
+  setChanging: (name: string | null) => void;
+}
+
+interface Wish {
+  readonly keys: string;
+  /** Why not at once. */
+  readonly problem: string;
+  /** Whether others would give the keys up. */
+  readonly others: boolean;
+}
+
+function wishFor(editAction: EditAction, own: OwnShortcuts, keys: string): Wish | null {
+  const refused = refusalOf(keys);
+  if (refused !== null) return { keys, problem: refused, others: false };
+  const others = takenBy(withOwn(EDIT_ACTIONS, own), editAction.name, keys);
+  if (others.length === 0) return null;
+  const printed = printedKeys(keys).join(" ");
+  const names = others.map(({ label }) => `“${isolated(label)}”`).join(", ");
+  return { keys, problem: `${printed} is taken by ${names}.`, others: others.every(isChangeable) };
+}
+
+/** Waits for keys. STOP's go past it, wherever the focus is. */
+function KeysWanted({ editAction, own, setChanging }: Omit<Props, "changing">) {
+  const [wish, setWish] = useState<Wish | null>(null);
+  const give = (shortcuts: readonly string[]) => {
+    keepOwn(assigned(EDIT_ACTIONS, own, editAction.name, shortcuts));
+    setChanging(null);
+  };
+  const onKeyDown = (event: React.KeyboardEvent) => {
+    const key = keyOf(event);
+    if (key === "Tab" && !event.ctrlKey && !event.altKey) return; // to the buttons
+    event.preventDefault();
+    event.stopPropagation();
+    if (key === "Escape") return setChanging(null);
+    const keys = shortcutOf(event);
+    if (keys === null || event.repeat) return;
+    const problem = wishFor(editAction, own, keys);
+    if (problem === null) give([keys]);
+    else setWish(problem);
+  };
+  const changed = own[editAction.name] !== undefined;
+  return (
+    <div className={style.wanted}>
+      {/* biome-ignore lint/a11y/noAutofocus: it was asked for a moment ago */}
+      <button type="button" className={style.press} autoFocus onKeyDown={onKeyDown}>
+        Press the new keys for “{editAction.label}”
+      </button>
+      <p className={style.problem} role="status">
+        {wish?.problem}
+      </p>
+      <div className={style.choices}>
+        {wish?.others && (
+          <Button size="compact-xs" variant="filled" onClick={() => give([wish.keys])}>
+            Take them
+          </Button>
+        )}
+        <Button size="compact-xs" onClick={() => give([])}>
+          No keys
+        </Button>
+        {changed && (
+          <Button size="compact-xs" onClick={() => give(editAction.shortcuts)}>
+            As it came
+          </Button>
+        )}
+        <Button size="compact-xs" variant="subtle" onClick={() => setChanging(null)}>
+          Cancel
+        </Button>
+      </div>
+    </div>
+  );
+}
+
+function ShortcutRow({ changing, ...props }: Props) {
+  const { editAction, own, setChanging } = props;
+  const shortcuts = own[editAction.name] ?? editAction.shortcuts;
+  return (
+    <div className={style.row} data-own={own[editAction.name] !== undefined || undefined}>
+      <dt>{editAction.label}</dt>
+      <dd>
+        {shortcuts.slice(0, 2).map((shortcut) => (
+          <ShortcutKeys key={shortcut} shortcut={shortcut} />
+        ))}
+        {isChangeable(editAction) && (
+          <ActionIcon
+            size={24}
+            aria-label={`Other keys for ${editAction.label}`}
+            aria-expanded={changing}
+            onClick={() => setChanging(changing ? null : editAction.name)}
+          >
+            <IconPencil size={13} aria-hidden />
+          </ActionIcon>
+        )}
+        {changing && <KeysWanted {...props} />}
+      </dd>
+    </div>
+  );
+}
 
 const GROUPS: readonly EditActionGroup[] = ["Draw", "Arrange", "Look", "Graph", "Dry-run"];
 

@@ -1,5 +1,5 @@
-/** Where the parts of the editor stand: one at a time on a phone, else around the canvas. */
-import { ActionIcon } from "@mantine/core";
+/** Arranges the parts of the editor: one at a time on a phone, around the canvas elsewhere. */
+import { ActionIcon, Button } from "@mantine/core";
 import {
   IconLayoutSidebar,
   IconLayoutSidebarLeftCollapse,
@@ -7,6 +7,8 @@ import {
 } from "@tabler/icons-react";
 import { type ReactNode, useEffect, useRef, useSyncExternalStore } from "react";
 import { actionDrag } from "../../canvas/action-drag";
+import { dryRun } from "../../edit-actions/dry-run-actions";
+import { isEnabled } from "../../edit-actions/edit-action";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import type { ToldProblem } from "../../graph/problems/told-problems";
 import { Tooltip } from "../../ui/floating/tooltip";
@@ -15,9 +17,28 @@ import { type ListTab, useListTab } from "../../ui/hooks/use-list-tab";
 import { lazyPart } from "../../ui/parts/lazy-part";
 import { PartBoundary } from "../../ui/parts/part-boundary";
 import { Segments } from "../../ui/segments";
-import { DryRunButton } from "../menus/dry-run-button";
 import style from "./layouts.module.css";
 import type { Pane, Panels } from "./use-panels";
+
+/** `stacked`: its sign over its word, where there is little room. */
+export function DryRunButton({ stacked = false }: { stacked?: boolean }) {
+  const context = useEditorContext();
+  const Sign = dryRun.icon;
+  return (
+    <Button
+      className={style.dry ?? ""}
+      data-stacked={stacked || undefined}
+      leftSection={<Sign size={stacked ? 20 : 16} aria-hidden />}
+      aria-pressed={context.dryRun !== null}
+      data-pressed={context.dryRun !== null || undefined}
+      disabled={!isEnabled(dryRun, context)}
+      title="Play the graph on the canvas, by the engine’s rules; nothing moves"
+      onClick={() => dryRun.run(context)}
+    >
+      {dryRun.label}
+    </Button>
+  );
+}
 
 const ListRail = lazyPart(() => import("./list-rail").then((part) => part.ListRail));
 

@@ -1,0 +1,195 @@
+/** Shows an action to read: its description, parameters and outputs, the graphs that use it, and the robots that have it. */
+
+import { Button } from "@mantine/core";
+import type { ReactNode } from "react";
+import { Link } from "wouter";
+import type { LibraryAction } from "../api/documents/library";
+import { useGraphs } from "../api/graphs";
+import type { Parameter } from "../graph/model";
+import { type RobotAction, type RobotsKnowledge, robotDifferences } from "../library/robot-actions";
+import { colorOfName } from "../ui/name-colors";
+import { isolated } from "../words/isolated";
+import style from "./action-overview.module.css";
+import { type ParameterFacts, parameterFacts } from "./parameter-facts";
+
+function Row({ facts, free }: { facts: ParameterFacts; free: string }) {
+  const { name, type, required, allowed, value, more } = facts;
+  return (
+    <tr>
+      <th scope="row">{name}</th>
+      <td>
+        <code className={style.type}>{type}</code>
+      </td>
+      <td className={style.said}>
+        {[allowed, ...more].filter(Boolean).join(" · ") || (
+          <span className={style.quiet}>{free}</span>
+        )}
+      </td>
+      <td className={style.value}>
+        {value !== null && <code>{value}</code>}{" "}
+        {!required && <span className={style.quiet}>optional</span>}
+      </td>
+    </tr>
+  );
+}
+
+interface ParameterTableProps {
+  title: string;
+  /** What is said when there are none. */
+  none: string;
+  parameters: readonly Parameter[];
+  /** What is said where nothing is asked of a value. */
+  free?: string;
+}
+
+function ParameterTable({ title, none, parameters, free = "" }: ParameterTableProps) {
+  const rows = parameterFacts(parameters);
+  return (
+    <section>
+      <h3 className={style.heading}>{title}</h3>
+      {rows.length === 0 ? (
+        <p className={style.quiet}>{none}</p>
+      ) : (
+        <table className={style.table} aria-label={title}>
+          <thead>
+            <tr>
+              <th scope="col">name</th>
+              <th scope="col">type</th>
+              <th scope="col">allowed</th>
+              <th scope="col" className={style.value}>
+                value
+              </th>
+            </tr>
+          </thead>
+          <tbody>
+            {rows.map((facts) => (
+              <Row key={facts.path} facts={facts} free={free} />
+            ))}
+          </tbody>
+        </table>
+      )}
+    </section>
+  );
+}
+
+interface UsedInProps {
+  usedIn: readonly string[];
+  /** Of them, those with other parameters. */
+  differs: readonly string[];
+  /** Makes the action what a graph has; absent where that cannot be done. */
+  onTake?: (graph: string, name: string) => void;
+}
+
+export function UsedIn({ usedIn, differs, onTake }: UsedInProps) {
+  const graphs = useGraphs().data ?? [];
+  const nameOf = (id: string) => graphs.find((graph) => graph.id === id)?.name || "Untitled";
+  return (
+    <section>
+      <h3 className={style.heading}>
+        Used in
+        {usedIn.length > 0 && (
+          <span>{usedIn.length === 1 ? "1 graph" : `${usedIn.length} graphs`}</span>
+        )}
+      </h3>
+      {usedIn.length === 0 && <p className={style.quiet}>No graph uses it yet.</p>}
+      <ul className={style.facts} aria-label="Graphs that use it">
+        {usedIn.map((id) => (
+          <li key={id}>
+            <Link to={`/graphs/${id}`} className={style.link}>
+              <bdi>{nameOf(id)}</bdi>
+            </Link>
+            {differs.includes(id) && (
+              <span className={style.differs}>
+                older parameters
+                {onTake && (
+                  <Button size="compact-sm" variant="subtle" onClick={() => onTake(id, nameOf(id))}>
+                    Take over
+                    <span className="visually-hidden"> what {isolated(nameOf(id))} has</span>
+                  </Button>
+                )}
+              </span>
+            )}
+          </li>
+        ))}
+      </ul>
+    </section>
+  );
+}
+
+interface OnRobotsProps {
+  name: string;
+  knowledge: RobotsKnowledge;
+  /** What the library says; null: nothing. */
+  own: Pick<LibraryAction, "inputs" | "outputs"> | null;
+  /** What can be done with what a robot has. */
+  offer?: (has: RobotAction) => ReactNode;
+}
+
+function words(has: RobotAction | undefined, unknown: boolean, own: OnRobotsProps["own"]) {
+  if (has === undefined) {
+    return { differs: false, text: unknown ? "does not say what it has" : "does not have it" };
+  }
+  const found = own === null ? [] : robotDifferences(own, has.action);
+  return found.length === 0
+    ? { differs: false, text: "has it" }
+    : { differs: true, text: `has another: ${found.join(", ")}` };
+}
+
+export function OnRobots({ name, knowledge, own, offer }: OnRobotsProps) {
+  const { robots, unknown, byName } = knowledge;
+  const having = byName.get(name) ?? [];
+  return (
+    <section>
+      <h3 className={style.heading}>On robots</h3>
+      {robots.length === 0 && <p className={style.quiet}>No robot is registered.</p>}
+      <ul className={style.facts} aria-label="Robots">
+        {robots.map((robot) => {
+          const has = having.find((each) => each.robot === robot);
+          const { differs, text } = words(has, unknown.includes(robot), own);
+          return (
+            <li key={robot}>
+              <span className={style.robot}>
+                <i style={{ background: colorOfName(robot) }} aria-hidden /> <bdi>{robot}</bdi>
+              </span>
+              <span className={differs ? style.differs : style.quiet}>{text}</span>
+              {has && offer?.(has)}
+            </li>
+          );
+        })}
+      </ul>
+    </section>
+  );
+}
+
+interface Props {
+  description: string;
+  type: string;
+  labels: readonly string[];
+  inputs: readonly Parameter[];
+  outputs: readonly Parameter[];
+  /** Where it is used, and who has it. */
+  children: ReactNode;
+}
+
+const TYPES: Readonly<Record<string, string>> = {
+  sync: "runs until it is done",
+  async: "runs until it is done",
+  spontaneous: "may report again and again",
+};
+
+export function ActionOverview({ description, type, labels, inputs, outputs, children }: Props) {
+  return (
+    <>
+      <p className={style.lead}>{description || "Nobody has described it yet."}</p>
+      <ul className={style.marks} aria-label="Type and labels">
+        <li title={`Type ${type}`}>{TYPES[type] ?? `type ${type}`}</li>
+        {labels.map((label) => (
+          <li key={label}>{label}</li>
+        ))}
+      </ul>
+      <ParameterTable title="Takes" none="No parameters." free="anything" parameters={inputs} />
+      <ParameterTable title="Gives" none="Nothing but its outcome." parameters={outputs} />
+      <div className={style.pair}>{children}</div>
+    </>
+  );
+}

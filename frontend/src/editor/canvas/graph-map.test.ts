@@ -1,0 +1,69 @@
+/** The map shows everything, each in its colour, and what is seen. */
+import { expect, test } from "vitest";
+import type { CanvasNode } from "../../canvas/elements";
+import type { PartOnCard } from "../../canvas/graphs-inside";
+import type { Action } from "../../graph/model";
+import { isWithin, mapFrame, mapMarks, seenArea } from "./graph-map";
+
+const card = (x: number, y: number, actor = "") =>
+  ({
+    id: `${x}-${y}`,
+    type: "action",
+    position: { x, y },
+    measured: { width: 200, height: 100 },
+    data: { action: { actor }, progress: null },
+  }) as unknown as CanvasNode;
+
+test("cards of one colour are one path, and what has no size is left out", () => {
+  const unknown = { ...card(5000, 5000), measured: {} } as CanvasNode;
+  const { paths, area } = mapMarks([card(0, 0), card(300, 50), card(0, 200, "Ada"), unknown]);
+  expect(paths.map(([, path]) => path.split("M").length - 1)).toEqual([2, 1]);
+  expect(area).toEqual({ x: 0, y: 0, width: 500, height: 300 });
+});
+
+test("the map shows all of the graph and all that is seen, its middle in its middle", () => {
+  const seen = seenArea({ x: -1000, y: -20, zoom: 2 }, { width: 2000, height: 400 });
+  expect(seen).toEqual({ x: 500, y: 10, width: 1000, height: 200 });
+  const frame = mapFrame({ x: 0, y: 0, width: 600, height: 220 }, seen);
+  expect(frame.x).toBeLessThan(0);
+  expect(frame.x + frame.width).toBeGreaterThan(1500);
+  expect(frame.x + frame.width / 2).toBeCloseTo(750);
+  expect(frame.y + frame.height / 2).toBeCloseTo(110);
+  expect(frame.width / frame.height).toBeCloseTo(142 / 102);
+});
+
+test("a map of nothing shows what is seen", () => {
+  const seen = seenArea({ x: -40, y: -30, zoom: 1 }, { width: 132, height: 92 });
+  expect(mapFrame(mapMarks([]).area, seen)).toEqual({
+    x: 35,
+    y: 25,
+    width: 142,
+    height: 102,
+    scale: 1,
+  });
+});
+
+test("a map is needed as soon as anything is out of sight", () => {
+  const seen = { x: 0, y: 0, width: 800, height: 600 };
+  const at = (x: number, y: number) => ({ x, y, width: 200, height: 100 });
+  expect(isWithin(at(0, 0), seen)).toBe(true);
+  expect(isWithin(at(600, 500), seen)).toBe(true);
+  for (const [x, y] of [
+    [-1, 0],
+    [601, 0],
+    [0, -1],
+    [0, 501],
+  ] as const)
+    expect(isWithin(at(x, y), seen)).toBe(false);
+});
+
+test("of a card with a graph in it the map shows what is in it, in the colours of their states", () => {
+  const action = { actor: "" } as Action;
+  const part = (x: number, expanded: boolean, progress: unknown) =>
+    ({ path: "p", x, y: 40, width: 50, height: 20, action, expanded, progress }) as PartOnCard;
+  const parts = [part(10, false, null), part(70, false, { tone: "run" }), part(130, true, null)];
+  const { paths, area } = mapMarks([card(1000, 0)], () => parts);
+  expect(paths).toHaveLength(3);
+  expect(paths.find(([color]) => color === "var(--run)")?.[1]).toMatch(/^M1080,40/);
+  expect(area).toEqual({ x: 1000, y: 0, width: 200, height: 100 });
+});

@@ -1,0 +1,130 @@
+/** The tree of graphs that are expanded on the cards of their actions. Unchanged parts keep their identity. */
+
+import { keepPreviousData, useQueries } from "@tanstack/react-query";
+import { useMemo } from "react";
+import { queryKeys, useGraphs } from "../api/graphs";
+import { errorText, fetchJson } from "../api/http";
+import { fromUmrf } from "../canvas/from-umrf";
+import type { Action, Graph, Key } from "../graph/model";
+import { Watched } from "../ui/watched";
+
+type LevelAction = Pick<Action, "name" | "instanceId">;
+
+/** The graph that an action stands for, and what is expanded in it. */
+export interface LevelGraph {
+  /** Of the graph on the server. */
+  readonly id: string;
+  /** Keys of the actions that lead here, outermost first, joined by "/". */
+  readonly path: string;
+  /** Those actions. */
+  readonly names: readonly LevelAction[];
+  /** Null while it is not here; else why it cannot be. */
+  readonly graph: Graph | string | null;
+  readonly levels: ReadonlyMap<Key, LevelGraph>;
+}
+
+/** What is known of the graphs of the server. */
+export interface KnownGraphs {
+  /** The id of the graph that an action of this name stands for. */
+  idOf(name: string): string | undefined;
+  graphOf(id: string): Graph | string | null;
+}
+
+const joined = (path: string, key: Key): string => (path === "" ? key : `${path}/${key}`);
+
+const called = ({ name, instanceId }: LevelAction) => `${name} ${instanceId}`;
+
+const same = (a: LevelGraph, b: LevelGraph): boolean =>
+  a.id === b.id &&
+  a.graph === b.graph &&
+  String(a.names.map(called)) === String(b.names.map(called)) &&
+  a.levels.size === b.levels.size &&
+  [...a.levels].every(([key, level]) => b.levels.get(key) === level);
+
+/** Below the actions of `graph`, what of `expanded` is there. A name inside of itself is an action, as engines
+ * have it, so `above` has the ids of the graphs around. */
+export function levelsBelow(
+  graph: Graph,
+  expanded: ReadonlySet<string>,
+  known: KnownGraphs,
+  before: ReadonlyMap<Key, LevelGraph> | undefined,
+  around: { path: string; names: readonly LevelAction[]; above: readonly string[] },
+): ReadonlyMap<Key, LevelGraph> {
+  const found = new Map<Key, LevelGraph>();
+  for (const action of graph.actions) {
+    const path = joined(around.path, action.key);
+    if (!expanded.has(path)) continue;
+    const id = known.idOf(action.name);
+    if (id === undefined || around.above.includes(id)) continue;
+    const last = before?.get(action.key);
+    const { name, instanceId } = action;
+    const names = [...around.names, { name, instanceId }];
+    const inner = known.graphOf(id);
+    const below = { path, names, above: [...around.above, id] };
+    const levels =
+      inner === null || typeof inner === "string"
+        ? new Map<Key, LevelGraph>()
+        : levelsBelow(inner, expanded, known, last?.levels, below);
+    const level = { id, path, names, graph: inner, levels };
+    found.set(action.key, last && same(last, level) ? last : level);
+  }
+  const unchanged =
+    before?.size === found.size && [...found].every(([key, level]) => before.get(key) === level);
+  return before && unchanged ? before : found;
+}
+
+/** The paths of everything that stands for a graph, `depth` levels down. */
+export function pathsTo(
+  graph: Graph,
+  depth: number,
+  known: KnownGraphs,
+  around: { path: string; above: readonly string[] },
+): string[] {
+  if (depth === 0) return [];
+  return graph.actions.flatMap(({ key, name }) => {
+    const id = known.idOf(name);
+    if (id === undefined || around.above.includes(id)) return [];
+    const path = joined(around.path, key);
+    const inner = known.graphOf(id);
+    if (inner === null || typeof inner === "string") return [path];
+    const below = { path, above: [...around.above, id] };
+    return [path, ...pathsTo(inner, depth - 1, known, below)];
+  });
+}
+
+interface Expansion {
+  /** By the actions of the graph on the canvas. */
+  readonly levels: ReadonlyMap<Key, LevelGraph>;
+  toggle(path: string): void;
+  enter(path: string): void;
+}
+
+export const expansion = new Watched<Expansion>({
+  levels: new Map(),
+  toggle: () => {},
+  enter: () => {},
+});
+
+const read = (umrf: unknown): Graph => fromUmrf(umrf);
+
+/** Each as a graph, as words when it cannot be had, or null while it is on its way. What did not change
+ * is the same object as before. */
+export function useLevelGraphs(ids: readonly string[]): ReadonlyMap<string, Graph | string | null> {
+  const { data: graphs } = useGraphs();
+  const found = useQueries({
+    queries: ids.map((id) => {
+      // The list tells of every change; without it, it is asked for once.
+      const seq = graphs?.find((graph) => graph.id === id)?.seq ?? 0;
+      const path = `/api/graphs/${encodeURIComponent(id)}/umrf?identities=true`;
+      return {
+        queryKey: [...queryKeys.graph(id), "umrf", seq],
+        queryFn: ({ signal }: { signal: AbortSignal }) => fetchJson<unknown>(path, { signal }),
+        placeholderData: keepPreviousData,
+        select: read,
+      };
+    }),
+    combine: (results) =>
+      results.map(({ data, error }) => data ?? (error ? errorText(error) : null)),
+  });
+  return useMemo(() => new Map(ids.map((id, i) => [id, found[i] ?? null])), [ids, found]);
+}

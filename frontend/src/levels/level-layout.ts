@@ -1,0 +1,137 @@
+/** Where everything stands in a graph that is drawn inside of an action, and how large that makes it. Pure. */
+import { type Bundle, bundlesOf, pillSizeOf } from "../canvas/arrows/bundles";
+import { routed } from "../canvas/arrows/routes";
+import { gridOffset, type Scene, type SceneCard } from "../canvas/arrows/scene";
+import { type LineMap, type RoutedLine, simpleLines } from "../canvas/arrows/simple-lines";
+import { estimatedSizes, type Positions, positionsOf, type Size } from "../canvas/geometry/arrange";
+import { type Action, type Direction, ENTRY, EXIT, type Graph, type Key } from "../graph/model";
+import type { LevelGraph } from "./level-graph";
+import { placesIn, roomFor } from "./room";
+
+interface LevelCard extends Size {
+  readonly action: Action;
+  readonly x: number;
+  readonly y: number;
+}
+
+interface LevelLine {
+  readonly bundle: Bundle;
+  readonly line: RoutedLine;
+}
+
+export interface LevelLayout {
+  readonly size: Size;
+  readonly direction: Direction;
+  readonly cards: readonly LevelCard[];
+  readonly lines: readonly LevelLine[];
+}
+
+/** Of `level-frame.module.css`, px: its head, and what is kept free round the cards. */
+const HEAD = 38;
+const AIR = { along: 56, across: 26 } as const;
+/** Where an arrow from outside goes on inside, and the other way round: no larger than a dot. */
+const DOT = 8;
+/** Of a graph that is not here, or has nothing in it. */
+const EMPTY: Size = { width: 260, height: HEAD + 84 };
+const LEAST_WIDTH = 260;
+/** More are not led round cards: that takes as long as it takes, and the page waits for it. */
+const MOST_ROUTED = 200;
+
+const known = new WeakMap<LevelGraph, LevelLayout>();
+
+/** The same for the same: of many levels few change at once. */
+export function layoutOf(level: LevelGraph): LevelLayout {
+  const before = known.get(level);
+  if (before) return before;
+  const { graph } = level;
+  const isThere = graph !== null && typeof graph !== "string" && graph.actions.length > 0;
+  const layout = isThere ? laidOut(graph, level) : NOTHING;
+  known.set(level, layout);
+  return layout;
+}
+
+const NOTHING: LevelLayout = { size: EMPTY, direction: "right", cards: [], lines: [] };
+
+/** Where the actions are drawn, and how large they are there. */
+function cardsOf(given: Graph, { levels }: LevelGraph) {
+  const closed = estimatedSizes(given);
+  const rest = positionsOf(given, closed);
+  const sizes = new Map<Key, Size>([...levels].map(([key, each]) => [key, layoutOf(each).size]));
+  const roomy = roomFor(given, rest, sizes);
+  const graph = roomy?.graph ?? given;
+  const places: Positions = roomy ? placesIn(roomy, rest) : rest;
+  const cards = graph.actions.map((action): LevelCard => {
+    const [x, y] = places.get(action.key) ?? [0, 0];
+    const size = sizes.get(action.key) ?? closed.get(action.key) ?? EMPTY;
+    return { action, x, y, ...size };
+  });
+  return { graph, cards };
+}
+
+function boundsOf(cards: readonly LevelCard[]) {
+  const [left, top] = [Math.min(...cards.map(({ x }) => x)), Math.min(...cards.map(({ y }) => y))];
+  const right = Math.max(...cards.map(({ x, width }) => x + width));
+  const bottom = Math.max(...cards.map(({ y, height }) => y + height));
+  return { left, top, width: right - left, height: bottom - top };
+}
+
+/** Entry and exit are where arrows from outside meet the frame. */
+function endsOf(direction: Direction, { width, height }: Size): SceneCard[] {
+  const dot = { width: DOT, height: DOT };
+  const [middle, half] = [Math.round((HEAD + height) / 2 - DOT / 2), Math.round((width - DOT) / 2)];
+  return direction === "right"
+    ? [
+        { key: ENTRY, x: -DOT, y: middle, ...dot },
+        { key: EXIT, x: width, y: middle, ...dot },
+      ]
+    : [
+        { key: ENTRY, x: half, y: HEAD - DOT, ...dot },
+        { key: EXIT, x: half, y: height, ...dot },
+      ];
+}
+
+function linesOf(
+  graph: Graph,
+  cards: readonly LevelCard[],
+  size: Size,
+  moved: readonly [number, number],
+) {
+  const { direction } = graph;
+  const standing = new Set<Key>([ENTRY, EXIT, ...cards.map(({ action }) => action.key)]);
+  const bundles = graph.relations
+    .filter(({ parent, child }) => standing.has(parent) && standing.has(child))
+    .flatMap(bundlesOf);
+  const boxes: SceneCard[] = [
+    ...endsOf(direction, size),
+    ...cards.map(({ action: { key }, x, y, width, height }) => ({ key, x, y, width, height })),
+  ];
+  const scene: Scene = {
+    direction,
+    offset: gridOffset(boxes, direction, null),
+    cards: boxes,
+    lines: bundles.map((bundle) => {
+      const { id, source, target, waypoints } = bundle;
+      const via = waypoints.map(([x, y]) => [x + moved[0], y + moved[1]] as const);
+      return { id, source, target, pill: pillSizeOf(bundle, false), via };
+    }),
+  };
+  const lines: LineMap = bundles.length > MOST_ROUTED ? simpleLines(scene) : routed(scene).lines;
+  return bundles.flatMap((bundle) => {
+    const line = lines.get(bundle.id);
+    return line ? [{ bundle, line }] : [];
+  });
+}
+
+function laidOut(given: Graph, level: LevelGraph): LevelLayout {
+  const { graph, cards } = cardsOf(given, level);
+  const { direction } = graph;
+  const bounds = boundsOf(cards);
+  const [across, down] = direction === "right" ? [AIR.along, AIR.across] : [AIR.across, AIR.along];
+  const size = {
+    width: Math.max(LEAST_WIDTH, bounds.width + 2 * across),
+    height: HEAD + bounds.height + 2 * down,
+  };
+  const [dx, dy] = [across - bounds.left, HEAD + down - bounds.top];
+  const placed = cards.map((card) => ({ ...card, x: card.x + dx, y: card.y + dy }));
+  return { size, direction, cards: placed, lines: linesOf(graph, placed, size, [dx, dy]) };
+}

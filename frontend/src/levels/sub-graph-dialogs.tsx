@@ -1,0 +1,370 @@
+/** Dialogs that make a sub-graph of selected actions, and that unpack a sub-graph in place of its action. */
+
+import { Button, Modal, Skeleton, TextInput } from "@mantine/core";
+import { notifications } from "@mantine/notifications";
+import { useQuery, useQueryClient } from "@tanstack/react-query";
+import { useEffect, useMemo, useRef, useState } from "react";
+import {
+  type ExtractionLook,
+  type FlatteningReason,
+  lookAtExtraction,
+  lookAtUnpacking,
+  makeSubGraph,
+  type UnpackingLook,
+} from "../api/documents/inside";
+import { useGraphsAsActions, useLibrary } from "../api/documents/library";
+import { refreshGraphs, refreshLibrary } from "../api/graphs";
+import { errorText } from "../api/http";
+import { unplaced } from "../canvas/geometry/arrange";
+import type { EditorContext } from "../edit-actions/editor-context";
+import { rootOf, splitKey } from "../graph/document-keys";
+import { asOneEdit, moveActions } from "../graph/edit";
+import {
+  applyActionChanges,
+  collisionsOfActions,
+  type DocumentChange,
+  places,
+} from "../graph/edit/key-changes";
+import { newAid } from "../graph/ids";
+import type { Key, Position } from "../graph/model";
+import { announcer } from "../ui/announcer";
+import { useStableCallback } from "../ui/hooks/use-stable-callback";
+import { isolated } from "../words/isolated";
+import style from "./levels.module.css";
+import { ReasonList } from "./reason-list";
+
+/** Keys of actions that come or go with these changes. */
+function actionsOf(changes: readonly DocumentChange[], fits: (change: DocumentChange) => boolean) {
+  const own = changes.filter(({ root, key }) => root === "actions" && splitKey(key).rest === "");
+  return own.filter(fits).map(({ key }) => key);
+}
+
+const within = (place: Position | undefined) => (place === undefined ? [] : [place]);
+
+function middleOf(places: readonly Position[]): Position | null {
+  if (places.length === 0) return null;
+  const [xs, ys] = [places.map(([x]) => x), places.map(([, y]) => y)];
+  const mean = (all: number[]) => Math.round((Math.min(...all) + Math.max(...all)) / 2);
+  return [mean(xs), mean(ys)];
+}
+
+/** Makes the changes, which one undo takes back, and shows what is new. Everything else stays where it is
+ * drawn. */
+function makeActionEdit(context: EditorContext, changes: readonly DocumentChange[]): void {
+  const { doc, graph } = context;
+  const places = context.positions();
+  const gone = new Set<Key>(actionsOf(changes, ({ after }) => after === undefined));
+  const fresh = actionsOf(changes, ({ before }) => before === undefined);
+  const middle = middleOf([...gone].flatMap((key) => within(places.get(key))));
+  asOneEdit(doc, () => {
+    moveActions(
+      doc,
+      unplaced(graph, places).filter(([key]) => !gone.has(key)),
+    );
+    applyActionChanges(doc, changes);
+    const positions = rootOf(doc, "positions");
+    for (const key of fresh) if (middle && !positions.has(key)) positions.set(key, [...middle]);
+  });
+  context.select(fresh);
+  requestAnimationFrame(() => context.view.show(fresh));
+}
+
+/** A name for a graph of these actions that is nobody's yet, and that a class could have. */
+function subGraphName(first: string, taken: ReadonlySet<string>): string {
+  const stem = `${first.replace(/\W/g, "").replace(/^\d+/, "") || "New"}Steps`;
+  for (let n = 1; ; n += 1) {
+    const name = n === 1 ? stem : `${stem}${n}`;
+    if (!taken.has(name)) return name;
+  }
+}
+
+interface ExtractProps {
+  context: EditorContext;
+  actions: readonly Key[];
+  onClose: () => void;
+}
+
+/** What is called something already: a graph, an action of the library or of any graph. */
+function useTakenNames({ graph }: EditorContext): ReadonlySet<string> {
+  const { data: known = [] } = useLibrary();
+  const { data: graphs = [] } = useGraphsAsActions();
+  return useMemo(() => {
+    const names = [...known, ...graphs, ...graph.actions].map(({ name }) => name);
+    return new Set([graph.name, ...names]);
+  }, [known, graphs, graph]);
+}
+
+/** Of the way to an action: the graph around all of it need not be told. */
+function ofGraph({ graph }: EditorContext) {
+  const there = new Set(graph.actions.map(({ key }) => key));
+  return (way: NonNullable<FlatteningReason["at"]>) =>
+    way.filter(({ key }) => there.has(key)).slice(-1);
+}
+
+function Sides({ look: { inputs = {}, outputs = {} } }: { look: ExtractionLook }) {
+  const sides = [
+    ["Takes", inputs],
+    ["Gives", outputs],
+  ] as const;
+  return (
+    <dl className={style.sides}>
+      {sides.map(([word, side]) => (
+        <div key={word}>
+          <dt>{word}</dt>
+          <dd>
+            {Object.keys(side).length === 0 && <span className={style.quiet}>nothing</span>}
+            {Object.entries(side).map(([name, type]) => (
+              <span key={name} className={style.side}>
+                <bdi>{name.replaceAll("::", ".")}</bdi> <bdi className={style.quiet}>{type}</bdi>
+              </span>
+            ))}
+          </dd>
+        </div>
+      ))}
+    </dl>
+  );
+}
+
+/** The new graph on the server, then one edit here, if what was looked at is still what there is. */
+function useMaking(context: EditorContext, look: ExtractionLook, again: () => Promise<unknown>) {
+  const client = useQueryClient();
+  const meanwhile = (changes: ExtractionLook["changes"]) =>
+    places(context.graph, collisionsOfActions(context.doc, changes ?? [])).join(", ");
+  return async (actions: readonly Key[], name: string): Promise<string | null> => {
+    const changed = meanwhile(look.changes);
+    if (changed !== "") {
+      await again();
+      return `Changed meanwhile: ${changed}. Look at it again.`;
+    }
+    const otherwise = (look.differences ?? []).length > 0;
+    const body = { actions: [...actions], name, seq: look.seq, otherwise };
+    const made = await makeSubGraph(context.id, body);
+    await Promise.all([refreshGraphs(client), refreshLibrary(client)]);
+    const late = meanwhile(made.changes);
+    if (late !== "")
+      return `The graph “${isolated(name)}” is made, but the actions stay here too: changed meanwhile: ${late}.`;
+    makeActionEdit(context, made.changes);
+    notifications.show({
+      title: `“${isolated(name)}” is a graph of its own now`,
+      message: "Undo brings the actions back here; that graph then stays in the list of graphs.",
+    });
+    return null;
+  };
+}
+
+function Form({ look, again, ...props }: ExtractProps & Looked) {
+  const { context, actions, onClose } = props;
+  const taken = useTakenNames(context);
+  const first = context.graph.actions.find(({ key }) => actions.includes(key))?.name ?? "";
+  const [typed, setTyped] = useState<string | null>(null);
+  const [wrong, setWrong] = useState("");
+  const [busy, setBusy] = useState(false);
+  const name = typed ?? subGraphName(first, taken);
+  const differences = look.differences ?? [];
+  const make = useMaking(context, look, again);
+  const field = useRef<HTMLInputElement>(null);
+  // It comes when the dialog has the keyboard already.
+  useEffect(() => field.current?.select(), []);
+  const submit = async () => {
+    setBusy(true);
+    try {
+      const failed = await make(actions, name.trim());
+      if (failed === null) return onClose();
+      setWrong(failed);
+    } catch (error) {
+      setWrong(errorText(error));
+    }
+    setBusy(false);
+  };
+  const isTaken = taken.has(name.trim());
+  return (
+    <form
+      onSubmit={(event) => {
+        event.preventDefault();
+        if (!isTaken) void submit();
+      }}
+    >
+      <TextInput
+        label="Name of the new graph"
+        description="The action that stands for it here is called the same."
+        maxLength={200}
+        required
+        ref={field}
+        value={name}
+        error={isTaken ? "A graph or an action is called that already." : wrong || undefined}
+        onChange={(event) => {
+          setTyped(event.currentTarget.value);
+          setWrong("");
+        }}
+      />
+      <Sides look={look} />
+      {differences.length === 0 ? (
+        <p className={style.quiet}>It does what these actions do now, for all of their results.</p>
+      ) : (
+        <div className={style.warned}>
+          <p>As a sub-graph they may do otherwise than in one graph, as now:</p>
+          <ReasonList
+            label="What may be otherwise"
+            reasons={differences}
+            told={ofGraph(context)}
+            {...{ context, onClose }}
+          />
+        </div>
+      )}
+      <p className={style.quiet}>
+        A robot runs it only with the new graph in its index, and cannot be paused meanwhile.
+      </p>
+      <div className={style.answers}>
+        <Button onClick={onClose}>Cancel</Button>
+        <Button type="submit" variant="filled" loading={busy} disabled={isTaken}>
+          {differences.length === 0 ? "Make it" : "Make it all the same"}
+        </Button>
+      </div>
+    </form>
+  );
+}
+
+interface Looked {
+  look: ExtractionLook;
+  again: () => Promise<unknown>;
+}
+
+function Refused({ look, context, onClose }: ExtractProps & { look: ExtractionLook }) {
+  return (
+    <>
+      <p>No graph can be made of exactly these actions:</p>
+      <ReasonList
+        label="Why none is made"
+        reasons={look.reasons ?? []}
+        told={ofGraph(context)}
+        {...{ context, onClose }}
+      />
+      <div className={style.answers}>
+        <Button onClick={onClose}>Close</Button>
+      </div>
+    </>
+  );
+}
+
+export function ExtractDialog(props: ExtractProps) {
+  const { context, actions, onClose } = props;
+  // A name that nobody has, so that the look is about the actions alone.
+  const [passing] = useState(newAid);
+  const { data, error, isPending, refetch } = useQuery({
+    queryKey: ["graphs", context.id, "extraction", actions],
+    queryFn: () => lookAtExtraction(context.id, { actions: [...actions], name: `G${passing}` }),
+    staleTime: Number.POSITIVE_INFINITY,
+    gcTime: 0,
+  });
+  const count = actions.length === 1 ? "1 action" : `${actions.length} actions`;
+  return (
+    <Modal opened onClose={onClose} title={`A sub-graph of ${count}`} size="32rem">
+      {isPending && <Skeleton height={180} />}
+      {error !== null && <p role="alert">{errorText(error)}</p>}
+      {data?.umrf === null && <Refused look={data} {...props} />}
+      {data?.umrf && <Form look={data} again={refetch} {...props} />}
+    </Modal>
+  );
+}
+
+interface UnpackProps {
+  context: EditorContext;
+  action: Key;
+  onClose: () => void;
+}
+
+function failed(message: string): void {
+  notifications.show({ color: "red", title: "Not unpacked", message, autoClose: 12_000 });
+}
+
+/** Makes the edit, unless others have changed something of the action meanwhile. */
+function unpack(context: EditorContext, look: UnpackingLook): void {
+  const changes = look.changes ?? [];
+  const changed = places(context.graph, collisionsOfActions(context.doc, changes));
+  if (changed.length > 0) {
+    failed(`Changed meanwhile: ${changed.join(", ")}.`);
+    return;
+  }
+  makeActionEdit(context, changes);
+  const count = (look.actions ?? []).length;
+  announcer.say(count === 1 ? "Unpacked into 1 action" : `Unpacked into ${count} actions`);
+}
+
+function Asked({ look, context, onClose, name }: Asking) {
+  const { differences = [], reasons = [], left_out: left = [] } = look;
+  const refused = reasons.length > 0;
+  const told = refused ? reasons : differences;
+  return (
+    <>
+      {told.length > 0 && (
+        <p>
+          {refused
+            ? "No actions in its place would do the same, so it stays:"
+            : "In its place they may do otherwise than inside:"}
+        </p>
+      )}
+      <ReasonList label="What would be otherwise" reasons={told} {...{ context, onClose }} />
+      {left.length > 0 && (
+        <p className={style.quiet}>
+          No action has these any more: {left.map(isolated).join(", ")} of <bdi>{name}</bdi>.
+        </p>
+      )}
+      <div className={style.answers}>
+        <Button onClick={onClose}>{refused ? "Close" : "Cancel"}</Button>
+        {!refused && (
+          <Button
+            variant="filled"
+            onClick={() => {
+              onClose();
+              unpack(context, look);
+            }}
+          >
+            {told.length > 0 ? "Unpack it all the same" : "Unpack it"}
+          </Button>
+        )}
+      </div>
+    </>
+  );
+}
+
+interface Asking extends Omit<UnpackProps, "action"> {
+  look: UnpackingLook;
+  name: string;
+}
+
+export function UnpackDialog({ context, action, onClose }: UnpackProps) {
+  const [look, setLook] = useState<UnpackingLook | null>(null);
+  const name = context.graph.actions.find(({ key }) => key === action)?.name ?? "";
+  const looked = useStableCallback((found: UnpackingLook) => {
+    const { differences = [], reasons = [], left_out: left = [] } = found;
+    if (differences.length + reasons.length + left.length > 0) {
+      setLook(found);
+      return;
+    }
+    onClose();
+    unpack(context, found);
+  });
+  const stopped = useStableCallback((error: unknown) => {
+    onClose();
+    failed(errorText(error));
+  });
+  const placeOf = useStableCallback(() => context.positions().get(action));
+  useEffect(() => {
+    let isOpen = true;
+    const at = placeOf();
+    const body = { action, ...(at && { at: [...at] as [number, number] }) };
+    lookAtUnpacking(context.id, body).then(
+      (found) => isOpen && looked(found),
+      (error) => isOpen && stopped(error),
+    );
+    return () => {
+      isOpen = false;
+    };
+  }, [context.id, action, looked, stopped, placeOf]);
+  if (look === null) return null;
+  return (
+    <Modal opened onClose={onClose} title={`Unpack ${isolated(name)}`} size="32rem">
+      <Asked {...{ look, context, onClose, name }} />
+    </Modal>
+  );
+}

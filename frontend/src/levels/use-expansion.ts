@@ -1,0 +1,171 @@
+/** Keeps known what is expanded: to the canvas, which makes room, and to what draws it. */
+import { useEffect, useMemo, useRef, useState, useSyncExternalStore } from "react";
+import { spreading } from "../canvas/folding/spread";
+import { expandedGraphs, type PartOnCard } from "../canvas/graphs-inside";
+import { useEditorContext } from "../edit-actions/editor-context";
+import type { Graph, Key } from "../graph/model";
+import { runOnCanvas } from "../status/progress-inside";
+import { announcer } from "../ui/announcer";
+import { useKeptKeys } from "../ui/hooks/use-kept-keys";
+import { useStableCallback } from "../ui/hooks/use-stable-callback";
+import { ExpandedCard, progressOf, type StateSource } from "./level-frame";
+import {
+  expansion,
+  type KnownGraphs,
+  type LevelGraph,
+  levelsBelow,
+  pathsTo,
+  useLevelGraphs,
+} from "./level-graph";
+import { layoutOf } from "./level-layout";
+import { spreadOf } from "./room";
+
+/** A hierarchy in which each graph has ten of the next is soon more than anybody can look at. */
+const MOST = 400;
+const NO_LEVELS: ReadonlyMap<Key, LevelGraph> = new Map();
+const NO_IDS: readonly string[] = [];
+
+/** All graphs of all levels, each once. */
+function idsOf(levels: ReadonlyMap<Key, LevelGraph>, found = new Set<string>()): Set<string> {
+  for (const level of levels.values()) {
+    found.add(level.id);
+    idsOf(level.levels, found);
+  }
+  return found;
+}
+
+/** Whether the graph of a path is here. */
+function isDrawn(levels: ReadonlyMap<Key, LevelGraph>, path: string): boolean {
+  const [first = "", ...rest] = path.split("/");
+  const level = levels.get(first);
+  if (!level || rest.length === 0) return typeof level?.graph === "object" && level.graph !== null;
+  return isDrawn(level.levels, rest.join("/"));
+}
+
+/** Until then cards have been drawn in their new places. */
+const SETTLED_MS = 60;
+
+const depthOf = (path: string): number => path.split("/").length;
+
+interface ExpansionInput {
+  readonly id: string;
+  readonly graph: Graph;
+  readonly idOf: KnownGraphs["idOf"];
+  /** What is drawn cannot be expanded: it is not the graph as it is now. */
+  readonly off: boolean;
+  enter(path: string): void;
+}
+
+/** The tree of what is expanded. What it needs is known only when it is there, so it grows in steps. */
+function useLevels({ id, graph, idOf, off }: ExpansionInput, expanded: ReadonlySet<string>) {
+  const [ids, setIds] = useState(NO_IDS);
+  const graphs = useLevelGraphs(ids);
+  const last = useRef(NO_LEVELS);
+  const known = useMemo<KnownGraphs>(
+    () => ({ idOf, graphOf: (inner) => graphs.get(inner) ?? null }),
+    [idOf, graphs],
+  );
+  const levels = useMemo(
+    () =>
+      off || expanded.size === 0
+        ? NO_LEVELS
+        : levelsBelow(graph, expanded, known, last.current, { path: "", names: [], above: [id] }),
+    [off, graph, expanded, known, id],
+  );
+  useEffect(() => {
+    last.current = levels;
+    const wanted = [...idsOf(levels)].sort();
+    setIds((before) => (before.join() === wanted.join() ? before : wanted));
+  }, [levels]);
+  return { levels, known };
+}
+
+/** The actions of a level and of all below it, by where they are drawn on the card of the outermost one. */
+function partsOf(level: LevelGraph | undefined, source: StateSource): PartOnCard[] {
+  if (level === undefined) return [];
+  const progress = progressOf(level, source);
+  return layoutOf(level).cards.flatMap(({ action, x, y, width, height }) => {
+    const { key } = action;
+    const inner = level.levels.get(key);
+    const states = { progress: progress.get(key) ?? null, expanded: inner !== undefined };
+    const own = { path: `${level.path}/${key}`, x, y, width, height, action, ...states };
+    const below = partsOf(inner, source);
+    return [own, ...below.map((part) => ({ ...part, x: x + part.x, y: y + part.y }))];
+  });
+}
+
+/** From where states are known now: for those who ask once in a while. */
+function useStateSource() {
+  const { dryRun, graph } = useEditorContext();
+  const run = useSyncExternalStore(runOnCanvas.subscribe, runOnCanvas.now);
+  const source = useRef<StateSource>({ dryRun, run, outermost: graph.name });
+  source.current = { dryRun, run, outermost: graph.name };
+  return source;
+}
+
+/** The graph on the canvas with graphs inside of its actions; what they say is done with it. */
+export function useExpansion(given: ExpansionInput) {
+  const { id, graph, enter } = given;
+  const { view } = useEditorContext();
+  const { keys: expanded, put } = useKeptKeys("aa.expanded", id);
+  const { levels, known } = useLevels(given, expanded);
+  const [goal, setGoal] = useState(0);
+  const shown = useRef<string | null>(null);
+  const toggle = useStableCallback((path: string) => {
+    setGoal(0);
+    const isOpen = expanded.has(path);
+    const below = [...expanded].filter((each) => each === path || each.startsWith(`${path}/`));
+    if (isOpen) put(below, false);
+    else put([path], true);
+    shown.current = isOpen ? null : path;
+    announcer.say(isOpen ? "Collapsed" : "Expanded");
+  });
+  const source = useStateSource();
+  useEffect(() => {
+    const sizes = new Map([...levels].map(([key, level]) => [key, layoutOf(level).size]));
+    expansion.set({ levels, toggle, enter });
+    const known = (key: Key) => partsOf(levels.get(key), source.current);
+    const none = sizes.size === 0;
+    expandedGraphs.set(none ? null : { sizes, Frame: ExpandedCard, partsOf: known });
+    spreading.set(none ? null : (standing) => spreadOf(standing, sizes));
+  }, [levels, toggle, enter, source]);
+  // Once it is there and has its room, what was expanded is brought into view.
+  useEffect(() => {
+    const [first = ""] = shown.current?.split("/") ?? [];
+    if (!levels.has(first) || !isDrawn(levels, shown.current ?? "")) return;
+    const timer = setTimeout(() => {
+      shown.current = null;
+      view.show([first]);
+    }, SETTLED_MS);
+    return () => clearTimeout(timer);
+  }, [levels, view]);
+  useEffect(
+    () => () => {
+      expandedGraphs.set(null);
+      spreading.set(null);
+    },
+    [],
+  );
+  // Graphs further down become known one level after the other.
+  useEffect(() => {
+    if (goal === 0) return;
+    const all = pathsTo(graph, goal, known, { path: "", above: [id] });
+    const missing = all.filter((path) => !expanded.has(path));
+    if (missing.length > 0 && expanded.size < MOST)
+      put(missing.slice(0, MOST - expanded.size), true);
+  }, [goal, graph, known, expanded, put, id]);
+  const depth = Math.max(0, ...[...expanded].map(depthOf));
+  const expandMore = useStableCallback(() => {
+    setGoal(Math.max(goal, depth) + 1);
+    announcer.say("Expanded one level more");
+  });
+  const collapseAll = useStableCallback(() => {
+    setGoal(0);
+    put([...expanded], false);
+    announcer.say("Collapsed");
+  });
+  return useMemo(
+    () => ({ toggle, expandMore, collapseAll, isAnyExpanded: () => expanded.size > 0 }),
+    [toggle, expandMore, collapseAll, expanded],
+  );
+}
