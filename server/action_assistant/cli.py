@@ -152,7 +152,7 @@ class _CommandParser(argparse.ArgumentParser):
     complete: Callable[[], None] | None = None
 
     def parse_known_args(self, *args: Any, **more: Any) -> Any:
-        """As the parser above asks, for the command that was given."""
+        """Parse the arguments of a command, after its options were added to the parser."""
         if self.complete is not None:
             self.complete()
             self.complete = None

@@ -1,6 +1,6 @@
-"""Every refusal of this program, as one tree of exceptions.
+"""Define every refusal of this program, as one tree of exceptions.
 
-    Refused                         400  something was asked that cannot be done
+    Refused                         400  the request cannot be served
     ├── BadInput                    400  the bytes or values sent are not what the route takes
     │   └── NotUmrf                 422  readable, but not a UMRF graph
     ├── Unauthenticated             401  no valid credentials
@@ -12,13 +12,13 @@
     ├── Conflict                    409  the thing is not in a state that allows it
     ├── TooLarge                    413  over a stated limit
     ├── TooMany                     429  too often
-    ├── Misrouted                   502  a proxy leads here what is the other process's
-    └── Unavailable                 503  something this process needs does not answer
+    ├── Misrouted                   502  a proxy sends requests of the other process here
+    └── Unavailable                 503  a part that this process needs does not answer
     CannotStart                          the process cannot begin its work; one sentence, exit 2
     ├── AnothersDatabase                 a database that another program made
     └── NewerSchema                      one that a newer version of this program made
 
-The class docstring is the title on the wire, the instance's message the detail.
+On the wire, `title` stands for the class and `detail` for one instance.
 """
 
 from typing import ClassVar
@@ -27,8 +27,9 @@ from action_assistant.safe_text import sentence
 
 
 class Refused(Exception):
-    """Request refused"""
+    """A request that the server refuses. `where` names the place of the fault in the input, if it is known."""
 
+    title: ClassVar[str] = "Request refused"
     status: ClassVar[int] = 400
 
     def __init__(self, detail: str, *, where: dict[str, object] | None = None) -> None:
@@ -39,89 +40,102 @@ class Refused(Exception):
 
     @property
     def type(self) -> str:
-        """A stable name for programs, e.g. `not-found`."""
+        """Return a stable name for programs, for example `not-found`."""
         name = type(self).__name__
         return "".join(f"-{c.lower()}" if c.isupper() else c for c in name).lstrip("-")
 
-    @property
-    def title(self) -> str:
-        """One line that fits every instance of the class."""
-        return (type(self).__doc__ or "Refused").strip().splitlines()[0].rstrip(".")
-
 
 class BadInput(Refused):
-    """What was sent cannot be read"""
+    """The bytes or values that were sent are not those that the route takes."""
+
+    title = "What was sent cannot be read"
 
 
 class NotUmrf(BadInput):
-    """Not a UMRF graph"""
+    """The input can be read, but is no UMRF graph."""
 
+    title = "Not a UMRF graph"
     status = 422
 
 
 class Unauthenticated(Refused):
-    """Sign in first"""
+    """The request has no valid credentials."""
 
+    title = "Sign in first"
     status = 401
 
 
 class Withdrawn(Unauthenticated):
-    """Your invitation was revoked"""
+    """The credentials were valid until somebody revoked them."""
+
+    title = "Your invitation was revoked"
 
 
 class Forbidden(Refused):
-    """Not allowed"""
+    """The credentials are valid, but do not allow this request."""
 
+    title = "Not allowed"
     status = 403
 
 
 class WrongHost(Forbidden):
-    """Unknown host name"""
+    """The Host header names a host that this server does not have."""
+
+    title = "Unknown host name"
 
 
 class WrongOrigin(Forbidden):
-    """Unknown origin"""
+    """The page that sent the request is of another origin."""
+
+    title = "Unknown origin"
 
 
 class NotFound(Refused):
-    """No such thing"""
+    """The address names nothing that exists."""
 
+    title = "No such thing"
     status = 404
 
 
 class Conflict(Refused):
-    """Not possible in this state"""
+    """The object exists, but its state does not allow the request."""
 
+    title = "Not possible in this state"
     status = 409
 
 
 class TooLarge(Refused):
-    """Too large"""
+    """The input is over a stated limit of size."""
 
+    title = "Too large"
     status = 413
 
 
 class TooMany(Refused):
-    """Too many requests"""
+    """The client sends more requests than its limit allows."""
 
+    title = "Too many requests"
     status = 429
 
 
 class Misrouted(Refused):
-    """A proxy leads to the wrong place"""
+    """A proxy sends requests here that belong to the other process."""
 
+    title = "A proxy leads to the wrong place"
     status = 502
 
 
 class Unavailable(Refused):
-    """Not available now"""
+    """A part that this process needs does not answer."""
 
+    title = "Not available now"
     status = 503
 
 
 class OutcomeUnknown(Refused):
-    """Nobody knows whether it was done"""
+    """The request may have taken effect or not: its answer was lost."""
 
+    title = "Nobody knows whether it was done"
     status = 504
 
 

@@ -66,8 +66,10 @@ def for_runner(environ: Mapping[str, str] = os.environ) -> Interpreter:
 
 
 def rclpy_fits(environ: Mapping[str, str] = os.environ) -> bool:
-    """Whether this interpreter finds an rclpy that was built for it, its own or that of the workspace
-    which is sourced, without importing it."""
+    """Return whether this interpreter finds an rclpy that was built for it.
+
+    The rclpy may be its own or that of the sourced workspace. Nothing is imported.
+    """
     own = importlib.util.find_spec("rclpy")
     if own is not None and ros_workspace.rclpy_fits(own):
         return True
@@ -75,8 +77,10 @@ def rclpy_fits(environ: Mapping[str, str] = os.environ) -> bool:
 
 
 def is_current(wheels: Path) -> bool:
-    """Whether an environment of `make ros` has what this checkout asks for; a stale one may lack a
-    package and would not even start."""
+    """Return whether the environment of `make ros` has the packages that this checkout asks for.
+
+    An outdated environment may lack a package and would not even start.
+    """
     try:
         made_for = (wheels / ".done").read_text().strip()
         asked = (wheels.parent / "requirements" / "ros.txt").read_bytes()

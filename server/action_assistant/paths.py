@@ -13,7 +13,7 @@ def _carried(name: str, in_checkout: Path) -> Path:
 
 
 def migrations() -> Path:
-    """The Alembic scripts."""
+    """Return the folder of the Alembic scripts."""
     return _carried("migrations", _CHECKOUT / "migrations")
 
 
@@ -23,7 +23,7 @@ def page() -> Path:
 
 
 def page_sources() -> Path | None:
-    """What the page is built of, in a checkout; None outside of one."""
+    """Return the folder of the page's sources in a checkout; None outside of one."""
     return _CHECKOUT / "frontend" / "src" if checkout() is not None else None
 
 
@@ -48,8 +48,8 @@ def examples() -> Path:
 
 
 def data() -> Path:
-    """Where journals and the token are kept when no option says otherwise: where the environment does,
-    else among the user's data (XDG base directories)."""
+    """Return the default data folder: ACTION_ASSISTANT_DATA, else a folder in the user's XDG data
+    directory."""
     named = os.environ.get("ACTION_ASSISTANT_DATA")
     if named:
         return Path(named)

@@ -31,7 +31,7 @@ def make_folder(path: Path) -> None:
 
 
 def sync(path: Path) -> None:
-    """What was written or renamed has to be found after a power cut, too."""
+    """Flush a file or folder to disk, so that its content or a rename survives a power cut."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
@@ -61,8 +61,11 @@ def prove_writable(data: Path) -> None:
 
 
 def open_to_others(data: Path) -> list[Path]:
-    """What other users of this computer may read or enter: the folder first, then what is ours in it.
-    Not told on Windows."""
+    """Return the paths that other users of this computer may read or enter: the folder first, then
+    our files in it.
+
+    The list is empty on Windows, where modes say nothing about rights.
+    """
     if not hasattr(os, "geteuid"):
         return []  # Windows keeps rights in lists of its own, of which modes tell nothing
     return [path for path in (data, *_ours_in(data)) if _is_open(path)]
@@ -100,7 +103,7 @@ def _close(path: Path) -> None:
 
 
 def of_others(data: Path) -> list[Path]:
-    """What is ours in it, yet belongs to another user than the folder does."""
+    """Return our files in a data folder that belong to another user than the folder does."""
     owner = data.stat().st_uid
     found: list[Path] = []
     for path in _ours_in(data):

@@ -39,7 +39,8 @@ LOOPBACK_PROXIES: Final[tuple[Network, ...]] = (
 
 
 class PublicUrl(msgspec.Struct, frozen=True):
-    """Where the page is for whoever comes through the proxy. `path` is "" or as "/temoto"."""
+    """The address of the page for people who come through the proxy. `path` is "" or, for example,
+    "/temoto"."""
 
     scheme: str
     host: str
@@ -48,32 +49,32 @@ class PublicUrl(msgspec.Struct, frozen=True):
 
     @property
     def authority(self) -> str:
-        """Name and port as an address bar shows them."""
+        """Return host and port as an address bar shows them: without the default port."""
         shown = f"[{self.host}]" if ":" in self.host else self.host
         return shown if self.port == _PORTS[self.scheme] else f"{shown}:{self.port}"
 
     @property
     def origin(self) -> str:
-        """As browsers send it."""
+        """Return the origin as browsers send it."""
         return f"{self.scheme}://{self.authority}"
 
     @property
     def page(self) -> str:
-        """Of the page and its API, without a slash at its end."""
+        """Return the URL of the page and its API, without a final slash."""
         return self.origin + self.path
 
     @property
     def runner(self) -> str:
-        """Of the runner, without a slash at its end."""
+        """Return the URL of the runner, without a final slash."""
         return self.page + RUNNER
 
     @property
     def is_secure(self) -> bool:
-        """Whether it is encrypted on its way to the proxy."""
+        """Return whether the way to the proxy is encrypted."""
         return self.scheme == "https"
 
     def is_named(self, name: str, port: int | None) -> bool:
-        """Whether a Host header means this address. Proxies leave out the port, or pass it on."""
+        """Return whether a Host header names this address. Proxies may leave the port out."""
         return name == self.host and port in {None, self.port}
 
 

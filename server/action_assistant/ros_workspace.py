@@ -72,8 +72,11 @@ class Workspace:
         environ: Mapping[str, str],
         system: tuple[Path, ...] = (Path("/usr"), Path(sys.base_prefix)),
     ) -> "Workspace":
-        """What this environment names. `system` is where numpy may be: the distribution's first, since
-        messages were compiled for its generation."""
+        """Return the workspace that an environment names.
+
+        `system` lists the folders where numpy may be. The distribution's folder comes first, since
+        the messages were compiled against its version.
+        """
         named = environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
         prefixes = tuple(each for each in map(Path, named) if each.is_absolute())
         return cls(prefixes, system)
@@ -87,7 +90,10 @@ class Workspace:
     def find_spec(
         self, fullname: str, path: Sequence[str] | None = None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """As importlib asks, after nobody else had it. Parts of a package are found by the package."""
+        """Return the spec of a module in the workspace, as the protocol of import finders asks.
+
+        Names with a dot are left to the finder of their package.
+        """
         if "." in fullname or not self.prefixes:
             return None
         prefixes = [each for each in self.prefixes if (each / _INDEX / fullname).exists()]
@@ -105,7 +111,10 @@ class Workspace:
         return found if found is not None and rclpy_fits(found) else None
 
     def other_python(self) -> str:
-        """Why its rclpy is of no use here, in a sentence; empty where it is, or there is none."""
+        """Return a sentence that says why the workspace's rclpy does not fit this Python.
+
+        The sentence is empty where rclpy fits, or where there is none.
+        """
         if self.rclpy() is not None:
             return ""
         for prefix in self.prefixes:
@@ -119,7 +128,7 @@ class Workspace:
 
 
 def rclpy_fits(rclpy: ModuleSpec) -> bool:
-    """Whether an rclpy that was found was built for this Python."""
+    """Return whether a found rclpy was built for this Python."""
     return any(
         Path(folder, f"{_EXTENSION}{suffix}").exists()
         for folder in rclpy.submodule_search_locations or ()
@@ -136,8 +145,11 @@ def prefix_of(file: str) -> str:
 
 
 def source_of(build: Path) -> Path | None:
-    """Where the source of a package lies that colcon has built in this folder, as CMake keeps it; None
-    where that is not known."""
+    """Return the source folder of the package that colcon built in this folder, from the cache of
+    CMake.
+
+    Return None where the cache does not name it.
+    """
     try:
         with (build / "CMakeCache.txt").open("rb") as file:
             cache = file.read(_CACHE).decode(errors="replace")
@@ -156,7 +168,7 @@ def _for_another(prefix: Path, version: str) -> str:
 
 
 def _fits(found: ModuleSpec) -> bool:
-    """Whether a package beside ROS was built for this Python, as far as it was built."""
+    """Return whether the compiled parts of a package beside ROS, if it has any, fit this Python."""
     built = _BESIDE.get(found.name, ())
     return not built or any(
         Path(folder, f"{name}{suffix}").exists()

@@ -123,14 +123,14 @@ def make_streams_printable() -> None:
 
 
 class PrintableLog(logging.Formatter):
-    """One line for each record; what belongs to it is indented. `secrets` are never shown."""
+    """Writes each record as one line, and what belongs to it indented. `secrets` are never written."""
 
     def __init__(self, *secrets: str) -> None:
         super().__init__("%(asctime)s %(levelname)s %(name)s: %(message)s")
         self._secrets = secrets
 
     def format(self, record: logging.LogRecord) -> str:
-        """As `logging` asks."""
+        """Format a record, with the secrets replaced."""
         return redacted(super().format(record), self._secrets)
 
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 - as `logging` asks

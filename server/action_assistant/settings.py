@@ -69,15 +69,18 @@ LOOPBACK: Final = frozenset({"127.0.0.1", "::1", "localhost"})
 
 
 class Reachability(msgspec.Struct, frozen=True):
-    """How others come to us: by a public address that a proxy shows, if there is one. `proxies` are
-    believed about the address of whoever asks."""
+    """The way by which others reach this server.
+
+    `public` is the address that a proxy shows, if there is one. The server believes `proxies` about
+    the address of a client.
+    """
 
     public: PublicUrl | None = None
     proxies: tuple[Network, ...] = ()
 
 
 class EditorSettings(msgspec.Struct, frozen=True, kw_only=True):
-    """How the editor runs. `database` is a URL such as `sqlite:////data/editor.db`."""
+    """The settings of the editor process. `database` is a URL such as `sqlite:////data/editor.db`."""
 
     data: Path
     database: str
@@ -103,9 +106,12 @@ class Keep(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class RunnerSettings(msgspec.Struct, frozen=True, kw_only=True):
-    """How the runner runs. `page_port` is the port of the page that may talk to it, `behaviours` the
-    folder of Python files that simulated actions may be run with, `index_folders` those that robots
-    index, by their names."""
+    """The settings of the runner process.
+
+    `page_port` is the port of the page that may talk to the runner. `behaviours` is the folder of
+    Python files with which simulated actions may run. `index_folders` holds the folder that each
+    robot indexes, by the robot's name.
+    """
 
     data: Path
     host: str = "127.0.0.1"
@@ -163,8 +169,8 @@ def port(environ: Mapping[str, str] = os.environ) -> int:
 
 
 def share(environ: Mapping[str, str] = os.environ) -> str:
-    """How others on the network are let in, when the command line says nothing: "", "http" or "tls".
-    Raises CannotStart."""
+    """Return how the environment lets others on the network in: "", "http" or "tls". Raise
+    CannotStart for other values."""
     text = environ.get("ACTION_ASSISTANT_SHARE", "").strip().lower()
     if text not in {"", "http", "tls"}:
         raise CannotStart(f"ACTION_ASSISTANT_SHARE is `http` or `tls`, not {text!r}.")
@@ -193,8 +199,11 @@ def hide_password() -> None:
 
 
 def hide_target_password() -> None:
-    """The same for what `move --to` and `runs copy --to` say: the driver finds the password in the
-    environment."""
+    """Restart the program so that the URL of `--to` holds no password.
+
+    The options `move --to` and `runs copy --to` may carry one, and everybody may read a command
+    line. The database driver takes the password from the environment instead.
+    """
     for at, word in enumerate(sys.orig_argv):
         name, sign, url = word.partition("=")
         if not sign:
@@ -223,7 +232,8 @@ def _has_password(url: str) -> bool:
 
 
 def metrics_token(environ: Mapping[str, str] = os.environ) -> str | None:
-    """What opens /metrics and nothing else, if there is such a token. Raises CannotStart."""
+    """Return the token that opens /metrics and nothing else, or None. Raise CannotStart for a short
+    one."""
     name = "ACTION_ASSISTANT_METRICS_TOKEN"
     token = environ.get(name, "").strip()
     if token and len(token) < _MIN_TOKEN:
@@ -234,17 +244,18 @@ def metrics_token(environ: Mapping[str, str] = os.environ) -> str | None:
 
 
 def backup_rule(name: str, environ: Mapping[str, str] = os.environ) -> str | None:
-    """What the environment says of backups: TO, EVERY, KEEP or AFTER."""
+    """Return one setting of regular backups from the environment: TO, EVERY, KEEP or AFTER."""
     return environ.get(f"ACTION_ASSISTANT_BACKUP_{name}", "").strip() or None
 
 
 def limits(environ: Mapping[str, str] = os.environ) -> bool:
-    """Whether rate and socket limits hold."""
+    """Return whether the limits for rates and sockets are on."""
     return environ.get("ACTION_ASSISTANT_LIMITS", "").lower() != "off"
 
 
 def direct_sockets(environ: Mapping[str, str] = os.environ) -> bool:
-    """Whether rooms take their sockets over from the server below. Raises CannotStart."""
+    """Return whether rooms take their sockets over from the server below. Raise CannotStart for an
+    unknown value."""
     way = environ.get("ACTION_ASSISTANT_SOCKETS", "").strip().lower()
     if way not in {"", "direct", "asgi"}:
         raise CannotStart(f"ACTION_ASSISTANT_SOCKETS is direct or asgi, not {way!r}.")
@@ -252,7 +263,8 @@ def direct_sockets(environ: Mapping[str, str] = os.environ) -> bool:
 
 
 def keep(data: Path, environ: Mapping[str, str] = os.environ) -> Keep:
-    """What is kept here, and for how long. Raises CannotStart."""
+    """Return how long runs and raw messages are kept, and the folder of archives. Raise
+    CannotStart."""
     return Keep(
         folder=Path(environ.get("ACTION_ASSISTANT_ARCHIVE") or data / ARCHIVE).resolve(),
         runs=_days("ACTION_ASSISTANT_KEEP_RUNS", environ),
@@ -291,7 +303,7 @@ def index_folders(
 
 
 def as_index_folders(folders: Mapping[str, Path]) -> str:
-    """The same as the environment has it."""
+    """Return the folders in the form of the environment variable ACTION_ASSISTANT_INDEX_FOLDERS."""
     return os.pathsep.join(f"{robot}={folder}" for robot, folder in folders.items())
 
 
@@ -304,8 +316,12 @@ def more_hosts(environ: Mapping[str, str] = os.environ) -> tuple[str, ...]:
 def reached(
     url: str | None, trusted: str | None, environ: Mapping[str, str] = os.environ
 ) -> Reachability:
-    """What the command line says, else the environment. Behind a public address the proxies of this
-    computer are believed unless others are named. Raises CannotStart."""
+    """Return the public address and the trusted proxies, from the command line or else from the
+    environment.
+
+    Behind a public address, the proxies of this computer are trusted unless others are named. Raise
+    CannotStart.
+    """
     written = url if url is not None else environ.get("ACTION_ASSISTANT_PUBLIC_URL", "")
     public = public_url(written) if written.strip() else None
     named = trusted if trusted is not None else environ.get("ACTION_ASSISTANT_TRUSTED_PROXIES", "")

@@ -29,7 +29,7 @@ class ShareLink(msgspec.Struct, frozen=True):
 
 
 class Links(msgspec.Struct, frozen=True):
-    """What the editor knows about sharing."""
+    """The origins and invitations that the editor reports."""
 
     origins: list[str]
     invitations: list[ShareLink]
@@ -70,7 +70,7 @@ def invitations_as_text(
 
 
 def is_ours(base: str, keys: Keys, trust: ssl.SSLContext | None = None) -> bool:
-    """Whether what answers there knows the token, and is to be told it."""
+    """Return whether the server at an address knows our token, so that it may be sent there."""
     challenge = secrets.token_urlsafe(32)
     url = f"{base}/api/server?challenge={challenge}"
     try:
@@ -106,7 +106,7 @@ def _text(origins: list[str], link: ShareLink) -> str:
 
 
 def may_of(role: str) -> str:
-    """What a role may do, in words."""
+    """Return in words what a role may do."""
     match role:
         case "viewer" | "editor" | "operator" | "owner":
             return may(role)

@@ -46,7 +46,7 @@ class BackupPlan(msgspec.Struct, frozen=True):
 
 
 class ServePlan(msgspec.Struct, frozen=True, kw_only=True):
-    """What to serve, and where. The runner listens on the port after the editor's."""
+    """The settings of `serve`. The runner listens on the port after the editor's."""
 
     data: Path
     database: str | None
@@ -63,11 +63,11 @@ class ServePlan(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class EndSignal:
-    """Whether one of these signals has come.
+    """Remembers whether one of some signals was received.
 
-    A handler runs in the main thread wherever that is just then, also while it holds a lock, as it
-    does in parts of `threading.Event.wait`. A handler that took the same lock would wait for itself,
-    for ever. This one takes none.
+    Python runs a handler in the main thread at any moment, also while that thread holds a lock, for
+    example inside `threading.Event.wait`. A handler that took the same lock would deadlock. This
+    handler takes no lock.
     """
 
     def __init__(self, *signals: signal.Signals) -> None:
@@ -79,14 +79,14 @@ class EndSignal:
         self._came = True
 
     def within(self, seconds: float) -> bool:
-        """Whether one has come, at the latest after so many seconds."""
+        """Wait up to this many seconds, and return whether a signal was received."""
         if not self._came:
             time.sleep(seconds)
         return self._came
 
 
 class Child:
-    """One of the processes, as often as it takes."""
+    """Runs one of the processes, and starts it again when it dies."""
 
     def __init__(
         self,
@@ -121,7 +121,8 @@ class Child:
         )
 
     def tend(self, parent: int) -> int | None:
-        """Notice a death and start again after a while; the exit code if starting is hopeless."""
+        """Start the process again some time after its death. Return its exit code if a new start is
+        hopeless."""
         now = time.monotonic()
         if self._process is None:
             if now >= self._again:
@@ -221,7 +222,8 @@ def _children(plan: ServePlan) -> list[Child]:
 
 
 def _keeper(plan: ServePlan) -> Child | None:
-    """Who makes backups: a process of its own, of low priority, for which nobody waits."""
+    """Return the process that makes backups, with a low priority; None where no backups are
+    planned."""
     if plan.backups is None:
         return None
     keeps = plan.backups

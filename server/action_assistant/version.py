@@ -43,7 +43,10 @@ def described() -> str:
 
 
 def _checked_out() -> str | None:
-    """What git says of the checkout that this is. A copy that lies in another repository is none."""
+    """Return the commit of the checkout that this code runs from, or None.
+
+    Return None for a copy that lies inside another repository.
+    """
     folder = paths.checkout()
     if folder is None or not (folder / ".git").exists():
         return None

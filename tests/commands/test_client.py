@@ -10,7 +10,7 @@ from typing import Any
 import httpx
 import pytest
 
-from action_assistant.commands.client import AfterProof
+from action_assistant.commands.token_proof import AfterProof
 from action_assistant.errors import CannotStart
 from action_assistant.web.auth.keys import Keys
 from support.product import TOKEN, Product

@@ -46,8 +46,8 @@ class BuildError(msgspec.Struct, frozen=True):
 
 
 class PackageBuild(msgspec.Struct, frozen=True):
-    """How the last build of a package ended. `source`: the folder of its source, None if it is not
-    known any more."""
+    """The result of the last build of one package. `source` is the folder of its source; None if it
+    is not known any more."""
 
     package: str
     ended_well: bool
@@ -131,7 +131,7 @@ COMMANDS: Final = {"builds": _add_builds}
 
 
 class ActionBuild(msgspec.Struct, frozen=True):
-    """How the last build went for one action."""
+    """The result of the last build for one action."""
 
     action: str
     build: PackageBuild
@@ -161,8 +161,10 @@ def _builds(options: argparse.Namespace) -> int:
 
 
 def of_actions(build: PackageBuild) -> Iterator[ActionBuild]:
-    """What the build of a package means for each action that the package describes. An error in a file
-    of one action is that action's; any other is every one's."""
+    """Yield the result of a package's build for each action that the package describes.
+
+    An error in a file of one action belongs to that action; any other error belongs to all of them.
+    """
     names = {} if build.source is None else dict(_described(build.source))
     for package, name in names.items():
         own = tuple(

@@ -4,80 +4,20 @@ import argparse
 import contextlib
 import os
 import re
-import secrets
 import socket
 import ssl
 import sys
-from collections.abc import Generator, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-import httpx
 import msgspec
 
 from action_assistant import paths, settings
 from action_assistant.errors import CannotStart
-from action_assistant.web.auth.keys import Keys, ServerProof
+from action_assistant.web.auth.keys import Keys
 from action_assistant.web.network.certificate import Certificate
-
-_API: Final = "/api/"
-
-
-class AfterProof(httpx.Auth):
-    """Adds the token, once whoever answers at an address has answered a challenge.
-
-    Whoever listens where we only suppose our server (`supposed`) might pass the challenge on to it: so
-    it has to name the very address that we are connected to, which it cannot for another's.
-    """
-
-    requires_response_body = True
-
-    def __init__(self, keys: Keys, *, supposed: bool) -> None:
-        self._keys = keys
-        self._supposed = supposed
-        self._proven: set[str] = set()
-
-    def auth_flow(self, request: httpx.Request) -> Generator[httpx.Request, httpx.Response, None]:
-        """As httpx asks. Raises CannotStart."""
-        base = str(request.url).partition(_API)[0]
-        if base not in self._proven:
-            challenge = secrets.token_urlsafe(32)
-            url = f"{base}{_API}server?challenge={challenge}"
-            answer = yield httpx.Request("GET", url, extensions=request.extensions)
-            if not self._holds(challenge, answer):
-                raise CannotStart(_why(base, supposed=self._supposed))
-            self._proven.add(base)
-        request.headers["authorization"] = f"Bearer {self._keys.token}"
-        yield request
-
-    def _holds(self, challenge: str, answer: httpx.Response) -> bool:
-        try:
-            proof = msgspec.json.decode(answer.content, type=ServerProof)
-        except msgspec.DecodeError:
-            return False
-        at = _peer(answer) if self._supposed else None
-        return self._keys.proven(challenge, proof, at=at)
-
-
-def _peer(answer: httpx.Response) -> str:
-    """To whom we are connected."""
-    try:
-        host, port, *_ = answer.extensions["network_stream"].get_extra_info("server_addr")
-    except (OSError, KeyError, TypeError, ValueError):
-        return ""
-    return f"{host}:{port}"
-
-
-def _why(base: str, *, supposed: bool) -> str:
-    said = (
-        f"What answers at {base} does not know the token of this data folder, so nothing was sent to "
-        "it: it is another program, another server of ours, or one of before this check."
-    )
-    if supposed:
-        said += " Name the folder with --data, or with --url the place where your server is."
-    return said
-
 
 if TYPE_CHECKING:  # slow to load, and most commands do not need it
     import httpx
@@ -100,7 +40,7 @@ def command(
 
 
 def add_server(parser: argparse.ArgumentParser, example: str) -> None:
-    """How a command finds the server that it needs, and an example of it."""
+    """Add the options by which a command finds its server, and an example to the help."""
     parser.epilog = f"example: {parser.prog} {example}".rstrip()
     parser.add_argument(
         "--url",
@@ -122,7 +62,7 @@ class Server:
 
     @property
     def url(self) -> str:
-        """Of the editor, as we ask it; without a slash at its end."""
+        """Return the URL of the editor without a final slash."""
         return str(self._client.base_url).rstrip("/")
 
     def editor(self, method: str, path: str, **body: Any) -> "httpx.Response":
@@ -130,7 +70,7 @@ class Server:
         return _asked(self._client, method, path, **body)
 
     def runner(self, method: str, path: str, **body: Any) -> "httpx.Response":
-        """Ask the runner."""
+        """Send a request to the runner, and return its answer."""
         return _asked(self._client, method, self._runner_url + path, **body)
 
     def graph_id(self, asked: str) -> str:
@@ -175,7 +115,7 @@ def _asked(client: "httpx.Client", method: str, path: str, **body: Any) -> "http
 
 
 def sentence(answer: "httpx.Response") -> str:
-    """What a refusal says."""
+    """Return the text of a refusal, with its place."""
     try:
         problem = answer.json()
         place = (problem.get("where") or {}).get("path", "")
@@ -195,9 +135,11 @@ def running(options: argparse.Namespace) -> Iterator[Server]:
 
 
 def reach(options: argparse.Namespace) -> dict[str, Any]:
-    """What a client of httpx is made of that speaks to the server of a command and sends it the token,
-    but only after its proof. Raises CannotStart."""
-    from action_assistant.commands.client import AfterProof
+    """Return the arguments of an httpx client for the server of a command.
+
+    The client sends the token only after the server has proven that it knows it. Raise CannotStart.
+    """
+    from action_assistant.commands.token_proof import AfterProof
 
     data = options.data.resolve()
     trust = Certificate(data).trusting_too()
@@ -212,7 +154,7 @@ def reach(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _here(trust: ssl.SSLContext) -> str:
-    """Where the server of this computer is: it may have been started with --tls or without."""
+    """Return the URL of the server on this computer, which may run with --tls or without."""
     port = settings.port()
     with (
         contextlib.suppress(OSError),

@@ -93,7 +93,7 @@ def _place(server: Server, asked: str) -> _Moment | _Version:
 
 
 def _fetched(server: Server, place: str | _Moment | _Version) -> tuple[str, bytes]:
-    """What to call it, and its text."""
+    """Return the name and the text of one side of a comparison."""
     match place:
         case str():
             return place, file_text(Path(place))

@@ -62,7 +62,7 @@ class Directory(Protocol):
         """Delete a file, on the disk when this returns."""
 
     def close(self) -> None:
-        """Let go."""
+        """Release the directory and its descriptor."""
 
 
 def opened(root: Path) -> Directory:
@@ -71,7 +71,7 @@ def opened(root: Path) -> Directory:
 
 
 class HeldDirectory:
-    """By its descriptor."""
+    """A directory that is held open by its descriptor, so that no link can redirect it."""
 
     def __init__(self, descriptor: int) -> None:
         self._at = descriptor
@@ -91,7 +91,7 @@ class HeldDirectory:
         return os.stat(_component(name), dir_fd=self._at, follow_symlinks=False)
 
     def below(self, name: str, *, make: bool) -> Self:
-        """A folder in it."""
+        """Open a subdirectory; create it first with `make`. Raise OSError for a link."""
         _component(name)
         if make:
             with suppress(FileExistsError):
@@ -109,7 +109,7 @@ class HeldDirectory:
     def write_new(
         self, name: str, content: bytes, mode: int | None, owner: Owner | None = None
     ) -> None:
-        """Write a file."""
+        """Write a new file and flush it to disk. Raise FileExistsError where the name is taken."""
         flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
         at_first = 0o666 if mode is None else 0o600
         file = os.open(_component(name), flags, at_first, dir_fd=self._at)
@@ -144,23 +144,23 @@ class HeldDirectory:
         os.fsync(self._at)
 
     def replace(self, new: str, name: str) -> None:
-        """Rename a file."""
+        """Rename `new` to `name`, replacing what stands there."""
         names = _component(new), _component(name)
         os.replace(*names, src_dir_fd=self._at, dst_dir_fd=self._at)
         os.fsync(self._at)  # the steps reach the disk in their order, too
 
     def remove(self, name: str) -> None:
-        """Delete a file."""
+        """Delete a file of this directory."""
         os.unlink(_component(name), dir_fd=self._at)
         os.fsync(self._at)
 
     def close(self) -> None:
-        """Let go."""
+        """Close the descriptor of the directory."""
         os.close(self._at)
 
 
 class NamedDirectory:
-    """By its path."""
+    """A directory that is named by its path, where descriptors of directories do not exist."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -180,7 +180,7 @@ class NamedDirectory:
         return (self._path / _component(name)).lstat()
 
     def below(self, name: str, *, make: bool) -> Self:
-        """A folder in it."""
+        """Open a subdirectory; create it first with `make`. Raise OSError for a link."""
         path = self._path / _component(name)
         if make:
             path.mkdir(exist_ok=True)
@@ -231,12 +231,12 @@ class NamedDirectory:
         os.link(self._path / _component(old), self._path / _component(new))
 
     def replace(self, new: str, name: str) -> None:
-        """Rename a file."""
+        """Rename `new` to `name`, replacing what stands there."""
         _refuse_link(self._path / _component(name))
         (self._path / _component(new)).replace(self._path / name)
 
     def remove(self, name: str) -> None:
-        """Delete a file."""
+        """Delete a file of this directory."""
         (self._path / _component(name)).unlink()
 
     def close(self) -> None:

@@ -111,7 +111,7 @@ def _merged(server: Server, below: str, seen: dict[str, Any], asked: dict[str, A
 
 
 def _choices(words: Iterable[str]) -> dict[str, str]:
-    """Raises CannotStart."""
+    """Return the side that was chosen for each place. Raise CannotStart for a word of another form."""
     found = {}
     for each in words:
         place, equals, side = each.rpartition("=")

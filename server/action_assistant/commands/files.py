@@ -27,8 +27,10 @@ _COMMANDS: Final = frozenset({"stop", "pause", "resume"})
 
 
 class CheckVerdict(msgspec.Struct, frozen=True):
-    """What `check` found in one file, with places there. `notes`: what reading it translated or left
-    out."""
+    """The problems that `check` found in one file, with their places.
+
+    `notes` say what reading the file translated or left out.
+    """
 
     file: str
     dialect: str | None
@@ -110,7 +112,7 @@ def _command(text: str) -> tuple[float, str, str | None]:
 
 
 def file_text(path: Path) -> bytes:
-    """What is in a file. Raises CannotStart."""
+    """Return the content of a file. Raise CannotStart if it cannot be read."""
     try:
         return path.read_bytes()
     except OSError as error:
@@ -118,7 +120,7 @@ def file_text(path: Path) -> bytes:
 
 
 def refusal(name: Path | str, error: codec.Unreadable) -> str:
-    """Why a text cannot be read, with its place."""
+    """Return the reason why a text cannot be read, with its place."""
     within = f" at {error.path}" if error.path else ""
     return f"{name}:{error.line}:{error.column}: {error.message}{within}"
 
@@ -334,7 +336,8 @@ def _library(folder: Path | None) -> Mapping[str, Graph]:
 
 
 def actions_below(folder: Path) -> Mapping[str, Signature]:
-    """What the actions of a folder take and give, by name; the engine indexes `*umrf.json`."""
+    """Return the signatures of a folder's actions by name. Like the engine, look at files
+    `*umrf.json`."""
     found: dict[str, Signature] = {}
     for path in sorted(folder.rglob("*umrf.json")):
         try:

@@ -27,7 +27,7 @@ from action_assistant.umrf.model import Problem, Where
 
 
 class GivenGraph(NamedTuple):
-    """One file, read."""
+    """A graph that was read from a file, and the path of the file."""
 
     path: Path
     reading: codec.Reading
@@ -65,7 +65,7 @@ def _below(folder: Path) -> Iterator[GivenGraph]:
 
 
 class FlattenedFile(msgspec.Struct, frozen=True, tag="flattened", tag_field="kind"):
-    """What `flatten --json` prints of a graph that could be made flat."""
+    """The output of `flatten --json` for a graph that could be made flat."""
 
     umrf: msgspec.Raw
     origins: tuple[FlatOrigin, ...]

@@ -89,7 +89,7 @@ def _show(origins: list[str], invitation: dict[str, Any]) -> None:
 
 
 def _revoke(options: argparse.Namespace) -> int:
-    """Both processes are told; where none answers, the data folder is, which both look at."""
+    """Revoke a link on both processes, or in the data folder where no server answers."""
     try:
         with running(options) as server:
             return _revoke_at(server, options.id)

@@ -23,7 +23,7 @@ def _add_serve(both: argparse.ArgumentParser) -> None:
 
 
 def add_serve_options(parser: argparse.ArgumentParser) -> None:
-    """What `serve` takes, also as a service."""
+    """Add the options of `serve`, which a service takes as well."""
     _address(parser, port=settings.port())
     _database(parser, switch=True)
     _sharing(parser)
@@ -176,12 +176,13 @@ def _logging(parser: argparse.ArgumentParser) -> None:
 
 
 def reached(options: argparse.Namespace) -> settings.Reachability:
-    """How others come to us. Raises CannotStart."""
+    """Return how others reach this server. Raise CannotStart."""
     return settings.reached(options.public_url, options.trusted_proxies)
 
 
 def _host(options: argparse.Namespace) -> str:
-    """Where to listen. Raises CannotStart when that would surprise somebody."""
+    """Return the address to listen at. Raise CannotStart for one that opens more than was asked
+    for."""
     host: str = options.host or (settings.EVERYWHERE if options.share else "127.0.0.1")
     if options.share and host in {"0.0.0.0", "::"}:
         host = settings.EVERYWHERE

@@ -215,7 +215,7 @@ def _watch(server: Server, run: str) -> int:
 
 
 def _is_at_rest(run: Run) -> bool:
-    """Whether it was proven or seen that nothing of it moves."""
+    """Return whether it was proven or seen that no action of a run moves."""
     return run["state"] in _ENDED and (run["state"] != "lost" or bool(run["at_rest"]))
 
 
@@ -297,7 +297,7 @@ def _unconfirmed(run: Run) -> str:
 
 
 def _unproven(stopped: dict[str, list[str]], robots: list[dict[str, Any]]) -> list[str]:
-    """Of graphs that others started, by robot: which are not proven to be at rest, and why not."""
+    """Return one sentence for each graph of others that is not proven to be at rest."""
     known = {robot["name"]: robot for robot in robots}
     found: list[str] = []
     for name, graphs in stopped.items():

@@ -16,7 +16,7 @@ from action_assistant.umrf.difference_text import lines, without_looks
 
 
 def add_since(runs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """The command below `runs`."""
+    """Add the command `runs since`."""
     since = command(
         runs,
         "since",

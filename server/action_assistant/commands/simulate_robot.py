@@ -178,7 +178,7 @@ def _script(path: Path | None) -> Script:
 
 
 def _index(folder: Path) -> EmulatedIndex:
-    """What an engine finds there. Raises CannotStart where there is no folder."""
+    """Return what an engine would index in a folder. Raise CannotStart where there is no folder."""
     if not folder.is_dir():
         raise CannotStart(f"There is no folder {folder}.")
     return _found(folder)

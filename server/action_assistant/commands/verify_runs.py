@@ -15,7 +15,11 @@ from action_assistant.umrf.semantics import script_from
 
 
 class VerifyVerdict(msgspec.Struct, frozen=True, kw_only=True):
-    """What became of one expectation. `against`: the graph as it was sent then, or as it is now."""
+    """The verdict on one expected run.
+
+    `against` says which graph was simulated: the one that was sent `then`, or the one that is there
+    `now`.
+    """
 
     name: str
     run: str

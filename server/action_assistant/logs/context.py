@@ -37,7 +37,7 @@ def is_about(subject: Subject, id_of_it: str) -> None:
 
 @contextmanager
 def about(subject: Subject, id_of_it: str) -> Iterator[None]:
-    """What is written inside is about this, too."""
+    """Add a subject and its id to every log line that is written inside the block."""
     token = _SUBJECTS.set({**_SUBJECTS.get(), subject: id_of_it})
     try:
         yield

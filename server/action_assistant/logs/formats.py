@@ -31,7 +31,7 @@ class JsonLog(PrintableLog):
         self._process = process
 
     def format(self, record: logging.LogRecord) -> str:
-        """As `logging` asks."""
+        """Return a record as one line of JSON."""
         at = time.strftime("%Y-%m-%dT%H:%M:%S", time.gmtime(record.created))
         line: dict[str, Any] = {
             "time": f"{at}.{int(record.msecs):03}Z",

@@ -30,7 +30,7 @@ log: Final = logging.getLogger("action_assistant")
 
 
 class LogSettings(msgspec.Struct, frozen=True):
-    """In which form a process writes, and from which level on."""
+    """The form of the log of a process, and its lowest level."""
 
     form: Form = "console"
     level: Level = "info"
@@ -39,7 +39,8 @@ class LogSettings(msgspec.Struct, frozen=True):
 def log_settings(
     form: str | None = None, level: str | None = None, environ: Mapping[str, str] = os.environ
 ) -> LogSettings:
-    """What the command line says, else the environment. Raises CannotStart."""
+    """Return the log settings of the command line, or else of the environment. Raise CannotStart
+    for unknown values."""
     given = {
         "form": (form or environ.get(_FORM, "")).strip().lower() or "console",
         "level": (level or environ.get(_LEVEL, "")).strip().lower() or "info",
@@ -76,7 +77,7 @@ def set_up(process: str, chosen: LogSettings, *secrets: str) -> None:
 
 
 def set_up_worker(name: str) -> None:
-    """The same in a process that was forked to work for this one."""
+    """Set up the log of a worker process that was forked from this one."""
     try:
         chosen = log_settings()
     except CannotStart:  # then its parent did not start either
@@ -85,7 +86,7 @@ def set_up_worker(name: str) -> None:
 
 
 def writes_json() -> bool:
-    """Whether whatever is said is read by programs."""
+    """Return whether the log is written for programs."""
     return any(isinstance(each.formatter, JsonLog) for each in logging.getLogger().handlers)
 
 
@@ -99,5 +100,5 @@ def say(text: str, level: Level = "info") -> None:
 
 
 def _failed(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
-    """What nobody caught."""
+    """Log an exception that nothing caught."""
     log.critical("failed", exc_info=(kind, error, trace))

@@ -103,12 +103,12 @@ CODES: Final[Mapping[str, Severity]] = {
 
 
 def found(code: str, where: object, message: str, remedy: str) -> Diagnostic:
-    """Something that is wrong."""
+    """Return the diagnostic of a fault, with the severity of its code."""
     return Diagnostic(
         code=code, severity=CODES[code], where=str(where), message=message, remedy=remedy
     )
 
 
 def fine(where: object, message: str) -> Diagnostic:
-    """Something that was looked at, and is as it should be."""
+    """Return the diagnostic of a check that found no fault."""
     return Diagnostic(code="", severity="fine", where=str(where), message=message, remedy="")

@@ -16,7 +16,7 @@ def take(descriptor: int) -> bool:
 
 
 def wait_for(descriptor: int) -> None:
-    """The same, as soon as nobody else has locked it. Raises OSError, CannotStart."""
+    """Lock an open file as soon as nobody else holds its lock. Raise OSError or CannotStart."""
     _locking(descriptor, wait=True)
 
 

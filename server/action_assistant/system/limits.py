@@ -25,7 +25,7 @@ def raise_descriptors() -> int:
 
 
 def descriptors_allowed() -> int:
-    """How many that could be at most."""
+    """Return how many files and sockets this process could open at most."""
     if resource is None:
         return _WINDOWS
     _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)

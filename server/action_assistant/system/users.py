@@ -27,7 +27,7 @@ def mine() -> str:
 
 
 def exists(name: str) -> bool:
-    """Whether this computer has a user of this name."""
+    """Return whether this computer has a user of this name."""
     if pwd is None:
         return False
     try:

@@ -40,7 +40,7 @@ _MODE: Final = 0o600
 
 
 class NoRoom(CannotStart):
-    """What is packed is larger than what is left of the disk."""
+    """The disk has less space left than the packed files need."""
 
 
 class JournalCopy(msgspec.Struct, frozen=True):
@@ -59,9 +59,12 @@ class BackupPart(msgspec.Struct, frozen=True):
 
 
 class BackupManifest(msgspec.Struct, frozen=True, kw_only=True):
-    """What a backup says of itself. `database`: where the graphs were, without a password; None in
-    the data folder. `commit`: of the version, None when not known; `schemas`: revisions of the tables.
-    `settings`: of the environment, without the token. `missing`: sentences."""
+    """The description that a backup holds of itself.
+
+    `database` is where the graphs were, without a password; None means the data folder. `commit` is
+    that of the version, None if unknown. `schemas` holds the revisions of the tables, `settings`
+    those of the environment without the token, and `missing` one sentence for each missing part.
+    """
 
     format: int
     version: str
@@ -254,7 +257,7 @@ class Package:
 
 
 def about_now(**fields: object) -> BackupManifest:
-    """What this version says."""
+    """Return a manifest with the version, commit and schemas of this program."""
     own = {
         "format": FORMAT,
         "version": VERSION,
@@ -265,13 +268,13 @@ def about_now(**fields: object) -> BackupManifest:
 
 
 def sha256_of(path: Path) -> str:
-    """Of a file."""
+    """Return the SHA-256 of a file in hex."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _is_place(name: str) -> bool:
-    """Whether a name leads to a place below one of the two folders, and nowhere else."""
+    """Return whether a name leads to a path below one of the two folders, and nowhere else."""
     parts = PurePosixPath(name).parts
     plain = all(each not in {"", ".", ".."} and each.isprintable() for each in name.split("/"))
     return plain and len(parts) > 1 and parts[0] in {FILES, ARCHIVE} and "\\" not in name

@@ -66,7 +66,7 @@ def belongings(data: Path) -> Iterator[tuple[str, Path]]:
 
 
 def left_out(data: Path) -> list[Path]:
-    """What is in the folder that is nothing of ours."""
+    """Return the entries of the folder that are not this program's."""
     if not data.is_dir():
         return []
     known = MERGED | WHOLE | _OWN
@@ -84,7 +84,7 @@ def _is_passing(path: Path) -> bool:
 
 
 def is_database(path: Path) -> bool:
-    """Whether a file is SQLite's, so that its bytes alone do not say what is in it."""
+    """Return whether a file is a SQLite database, which has to be copied by SQLite itself."""
     with path.open("rb") as file:
         return file.read(len(_MAGIC)) == _MAGIC
 
@@ -106,7 +106,7 @@ def tables_copied(source: Path, target: Path, name: str, progress: Progress) -> 
 
 
 def fold_of(branch: Branch) -> Fold:
-    """How a journal becomes its tables."""
+    """Return the function that turns a journal's events into its tables."""
     if branch == "editor":
         from action_assistant.editor.log.graph_events import fold as editor_fold
 
@@ -212,7 +212,7 @@ def workshop(parent: Path, prefix: str) -> Iterator[Path]:
 
 
 def sweep(parent: Path, prefix: str) -> None:
-    """What is left of workshops whose process was killed goes; those that somebody works in stay."""
+    """Remove the work folders of processes that were killed; leave those that a process still uses."""
     for left in parent.glob(f"{prefix}*"):
         if left.is_symlink() or (left / _AT_WORK).is_symlink():
             continue  # nothing of ours: it may be a folder of everybody's, such as /tmp

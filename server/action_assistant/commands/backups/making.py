@@ -51,8 +51,11 @@ _ROOM: Final = 64 << 20  # bytes that have to be left on the disk
 
 
 class FinishedBackup(msgspec.Struct, frozen=True):
-    """What was made, and what stands in it. `strangers`: what journals have in their schema that is not this
-    program's, and was left out."""
+    """A finished backup and its content.
+
+    `strangers` names what stood in the schema of a journal, is not this program's, and was left
+    out.
+    """
 
     made: BackupMade
     journals: Mapping[Branch, JournalCopy]
@@ -155,7 +158,7 @@ def _size(source: str) -> int:
 
 
 def _read_back(part: Path, progress: Progress) -> None:
-    """Whether a file is what was written. Raises CannotStart."""
+    """Prove that a finished file holds what was written. Raise CannotStart otherwise."""
     package = Package(part)
     try:
         package.prove(progress)
@@ -181,8 +184,11 @@ def _copy(source: str, branch: Branch, target: Path, progress: Progress) -> None
 
 
 def _fill(packer: Packer, data: Path, folder: Path, progress: Progress) -> tuple[str, ...]:
-    """Everything beside the journals, whose copies are in `folder`; what is missing, in sentences.
-    Archives come after the journals: a run that goes into one meanwhile is in both."""
+    """Pack everything beside the journals, whose copies are in `folder`; return sentences about
+    missing parts.
+
+    Archives come after the journals: a run that is archived meanwhile is then in both.
+    """
     missing = []
     given = os.environ.get("ACTION_ASSISTANT_TOKEN")
     for name, path in belongings(data):
@@ -223,7 +229,7 @@ def _archives(packer: Packer, kept: Path, runner: Path) -> list[str]:
 
 
 def _links(editor: Path) -> bool:
-    """Whether there are links that let people in."""
+    """Return whether a journal holds invitations that were not revoked."""
     if not editor.exists():
         return False
     open_ = select(invitation.c.id).where(invitation.c.revoked_at.is_(None)).limit(1)
@@ -231,7 +237,7 @@ def _links(editor: Path) -> bool:
 
 
 def _settings() -> dict[str, str]:
-    """What the environment says, but for what is secret."""
+    """Return the settings of the environment without the secret ones."""
     return {
         name: value
         for name in settings.VARIABLES

@@ -20,8 +20,10 @@ DEFAULT: Final = "7d,4w,6m"
 
 
 class Keeping(msgspec.Struct, frozen=True):
-    """How many days, weeks and months of which there is a backup keep their newest one. All None: every
-    backup stays."""
+    """A rule of rotation: the numbers of days, weeks and months whose newest backup stays.
+
+    With None in all three, every backup stays.
+    """
 
     days: int | None = 0
     weeks: int | None = 0
@@ -44,12 +46,12 @@ def keeping(text: str) -> Keeping:
 
 
 def name_at(moment: datetime) -> str:
-    """What a backup of that moment is called."""
+    """Return the file name of a backup that was begun at this moment."""
     return f"action-assistant-{moment.astimezone(UTC).strftime(_STAMP)}Z.zip"
 
 
 def moment_of(path: Path) -> datetime | None:
-    """When a scheduled backup was begun; None for what is not named as one."""
+    """Return the time at which a scheduled backup was begun; None for another file name."""
     found = _NAME.fullmatch(path.name)
     try:
         return found and datetime.strptime(found[1], _STAMP).replace(tzinfo=UTC)
@@ -58,8 +60,11 @@ def moment_of(path: Path) -> datetime | None:
 
 
 def superfluous(paths: Iterable[Path], keep: Keeping, now: datetime) -> list[Path]:
-    """Those that may go. The newest one always stays; so do those of a clock that was wrong, after `now`,
-    and none goes for them."""
+    """Return the backups that may be deleted.
+
+    The newest one always stays. Backups dated after `now` come from a wrong clock: they stay, and
+    none is deleted for them.
+    """
     if keep.days is None:
         return []
     moments = ((moment_of(path), path) for path in paths)
@@ -80,7 +85,7 @@ _SECONDS: Final = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86_400.0}
 
 
 def add_rules(parser: argparse.ArgumentParser, prefix: str) -> None:
-    """How many stay, and what takes a finished one elsewhere."""
+    """Add the options for how many backups stay and for the command that takes them elsewhere."""
     parser.add_argument(
         f"{prefix}keep",
         type=rule,
@@ -105,7 +110,7 @@ def span(text: str) -> float:
 
 
 def rule(text: str) -> str:
-    """How many stay."""
+    """Return a rule of how many backups stay, unchanged. Raise ArgumentTypeError for another text."""
     try:
         keeping(text)
     except ValueError as error:

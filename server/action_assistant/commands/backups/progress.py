@@ -10,15 +10,18 @@ _EVERY: Final = 1.0  # seconds
 
 
 class Progress:
-    """Says nothing in the first second, and then one thing a second: over the last one on a terminal,
-    on a line of its own elsewhere."""
+    """Reports how far long work has come, on stderr.
+
+    It writes nothing in the first second, and then one text a second: over the last one on a
+    terminal, on lines of their own elsewhere.
+    """
 
     def __init__(self) -> None:
         self._next = time.monotonic() + _EVERY
         self._shown = False
 
     def tell(self, text: str) -> None:
-        """It has come so far."""
+        """Say how far the work has come, once a second at most."""
         if time.monotonic() < self._next:
             return
         self._next = time.monotonic() + _EVERY
@@ -30,7 +33,7 @@ class Progress:
             sys.stderr.flush()
 
     def end(self) -> None:
-        """Something else is said next."""
+        """Clear the line of a terminal before other output."""
         if self._shown:
             _steer("\r\x1b[K")
         self._shown = False

@@ -39,7 +39,8 @@ _NICE: Final = 19  # the least of a processor
 
 
 class RegularBackups(msgspec.Struct, frozen=True):
-    """Whose backups go where, how many stay, and the command that takes them elsewhere."""
+    """The settings of regular backups: source, target folder, rule of what stays, command for
+    finished ones."""
 
     data: Path
     database: str | None
@@ -132,7 +133,8 @@ def _free(into: Path) -> Path:
 
 
 def _is_anothers(path: Path, done: FinishedBackup) -> bool:
-    """Whether a backup is of another server, which has another token: servers may share a folder."""
+    """Return whether a backup comes from another server, which has another token. Servers may share
+    a folder."""
     if moment_of(path) is None or not zipfile.is_zipfile(path):
         return False
     try:
@@ -177,7 +179,7 @@ def _taken_away(command: str | None, path: Path) -> OffSite | None:
 
 
 def _first(plan: RegularBackups, every: float) -> float:
-    """When the first one is due: now, unless one was made not long ago."""
+    """Return when the first backup is due: now, unless a recent one exists."""
     state = backup_state.backup_state(plan.data)
     last = state.last if state is not None else None
     if last is None or Path(last.file).parent != plan.into or not Path(last.file).exists():

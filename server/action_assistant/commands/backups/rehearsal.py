@@ -34,7 +34,7 @@ Tell: TypeAlias = Callable[[str], None]
 
 
 class Findings:
-    """What was looked at, in words, and what is not sound."""
+    """The sentences of a rehearsal: what was looked at, and what is not sound."""
 
     def __init__(self) -> None:
         self.looked_at: list[str] = []
@@ -76,7 +76,8 @@ def rehearse(source: Path, data: Path) -> int:
 
 
 def _is_of_the_disk(error: BaseException | None) -> bool:
-    """Whether the disk of the scratch place is at fault, and not what is looked at."""
+    """Return whether an error is the fault of the disk of the scratch folder, and not of the
+    backup."""
     while error is not None:
         if isinstance(error, OSError) and error.errno in _DISK:
             return True

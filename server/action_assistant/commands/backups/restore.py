@@ -51,8 +51,11 @@ _LAST: Final = select(_event.position, _event.chain).order_by(_event.position.de
 
 
 class Under(msgspec.Struct, frozen=True):
-    """What is being put into the folder: the SHA-256 of the editor's journal in the backup, and where
-    the log ends that it becomes here. For who comes again."""
+    """The restore that is under way, for a later run that continues it.
+
+    `sha256` is that of the editor's journal in the backup. `position` and `chain` are the end of
+    the log that it becomes here.
+    """
 
     sha256: str
     position: int
@@ -60,7 +63,7 @@ class Under(msgspec.Struct, frozen=True):
 
 
 def restore(options: argparse.Namespace) -> int:
-    """The command. Raises CannotStart."""
+    """Run the command `restore`. Raise CannotStart."""
     from action_assistant.editor.log import database_location
 
     data, source = options.data.resolve(), options.file.resolve()
@@ -124,7 +127,8 @@ def _check_folder(data: Path, source: Path) -> None:
 def _put(
     folder: Path, data: Path, url: str, about: BackupManifest, progress: Progress
 ) -> tuple[Path | None, list[str]]:
-    """Everything into its place; where what was there has gone, and what stayed as it was."""
+    """Put everything into its place; return the folder with what was there before, and the names
+    that were kept."""
     from action_assistant.editor.log import database_location, epochs
 
     mark, is_own = data / settings.RESTORING, database_location.is_own(data, url)
@@ -193,7 +197,7 @@ def _end_of(folder: Path, about: BackupManifest) -> Under:
 
 
 def _is_there(url: str, under: Under, about: BackupManifest) -> bool:
-    """Whether a database holds the same backup already. Raises CannotStart."""
+    """Return whether a database already holds the same backup. Raise CannotStart."""
     if "editor" not in about.journals or under.sha256 != about.journals["editor"].sha256:
         return False
 

@@ -40,7 +40,7 @@ _DAMAGED: Final = {sqlite3.SQLITE_ERROR, sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_
 
 
 def go_back(data: Path, database: str | None, files: list[Path]) -> int:
-    """The command. Raises CannotStart."""
+    """Run `migrate --back`. Raise CannotStart."""
     settings.settled(data)
     if not files:
         return _list(data)
@@ -77,7 +77,8 @@ def _list(data: Path) -> int:
 
 
 def _asked(path: Path) -> str:
-    """Which version wrote a file last, if it says so; nothing is changed by asking."""
+    """Return the version that last wrote a database file; "" if the file does not say. The file is
+    not changed."""
     engine = create_engine(unchanged(path), poolclass=NullPool)
     try:
         with engine.connect() as connection:
@@ -151,8 +152,11 @@ def _exchange(part: Path, path: Path, aside: Path) -> None:
 
 
 def _emptied(path: Path) -> int | None:
-    """How many events are in what there is now; what waits in the log beside it goes into the file, so
-    that at no moment there is a file without it. None when it is damaged. Raises CannotStart."""
+    """Return the number of events of a database, after its write-ahead log was merged into the
+    file.
+
+    Return None for a damaged file. Raise CannotStart while somebody else has it open.
+    """
     if not path.exists():
         return 0
     try:

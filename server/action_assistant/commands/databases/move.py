@@ -47,14 +47,15 @@ _WIDE: Final = 1 << 256
 
 
 class TableSum(NamedTuple):
-    """How many rows a table has, and the sum of their digests."""
+    """The number of rows of a table, and the sum of their digests."""
 
     rows: int
     digest: int
 
 
 def differences(one: str, other: str, progress: Progress) -> list[str]:
-    """Which tables of the editor are not the same, in words. Raises CannotStart."""
+    """Return one sentence for each table of the editor that differs between two databases. Raise
+    CannotStart."""
     found = [ask_once(url, lambda c: dict(_sums(c, progress))) for url in (one, other)]
     return [
         f"{name}: {found[0][name].rows} rows and {found[1][name].rows}"
@@ -82,7 +83,8 @@ def _sum(connection: Connection, table: Table, progress: Progress) -> TableSum:
 
 
 def _digest(values: tuple[Any, ...]) -> bytes:
-    """Of what each value is and how long, so that no two rows look alike."""
+    """Return the digest of a row. It covers type and length of each value, so that different rows
+    differ."""
     digest = blake2b(digest_size=32)
     for value in values:
         if isinstance(value, bytes | memoryview):
@@ -189,7 +191,7 @@ def _target(data: Path, to: str) -> str:
 
 
 def _source(data: Path, known: str, given: str | None) -> str:
-    """Where the graphs are, with the password that was given. Raises CannotStart."""
+    """Return the URL of the graphs' database, with the password that was given. Raise CannotStart."""
     from action_assistant.editor.log import database_location
 
     if given is not None and database_location.same(given, known):
@@ -216,7 +218,8 @@ def _into_server(data: Path, source: str, target: str, progress: Progress) -> in
 def _into_folder(
     data: Path, source: str, target: str, progress: Progress
 ) -> tuple[int, Path | None]:
-    """The same, into a file that is made beside its place; also where a file is that was there."""
+    """Copy the graphs into a file of the data folder; return the number of events and the file that
+    was put aside."""
     with workshop(data, _WORK) as folder, ExitStack() as locks:
         locks.callback(os.close, own(data / "editor.db"))
         sweep(data, _WORK)
@@ -238,7 +241,7 @@ def _into_folder(
 
 
 def _tidy(data: Path, target: str) -> None:
-    """What a move leaves that was killed after the folder remembered the other database."""
+    """Remove what a move left that was killed after the folder remembered the other database."""
     try:
         lock = own(data / "editor.db")
     except CannotStart:

@@ -35,7 +35,7 @@ _PASSWORD: Final = (
 
 
 def fault(url: str, error: Exception) -> Diagnostic:
-    """What is wrong with a database that could not be asked. `url` has no password."""
+    """Return the diagnostic for a database that could not be asked. `url` has no password."""
     host = make_url(url).host or "this computer"
     causes = [*_causes(error)]
     if any(isinstance(each, socket.gaierror) for each in causes):
@@ -92,27 +92,29 @@ _event, _head = editor_event.c, editor_head.c  # both databases have these table
 
 
 def newest_at(connection: Connection) -> int | None:
-    """When the last events were written, in microseconds since 1970; None when there are none."""
+    """Return when the newest events were written, in microseconds since 1970; None without events."""
     newest = select(_event.at).order_by(_event.position.desc()).limit(50)
     return max((row.at for row in connection.execute(newest) if type(row.at) is int), default=None)
 
 
 def oldest_at(connection: Connection) -> int | None:
-    """When the first event was written, in microseconds since 1970; None when there is none."""
+    """Return when the first event was written, in microseconds since 1970; None without events."""
     oldest = select(_event.at).order_by(_event.position).limit(1)
     return connection.execute(oldest).scalar()
 
 
 def has_events(connection: Connection) -> bool:
-    """Whether there is any."""
+    """Return whether a database has any event."""
     if not inspect(connection).has_table(editor_event.name):
         return False
     return connection.execute(select(_event.position).limit(1)).first() is not None
 
 
 def first_damage(database: Database, connection: Connection) -> str:
-    """What is wrong with one of the newest events, in a clause; empty where nothing is. Looks at some
-    thousand, for a second or two at most."""
+    """Return a clause about damage among the newest events; empty if none is found.
+
+    The search covers some thousand events and ends after two seconds at most.
+    """
     until = time.monotonic() + _SECONDS
     heads: dict[str, Head] = {}
     after = _last(connection) - _EVENTS
@@ -128,14 +130,15 @@ def first_damage(database: Database, connection: Connection) -> str:
 
 
 def _last(connection: Connection) -> int:
-    """Where `scan` ends: it goes by rows in a file, by positions on a server."""
+    """Return the last position for `scan`: the row id in a file, the event's position on a server."""
     if connection.dialect.name == "sqlite":
         return connection.execute(text("SELECT max(rowid) FROM event NOT INDEXED")).scalar() or 0
     return connection.execute(select(func.max(_event.position))).scalar() or 0
 
 
 def _wrong(connection: Connection, heads: dict[str, Head], row: Sequence[Any]) -> str:
-    """What is wrong with an event, given those before it."""
+    """Return a clause about what is wrong with an event, given those before it; empty if it is
+    sound."""
     stream, seq = row[0], row[1]
     if tuple(map(type, row)) != _TYPES:
         return f"one of {stream!r} holds values of the wrong kind"
@@ -160,7 +163,7 @@ def _before(connection: Connection, stream: str, seq: int) -> Head | None:
 
 
 def _wrong_ends(connection: Connection, heads: dict[str, Head]) -> str:
-    """Whether streams end where the database says that they end."""
+    """Return a clause about a stream that does not end where its head says; empty if there is none."""
     names = list(heads)[:500]
     chosen = select(_head.stream, _head.seq, _head.chain).where(_head.stream.in_(names))
     for row in connection.execute(chosen):
@@ -240,7 +243,7 @@ def runs_are_there(place: Installation) -> Iterator[Diagnostic]:
 
 
 class _DatabaseLook(msgspec.Struct):
-    """What a look into a database has shown."""
+    """The findings of one look into a database."""
 
     damage: str = ""
     newest: int | None = None
@@ -249,7 +252,8 @@ class _DatabaseLook(msgspec.Struct):
 
 
 def _holds_events(file: Path) -> bool:
-    """Whether a journal has events; not where that cannot be told, which is told elsewhere."""
+    """Return whether a journal has events; False where it cannot be read, which another check
+    reports."""
     held: list[bool] = []
     try:
         database_of(f"sqlite:///{file}").look(lambda each: held.append(has_events(each)))
@@ -295,7 +299,7 @@ def _refused(where: object, error: CannotStart) -> Diagnostic:
 
 
 def _events(what: str, where: object, seen: _DatabaseLook) -> Iterator[Diagnostic]:
-    """What is wrong with the newest events."""
+    """Yield the faults of the newest events."""
     if seen.damage:
         yield found(
             "events-damaged",
@@ -316,7 +320,7 @@ def _events(what: str, where: object, seen: _DatabaseLook) -> Iterator[Diagnosti
 
 
 def span(seconds: float) -> str:
-    """A time for people."""
+    """Return a time as text, for example `90 s` or `5 min`."""
     if abs(seconds) < 120:
         return f"{abs(seconds):.0f} s"
     return f"{abs(seconds) / 60:.0f} min" if abs(seconds) < 7200 else f"{abs(seconds) / 3600:.0f} h"
@@ -362,7 +366,7 @@ def _on_server(data: Path, url: str) -> Iterator[Diagnostic]:
 
 
 async def _asked(database: Database, data: Path) -> _DatabaseLook:
-    """What a look shows, for which nothing is made or changed. Raises what its driver raises,
+    """Look into a database on a server without changing it. Raise its driver's errors,
     TimeoutError, CannotStart."""
     seen = _DatabaseLook()
 
@@ -380,7 +384,10 @@ async def _asked(database: Database, data: Path) -> _DatabaseLook:
 
 
 def _holds_mark(connection: Connection, data: Path) -> bool:
-    """Whether the database goes as far as this folder has seen; true where it has seen nothing."""
+    """Return whether the database holds all events that this folder has seen.
+
+    Return True where the folder has seen none.
+    """
     mark = marked(data / MARK)
     if mark is None or mark.position == 0:
         return True

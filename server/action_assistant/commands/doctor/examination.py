@@ -42,8 +42,10 @@ CHECKS: Final[tuple[Check, ...]] = (
 
 
 def diagnose(place: Installation) -> list[Diagnostic]:
-    """What is wrong with an installation, robots apart; empty where nothing is. Takes a second, and
-    ten at most."""
+    """Return the faults of an installation, without those of robots.
+
+    This takes about a second, and ten seconds at most.
+    """
     return [each for each in examine(place) if each.severity != "fine"]
 
 
@@ -58,7 +60,7 @@ def examine(
 
 
 class _Look(threading.Thread):
-    """One check, on a thread of its own that nobody waits for at the end."""
+    """Runs one check on a daemon thread."""
 
     def __init__(self, check: Check, place: Installation) -> None:
         super().__init__(name=check.__name__, daemon=True)
@@ -68,7 +70,7 @@ class _Look(threading.Thread):
         self.start()
 
     def run(self) -> None:
-        """Look."""
+        """Run the check and store its findings; an exception becomes a finding."""
         try:
             self._found = list(self._check(self._place))
         except Exception as error:  # noqa: BLE001 - that a check fails is told, and ends no other one
@@ -82,7 +84,8 @@ class _Look(threading.Thread):
             ]
 
     def seen(self, until: float) -> list[Diagnostic]:
-        """What it has found, at the latest at a time of the monotonic clock."""
+        """Return the findings, or a finding that says that the check did not end before `until`
+        (monotonic clock)."""
         self.join(max(0.0, until - time.monotonic()))
         if not self.is_alive():
             return self._found

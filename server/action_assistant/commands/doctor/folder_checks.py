@@ -28,7 +28,7 @@ _BACK_UP: Final = "Make one: `action-assistant backup FILE`, and keep it elsewhe
 
 
 def backups_are_made(place: Installation) -> Iterator[Diagnostic]:
-    """What is known of backups of this folder."""
+    """Check that backups of this folder exist and are not late."""
     state, where, now = backup_state(place.data), place.data / backups.FILE, time.time()
     if state is None:
         message = "What is known of backups cannot be read."
@@ -48,7 +48,7 @@ def backups_are_made(place: Installation) -> Iterator[Diagnostic]:
 
 
 def _trouble(state: BackupState, last: float, now: float) -> str:
-    """Why the newest backup is not what it should be."""
+    """Return a sentence about what is wrong with the newest backup; empty if it is fine."""
     if state.failed is not None:
         return f"The last backup failed ({state.failed.why}); the newest is of {_day(last)}."
     if state.is_late(now) and state.schedule is not None:
@@ -60,7 +60,8 @@ def _trouble(state: BackupState, last: float, now: float) -> str:
 
 
 def _used_since(place: Installation) -> float | None:
-    """When the first event of graphs or runs was written, in seconds since 1970."""
+    """Return the time of the first event of graphs or runs, in seconds since 1970; None without
+    events."""
     found_at: list[int] = []
     for name in ("editor.db", "runner.db"):
         file = place.data / name
@@ -84,7 +85,7 @@ _SHOWN: Final = 5
 
 
 def folder_is_ours(place: Installation) -> Iterator[Diagnostic]:
-    """Whether it can be used by whoever looks, and by nobody else."""
+    """Check that the current user can use the data folder, and that nobody else can."""
     data = place.data
     if not data.exists():
         if blocked := _blocked(data):
@@ -129,7 +130,7 @@ def _unusable(data: Path, why: Path) -> Diagnostic:
 
 
 def _blocked(folder: Path) -> Path | None:
-    """What keeps us from making a folder that is not there."""
+    """Return the path that keeps us from creating a missing folder; None if it can be created."""
     above = next(each for each in folder.absolute().parents if each.exists())
     return None if above.is_dir() and os.access(above, os.W_OK | os.X_OK) else above
 

@@ -143,7 +143,7 @@ _ASSET: Final = re.compile(r'(?:src|href)="\.?/?(assets/[^"]+)"')
 
 
 def program(place: Installation) -> Iterator[Diagnostic]:
-    """What runs this."""
+    """Report the versions of this program, of Python and of SQLite."""
     del place
     python = f"{sys.version_info.major}.{sys.version_info.minor}.{sys.version_info.micro}"
     yield fine(

@@ -29,8 +29,11 @@ _PATIENCE_S: Final = 3.0
 
 
 class ProcessAnswer(msgspec.Struct, frozen=True, kw_only=True):
-    """What came back from `/healthz`. `base` is with its scheme; `version` is "" for other programs;
-    `clock_s`: by how many seconds its clock is ahead of ours, if it says so."""
+    """The answer of a process to `/healthz`.
+
+    `base` includes the scheme. `version` is "" for other programs. `clock_s` is how many seconds
+    the clock of the process is ahead of ours; None if it does not say.
+    """
 
     base: str
     status: int
@@ -46,7 +49,7 @@ class _Health(msgspec.Struct):
 
 
 def listens(host: str, port: int) -> bool:
-    """Whether anything takes connections there."""
+    """Return whether a program accepts connections at this address."""
     try:
         socket.create_connection((_reached(host), port), _PATIENCE_S).close()
     except OSError:
@@ -55,7 +58,7 @@ def listens(host: str, port: int) -> bool:
 
 
 def at_port(host: str, port: int) -> ProcessAnswer | None:
-    """What answers at a port, by http or https; None when nothing answers as a web server does."""
+    """Return the answer of the web server at a port, over http or https; None if none answers."""
     shown = _reached(host)
     shown = f"[{shown}]" if ":" in shown else shown
     for scheme in ("http", "https"):
@@ -74,7 +77,7 @@ def client(verify: ssl.SSLContext | bool) -> httpx.Client:
 
 
 def health(asking: httpx.Client, base: str) -> ProcessAnswer:
-    """What `/healthz` answers. Raises httpx.HTTPError."""
+    """Return the answer to `/healthz`. Raise httpx.HTTPError."""
     answer = asking.get(f"{base}/healthz")
     now = time.time()
     try:
@@ -98,7 +101,7 @@ def _ahead(date: str, now: float) -> float | None:
 
 
 def _reached(host: str) -> str:
-    """Where a process that listens everywhere is reached from here."""
+    """Return the address by which a process that listens everywhere is reached from here."""
     return "127.0.0.1" if host in {"*", "0.0.0.0", "::", "localhost"} else host
 
 
@@ -108,7 +111,7 @@ _OTHER_NAME: Final = (62, 64)  # X509_V_ERR_HOSTNAME_MISMATCH, …IP_ADDRESS_MIS
 
 
 def certificate_fits(where: str, url: str, trust: ssl.SSLContext) -> Iterator[Diagnostic]:
-    """What is wrong with the certificate at an address; nothing where nobody answers."""
+    """Yield the faults of the certificate at an address; nothing if nobody answers there."""
     host, port = urlsplit(url).hostname or "", urlsplit(url).port or 443
     try:
         _shake(host, port, trust)
@@ -189,7 +192,7 @@ _UPGRADE: Final = {
 
 
 def proxy_leads_here(place: Installation) -> Iterator[Diagnostic]:
-    """What the public address shows. Nothing secret is sent."""
+    """Check that the public address leads to both processes. Nothing secret is sent."""
     try:
         public = reached(place.public_url, None).public
     except CannotStart as error:
@@ -263,7 +266,7 @@ _CLOCK_S: Final = 5.0
 
 
 def processes_fit(place: Installation) -> Iterator[Diagnostic]:
-    """What listens at both ports; and who holds the databases."""
+    """Check which programs listen at both ports, and which hold the databases."""
     for name, port in place.processes:
         where = f"{place.host}:{port}"
         answer = at_port(place.host, port)
@@ -326,7 +329,7 @@ def clock_differs(name: str, where: str, ahead_s: float) -> Diagnostic:
 
 
 def _held(place: Installation, name: str, *, runs: bool) -> Iterator[Diagnostic]:
-    """Who holds the lock of a database, if that is not the process that answers."""
+    """Yield a finding if another process than the one that answers holds the lock of a database."""
     file = place.data / f"{name}.db"
     holder = lock.holder(file)
     if holder is None:

@@ -84,7 +84,7 @@ def _said(words: Sequence[str], option: str) -> str:
 
 
 def look_here(place: Installation) -> list[Diagnostic]:
-    """The same by this very Python."""
+    """Return the findings about ROS 2 and the robots, with the Python that runs this."""
     return anyio.run(look, _registered(place.data), lambda: time.time_ns() // 1000)
 
 

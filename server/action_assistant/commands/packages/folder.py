@@ -13,8 +13,11 @@ from action_assistant.errors import CannotStart
 
 
 class FolderContents(msgspec.Struct, frozen=True):
-    """What is there, by path. `barred` says why a path can neither be read nor written: a link, a
-    folder, something else. What is in neither is missing."""
+    """The files that are present, by path, and the paths that cannot be used.
+
+    `barred` gives the reason for a path that can be neither read nor written, for example a link or
+    a folder. A path in neither mapping is missing.
+    """
 
     present: dict[str, bytes] = {}
     barred: dict[str, str] = {}
@@ -103,7 +106,7 @@ def _inside(top: Directory, path: str, make: bool = False) -> Iterator[tuple[Dir
 
 
 def _content(top: Directory, path: str) -> tuple[bytes, int]:
-    """What a file holds, and who may do what with it."""
+    """Return the content of a file and its mode."""
     with _inside(top, path) as (at, name):
         return at.read(name)
 

@@ -25,7 +25,7 @@ from action_assistant.umrf.packages.regenerating import GeneratedChange
 
 
 def tell_refusals(root: Path, plan: PackagesPlan) -> None:
-    """What stands against writing, each with its place."""
+    """Print each reason against writing, with its place."""
     for path, reason in plan.barred.items():
         _tell(f"{root / path}: {reason}.")
     for folder, each in plan.regenerations.items():
@@ -54,7 +54,7 @@ def tell_refused(plan: PackagesPlan) -> None:
 
 
 def tell_changes(root: Path, plan: PackagesPlan) -> None:
-    """What a call would do."""
+    """Print what a call would change."""
     for path in plan.writes:
         _tell(f"{root / path}: {'would change' if path in plan.there else 'is not there'}.")
     for path in plan.removals:
@@ -62,8 +62,11 @@ def tell_changes(root: Path, plan: PackagesPlan) -> None:
 
 
 def tell_notes(root: Path, plan: PackagesPlan, with_lines: bool) -> None:
-    """What stays as it is, although it is generated otherwise or no longer. `with_lines`: also how, since
-    once it is written nothing else knows what was generated before."""
+    """Print which files stay although they are generated differently now, or not at all.
+
+    With `with_lines`, print the difference too: once files are written, nothing else knows what was
+    generated before.
+    """
     for folder, each in plan.regenerations.items():
         for path in each.kept:
             _tell(
@@ -81,8 +84,11 @@ def tell_notes(root: Path, plan: PackagesPlan, with_lines: bool) -> None:
 
 
 def print_difference(plan: PackagesPlan) -> None:
-    """As `diff -u` prints it: what would be written after merging, or stands against it, but the base,
-    whose changes are those of the other files; then what would not be written, but has to be taken over by hand."""
+    """Print, like `diff -u`, what would be written after merging or what prevents it.
+
+    The base files are left out: their changes are those of the other files. Changes that people
+    have to take over by hand follow at the end.
+    """
     shown: dict[str, bytes | None] = {**plan.writes, **dict.fromkeys(plan.removals)}
     for folder, each in plan.regenerations.items():
         shown |= {f"{folder}/{path}": content for path, content in each.differing.items()}

@@ -29,14 +29,14 @@ class PackagesPlan(msgspec.Struct, frozen=True):
 
     @property
     def refused(self) -> bool:
-        """Whether anything stands against writing."""
+        """Return whether anything prevents writing."""
         return bool(self.barred) or any(
             each.conflicts or each.differing or each.broken for each in self.regenerations.values()
         )
 
     @property
     def writes(self) -> dict[str, bytes]:
-        """What files are to hold that change or are missing, bases among them."""
+        """Return the new content of each file that changes or is missing, base files included."""
         found: dict[str, bytes] = {}
         for folder, each in self.regenerations.items():
             found |= {f"{folder}/{path}": content for path, content in each.writes.items()}
@@ -55,9 +55,12 @@ class PackagesPlan(msgspec.Struct, frozen=True):
 
     @property
     def steps(self) -> tuple[FileStep, ...]:
-        """How it is written. The bases come last: if they came first, a call that is killed in between
-        would leave files that look as if people had taken back what is new. They are told beforehand
-        which files are coming, so that the next call knows those that have arrived."""
+        """Return the steps of writing, in an order that may be interrupted anywhere.
+
+        The base files come last. If they came first, a killed call would leave files that look as
+        if people had reverted the new content. Before all files, each base announces which files
+        will follow, so that the next call knows those that were written.
+        """
         announced = [
             FileStep(f"{folder}/{BASE_NAME}", each.announced)
             for folder, each in self.regenerations.items()

@@ -51,7 +51,8 @@ def _packages(source: Path) -> Iterator[tuple[Path, str]]:
 
 
 def _name(manifest: Path) -> str | None:
-    """None of what cannot be read: colcon skips it, too."""
+    """Return the package name in a manifest; None if it cannot be read, as colcon skips it then,
+    too."""
     try:
         name = ElementTree.fromstring(manifest.read_bytes()).findtext("name")
     except (OSError, ElementTree.ParseError):

@@ -178,7 +178,7 @@ def _status(options: argparse.Namespace) -> int:
 
 
 def _plan(options: argparse.Namespace, systemd: Systemd) -> ServicePlan:
-    """What these options mean. Raises CannotStart."""
+    """Return the service that these options describe. Raise CannotStart."""
     settings.check_environment()  # files of secrets stay named, and are read by the service
     if options.database and ("@" in options.database or "password" in options.database):
         raise CannotStart(
@@ -261,7 +261,7 @@ def _user(options: argparse.Namespace) -> str:
 
 
 def _program() -> tuple[str, ...]:
-    """What starts this program, for as long as it is installed. Raises CannotStart."""
+    """Return the command that starts this program as long as it is installed. Raise CannotStart."""
     python = Path(sys.executable)
     if any(part in {"archive-v0", "environments-v2"} for part in python.parts) or (
         "uv" in python.parts and ".cache" in python.parts
@@ -277,7 +277,8 @@ def _program() -> tuple[str, ...]:
 
 
 def _sourced(environ: Mapping[str, str]) -> dict[str, str]:
-    """What this shell says of ROS 2 and of settings; secrets stay out of a file that all can read."""
+    """Return the shell's ROS 2 environment and settings. Secrets are left out: everybody can read a
+    unit."""
     plain = [name for name in settings.VARIABLES if name not in _SECRET | _SAID]
     return {name: environ[name] for name in (*SOURCED, *plain) if environ.get(name)}
 

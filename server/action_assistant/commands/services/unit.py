@@ -61,9 +61,12 @@ _ENCLOSED: Final = (
 
 
 class ServicePlan(msgspec.Struct, frozen=True, kw_only=True):
-    """What the service is to run. `data` is None for the folder that systemd keeps for it; `words` are
-    options of `serve`; `options` are those of `service install`, by which it can be made again;
-    `writes` are folders beside the data folder that it writes to."""
+    """The content of a service.
+
+    `data` is None for the folder that systemd keeps for it. `words` are options of `serve`,
+    `options` those of `service install` that make the same service again. `writes` lists folders
+    beside the data folder to which the service writes.
+    """
 
     scope: Scope
     program: tuple[str, ...]
@@ -77,7 +80,7 @@ class ServicePlan(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def text_of(plan: ServicePlan) -> str:
-    """The whole unit."""
+    """Return the whole text of the unit."""
     body = "\n".join([*_unit(plan), *_service(plan), *_install(plan), ""])
     head = (
         f"# Made by `action-assistant service install`, version {VERSION}. What you want otherwise\n"
@@ -88,7 +91,7 @@ def text_of(plan: ServicePlan) -> str:
 
 
 def is_untouched(text: str) -> bool:
-    """Whether a unit is as this program wrote it, whichever version."""
+    """Return whether nobody edited a unit since this program, in any version, wrote it."""
     first, _, rest = text.partition("\n")
     return first == f"{_DIGEST}{_digest(rest)}"
 
@@ -190,7 +193,7 @@ class Systemd:
 
     @property
     def unit(self) -> Path:
-        """Where the unit is."""
+        """Return the path of the unit."""
         if self.root is not None:
             return self.root / "etc" / "systemd" / self.scope / NAME
         if self.scope == "system":
@@ -231,7 +234,8 @@ class Systemd:
                 )
 
     def state(self) -> dict[str, str]:
-        """What the manager says of the service; nothing where it cannot be asked."""
+        """Return the properties that the manager reports of the service; empty if it cannot be
+        asked."""
         wanted = "LoadState,ActiveState,SubState,MainPID,NRestarts,UnitFileState,DropInPaths"
         answer = subprocess.run(
             self.command("show", NAME, "--property", wanted),

@@ -36,7 +36,11 @@ class ShownGraph(msgspec.Struct, frozen=True):
 
 
 def changes(before: ShownGraph, after: ShownGraph) -> list[GraphChange]:
-    """What is different. A change that nothing here names, as of an order, is one of the graph."""
+    """Return the differences between two states, one sentence each.
+
+    A difference that has no sentence of its own, for example of an order, is told as a change of
+    the graph.
+    """
     found = [
         *_of_graph(difference((0, before.graph), (0, after.graph))),
         *_of_texts("note", dict(before.graph.notes), dict(after.graph.notes)),

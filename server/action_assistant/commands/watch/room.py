@@ -55,7 +55,7 @@ class _State(msgspec.Struct, frozen=True):
 
 
 class Lines:
-    """Where changes and news of the connection are printed."""
+    """Prints changes to standard output and news of the connection to standard error."""
 
     def __init__(self, *, as_json: bool) -> None:
         self._as_json = as_json
@@ -76,7 +76,8 @@ class Lines:
 
 
 class WatchedGraph:
-    """What is known of the graph: its document, the moment that was told last, and who is who."""
+    """The state of a followed graph: its document, the sequence number that was told last, and
+    people's names."""
 
     def __init__(self, lines: Lines) -> None:
         self._lines = lines
@@ -106,7 +107,7 @@ class WatchedGraph:
 
     @property
     def claims(self) -> dict[str, str]:
-        """What the room is told when it is entered (docs/room-protocol.md 1)."""
+        """Return the query parameters with which the room is entered (docs/room-protocol.md 1)."""
         known = {"epoch": self._epoch, "seq": str(self._seq)} if self._epoch else {}
         return {"acks": "1"} | known
 
@@ -140,7 +141,7 @@ class WatchedGraph:
                     self._names[entry.client] = state.user.name
 
     def _reach(self, seq: int) -> None:
-        """Everything up to a moment is there: tell what is different."""
+        """Tell what changed up to a sequence number, once everything up to it was received."""
         self._seq = seq
         if not self._greeted and self._told is not None:
             self._lines.news(f"Connected again, at moment {seq}.")
@@ -162,7 +163,7 @@ class WatchedGraph:
             self._lines.change(seq, who, change)
 
     def _who_wrote(self) -> list[str]:
-        """Who added something since this was asked last. Who only deleted does not show."""
+        """Return who added content since the last call. People who only deleted are not visible."""
         reader = messages.ByteReader(self.doc.get_state())
         clocks = {reader.number(): reader.number() for _ in range(reader.number())}
         before, self._clocks = self._clocks, clocks
@@ -188,7 +189,7 @@ class QuietSocket(HttpxWebsocket):
         self._ended = ended
 
     async def send(self, message: bytes) -> None:
-        """As the provider asks."""
+        """Send a message of the provider; drop everything but the first step of synchronisation."""
         if message[:2] != bytes((messages.SYNC, messages.STEP_1)):
             return
         try:
@@ -197,7 +198,8 @@ class QuietSocket(HttpxWebsocket):
             self._end(error)
 
     async def recv(self) -> bytes:
-        """As the provider asks, which takes every error for the end and keeps it to itself."""
+        """Return the next message, and keep the error that ends the connection, which the provider
+        drops."""
         try:
             message: bytes = await super().recv()
             self._graph.hear(message)

@@ -27,8 +27,9 @@ _LONGEST: Final = 64 << 20  # characters of one line
 
 
 class Damaged(Refused):
-    """The archive is damaged"""
+    """The content of an archive differs from its checksums."""
 
+    title = "The archive is damaged"
     status = 409
 
 

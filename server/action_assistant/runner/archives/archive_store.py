@@ -32,8 +32,9 @@ _KEPT: Final = 64 << 20  # bytes of events from archives in memory
 
 
 class Archived(Refused):
-    """The run is in an archive that is not here"""
+    """The run was archived, and its archive is not in the folder of archives."""
 
+    title = "The run is in an archive that is not here"
     status = 410
 
 

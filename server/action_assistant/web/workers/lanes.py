@@ -64,15 +64,19 @@ async def run_here(work: Callable[..., T], /, *args: Any) -> T:
 
 
 class Crashed(Unavailable):
-    """What would have worked on this has died"""
+    """The worker process died before it answered."""
+
+    title = "What would have worked on this has died"
 
 
 class OutOfTime(Crashed):
-    """What would have worked on this had no processor time left"""
+    """The worker process used up its processor time before it answered."""
+
+    title = "What would have worked on this had no processor time left"
 
 
 class GaveUp(Unavailable):
-    """Not available now"""
+    """The work took longer than the lane waits, so its worker was killed."""
 
     @property
     def type(self) -> str:
