@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 from itertools import islice
-from typing import Final, Literal
+from typing import Literal
 
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.files.writing import name_order
@@ -20,9 +20,7 @@ from action_assistant.umrf.model import (
     Where,
 )
 from action_assistant.umrf.parameters import example_of, flat_name
-
-#: Problems of one code and severity that are kept.
-MAX_EACH: Final = 1_000
+from action_assistant.umrf.reports import MAX_EACH, ProblemList
 
 
 class Subject:
@@ -31,8 +29,7 @@ class Subject:
     def __init__(self, graph: Graph, facts: EngineFacts) -> None:
         self.graph = graph
         self.facts = facts
-        self.problems: list[Problem] = []
-        self._told: dict[str, int] = {}
+        self._problems = ProblemList()
         self.actions: dict[Key, Action] = {action.key: action for action in graph.actions}
         self.real = [action for action in graph.actions if not action.missing]
         self.paths: dict[Key, str] = {
@@ -61,6 +58,11 @@ class Subject:
         for r in self.sound:
             self.incoming.setdefault(r.child, []).append(r)
             self.outgoing.setdefault(r.parent, []).append(r)
+
+    @property
+    def problems(self) -> list[Problem]:
+        """The problems found so far."""
+        return self._problems.found
 
     def place(self, relation: Relation) -> tuple[int, int]:
         """Where a relation stands in the file: with which action, and there as which."""
@@ -130,9 +132,7 @@ class Subject:
 
         Only the first `MAX_EACH` of one code and severity: more help nobody and fill the memory.
         """
-        kind = f"{severity} {code}"
-        self._told[kind] = self._told.get(kind, 0) + 1
-        if self._told[kind] > MAX_EACH:
+        if not self._problems.has_room(severity, code):
             return
         where = Where(path=member)
         if action is not None:
@@ -140,7 +140,7 @@ class Subject:
         elif relation is not None:
             where = self._where(relation, member, side)
         others = tuple(self._where(other, member, side) for other in islice(also, MAX_EACH))
-        self.problems.append(
+        self._problems.found.append(
             Problem(
                 code=code,
                 severity=severity,

@@ -105,7 +105,7 @@ def translated(file: dict[str, Json], dialect: str) -> Translation:
         case _:
             return Translation(file)
     renumber(old)
-    return Translation(old.file, old.notes.told(), tuple(old.problems), old.origins)
+    return Translation(old.file, old.notes.all(), tuple(old.problems), old.origins)
 
 
 def _from_designer(file: dict[str, Json]) -> Old:

@@ -6,9 +6,10 @@ See docs/umrf-and-the-engine.md 1.5.
 from collections.abc import Iterator
 from typing import Final
 
-from action_assistant.umrf.files.origins import Notes, origin
+from action_assistant.umrf.files.origins import origin
 from action_assistant.umrf.json.text import Json, Number, pointer
 from action_assistant.umrf.model import Problem, Severity, Where
+from action_assistant.umrf.reports import Notes
 
 EFFECTS: Final = {"synchronous": "sync", "asynchronous": "async", "sync": "sync", "async": "async"}
 #: What says how an action stands among others; by itself it has no place.

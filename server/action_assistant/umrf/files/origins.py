@@ -4,40 +4,13 @@ Problems and notes name places of the graph's canonical text, or of a file that 
 from there to the given text, where the place is looked up.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Final, TypeAlias, TypeVar
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TypeAlias, TypeVar
 
 from msgspec.structs import replace
 
 from action_assistant.umrf.json.places import places_of
 from action_assistant.umrf.model import Note, Problem, Where
-
-#: Places of one note that are kept.
-MAX_EACH: Final = 1_000
-
-
-class Notes:
-    """What was translated or left out so far, in the order in which it came first."""
-
-    def __init__(self) -> None:
-        self._places: dict[str, list[Where]] = {}
-        self._times: dict[str, int] = {}
-
-    def add(self, message: str, path: str) -> None:
-        """Says that something was done with what stands at `path`."""
-        places = self._places.setdefault(message, [])
-        if len(places) < MAX_EACH:
-            places.append(Where(path=path))
-        self._times[message] = self._times.get(message, 0) + 1
-
-    def told(self) -> tuple[Note, ...]:
-        """All notes."""
-        return tuple(self._all())
-
-    def _all(self) -> Iterator[Note]:
-        for message, (first, *others) in self._places.items():
-            yield Note(message=message, where=first, times=self._times[message], also=tuple(others))
-
 
 #: Where values came from, in one step: a pointer → the pointer before it. What is not named stands
 #: where what is around it came from.

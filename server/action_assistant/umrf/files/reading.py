@@ -18,7 +18,6 @@ from action_assistant.umrf.files.fields import (
     position_of,
     text_of,
 )
-from action_assistant.umrf.files.origins import Notes
 from action_assistant.umrf.files.waypoints import with_waypoints
 from action_assistant.umrf.json.text import Json, dump, pointer
 from action_assistant.umrf.model import (
@@ -37,9 +36,8 @@ from action_assistant.umrf.model import (
     Where,
 )
 from action_assistant.umrf.relations import conditions_of, remap_of
+from action_assistant.umrf.reports import Notes, ProblemList
 
-#: Problems of one code that are kept.
-MAX_EACH: Final = 1_000
 NODE_STATES: Final = {
     "UNINITIALIZED", "INITIALIZED", "RUNNING", "PAUSE_REQUESTED", "PAUSED", "STOPPING", "FINISHED",
     "BYPASSED", "ERROR",
@@ -99,8 +97,7 @@ class _Item(msgspec.Struct):
 
 class _Reader:
     def __init__(self) -> None:
-        self.problems: list[Problem] = []
-        self.told: dict[str, int] = {}
+        self.problems = ProblemList()
         self.states: dict[Key, str] = {}
         self.actions: list[Action] = []
         self.by_name: dict[_Name, list[int]] = {}
@@ -110,10 +107,10 @@ class _Reader:
         self.origins: dict[str, str] = {}
 
     def report(self, code: str, path: str, message: str) -> None:
-        self.told[code] = self.told.get(code, 0) + 1
-        if self.told[code] <= MAX_EACH:
+        if self.problems.has_room("error", code):
             where = Where(path=path)
-            self.problems.append(Problem(code=code, severity="error", where=where, message=message))
+            problem = Problem(code=code, severity="error", where=where, message=message)
+            self.problems.found.append(problem)
 
     # The graph
 
@@ -146,10 +143,10 @@ class _Reader:
         )
         return Tree(
             with_waypoints(graph, ours.get("waypoints")),
-            tuple(self.problems),
+            tuple(self.problems.found),
             self.states,
             graph_state,
-            self.notes.told(),
+            self.notes.all(),
             self.origins,
         )
 
