@@ -9,7 +9,7 @@ import msgspec
 from action_assistant.commands.client import No, Server, print_json, refused, running
 from action_assistant.runner.analysis.expected_runs import Expectation
 from action_assistant.safe_text import one_line, told
-from action_assistant.umrf.courses.expected import checked
+from action_assistant.umrf.courses.expected import check_expected
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.semantics import script_from
 
@@ -78,7 +78,7 @@ def _verdict(each: Expectation, umrf: bytes, against: Literal["then", "now"]) ->
         return VerifyVerdict(
             name=each.name, run=each.run, against=against, same=False, why=wrong.message
         )
-    check = checked(was, each.course, script, now)
+    check = check_expected(was, each.course, script, now)
     return VerifyVerdict(
         name=each.name, run=each.run, against=against, same=check.apart is None, why=check.why
     )

@@ -76,3 +76,11 @@ def reachable(ways: Sequence[Sequence[int]]) -> list[Mask]:
         for node in members:
             found[node] = mask
     return found
+
+
+def nodes_in(mask: Mask) -> Iterator[int]:
+    """Yield the nodes of a set, the smallest first."""
+    while mask:
+        lowest = mask & -mask
+        yield lowest.bit_length() - 1
+        mask ^= lowest

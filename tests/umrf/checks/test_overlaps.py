@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from action_assistant.umrf.check import check
-from action_assistant.umrf.checks.flow import Reachable
+from action_assistant.umrf.checks.concurrency import Concurrency
+from action_assistant.umrf.checks.flow import Reachability
 from action_assistant.umrf.checks.places import Subject
-from action_assistant.umrf.checks.together import Together
 from action_assistant.umrf.facts import PINNED
 from action_assistant.umrf.files.codec import read
 from action_assistant.umrf.model import Graph, Problem
@@ -53,8 +53,8 @@ def test_what_runs_at_once_in_any_simulation_was_said_to_be_able_to(
     graph: Graph, calls: Calls
 ) -> None:
     subject = Subject(graph, PINNED)
-    reach = Reachable(subject)
-    together = Together(subject, reach.runs, reach.reports)
+    reach = Reachability(subject)
+    together = Concurrency(subject, reach.runs, reach.reports)
     keys = {action.full_name: action.key for action in graph.actions}
     now: set[str] = set()
     for trace in simulate(graph, script=scripted(graph, calls), max_events=400, until_ms=60_000):
@@ -134,10 +134,10 @@ def test_a_pause_of_what_cannot_be_running_then_is_no_pause() -> None:
     assert "only a pause and a resume" in found(beside, "H5")[0].message
 
 
-def together(value: Graph) -> Together:
+def together(value: Graph) -> Concurrency:
     subject = Subject(value, PINNED)
-    reach = Reachable(subject)
-    return Together(subject, reach.runs, reach.reports)
+    reach = Reachability(subject)
+    return Concurrency(subject, reach.runs, reach.reports)
 
 
 def test_what_has_reported_and_is_started_again_runs_beside_what_waited_for_it() -> None:

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from action_assistant.umrf.check import check
 from action_assistant.umrf.checks.trials import Trials
-from action_assistant.umrf.courses.course import Course, Outcome
-from action_assistant.umrf.courses.deviations import Deviations, Tied
+from action_assistant.umrf.courses.baseline import BaselineCourse, Outcome
+from action_assistant.umrf.courses.deviations import DeviatingCourses, SimultaneousEnds
 from action_assistant.umrf.courses.network import Network
-from action_assistant.umrf.courses.whole import whole
+from action_assistant.umrf.courses.simulated import simulated_outcome
 from action_assistant.umrf.files.codec import read
 from action_assistant.umrf.model import (
     ENTRY,
@@ -45,17 +45,17 @@ def test_a_deviation_ends_as_when_the_engine_goes_through_all_of_it(
 ) -> None:
     """In whichever order they are tried: what one comes to is remembered for the others."""
     net = Network(graph, slower_first=slower_first)
-    course = Course(net)
+    course = BaselineCourse(net)
     assume(not course.tied)
-    assert told(course.outcome) == told(whole(net, graph, "", "on_true")[0])
-    deviations = Deviations(course)
+    assert told(course.outcome) == told(simulated_outcome(net, graph, "", "on_true")[0])
+    deviations = DeviatingCourses(course)
     ways = [(name, outcome) for name in net.names for outcome in ("on_false", "on_error")]
     for name, outcome in reversed(ways) if backwards else ways:
         try:
-            found = deviations.outcome(net.place[name], outcome)  # type: ignore[arg-type]
-        except Tied:
+            found = deviations.outcome(net.index[name], outcome)  # type: ignore[arg-type]
+        except SimultaneousEnds:
             continue
-        assert told(found) == told(whole(net, graph, name, outcome)[0]), (name, outcome)
+        assert told(found) == told(simulated_outcome(net, graph, name, outcome)[0]), (name, outcome)
 
 
 def test_what_runs_on_when_the_usual_course_is_finished_is_not_finished_with_it() -> None:
@@ -93,11 +93,11 @@ def test_what_is_not_tried_cannot_end_otherwise(graph: Graph) -> None:
     """An outcome that no child answers in another way is no way of its own."""
     trials = Trials(graph)
     ways = {(t.action.full_name if t.action else "", t.outcome) for t in trials}
-    usual = told(whole(trials.net, graph, "", "on_true")[0])
+    usual = told(simulated_outcome(trials.net, graph, "", "on_true")[0])
     for name in trials.net.names:
         for outcome in ("on_false", "on_error"):
             if (name, outcome) not in ways:
-                assert told(whole(trials.net, graph, name, outcome)[0]) == usual
+                assert told(simulated_outcome(trials.net, graph, name, outcome)[0]) == usual
 
 
 # At any size

@@ -109,10 +109,10 @@ def followed(graph: Graph, course: Recorded) -> tuple[str, dict[str, int]]:
         for place, state in instant.states.items():
             states[place] = state
         instant = Instant(net, states.__getitem__, 0.0, instant.running, instant.active)
-        instant.ends(net.place[name], result)
+        instant.ends(net.index[name], result)
     for place, state in instant.states.items():
         states[place] = state
-    does = {name: states[net.place[name]].does for name in net.names}
+    does = {name: states[net.index[name]].does for name in net.names}
     return instant.end or "", does
 
 

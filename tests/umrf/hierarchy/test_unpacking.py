@@ -7,10 +7,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
+from action_assistant.umrf.hierarchy.equivalence import behaviour_differences
 from action_assistant.umrf.hierarchy.extraction import Extracted, extracted
 from action_assistant.umrf.hierarchy.flattening import Flattened, flattened
 from action_assistant.umrf.hierarchy.inlining import under_keys
-from action_assistant.umrf.hierarchy.likeness import unlike
 from action_assistant.umrf.hierarchy.unpacking import Unpackable, Unpacked, unpacked
 from action_assistant.umrf.model import Conditions, Graph
 from support.doses import examples
@@ -43,7 +43,7 @@ def test_what_was_made_is_unpacked_to_what_there_was(what: str) -> None:
     back = unpacked(made.outer, "new", made.inner)
     assert isinstance(back, Unpacked)
     assert (back.differences, back.left_out) == ((), ())
-    assert list(unlike(graph, again(graph, back))) == []
+    assert list(behaviour_differences(graph, again(graph, back))) == []
     shown = {a.name: (a.position, a.extra) for a in back.graph.actions}
     assert shown == {a.name: (a.position, a.extra) for a in graph.actions}
     assert {a.key for a in back.graph.actions} == {a.key for a in graph.actions}
@@ -78,7 +78,7 @@ def test_any_graph_is_made_and_unpacked_or_it_is_said_why_not() -> None:
             each.code for each in made.differences
         }
         if not made.differences:
-            assert list(unlike(graph, again(graph, back))) == []
+            assert list(behaviour_differences(graph, again(graph, back))) == []
 
     make()
     assert told["back"] > told["all"] / 5
@@ -112,7 +112,7 @@ def test_one_level_unpacked_is_the_flat_graph() -> None:
             if not below and not back.differences:
                 found = flattened(hierarchy.graph, graphs)
                 assert isinstance(found, Flattened)
-                assert list(unlike(by_name(found.graph), by_name(back.graph))) == []
+                assert list(behaviour_differences(by_name(found.graph), by_name(back.graph))) == []
                 told["unpacked"] += 1
 
     unpack()

@@ -18,14 +18,14 @@ from action_assistant.runner.runs.sent_graphs import (
     read_sent,
 )
 from action_assistant.safe_text import hold_names
+from action_assistant.umrf.courses.arrow_search import ArrowReached, ArrowSearch, search_arrow
 from action_assistant.umrf.courses.coverage import (
     ArrowCoverage,
     OutcomeArrow,
     TakenArrows,
     coverage,
 )
-from action_assistant.umrf.courses.expected import checked
-from action_assistant.umrf.courses.reaching import ArrowReached, Reaching, reaching
+from action_assistant.umrf.courses.expected import check_expected
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.json.embedded import JsonObject
 from action_assistant.umrf.model import Graph
@@ -126,7 +126,7 @@ def _checked(
         return told, None
     was = codec.read(saved.umrf.encode()).graph
     script = script_from(msgspec.json.decode(saved.script))
-    check = checked(was, saved.course, script, now, inside or graphs_in(saved.subgraphs))
+    check = check_expected(was, saved.course, script, now, inside or graphs_in(saved.subgraphs))
     same = check.apart is None
     arrows = tuple(sorted(check.taken.arrows))
     told = msgspec.structs.replace(told, same=same, why=check.why, taken=arrows)
@@ -144,7 +144,7 @@ def propose(
         (each.parent, each.child) == (arrow.parent, arrow.child) for each in graph.relations
     ):
         raise BadInput("The graph has no such arrow.", where={"path": "/arrow"})
-    found: Reaching = reaching(graph, arrow, inside=inside)
+    found: ArrowSearch = search_arrow(graph, arrow, inside=inside)
     if isinstance(found, ArrowReached):
         script = msgspec.json.encode(script_json(found.script))
         return ArrowProposal(verdict="reached", script=msgspec.Raw(script))

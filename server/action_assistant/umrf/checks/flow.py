@@ -6,6 +6,7 @@ See docs/umrf-and-the-engine.md 2.3, 2.9 and 2.10; H2, H3, H5, H8 and H9.
 from collections import deque
 from collections.abc import Callable, Collection, Container, Mapping
 
+from action_assistant.umrf.checks.concurrency import Concurrency
 from action_assistant.umrf.checks.overlaps import (
     check_endless,
     check_loading,
@@ -13,7 +14,6 @@ from action_assistant.umrf.checks.overlaps import (
     check_stragglers,
 )
 from action_assistant.umrf.checks.places import Subject, more
-from action_assistant.umrf.checks.together import Together
 from action_assistant.umrf.components import components
 from action_assistant.umrf.json.text import parse_small
 from action_assistant.umrf.model import (
@@ -117,17 +117,17 @@ def check_flow(subject: Subject, nested: Container[str] = frozenset()) -> None:
         message = "No action is connected to the entry: the graph is HALTED as soon as it starts."
         subject.report("no-entry", "error", message, member="/graph_entry")
         return
-    reach = Reachable(subject)
-    together = Together(subject, reach.runs, reach.reports)
-    _check_bypasses(subject, reach)
-    check_responses(subject, reach.reports, together, nested)
-    check_loading(subject, reach.reports, together, nested)
-    _check_waiting(subject, reach)
-    _check_exit(subject, reach)
+    reachability = Reachability(subject)
+    concurrency = Concurrency(subject, reachability.runs, reachability.reports)
+    _check_bypasses(subject, reachability)
+    check_responses(subject, reachability.reports, concurrency, nested)
+    check_loading(subject, reachability.reports, concurrency, nested)
+    _check_waiting(subject, reachability)
+    _check_exit(subject, reachability)
     check_spontaneous(subject)
-    check_instant_loops(subject, reach.runs, reach.reports)
-    check_endless(subject, reach.reports, together)
-    check_stragglers(subject, reach.reports, together)
+    check_instant_loops(subject, reachability.runs, reachability.reports)
+    check_endless(subject, reachability.reports, concurrency)
+    check_stragglers(subject, reachability.reports, concurrency)
 
 
 def _check_sides(subject: Subject) -> None:
@@ -151,7 +151,7 @@ def _check_sides(subject: Subject) -> None:
             subject.report("H2b", severity, message, relation=relation, fix="mirror-relation")
 
 
-def _check_bypasses(subject: Subject, reach: "Reachable") -> None:
+def _check_bypasses(subject: Subject, reachability: "Reachability") -> None:
     """H3: bypasses that can happen, told once."""
     if "H3" not in subject.facts.hazards or subject.facts.bypass_fixed:
         return
@@ -159,7 +159,7 @@ def _check_bypasses(subject: Subject, reach: "Reachable") -> None:
     for relation in sorted(subject.sound, key=subject.place):
         if relation.child == EXIT or relation.parent == ENTRY:
             continue
-        reported = reach.reports.get(relation.parent, set())
+        reported = reachability.reports.get(relation.parent, set())
         outcomes = [
             o for o in PRECONDITIONS if o in reported and relation.conditions.answer(o) == "bypass"
         ]
@@ -177,7 +177,7 @@ def _check_bypasses(subject: Subject, reach: "Reachable") -> None:
     subject.report("H3", "warning", message, relation=first, member="/conditions", also=others)
 
 
-class Reachable:
+class Reachability:
     """What can happen at all: which actions can run, and which can report an end.
 
     `stages` tell in which order: a parent that reports before its child ran is none of a loop.
@@ -248,20 +248,20 @@ def _first(relations: list[Relation]) -> list[Relation]:
     return [relation for relation in relations if not relation.listing]
 
 
-def _check_waiting(subject: Subject, reach: Reachable) -> None:
+def _check_waiting(subject: Subject, reachability: Reachability) -> None:
     """Actions that never run, and why."""
     net: dict[Key, int] = {}
     for number, members in enumerate(loops(subject)):
         net.update(dict.fromkeys(members, number))
     for action in subject.real:
-        if action.key in reach.runs:
+        if action.key in reachability.runs:
             continue
         missing = [
             relation
             for relation in _first(subject.parents.get(action.key, []))
-            if relation.required and not reach.reports.get(relation.parent)
+            if relation.required and not reachability.reports.get(relation.parent)
         ]
-        if action.key not in reach.asked:
+        if action.key not in reachability.asked:
             message = f"{action.full_name} cannot be reached from the entry; it never runs."
             subject.report("unreachable", "warning", message, action=action)
         elif missing:
@@ -294,7 +294,7 @@ def _report_missed_join(
             subject.report("H8", "error", message, relation=relation, member="/required")
 
 
-def _check_exit(subject: Subject, reach: Reachable) -> None:
+def _check_exit(subject: Subject, reachability: Reachability) -> None:
     exits = subject.incoming.get(EXIT, [])
     if not exits:
         message = (
@@ -305,7 +305,7 @@ def _check_exit(subject: Subject, reach: Reachable) -> None:
     if any(problem.code == "H8" for problem in subject.problems):
         return  # why no parent of the exit ends is said already
     for relation in exits:
-        if relation.required and not reach.reports.get(relation.parent):
+        if relation.required and not reachability.reports.get(relation.parent):
             message = (
                 f"The exit waits for {subject.name(relation.parent)}, which never ends: unless "
                 "another way bypasses into the exit, the graph stays RUNNING for ever."

@@ -9,10 +9,11 @@ from typing import Final
 
 import msgspec
 
+from action_assistant.umrf.checks.concurrency import Concurrency
 from action_assistant.umrf.checks.places import Subject, joined, more
-from action_assistant.umrf.checks.together import Together, places
+from action_assistant.umrf.components import nodes_in
 from action_assistant.umrf.courses.network import Network
-from action_assistant.umrf.courses.whole import whole
+from action_assistant.umrf.courses.simulated import simulated_outcome
 from action_assistant.umrf.model import (
     ENTRY,
     EXIT,
@@ -31,7 +32,10 @@ _Reports = Mapping[Key, Collection[Precondition]]
 
 
 def check_responses(
-    subject: Subject, reports: _Reports, together: Together, nested: Container[str] = frozenset()
+    subject: Subject,
+    reports: _Reports,
+    concurrency: Concurrency,
+    nested: Container[str] = frozenset(),
 ) -> None:
     """What a response does to a child that is in the wrong state. `nested`: names of actions that are
     graphs themselves, which run as soon as they are told to."""
@@ -44,8 +48,8 @@ def check_responses(
         met: dict[str, set[Key]] = {}
         for answer in ("pause", "stop"):
             # Only what runs can be paused or stopped, and only then does `run` kill.
-            others = {k for k, o in asking.get(answer, ()) if together.goes_on(key, k, o)}
-            late = {k for k in runs - others if together.may_run(k, key)}
+            others = {k for k, o in asking.get(answer, ()) if concurrency.may_run_at(key, k, o)}
+            late = {k for k in runs - others if concurrency.may_run(k, key)}
             met[answer] = others
             if others and late and key not in killed:
                 killed.add(key)
@@ -58,7 +62,9 @@ def check_responses(
         if met["pause"] and met["stop"]:
             message = f"{subject.name(key)} may be stopped while it is paused: it ends in ERROR after 5 s."
             subject.report("H5", "warning", message, action=subject.actions[key])
-        early = {k for k, o in asking.get("run", ()) if k != key and together.goes_on(key, k, o)}
+        early = {
+            k for k, o in asking.get("run", ()) if k != key and concurrency.may_run_at(key, k, o)
+        }
         if early and key not in killed and subject.name(key).rpartition("_")[0] not in nested:
             message = (
                 f"{_names(subject, early)} may run {subject.name(key)} while it still loads for somebody "
@@ -66,7 +72,7 @@ def check_responses(
             )
             subject.report("H4", "warning", message, action=subject.actions[key])
     for relation in subject.sound:
-        _check_without_effect(subject, relation, reports.get(relation.parent, ()), together)
+        _check_without_effect(subject, relation, reports.get(relation.parent, ()), concurrency)
 
 
 def _asking(
@@ -88,7 +94,10 @@ def _names(subject: Subject, keys: Collection[Key]) -> str:
 
 
 def _check_without_effect(
-    subject: Subject, relation: Relation, reported: Collection[Precondition], together: Together
+    subject: Subject,
+    relation: Relation,
+    reported: Collection[Precondition],
+    concurrency: Concurrency,
 ) -> None:
     if relation.child == EXIT or relation.parent == ENTRY:
         return
@@ -101,7 +110,7 @@ def _check_without_effect(
         message = f"{child} cannot run itself again: it still runs when it is asked."
         subject.report("self-loop", "warning", message, relation=relation, member="/conditions")
     pausing = [o for o, answer in answers.items() if answer == "pause"]
-    if any(together.goes_on(relation.child, relation.parent, o) for o in pausing):
+    if any(concurrency.may_run_at(relation.child, relation.parent, o) for o in pausing):
         message = f"When {parent} pauses {child}, only a pause and a resume of the whole graph wake it again."
         subject.report("H5", "warning", message, relation=relation, member="/conditions")
 
@@ -110,7 +119,10 @@ def _check_without_effect(
 
 
 def check_loading(
-    subject: Subject, reports: _Reports, together: Together, nested: Container[str] = frozenset()
+    subject: Subject,
+    reports: _Reports,
+    concurrency: Concurrency,
+    nested: Container[str] = frozenset(),
 ) -> None:
     """H14: ends that halt the graph beside an action that may still load, told once. `nested` as in
     `check_responses`. Not told of ends with on_error: whatever ignores the errors of one branch would have
@@ -126,7 +138,7 @@ def check_loading(
             listed = subject.outgoing.get(action.key, [])
             if any(r.conditions.answer(outcome) != "ignore" for r in listed) or len(found) > _ENDS:
                 continue
-            if beside := together.at_end(action.key, outcome) - runs_at_once:
+            if beside := concurrency.running_after(action.key, outcome) - runs_at_once:
                 found.append((action, outcome, beside))
     if not found:
         return
@@ -142,7 +154,7 @@ def check_loading(
     subject.report("H14", "warning", message, action=action)
 
 
-def check_endless(subject: Subject, reports: _Reports, together: Together) -> None:
+def check_endless(subject: Subject, reports: _Reports, concurrency: Concurrency) -> None:
     """H12 of spontaneous actions, told once: when the graph is FINISHED they begin again and again, and no
     stop reaches them. An error if that comes when all goes well."""
     lively = {action.key for action in subject.real if action.type == "spontaneous"}
@@ -153,7 +165,7 @@ def check_endless(subject: Subject, reports: _Reports, together: Together) -> No
         left: set[Key] = set()
         outcomes: list[Precondition] = []
         for outcome in PRECONDITIONS:
-            if going := _going_on(subject, relation, outcome, lively, together):
+            if going := _going_on(subject, relation, outcome, lively, concurrency):
                 outcomes.append(outcome)
                 left |= going
         if outcomes and not relation.listing:
@@ -182,14 +194,14 @@ def _going_on(
     relation: Relation,
     outcome: Precondition,
     lively: Collection[Key],
-    together: Together,
+    concurrency: Concurrency,
 ) -> set[Key]:
     """The spontaneous actions that may go on when this way has led to the exit with this outcome."""
     parent = relation.parent
     if relation.conditions.answer(outcome) == "ignore":
         return set()
-    going = together.at_end(parent, outcome)
-    if together.outlasts(parent, outcome):
+    going = concurrency.running_after(parent, outcome)
+    if concurrency.may_outlast(parent, outcome):
         going = going | {parent}
     stopped = {
         r.child for r in subject.outgoing.get(parent, []) if r.conditions.answer(outcome) == "stop"
@@ -207,13 +219,13 @@ def _endless_when_well(graph: Graph) -> set[str]:
     found: list[set[str]] = []
     for slower_first in (False, True):
         net = Network(graph, slower_first=slower_first)
-        end, _ = whole(net, graph, "", "on_true")
+        end, _ = simulated_outcome(net, graph, "", "on_true")
         if end.kind == "finished":
-            found.append({net.names[place] for place in places(end.endless)})
+            found.append({net.names[place] for place in nodes_in(end.endless)})
     return set.intersection(*found) if found else set()
 
 
-class _Early(msgspec.Struct, frozen=True):
+class _EarlyExit(msgspec.Struct, frozen=True):
     """A way to the exit that does not wait for what may still run. `bypassed`: with which outcomes it
     does not wait for anybody."""
 
@@ -223,7 +235,7 @@ class _Early(msgspec.Struct, frozen=True):
     started: bool
 
 
-def check_stragglers(subject: Subject, reports: _Reports, together: Together) -> None:
+def check_stragglers(subject: Subject, reports: _Reports, concurrency: Concurrency) -> None:
     """H12: ways to the exit on which something else may still run, told once."""
     if "H12" not in subject.facts.hazards:
         return
@@ -231,7 +243,7 @@ def check_stragglers(subject: Subject, reports: _Reports, together: Together) ->
     found = [
         early
         for relation in incoming[:_ENDS]
-        if (early := _early(subject, relation, incoming, reports, together)) is not None
+        if (early := _early(subject, relation, incoming, reports, concurrency)) is not None
     ]
     if not found:
         return
@@ -266,8 +278,8 @@ def _early(
     relation: Relation,
     incoming: list[Relation],
     reports: _Reports,
-    together: Together,
-) -> _Early | None:
+    concurrency: Concurrency,
+) -> _EarlyExit | None:
     bypassed: list[Precondition] = []
     left: set[Key] = set()
     others = [r.parent for r in incoming if r.required and r.parent != relation.parent]
@@ -277,8 +289,8 @@ def _early(
         if outcome not in reports.get(relation.parent, ()) or answer == "ignore":
             continue
         waited = () if answer == "bypass" else others
-        around = together.at_end(relation.parent, outcome, waited)
-        if answer == "bypass" and together.outlasts(relation.parent, outcome):
+        around = concurrency.running_after(relation.parent, outcome, waited)
+        if answer == "bypass" and concurrency.may_outlast(relation.parent, outcome):
             around = around | {relation.parent}
         around = {key for key in around if subject.actions[key].type != "spontaneous"}
         begun = _begun(subject, relation.parent, outcome) & around
@@ -287,7 +299,7 @@ def _early(
                 bypassed.append(outcome)
                 left |= around
             continue
-        if not together.known and not begun and (relation.required or len(incoming) == 1):
+        if not concurrency.known and not begun and (relation.required or len(incoming) == 1):
             continue  # it waits for others, and for which is not known
         if not around or _comes_after(subject, relation.parent, others):
             continue
@@ -295,7 +307,7 @@ def _early(
         left |= around
     if not left:
         return None
-    return _Early(relation, frozenset(left), tuple(bypassed), started and not bypassed)
+    return _EarlyExit(relation, frozenset(left), tuple(bypassed), started and not bypassed)
 
 
 def _begun(subject: Subject, key: Key, outcome: Precondition) -> set[Key]:

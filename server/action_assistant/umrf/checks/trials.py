@@ -9,10 +9,10 @@ from typing import Final
 import msgspec
 
 from action_assistant.umrf.checks.places import Subject, joined
-from action_assistant.umrf.courses.course import Course, Outcome
-from action_assistant.umrf.courses.deviations import Deviations, Tied
+from action_assistant.umrf.courses.baseline import BaselineCourse, Outcome
+from action_assistant.umrf.courses.deviations import DeviatingCourses, SimultaneousEnds
 from action_assistant.umrf.courses.network import Network
-from action_assistant.umrf.courses.whole import whole
+from action_assistant.umrf.courses.simulated import simulated_outcome
 from action_assistant.umrf.fixes import with_optional_outputs
 from action_assistant.umrf.model import EXIT, Action, Graph, Key, Precondition, Relation, Severity
 from action_assistant.umrf.semantics.parts import exit_inputs, exit_owner
@@ -67,21 +67,21 @@ class Trials:
         self._left = ""
 
     def __iter__(self) -> Iterator[Trial]:
-        course = None if self._plainly else Course(self.net)
+        course = None if self._plainly else BaselineCourse(self.net)
         if course is not None and course.tied:
             course = None
         usual = course.outcome if course is not None else self._whole("", "on_true")
         yield self._noted(Trial(None, "", usual))
         if usual.kind == "never":
             self._others = []
-        deviations = Deviations(course) if course is not None and self._others else None
-        for place, outcome in self._others:
+        deviations = DeviatingCourses(course) if course is not None and self._others else None
+        for index, outcome in self._others:
             work = deviations.work if deviations is not None else 0
             if self._spent + work > BUDGET or len(self.net.nodes) > MAX_ACTIONS:
-                self._left = f"{self.net.names[place]} with {outcome}"
+                self._left = f"{self.net.names[index]} with {outcome}"
                 return
-            end = self._deviating(deviations, place, outcome)
-            yield self._noted(Trial(self.actions[self.net.names[place]], outcome, end))
+            end = self._deviating(deviations, index, outcome)
+            yield self._noted(Trial(self.actions[self.net.names[index]], outcome, end))
 
     def coverage(self) -> Coverage:
         """What has been looked at, once all was asked for."""
@@ -94,17 +94,17 @@ class Trials:
         return trial
 
     def _deviating(
-        self, deviations: Deviations | None, place: int, outcome: Precondition
+        self, deviations: DeviatingCourses | None, index: int, outcome: Precondition
     ) -> Outcome:
         if deviations is not None:
             try:
-                return deviations.outcome(place, outcome)
-            except Tied:
+                return deviations.outcome(index, outcome)
+            except SimultaneousEnds:
                 pass  # the engine knows the order
-        return self._whole(self.net.names[place], outcome)
+        return self._whole(self.net.names[index], outcome)
 
     def _whole(self, full_name: str, outcome: Precondition) -> Outcome:
-        end, events = whole(self.net, self.graph, full_name, outcome)
+        end, events = simulated_outcome(self.net, self.graph, full_name, outcome)
         self._spent += _EVENT * events
         return end
 
@@ -112,14 +112,14 @@ class Trials:
         """What can make a difference: children that answer otherwise, or are bypassed and pass the
         outcome on, or outputs that are missed."""
         found: list[tuple[int, Precondition]] = []
-        for place, row in enumerate(self.net.edges):
+        for index, row in enumerate(self.net.edges):
             edges = [edge for edge in row if edge is not None]
             gives = any(edge.given is None or edge.given[1] for edge in edges)
             for outcome in _OTHERWISE:
                 answers = [(e.responses[outcome], e.responses["on_true"]) for e in edges]
                 differs = any(other != usual or other == "bypass" for other, usual in answers)
                 if differs or (gives and outcome == "on_error"):
-                    found.append((place, outcome))
+                    found.append((index, outcome))
         return found
 
 
@@ -173,13 +173,13 @@ class _Waiting:
         inside = trial.end.waiting & ~(1 << self.net.exit)
         if not inside and trial.end.waiting:
             return False
-        place = self._first(inside) if inside else -1
-        if place in self._told:
+        index = self._first(inside) if inside else -1
+        if index in self._told:
             return True
-        self._told.add(place)
-        words = self._words(place)
+        self._told.add(index)
+        words = self._words(index)
         if words is not None:
-            action = self.actions[self.net.names[place]] if place >= 0 else trial.action
+            action = self.actions[self.net.names[index]] if index >= 0 else trial.action
             message = f"{trial.when}, the graph stays RUNNING for ever: {words}."
             self.subject.report("H8", "warning", message, action=action)
         return True
@@ -196,15 +196,15 @@ class _Waiting:
             self._firsts[waiting] = (first & -first).bit_length() - 1
         return self._firsts[waiting]
 
-    def _words(self, place: int) -> str | None:
-        if place < 0:
+    def _words(self, index: int) -> str | None:
+        if index < 0:
             return "nothing runs any more"
-        name = self.net.names[place]
-        if not self.net.wants[place] & ~self.net.has[place]:
+        name = self.net.names[index]
+        if not self.net.wants[index] & ~self.net.has[index]:
             return f"{name} still waits for parents that are required and did not run"
         if any("pvf_allowed_values" in p.text for a in self.subject.real for p in a.inputs):
             return None  # which values actions give is not known
-        if not self.net.needs[place]:
+        if not self.net.needs[index]:
             return f"{name} still waits for inputs"
         return f"{name} still waits for parents that are required, or for inputs"
 

@@ -76,7 +76,7 @@ def outcomes_of(relation: Relation) -> list[Precondition]:
     return [o for o in PRECONDITIONS if relation.conditions.answer(o) != "ignore"]
 
 
-def taken(graph: Graph, traces: Iterable[Trace]) -> TakenArrows:
+def arrows_taken(graph: Graph, traces: Iterable[Trace]) -> TakenArrows:
     """What a course of this graph took. What happens in its sub-graphs is theirs."""
     keys = {a.full_name: a.key for a in graph.actions if not a.missing}
     ends = keys | {ENTRY_NODE: ENTRY, EXIT_NODE: EXIT}

@@ -12,7 +12,7 @@ from heapq import heappop, heappush
 from typing import Final
 
 from action_assistant.umrf.components import Mask
-from action_assistant.umrf.courses.course import LAPS, MORE, Course, Outcome, stuck
+from action_assistant.umrf.courses.baseline import LAPS, MORE, BaselineCourse, Outcome, stuck
 from action_assistant.umrf.courses.instants import DUE, Instant, State
 from action_assistant.umrf.model import Precondition
 from action_assistant.umrf.semantics.transitions import ACTIVE, IDLE, RUNS
@@ -21,17 +21,17 @@ from action_assistant.umrf.semantics.transitions import ACTIVE, IDLE, RUNS
 _FEW: Final = 8
 
 
-class Tied(Exception):
+class SimultaneousEnds(Exception):
     """Two actions end at one moment, in an order that is known to the engine only."""
 
 
 _Key = tuple[int, frozenset[tuple[int, State]]]
 
 
-class Deviations:
+class DeviatingCourses:
     """Courses beside the usual one. `work`: states that were looked at, the measure of what it took."""
 
-    def __init__(self, course: Course) -> None:
+    def __init__(self, course: BaselineCourse) -> None:
         self.course = course
         self.net = course.net
         self.work = 0
@@ -46,25 +46,25 @@ class Deviations:
     def _note_alone(self, number: int) -> None:
         """The usual course is one that came there, too."""
         course = self.course
-        for place in course.touched[number]:
-            if place == self.net.exit or course.state(place, number + 1).does != RUNS:
+        for index in course.touched[number]:
+            if index == self.net.exit or course.state(index, number + 1).does != RUNS:
                 continue
-            if place not in self.alone and not course.came[number] & self.net.reachable[place]:
-                self.alone[place] = course.outcome
+            if index not in self.alone and not course.came[number] & self.net.reachable[index]:
+                self.alone[index] = course.outcome
 
-    def outcome(self, place: int, result: Precondition) -> Outcome:
+    def outcome(self, index: int, result: Precondition) -> Outcome:
         """How a graph ends in which the first run of an action ends with `result`."""
-        instant = self.course.first_end(place)
+        instant = self.course.first_end(index)
         if instant is None:
             return self.course.outcome
-        return _Way(self).followed(instant, result)
+        return _DeviatingCourse(self).followed(instant, result)
 
 
-class _Way:
+class _DeviatingCourse:
     """One course that differs. `apart`: the states that do, by place; `forgotten`: who waits of those
     that nothing can reach any more."""
 
-    def __init__(self, all_: Deviations) -> None:
+    def __init__(self, all_: DeviatingCourses) -> None:
         self.all = all_
         self.course = all_.course
         self.net = all_.net
@@ -101,11 +101,11 @@ class _Way:
             at = self._queue[0][0]
             root = -1
             while self._queue and self._queue[0][0] == at:
-                place = heappop(self._queue)[1]
-                if place >= 0 and self._is_due(place, at):
-                    if root not in (-1, place):
-                        raise Tied
-                    root = place
+                index = heappop(self._queue)[1]
+                if index >= 0 and self._is_due(index, at):
+                    if root not in (-1, index):
+                        raise SimultaneousEnds
+                    root = index
             found = self._at(at, root, "on_true")
             if found is None and root >= 0 and self._is_over and self._is_lap(at, root):
                 found = Outcome("endless")
@@ -123,12 +123,12 @@ class _Way:
     def _differing(self, at: float) -> dict[int, State]:
         start = at // self.net.round_ms * self.net.round_ms
         return {
-            place: state._replace(due=state.due - start) if state.does in DUE else state
-            for place, state in self.apart.items()
+            index: state._replace(due=state.due - start) if state.does in DUE else state
+            for index, state in self.apart.items()
         }
 
-    def _is_due(self, place: int, at: float) -> bool:
-        state = self.apart.get(place)
+    def _is_due(self, index: int, at: float) -> bool:
+        state = self.apart.get(index)
         return state is not None and state.does in DUE and state.due == at
 
     def _push(self, instant: int) -> None:
@@ -150,7 +150,7 @@ class _Way:
             before = here - 1
             running = course.running[before] + self._running
             instant = Instant(
-                self.net, lambda place: self._state(place, here), at, running,
+                self.net, lambda index: self._state(index, here), at, running,
                 course.active[before] + self._active,
             )  # fmt: skip
             instant.ends(root, result)
@@ -161,9 +161,9 @@ class _Way:
                 return Outcome(instant.end, instant.early)
         after = here + usual
         touched = course.touched[here] if usual else ()
-        for place in states.keys() | touched:
-            own = states.get(place)
-            self._compare(place, own if own is not None else self._state(place, here), after)
+        for index in states.keys() | touched:
+            own = states.get(index)
+            self._compare(index, own if own is not None else self._state(index, here), after)
         self.all.work += 1 + len(touched)
         self._await_halt(after)
         if course.active[after - 1] + self._active == 0:
@@ -181,35 +181,35 @@ class _Way:
         if usually in self.apart:
             return root
         if root not in (-1, usually):
-            raise Tied
+            raise SimultaneousEnds
         return usually
 
-    def _state(self, place: int, before: int) -> State:
-        own = self.apart.get(place)
-        return own if own is not None else self.course.state(place, before)
+    def _state(self, index: int, before: int) -> State:
+        own = self.apart.get(index)
+        return own if own is not None else self.course.state(index, before)
 
-    def _compare(self, place: int, state: State, after: int) -> None:
+    def _compare(self, index: int, state: State, after: int) -> None:
         """Whether a state is the usual one now."""
-        usual = self.course.state(place, after)
-        running, active = self._sums.pop(place, (0, 0))
+        usual = self.course.state(index, after)
+        running, active = self._sums.pop(index, (0, 0))
         self._running -= running
         self._active -= active
         if state == usual and not (self._is_over and state.does in DUE):
-            if self.apart.pop(place, None) is not None:
-                self.mask ^= 1 << place
+            if self.apart.pop(index, None) is not None:
+                self.mask ^= 1 << index
             return
-        if place not in self.apart:
-            self.mask |= 1 << place
-        self._own(place, state)
+        if index not in self.apart:
+            self.mask |= 1 << index
+        self._own(index, state)
         sums = (
             (state.does == RUNS) - (usual.does == RUNS),
             (state.does in ACTIVE) - (usual.does in ACTIVE),
         )
         if sums != (0, 0):
-            self._sums[place] = sums
+            self._sums[index] = sums
             self._running += sums[0]
             self._active += sums[1]
-        instants = self.course.instants[place]
+        instants = self.course.instants[index]
         following = bisect_left(instants, after)
         if following < len(instants):
             self._push(instants[following])
@@ -222,27 +222,27 @@ class _Way:
             if following < len(halting):
                 self._push(halting[following])
 
-    def _own(self, place: int, state: State) -> None:
-        old = self.apart.get(place)
-        self.apart[place] = state
+    def _own(self, index: int, state: State) -> None:
+        old = self.apart.get(index)
+        self.apart[index] = state
         if state.does in DUE and (old is None or old.due != state.due or old.does != state.does):
-            heappush(self._queue, (state.due, place))
+            heappush(self._queue, (state.due, index))
 
     def _beyond(self) -> Outcome | None:
         """The usual course has ended, or was followed no further; this one has not ended."""
         course = self.course
         end = len(course.times)
         if course.outcome.kind == "endless":
-            places = range(len(self.net.nodes))
-            due = any(self._state(place, end).does in DUE for place in places)
+            indices = range(len(self.net.nodes))
+            due = any(self._state(index, end).does in DUE for index in indices)
             return Outcome("endless", cut=True) if due else self._quiet(end)
         if not self._is_over:
             self._is_over = True
-            for place in range(len(self.net.nodes)):
-                state = course.state(place, end)
-                if place not in self.apart and state.does in DUE:
-                    self.mask |= 1 << place
-                    self._own(place, state)
+            for index in range(len(self.net.nodes)):
+                state = course.state(index, end)
+                if index not in self.apart and state.does in DUE:
+                    self.mask |= 1 << index
+                    self._own(index, state)
         return self._as_before(end)
 
     # What is left of the difference
@@ -253,36 +253,36 @@ class _Way:
         course = self.course
         lively: Mask = 0
         idle: list[int] = []
-        for place, state in self.apart.items():
-            instants = course.instants[place]
+        for index, state in self.apart.items():
+            instants = course.instants[index]
             if state.does in ACTIVE or (instants and instants[-1] >= after):
-                lively |= self._behind(place)
-            elif place != self.net.exit and course.state(place, after).does == IDLE:
-                idle.append(place)
+                lively |= self._behind(index)
+            elif index != self.net.exit and course.state(index, after).does == IDLE:
+                idle.append(index)
         self.all.work += len(self.apart)
-        for place in idle:
-            if not lively >> place & 1:
-                self._drop(place)
+        for index in idle:
+            if not lively >> index & 1:
+                self._drop(index)
         if not self.apart:
             return self._joined(
                 course.outcome, self.forgotten | course.outcome.waiting & ~self.dropped
             )
         return self._as_before(after)
 
-    def _behind(self, place: int) -> Mask:
-        return 0 if place == self.net.exit else self.net.reachable[place]
+    def _behind(self, index: int) -> Mask:
+        return 0 if index == self.net.exit else self.net.reachable[index]
 
-    def _drop(self, place: int) -> None:
-        state = self.apart.pop(place)
-        self.mask ^= 1 << place
-        self.dropped |= 1 << place
+    def _drop(self, index: int) -> None:
+        state = self.apart.pop(index)
+        self.mask ^= 1 << index
+        self.dropped |= 1 << index
         if state.waiting:
-            self.forgotten |= 1 << place
+            self.forgotten |= 1 << index
 
     def _as_before(self, after: int) -> Outcome | None:
         """What another course came to from the same point."""
         if self.course.active[after - 1] + self._active == 1:
-            alone = [place for place, state in self.apart.items() if state.does == RUNS]
+            alone = [index for index, state in self.apart.items() if state.does == RUNS]
             if alone and self._is_fresh(alone[0], after):
                 known = self.all.alone.get(alone[0])
                 if known is not None:
@@ -296,9 +296,9 @@ class _Way:
             self._met.append((key, self.forgotten, self.dropped))
         return None
 
-    def _is_fresh(self, place: int, after: int) -> bool:
+    def _is_fresh(self, index: int, after: int) -> bool:
         """Whether everything behind a running action is as at the start."""
-        behind = self.net.reachable[place]
+        behind = self.net.reachable[index]
         if self.course.came[after - 1] & behind & ~self.mask:
             return False
         initial = self.course.initial
@@ -307,7 +307,7 @@ class _Way:
         )
 
     def _waiting(self, after: int) -> Mask:
-        own = sum(1 << place for place, state in self.apart.items() if state.waiting)
+        own = sum(1 << index for index, state in self.apart.items() if state.waiting)
         usual = self.course.waiting[after - 1] & ~(self.mask | self.dropped)
         return usual | own | self.forgotten
 
@@ -319,9 +319,9 @@ class _Way:
             self.net, self._waiting(after), self._state(self.net.exit, after), self._last()
         )
 
-    def _came_alone(self, place: int, known: Outcome, after: int) -> Outcome:
+    def _came_alone(self, index: int, known: Outcome, after: int) -> Outcome:
         """What is not behind the one that runs stays as it is."""
-        behind = self.net.reachable[place]
+        behind = self.net.reachable[index]
         waiting = self._waiting(after) | known.waiting & behind
         if known.kind == "stuck" and not behind >> self.net.exit & 1:
             return self._quiet(after)._replace(waiting=waiting)
@@ -343,8 +343,8 @@ class _Way:
         return self.last if self.last >= 0 else self.course.last[-1]
 
     def _remembered(self, found: Outcome) -> Outcome:
-        for place in self._passed:
-            self.all.alone.setdefault(place, found)
+        for index in self._passed:
+            self.all.alone.setdefault(index, found)
         for key, forgotten, dropped in self._met:
             kept = found._replace(waiting=found.waiting & ~forgotten)
             self.all.known.setdefault(key, (kept, dropped))

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 import msgspec
 from msgspec.structs import replace
 
-from action_assistant.umrf.courses.coverage import TakenArrows, taken
+from action_assistant.umrf.courses.coverage import TakenArrows, arrows_taken
 from action_assistant.umrf.facts import SIMULATED
 from action_assistant.umrf.files.fields import AID
 from action_assistant.umrf.model import Graph, Key
@@ -39,7 +39,7 @@ class CourseCheck(msgspec.Struct, frozen=True):
         return f"Step {self.apart.place + 1}: expected {expected}, found {found}."
 
 
-def checked(
+def check_expected(
     was: Graph,
     course: Sequence[ExpectedStep],
     script: Script,
@@ -65,7 +65,7 @@ def checked(
     )
     apart = departure(keyed(unnamed(course), old), keyed(unnamed(steps_of(traces)), new))
     names = {key: name for name, key in old.items()} | names
-    return CourseCheck(None if apart is None else _named(apart, names), taken(now, traces))
+    return CourseCheck(None if apart is None else _named(apart, names), arrows_taken(now, traces))
 
 
 def _identities(was: Graph, now: Graph) -> dict[str, Key]:

@@ -79,43 +79,43 @@ class Instant:
         self._inform(-1, "on_true", self._net.entry)
         self._settle()
 
-    def ends(self, place: int, result: Precondition) -> None:
+    def ends(self, index: int, result: Precondition) -> None:
         """The action that runs, stops or is given up here ends; `result`: of one that runs."""
-        state = self._state(place)
+        state = self._state(index)
         match state.does:
             case 1:
-                self._returns(place, state, result)
+                self._returns(index, state, result)
             case 2:
-                self._returns(place, state, "on_stopped")
+                self._returns(index, state, "on_stopped")
             case _:
-                self._put(place, state._replace(does=THREAD_LEFT, due=0.0))
-                self._inform(place, "on_error", self._net.edges[place])
+                self._put(index, state._replace(does=THREAD_LEFT, due=0.0))
+                self._inform(index, "on_error", self._net.edges[index])
         self._settle()
 
-    def _returns(self, place: int, state: State, result: Precondition) -> None:
+    def _returns(self, index: int, state: State, result: Precondition) -> None:
         failed = result == "on_error"
         does = IDLE if failed else state.does
-        self._put(place, state._replace(does=does, filled=state.filled or not failed))
-        self._returning = place
-        self._inform(place, result, self._net.edges[place])
+        self._put(index, state._replace(does=does, filled=state.filled or not failed))
+        self._returning = index
+        self._inform(index, result, self._net.edges[index])
         self._returning = -1
         if self.end == "crashed":
             return
-        state = self._state(place)
+        state = self._state(index)
         does = state.does if failed else IDLE  # one that failed may have begun anew
         due = state.due if does else 0.0
-        self._put(place, state._replace(does=does, due=due, has=state.has & ~state.got, got=0))
+        self._put(index, state._replace(does=does, due=due, has=state.has & ~state.got, got=0))
 
-    def _state(self, place: int) -> State:
-        state = self.states.get(place)
-        return self._read(place) if state is None else state
+    def _state(self, index: int) -> State:
+        state = self.states.get(index)
+        return self._read(index) if state is None else state
 
-    def _put(self, place: int, state: State) -> None:
-        old = self._state(place).does
+    def _put(self, index: int, state: State) -> None:
+        old = self._state(index).does
         if old != state.does:
             self.running += (state.does == RUNS) - (old == RUNS)
             self.active += (state.does in ACTIVE) - (old in ACTIVE)
-        self.states[place] = state
+        self.states[index] = state
 
     def _settle(self) -> None:
         if self._tasks and self._only_ends():
@@ -123,41 +123,41 @@ class Instant:
             self.early = self.active > 0
             return
         while self._tasks and self.end is None:
-            place, result = self._tasks.popleft()
-            self._inform(place, result, self._net.edges[place])
+            index, result = self._tasks.popleft()
+            self._inform(index, result, self._net.edges[index])
         if self.end is None and self._bypassed:
             circling = self._net.circling
-            if any(circling[result] >> place & 1 for place, result in self._bypassed):
+            if any(circling[result] >> index & 1 for index, result in self._bypassed):
                 self.end = "locked"
 
     def _only_ends(self) -> bool:
         """Whether these bypasses do nothing but lead to the exit, however far."""
         plain, ends = self._net.plain, self._net.ends
-        if not any(ends[result] >> place & 1 for place, result in self._tasks):
+        if not any(ends[result] >> index & 1 for index, result in self._tasks):
             return False
-        if any(not plain[result] >> place & 1 for place, result in self._tasks):
+        if any(not plain[result] >> index & 1 for index, result in self._tasks):
             return False
         # Whoever leads to the exit may run itself, and would not be one of the others then.
         return not self.active or not any(
-            self._state(place).does in ACTIVE for place in self._net.last
+            self._state(index).does in ACTIVE for index in self._net.last
         )
 
-    def _inform(self, place: int, result: Precondition, edges: list[EdgeQuestion | None]) -> None:
+    def _inform(self, index: int, result: Precondition, edges: list[EdgeQuestion | None]) -> None:
         ignored = 0
         for edge in edges:
             if edge is None:
                 self.end = "crashed"
                 return
-            ignored += self._ask(place, edge, result)
+            ignored += self._ask(index, edge, result)
             if self.end is not None:
                 return
-        own = place >= 0 and self._state(place).does == RUNS
+        own = index >= 0 and self._state(index).does == RUNS
         if ignored == len(edges):
             self.others.append(self.running - own)
             if self.running == own:
                 self.end = "halted"
 
-    def _ask(self, place: int, edge: EdgeQuestion, result: Precondition) -> bool:
+    def _ask(self, index: int, edge: EdgeQuestion, result: Precondition) -> bool:
         """One edge; whether the child ignores it."""
         child, net = edge.child, self._net
         before = state = self._state(child)
@@ -168,12 +168,12 @@ class Instant:
             if state is not before or child not in self.states:
                 self.states[child] = state
             if response == "bypass":
-                self._bypass(place, child, result)
+                self._bypass(index, child, result)
             return response == "ignore"
         if edge.given is None:
             self.end = "crashed"
             return False
-        given = edge.given[place >= 0 and self._state(place).filled]
+        given = edge.given[index >= 0 and self._state(index).filled]
         ready = not net.needs[child] & ~state.links and not net.wants[child] & ~(state.has | given)
         if given or state.waiting == ready:
             has, got = state.has | given, state.got | given
@@ -181,26 +181,26 @@ class Instant:
         self.states[child] = state
         if child == net.exit:
             if ready:
-                self._finish(place)
+                self._finish(index)
             else:
-                self.last = place
+                self.last = index
         elif ready:
             self._dispatch(child, state, response)
         return False
 
-    def _bypass(self, place: int, child: int, result: Precondition) -> None:
+    def _bypass(self, index: int, child: int, result: Precondition) -> None:
         """What a bypass of one action with one result does is done once: that it comes by several
         ways changes nothing."""
         if child == self._net.exit:
-            self._finish(place)
+            self._finish(index)
         elif (child, result) not in self._bypassed:
             self._bypassed.add((child, result))
             self._tasks.append((child, result))
 
-    def _finish(self, place: int) -> None:
+    def _finish(self, index: int) -> None:
         self.end = "finished"
         # One that was bypassed while it runs goes on.
-        own = place == self._returning >= 0 and self._state(place).does in ACTIVE
+        own = index == self._returning >= 0 and self._state(index).does in ACTIVE
         self.early = self.active > own
 
     def _dispatch(self, child: int, state: State, response: Response) -> None:

@@ -51,7 +51,7 @@ class Network:
         count = len(self.nodes)
         self.exit = count
         self.names = [node.full_name for node in self.nodes]
-        self.place = {name: number for number, name in enumerate(self.names)}
+        self.index = {name: number for number, name in enumerate(self.names)}
         self.able = [node.name not in RESERVED for node in self.nodes]
         self.round_ms = ROUND_MS * (1 + count // 8_000)
         late = range(count, 0, -1) if slower_first else range(1, count + 1)
@@ -71,21 +71,21 @@ class Network:
             sum(own[name] for name, slot in node.inputs.items() if slot.has_value())
             for node, own in zip(every, slots, strict=True)
         ]
-        places = {id(node): number for number, node in enumerate(every)}
+        indices = {id(node): number for number, node in enumerate(every)}
         empty: dict[str, Slot] = {}
-        self.entry = [_asked(edge, running.entry, (empty, empty), places, bits, slots) for edge in running.entry.children]  # fmt: skip
+        self.entry = [_asked(edge, running.entry, (empty, empty), indices, bits, slots) for edge in running.entry.children]  # fmt: skip
         self.edges: list[list[EdgeQuestion | None]] = []
         self._bypasses: dict[Precondition, dict[int, list[int]]] = {}
         for node in self.nodes:
             before = {name: slot for name, slot in node.outputs.items() if slot.has_value()}
             kinds = before, node.outputs
-            row = [_asked(edge, node, kinds, places, bits, slots) for edge in node.children]
+            row = [_asked(edge, node, kinds, indices, bits, slots) for edge in node.children]
             fill_outputs(node.outputs, None)
             self.edges.append(row)
 
-    def due(self, place: int, now_ms: float) -> float:
+    def due(self, index: int, now_ms: float) -> float:
         """When an action that begins now ends: each at its own time of the next round."""
-        return (now_ms // self.round_ms + 1) * self.round_ms + self.late[place]
+        return (now_ms // self.round_ms + 1) * self.round_ms + self.late[index]
 
     @cached_property
     def reachable(self) -> list[Mask]:
@@ -112,12 +112,12 @@ class Network:
     def last(self) -> list[int]:
         """The actions with an arrow to the exit."""
         rows = enumerate(self.edges)
-        return [place for place, row in rows if any(e and e.child == self.exit for e in row)]
+        return [index for index, row in rows if any(e and e.child == self.exit for e in row)]
 
     def _plain(self, outcome: Precondition) -> Mask:
         other = {
-            place
-            for place, row in enumerate(self.edges)
+            index
+            for index, row in enumerate(self.edges)
             if not all(e and e.responses[outcome] in ("bypass", "ignore") for e in row)
             or all(e and e.responses[outcome] == "ignore" for e in row)
         }
@@ -128,20 +128,20 @@ class Network:
         """Who leads to one of these by bypasses, and they themselves."""
         found, stack = set(to), list(to)
         while stack:
-            for place in self._bypassing(outcome).get(stack.pop(), ()):
-                if place not in found:
-                    found.add(place)
-                    stack.append(place)
-        return sum(1 << place for place in found)
+            for index in self._bypassing(outcome).get(stack.pop(), ()):
+                if index not in found:
+                    found.add(index)
+                    stack.append(index)
+        return sum(1 << index for index in found)
 
     def _bypassing(self, outcome: Precondition) -> dict[int, list[int]]:
         """Who bypasses whom, by the one that is bypassed."""
         if outcome not in self._bypasses:
             found: dict[int, list[int]] = {}
-            for place, row in enumerate(self.edges):
+            for index, row in enumerate(self.edges):
                 for e in row:
                     if e is not None and e.responses[outcome] == "bypass":
-                        found.setdefault(e.child, []).append(place)
+                        found.setdefault(e.child, []).append(index)
             self._bypasses[outcome] = found
         return self._bypasses[outcome]
 
@@ -152,7 +152,7 @@ class Network:
         ]
         if not any(ways):
             return 0
-        return sum(1 << place for place, mask in enumerate(reachable(ways)) if mask >> place & 1)
+        return sum(1 << index for index, mask in enumerate(reachable(ways)) if mask >> index & 1)
 
 
 def _bits(node: Node) -> dict[str, Mask]:
@@ -164,7 +164,7 @@ def _asked(
     edge: Edge,
     parent: Node,
     outputs: tuple[dict[str, Slot], dict[str, Slot]],
-    places: dict[int, int],
+    indices: dict[int, int],
     bits: Sequence[dict[str, Mask]],
     slots: Sequence[dict[str, Mask]],
 ) -> EdgeQuestion | None:
@@ -172,7 +172,7 @@ def _asked(
     link = edge.child.links.get(parent.full_name) if edge.child is not None else None
     if edge.child is None or link is None:
         return None
-    child = places[id(edge.child)]
+    child = indices[id(edge.child)]
     responses = {o: link.conditions.answer(o) for o in PRECONDITIONS}
     bit = bits[child].get(parent.full_name, 0)
     try:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from msgspec.structs import replace
 
-from action_assistant.umrf.hierarchy.joint_parts import Unjoined, in_order, names_of, renaming
+from action_assistant.umrf.hierarchy.joint_parts import JoinRefused, in_order, names_of, renaming
 from action_assistant.umrf.hierarchy.reasons import FlatteningReason, HierarchyLevel
 from action_assistant.umrf.json.text import Json, dump, parse_small
 from action_assistant.umrf.model import (
@@ -36,7 +36,7 @@ from action_assistant.umrf.semantics.values import RemapUnknown, renamed, slots_
 from action_assistant.umrf.signatures import action_of_graph
 
 
-class Border(NamedTuple):
+class Selection(NamedTuple):
     """Arrows of a graph by where they stand to the chosen actions; `leading` those that come from each of
     them. `entries`: the chosen actions to which others lead, or that nothing leads to where no arrow comes in
     at all."""
@@ -71,7 +71,7 @@ class Border(NamedTuple):
         return any(r.conditions.answer(outcome) != "ignore" for r in ways)
 
 
-def border_of(graph: Graph, chosen: Collection[Key]) -> Border:
+def selection_of(graph: Graph, chosen: Collection[Key]) -> Selection:
     """The border around these actions."""
     actions = {action.key: action for action in graph.actions if action.key in chosen}
     inside, ordered = actions.keys(), in_order(graph.relations, by_parent=False)
@@ -87,25 +87,25 @@ def border_of(graph: Graph, chosen: Collection[Key]) -> Border:
         leading.setdefault(relation.parent, []).append(relation)
     reached = {r.child for r in (into or within)}
     entries = tuple(key for key in actions if (key in reached) == bool(into))
-    return Border(graph, actions, into, within, out, entries, leading)
+    return Selection(graph, actions, into, within, out, entries, leading)
 
 
-def between(border: Border) -> Iterator[FlatteningReason]:
+def between(selection: Selection) -> Iterator[FlatteningReason]:
     """What was not chosen though ways lead over it from chosen actions to others."""
     ahead, back = dict[Key, list[Key]](), dict[Key, list[Key]]()
-    for relation in border.graph.relations:
+    for relation in selection.graph.relations:
         ahead.setdefault(relation.parent, []).append(relation.child)
         back.setdefault(relation.child, []).append(relation.parent)
-    there = _reached(border, ahead) & _reached(border, back)
-    for action in border.graph.actions:
-        if action.key in there and action.key not in border.chosen:
-            at = (HierarchyLevel(border.graph.name, action.key, action.full_name),)
+    there = _reached(selection, ahead) & _reached(selection, back)
+    for action in selection.graph.actions:
+        if action.key in there and action.key not in selection.chosen:
+            at = (HierarchyLevel(selection.graph.name, action.key, action.full_name),)
             yield FlatteningReason("between", "It lies between them and is not chosen.", at)
 
 
-def _reached(border: Border, ways: Mapping[Key, Sequence[Key]]) -> set[Key]:
+def _reached(selection: Selection, ways: Mapping[Key, Sequence[Key]]) -> set[Key]:
     found: set[Key] = set()
-    stack = list(border.chosen)
+    stack = list(selection.chosen)
     while stack:
         for key in ways.get(stack.pop(), ()):
             if key not in found:
@@ -114,45 +114,45 @@ def _reached(border: Border, ways: Mapping[Key, Sequence[Key]]) -> set[Key]:
     return found
 
 
-def ways_in_differ(border: Border) -> Iterator[FlatteningReason]:
+def ways_in_differ(selection: Selection) -> Iterator[FlatteningReason]:
     """Why these entries cannot be one: each has to be told the same by the same."""
-    if not border.entries:
+    if not selection.entries:
         message = "Each of these actions follows another of them, so none would begin."
         yield FlatteningReason("ways-in", message)
         return
-    first = border.entries[0]
-    told = _told(border, first)
-    for key in border.entries[1:]:
-        other = _told(border, key)
-        one, two = border.named(first), border.named(key)
+    first = selection.entries[0]
+    told = _told(selection, first)
+    for key in selection.entries[1:]:
+        other = _told(selection, key)
+        one, two = selection.named(first), selection.named(key)
         for parent in sorted(told.keys() ^ other.keys()):
             leads, not_ = (one, two) if parent in told else (two, one)
-            subject = "The entry" if parent == ENTRY else border.named(parent)
+            subject = "The entry" if parent == ENTRY else selection.named(parent)
             message = (
                 f"{subject} leads to {leads} and not to {not_}: a sub-graph begins with all "
                 "of its entry actions at once."
             )
-            yield FlatteningReason("ways-in", message, border.at(key))
+            yield FlatteningReason("ways-in", message, selection.at(key))
         for parent in sorted(told.keys() & other.keys()):
             if told[parent] != other[parent]:
-                message = f"{one} and {two} answer otherwise when {border.named(parent)} ends."
-                yield FlatteningReason("ways-in", message, border.at(key))
+                message = f"{one} and {two} answer otherwise when {selection.named(parent)} ends."
+                yield FlatteningReason("ways-in", message, selection.at(key))
 
 
-def _told(border: Border, key: Key) -> dict[Key, tuple[Conditions | None, bool]]:
-    ways = (r for r in border.into if r.child == key)
+def _told(selection: Selection, key: Key) -> dict[Key, tuple[Conditions | None, bool]]:
+    ways = (r for r in selection.into if r.child == key)
     return {
         r.parent: (None, True) if r.parent == ENTRY else (r.conditions, r.required) for r in ways
     }
 
 
-def ways_out_differ(border: Border) -> Iterator[FlatteningReason]:
+def ways_out_differ(selection: Selection) -> Iterator[FlatteningReason]:
     """Why these ends cannot be one: outside only the outcome is seen, and not who ended."""
     differing: dict[tuple[Key, Key], list[Precondition]] = {}
     for outcome in PRECONDITIONS:
         known: tuple[Key, dict[Key, Response]] | None = None
-        for key in border.chosen:
-            answers = border.answers(key, outcome)
+        for key in selection.chosen:
+            answers = selection.answers(key, outcome)
             if not answers:
                 continue
             if known is None:
@@ -160,45 +160,45 @@ def ways_out_differ(border: Border) -> Iterator[FlatteningReason]:
             elif known[1] != answers:
                 differing.setdefault((known[0], key), []).append(outcome)
     for (first, key), outcomes in differing.items():
-        one, two = border.named(first), border.named(key)
+        one, two = selection.named(first), selection.named(key)
         message = (
             f"When {one} ends {' or '.join(outcomes)}, something else follows than when {two} does: "
             "outside only the outcome of the sub-graph is seen, and not who ended it."
         )
-        yield FlatteningReason("ways-out", message, border.at(key))
+        yield FlatteningReason("ways-out", message, selection.at(key))
 
 
-def answers_of(border: Border, child: Key) -> Conditions:
+def answers_of(selection: Selection, child: Key) -> Conditions:
     """What an action outside answers to the ends of what stands for the chosen actions."""
     found: dict[str, Response] = {}
     for outcome in PRECONDITIONS:
-        for key in border.chosen:
-            answer = border.answers(key, outcome).get(child)
+        for key in selection.chosen:
+            answer = selection.answers(key, outcome).get(child)
             if answer is not None:
                 found[outcome] = answer
     return Conditions(**found)
 
 
-def ends_within(border: Border, *, closing: bool, gives: bool) -> dict[Key, Conditions]:
+def ends_within(selection: Selection, *, closing: bool, gives: bool) -> dict[Key, Conditions]:
     """The chosen actions that end the sub-graph, and with what. `closing`: also those after which nothing
     follows, which one graph would notice and a sub-graph would not; not with an outcome after which
     something follows elsewhere. `gives`: the exit waits for values."""
-    free = [o for o in OUTCOMES if not any(border.answers(key, o) for key in border.chosen)]
+    free = [o for o in OUTCOMES if not any(selection.answers(key, o) for key in selection.chosen)]
     found: dict[Key, Conditions] = {}
-    for key in border.chosen:
+    for key in selection.chosen:
         said: dict[str, Response] = {}
         for outcome in PRECONDITIONS:
-            answers = set(border.answers(key, outcome).values())
+            answers = set(selection.answers(key, outcome).values())
             if answers:
                 said[outcome] = "bypass" if answers == {"bypass"} else "run"
-            elif closing and outcome in free and not border.goes_on(key, outcome):
+            elif closing and outcome in free and not selection.goes_on(key, outcome):
                 said[outcome] = "bypass" if gives or outcome == "on_error" else "run"
         if said:
             found[key] = Conditions(**said)
     return found
 
 
-class Plan(NamedTuple):
+class CutPlan(NamedTuple):
     """One way to cut. `closing`: ends after which nothing follows end the sub-graph, too; `all_ends`: its
     exit waits for all ends."""
 
@@ -206,7 +206,7 @@ class Plan(NamedTuple):
     all_ends: bool
 
 
-class Cut(NamedTuple):
+class CutGraphs(NamedTuple):
     """The graph inside, the graph around it, and the action that stands for the former in the latter."""
 
     inner: Graph
@@ -214,44 +214,46 @@ class Cut(NamedTuple):
     action: Action
 
 
-def cut(border: Border, name: str, key: Key, plan: Plan) -> Cut | tuple[FlatteningReason, ...]:
+def cut(
+    selection: Selection, name: str, key: Key, plan: CutPlan
+) -> CutGraphs | tuple[FlatteningReason, ...]:
     """The two graphs, or why values cannot go through. `key`: of the new action."""
-    given = _given(border)
-    inner = _inner(border, name, plan, given)
+    given = _given(selection)
+    inner = _inner(selection, name, plan, given)
     action = replace(
         action_of_graph(inner),
         key=key,
-        actor=_actor(border),
+        actor=_actor(selection),
         description="",
-        position=middle_of(action.position for action in border.chosen.values()),
+        position=middle_of(action.position for action in selection.chosen.values()),
     )
     action = replace(action, inputs=tuple(_with_values(action.inputs, given)))
     against: list[FlatteningReason] = []
-    into, out = list(_into(border, action, against)), list(_out(border, action, against))
+    into, out = list(_into(selection, action, against)), list(_out(selection, action, against))
     if against:
         return tuple(against)
-    return Cut(inner, _outer(border, action, (*into, *out)), action)
+    return CutGraphs(inner, _outer(selection, action, (*into, *out)), action)
 
 
 # Inside
 
 
-def _given(border: Border) -> dict[tuple[Key, str], Parameter]:
+def _given(selection: Selection) -> dict[tuple[Key, str], Parameter]:
     """Inputs of entry actions that have a value and can get another from outside: those belong to the
     action that stands for the sub-graph, since what is handed to that passes by inputs with a value."""
     found: dict[tuple[Key, str], Parameter] = {}
-    for relation in border.into:
-        inputs = slots_of(border.chosen[relation.child].inputs)
-        reached = _handed(border, relation, inputs).keys()
-        for parameter in border.chosen[relation.child].inputs:
+    for relation in selection.into:
+        inputs = slots_of(selection.chosen[relation.child].inputs)
+        reached = _handed(selection, relation, inputs).keys()
+        for parameter in selection.chosen[relation.child].inputs:
             name = flat_name(parameter.path)
             if name in reached and inputs[name].has_value():
                 found[relation.child, parameter.path] = parameter
     return found
 
 
-def _handed(border: Border, relation: Relation, inputs: Collection[str]) -> dict[str, str]:
-    parent = next((a for a in border.graph.actions if a.key == relation.parent), None)
+def _handed(selection: Selection, relation: Relation, inputs: Collection[str]) -> dict[str, str]:
+    parent = next((a for a in selection.graph.actions if a.key == relation.parent), None)
     if parent is None:
         return {}
     try:
@@ -261,7 +263,7 @@ def _handed(border: Border, relation: Relation, inputs: Collection[str]) -> dict
 
 
 def _inner(
-    border: Border, name: str, plan: Plan, given: Mapping[tuple[Key, str], Parameter]
+    selection: Selection, name: str, plan: CutPlan, given: Mapping[tuple[Key, str], Parameter]
 ) -> Graph:
     def without_given(action: Action) -> Action:
         inputs = (_open(p) if (action.key, p.path) in given else p for p in action.inputs)
@@ -269,21 +271,23 @@ def _inner(
 
     graph = Graph(
         name=name,
-        actions=tuple(without_given(action) for action in border.chosen.values()),
-        direction=border.graph.direction,
-        extra=tuple(_labels(border.graph)),
+        actions=tuple(without_given(action) for action in selection.chosen.values()),
+        direction=selection.graph.direction,
+        extra=tuple(_labels(selection.graph)),
     )
-    entries = tuple(_entries(border))
-    plain = replace(graph, relations=(*entries, *border.within, *_exits(border, plan, gives=False)))
+    entries = tuple(_entries(selection))
+    plain = replace(
+        graph, relations=(*entries, *selection.within, *_exits(selection, plan, gives=False))
+    )
     if not exit_inputs(plain):
         return plain
-    exits = _exits(border, plan, gives=True)
-    return replace(graph, relations=(*entries, *border.within, *exits))
+    exits = _exits(selection, plan, gives=True)
+    return replace(graph, relations=(*entries, *selection.within, *exits))
 
 
-def _entries(border: Border) -> Iterator[Relation]:
-    for place, key in enumerate(border.entries):
-        orders = [r.child_order for r in border.into if r.child == key]
+def _entries(selection: Selection) -> Iterator[Relation]:
+    for place, key in enumerate(selection.entries):
+        orders = [r.child_order for r in selection.into if r.child == key]
         yield Relation(
             parent=ENTRY,
             child=key,
@@ -293,13 +297,13 @@ def _entries(border: Border) -> Iterator[Relation]:
         )
 
 
-def _exits(border: Border, plan: Plan, *, gives: bool) -> Iterator[Relation]:
+def _exits(selection: Selection, plan: CutPlan, *, gives: bool) -> Iterator[Relation]:
     """Who hands over values outside comes last: its outputs are those of the graph."""
-    ends = ends_within(border, closing=plan.closing, gives=gives)
-    handing = {r.parent for r in border.out if _gives(border, r)}
-    leading = {r.parent for r in border.out}
+    ends = ends_within(selection, closing=plan.closing, gives=gives)
+    handing = {r.parent for r in selection.out if _gives(selection, r)}
+    leading = {r.parent for r in selection.out}
     order = sorted(ends, key=lambda key: (key in handing, key in leading))
-    last = max((r.parent_order for r in border.within), default=0.0) + 1
+    last = max((r.parent_order for r in selection.within), default=0.0) + 1
     for place, key in enumerate(order):
         yield Relation(
             parent=key,
@@ -311,11 +315,11 @@ def _exits(border: Border, plan: Plan, *, gives: bool) -> Iterator[Relation]:
         )
 
 
-def _gives(border: Border, relation: Relation) -> bool:
-    outputs = names_of(border.chosen[relation.parent].outputs)
+def _gives(selection: Selection, relation: Relation) -> bool:
+    outputs = names_of(selection.chosen[relation.parent].outputs)
     if relation.child == EXIT:
         return bool(outputs)
-    child = next((a for a in border.graph.actions if a.key == relation.child), None)
+    child = next((a for a in selection.graph.actions if a.key == relation.child), None)
     try:
         return child is not None and bool(renamed(outputs, relation.remap, names_of(child.inputs)))
     except RemapUnknown:
@@ -339,8 +343,8 @@ def _labels(graph: Graph) -> Iterator[tuple[str, str]]:
 # Around
 
 
-def _actor(border: Border) -> str:
-    actors = {action.actor for action in border.chosen.values()}
+def _actor(selection: Selection) -> str:
+    actors = {action.actor for action in selection.chosen.values()}
     return actors.pop() if len(actors) == 1 else ""
 
 
@@ -360,23 +364,25 @@ def middle_of(places: Iterator[Position | None]) -> Position | None:
     return (min(xs) + max(xs)) / 2, (min(ys) + max(ys)) / 2
 
 
-def _into(border: Border, action: Action, against: list[FlatteningReason]) -> Iterator[Relation]:
+def _into(
+    selection: Selection, action: Action, against: list[FlatteningReason]
+) -> Iterator[Relation]:
     """One arrow for those from one action to all entries."""
     by_parent: dict[Key, list[Relation]] = {}
-    for relation in border.into:
+    for relation in selection.into:
         by_parent.setdefault(relation.parent, []).append(relation)
     names = names_of(action.inputs)
     for ways in by_parent.values():
         first = ways[0]
         wanted: dict[str, str] = {}
         for way in ways:
-            handed = _handed(border, way, names_of(border.chosen[way.child].inputs))
+            handed = _handed(selection, way, names_of(selection.chosen[way.child].inputs))
             for name, source in handed.items():
                 if wanted.setdefault(name, source) != source:
-                    one = f"Entry actions take “{name}” from {border.named(first.parent)}"
-                    against.append(_values(border, way.child, f"{one} by two outputs."))
+                    one = f"Entry actions take “{name}” from {selection.named(first.parent)}"
+                    against.append(_values(selection, way.child, f"{one} by two outputs."))
         wanted = {name: source for name, source in wanted.items() if name in names}
-        remap = _remap(border, first, action.inputs, wanted, against)
+        remap = _remap(selection, first, action.inputs, wanted, against)
         yield replace(
             first,
             child=action.key,
@@ -387,20 +393,22 @@ def _into(border: Border, action: Action, against: list[FlatteningReason]) -> It
         )
 
 
-def _out(border: Border, action: Action, against: list[FlatteningReason]) -> Iterator[Relation]:
+def _out(
+    selection: Selection, action: Action, against: list[FlatteningReason]
+) -> Iterator[Relation]:
     """One arrow for those from all ends to one action."""
     by_child: dict[Key, list[Relation]] = {}
-    for relation in border.out:
+    for relation in selection.out:
         by_child.setdefault(relation.child, []).append(relation)
     for child, ways in by_child.items():
-        first = next((way for way in ways if _gives(border, way)), ways[0])
+        first = next((way for way in ways if _gives(selection, way)), ways[0])
         remap: tuple[Remap, ...] = ()
         if child != EXIT:
-            remap = _out_remap(border, first, action, against)
+            remap = _out_remap(selection, first, action, against)
         yield replace(
             first,
             parent=action.key,
-            conditions=answers_of(border, child),
+            conditions=answers_of(selection, child),
             required=any(way.required for way in ways),
             remap=remap,
             parent_order=min(way.parent_order for way in ways),
@@ -410,22 +418,22 @@ def _out(border: Border, action: Action, against: list[FlatteningReason]) -> Ite
 
 
 def _out_remap(
-    border: Border, way: Relation, action: Action, against: list[FlatteningReason]
+    selection: Selection, way: Relation, action: Action, against: list[FlatteningReason]
 ) -> tuple[Remap, ...]:
     """Renamings for what goes out: names stay, but the outputs are those of the graph."""
-    child = next(a for a in border.graph.actions if a.key == way.child)
+    child = next(a for a in selection.graph.actions if a.key == way.child)
     outputs = names_of(action.outputs)
     try:
-        own = names_of(border.chosen[way.parent].outputs)
+        own = names_of(selection.chosen[way.parent].outputs)
         handed = renamed(own, way.remap, names_of(child.inputs))
         wanted = {name: source for name, source in handed.items() if source in outputs}
         return renaming(outputs, names_of(child.inputs), wanted, way.remap)
     except RemapUnknown as unknown:
         message = f"An output is renamed that does not exist: “{unknown}”."
-    except Unjoined as none:
+    except JoinRefused as none:
         message = none.message
-    if _answers_with_values(answers_of(border, way.child)):
-        against.append(_values(border, way.parent, message))
+    if _answers_with_values(answers_of(selection, way.child)):
+        against.append(_values(selection, way.parent, message))
     return ()
 
 
@@ -436,28 +444,28 @@ def _answers_with_values(said: Conditions) -> bool:
 
 
 def _remap(
-    border: Border,
+    selection: Selection,
     way: Relation,
     inputs: tuple[Parameter, ...],
     wanted: Mapping[str, str],
     against: list[FlatteningReason],
 ) -> tuple[Remap, ...]:
-    parent = next((a for a in border.graph.actions if a.key == way.parent), None)
+    parent = next((a for a in selection.graph.actions if a.key == way.parent), None)
     if parent is None:
         return way.remap  # from the entry
     try:
         return renaming(names_of(parent.outputs), names_of(inputs), wanted, way.remap)
-    except Unjoined as none:
-        against.append(_values(border, way.child, none.message))
+    except JoinRefused as none:
+        against.append(_values(selection, way.child, none.message))
         return ()
 
 
-def _values(border: Border, key: Key, message: str) -> FlatteningReason:
-    return FlatteningReason("values", message, border.at(key))
+def _values(selection: Selection, key: Key, message: str) -> FlatteningReason:
+    return FlatteningReason("values", message, selection.at(key))
 
 
-def _outer(border: Border, action: Action, joined: tuple[Relation, ...]) -> Graph:
-    graph, chosen = border.graph, border.chosen
+def _outer(selection: Selection, action: Action, joined: tuple[Relation, ...]) -> Graph:
+    graph, chosen = selection.graph, selection.chosen
     first = next(iter(chosen))
     actions = tuple(
         action if each.key == first else each

@@ -13,18 +13,18 @@ from typing import Final, TypeAlias
 import msgspec
 
 from action_assistant.umrf.hierarchy.cutting import (
-    Border,
-    Cut,
-    Plan,
+    CutGraphs,
+    CutPlan,
+    Selection,
     between,
-    border_of,
     cut,
+    selection_of,
     ways_in_differ,
     ways_out_differ,
 )
+from action_assistant.umrf.hierarchy.equivalence import behaviour_differences
 from action_assistant.umrf.hierarchy.flattening import Flattened, flattened
 from action_assistant.umrf.hierarchy.inlining import under_keys
-from action_assistant.umrf.hierarchy.likeness import unlike
 from action_assistant.umrf.hierarchy.reasons import FlatteningReason, HierarchyLevel
 from action_assistant.umrf.model import Graph, Key
 
@@ -54,17 +54,17 @@ Extraction: TypeAlias = Extracted | Unextractable
 def extracted(graph: Graph, chosen: Collection[Key], name: str, key: Key) -> Extraction:
     """These actions as a graph of this name. `key`: of the action that stands for it."""
     reasons = [*_unfit_names(graph, name), *_unfit(graph, chosen)]
-    border = border_of(graph, chosen)
-    if border.chosen:
-        against = [*ways_in_differ(border), *ways_out_differ(border)]
-        reasons += [*between(border), *against] if against else []
+    selection = selection_of(graph, chosen)
+    if selection.chosen:
+        against = [*ways_in_differ(selection), *ways_out_differ(selection)]
+        reasons += [*between(selection), *against] if against else []
     if reasons:
         return Unextractable(tuple(dict.fromkeys(reasons)))
     best: Extracted | None = None
     uncut: tuple[FlatteningReason, ...] = ()
-    for plan in _plans(border):
-        found = cut(border, name, key, plan)
-        if not isinstance(found, Cut):
+    for plan in _plans(selection):
+        found = cut(selection, name, key, plan)
+        if not isinstance(found, CutGraphs):
             uncut = uncut or found
             continue
         differences = _differences(graph, found)
@@ -104,18 +104,18 @@ def _unfit(graph: Graph, chosen: Collection[Key]) -> Iterator[FlatteningReason]:
             yield FlatteningReason("selection", message, at)
 
 
-def _plans(border: Border) -> Iterator[Plan]:
+def _plans(selection: Selection) -> Iterator[CutPlan]:
     """Ways to cut, the likelier first."""
     waiting: dict[Key, int] = {}
-    for relation in border.out:
+    for relation in selection.out:
         waiting[relation.child] = waiting.get(relation.child, 0) + relation.required
     if any(count > 1 for count in waiting.values()):
-        yield Plan(closing=False, all_ends=True)
-    yield Plan(closing=True, all_ends=False)
-    yield Plan(closing=False, all_ends=False)
+        yield CutPlan(closing=False, all_ends=True)
+    yield CutPlan(closing=True, all_ends=False)
+    yield CutPlan(closing=False, all_ends=False)
 
 
-def _differences(graph: Graph, found: Cut) -> tuple[FlatteningReason, ...]:
+def _differences(graph: Graph, found: CutGraphs) -> tuple[FlatteningReason, ...]:
     """In what the two graphs may do otherwise than the one."""
     flat = flattened(found.outer, {found.inner.name: found.inner})
     if not isinstance(flat, Flattened):
@@ -130,5 +130,5 @@ def _differences(graph: Graph, found: Cut) -> tuple[FlatteningReason, ...]:
             if each.about is None
             else (HierarchyLevel(graph.name, each.about, names.get(each.about, "")),),
         )
-        for each in unlike(graph, under_keys(flat.graph, keys))
+        for each in behaviour_differences(graph, under_keys(flat.graph, keys))
     )

@@ -187,16 +187,16 @@ def flattened(
     """One graph without sub-graphs that runs the same actions, in the same order, with the same
     values, and ends alike. `graphs`: those that the engine has indexed, by name. `known`: names of
     actions, which come before graphs of the same name."""
-    whole = _Hierarchy(graphs, known)
-    if not any(whole.is_sub(action) for action in graph.actions):
+    hierarchy = _Hierarchy(graphs, known)
+    if not any(hierarchy.is_sub(action) for action in graph.actions):
         return Flattened(graph, tuple(_plain(graph)))
-    actions = whole.actions_of(graph)
+    actions = hierarchy.actions_of(graph)
     if actions > MOST:
         said = f"{actions:,}" if actions <= _SAID else f"more than {_SAID:,}"
         message = f"One graph would have {said} actions; {MOST:,} are the most."
         return _unflattenable([FlatteningReason("too-large", message)])
-    found = whole.level(graph, ())
-    actors = {*whole.actors, *(action.actor for action in graph.actions)} - {""}
+    found = hierarchy.level(graph, ())
+    actors = {*hierarchy.actors, *(action.actor for action in graph.actions)} - {""}
     if len(actors) > 1:
         message = f"Its actions belong to several actors ({', '.join(sorted(actors))})."
         return _unflattenable((*found.reasons, FlatteningReason("actors", message)))

@@ -22,7 +22,7 @@ from action_assistant.umrf.model import (
 from action_assistant.umrf.semantics.values import RemapUnknown, renamed, slots_of
 
 
-class Unjoined(Exception):
+class JoinRefused(Exception):
     """There is no such arrow."""
 
     def __init__(self, code: FlatteningCode, message: str) -> None:
@@ -33,7 +33,7 @@ class Unjoined(Exception):
 
 def refuse(code: FlatteningCode, message: str) -> None:
     """Says that one graph would not do the same."""
-    raise Unjoined(code, message)
+    raise JoinRefused(code, message)
 
 
 class JoinedArrow(NamedTuple):
@@ -94,7 +94,7 @@ def renaming(
         fits = len(sources) == len(remap) and sources <= set(outputs)
         if fits and renamed(outputs, remap, inputs) == wanted:
             return remap
-    raise Unjoined(
+    raise JoinRefused(
         "renaming", "No renaming hands over exactly the values that go through the sub-graph."
     )
 
@@ -106,7 +106,7 @@ def renamed_or_refused(
         return renamed(outputs, remap, inputs)
     except RemapUnknown as unknown:
         message = f"An output is renamed that does not exist: “{unknown}”."
-        raise Unjoined("renaming", message) from None
+        raise JoinRefused("renaming", message) from None
 
 
 def outputs_within(graph: Graph, parent: Key) -> Collection[str]:

@@ -12,8 +12,8 @@ from msgspec.structs import replace
 from action_assistant.umrf.hierarchy.joint_parts import (
     JoinedArrow,
     JoinedPlace,
+    JoinRefused,
     SubGraphPlace,
-    Unjoined,
     ends_of,
     in_order,
     leads_to,
@@ -180,17 +180,17 @@ def _out_remap(place: SubGraphPlace, end: Relation, relation: Relation) -> tuple
 _Part = TypeVar("_Part")
 
 
-def joined(place: SubGraphPlace) -> JoinedPlace | tuple[Unjoined, ...]:
+def joined(place: SubGraphPlace) -> JoinedPlace | tuple[JoinRefused, ...]:
     """The arrows into and out of a sub-graph's actions; all that speaks against it, if anything
     does."""
     relations = place.around.relations
     own = place.action.key
     if any(r.parent == own == r.child for r in relations):
-        return (Unjoined("loop", "It leads to itself."),)
+        return (JoinRefused("loop", "It leads to itself."),)
     into = in_order([r for r in relations if r.child == own], by_parent=False)
     out = in_order([r for r in relations if r.parent == own], by_parent=True)
     against = [
-        Unjoined(
+        JoinRefused(
             "bypass",
             f"It can be bypassed with {outcome}, which goes on without any of its actions; no chain of "
             "bypasses from its entry to its exit would do the same.",
@@ -206,10 +206,10 @@ def joined(place: SubGraphPlace) -> JoinedPlace | tuple[Unjoined, ...]:
     return tuple(against) or found
 
 
-def _got(parts: Iterator[_Part], against: list[Unjoined]) -> Iterator[_Part]:
+def _got(parts: Iterator[_Part], against: list[JoinRefused]) -> Iterator[_Part]:
     try:
         yield from parts
-    except Unjoined as none:
+    except JoinRefused as none:
         against.append(none)
 
 

@@ -8,6 +8,7 @@ once, in any order. A sub-graph ends with what its own courses end with.
 from collections.abc import Iterator, Mapping
 from typing import Final, Literal, NamedTuple, TypeAlias
 
+from action_assistant.umrf.components import nodes_in
 from action_assistant.umrf.courses.instants import Instant, State
 from action_assistant.umrf.courses.network import EdgeQuestion, Network
 from action_assistant.umrf.model import OUTCOMES, Graph, Key, Precondition
@@ -57,7 +58,7 @@ class _LevelState(NamedTuple):
     begun: int
 
 
-class _Watched(Instant):
+class _LevelInstant(Instant):
     """An instant that notes what is asked of sub-graphs, and how the exit is reached."""
 
     __slots__ = (
@@ -85,16 +86,16 @@ class _Watched(Instant):
     def _only_ends(self) -> bool:
         return False  # each edge shall be seen, also where it is known to lead to the exit
 
-    def _inform(self, place: int, result: Precondition, edges: list[EdgeQuestion | None]) -> None:
-        super()._inform(place, result, edges)
+    def _inform(self, index: int, result: Precondition, edges: list[EdgeQuestion | None]) -> None:
+        super()._inform(index, result, edges)
         if self.end == "finished" and self.finished is None:
             self.finished = result
             asked = [e for e in edges if e is not None and e.responses[result] != "ignore"]
             self.beside = len(asked) > 1 or bool(self._tasks)
 
-    def _ask(self, place: int, edge: EdgeQuestion, result: Precondition) -> bool:
+    def _ask(self, index: int, edge: EdgeQuestion, result: Precondition) -> bool:
         child, response = edge.child, edge.responses[result]
-        ignored = super()._ask(place, edge, result)
+        ignored = super()._ask(index, edge, result)
         if response == "ignore":
             return ignored
         if child == self._net.exit:
@@ -117,22 +118,22 @@ class _Watched(Instant):
             self.lacking |= bit
         return ignored
 
-    def _bypass(self, place: int, child: int, result: Precondition) -> None:
-        super()._bypass(place, child, result)
+    def _bypass(self, index: int, child: int, result: Precondition) -> None:
+        super()._bypass(index, child, result)
         self.crossing = self.crossing or len(self._tasks) > 1
 
     def after(self, before: _LevelState) -> _LevelState:
         """The state that follows. Times do not matter, since any order of ends is looked at; nor does
         what has become of actions to which nothing that goes on leads any more."""
         states = list(before.states)
-        for place, state in self.states.items():
-            states[place] = state._replace(due=0.0, waiting=False)
+        for index, state in self.states.items():
+            states[index] = state._replace(due=0.0, waiting=False)
         ahead = 0
-        for place, state in enumerate(states[:-1]):
+        for index, state in enumerate(states[:-1]):
             if state.does == RUNS:
-                ahead |= self._net.reachable[place] | 1 << place
+                ahead |= self._net.reachable[index] | 1 << index
         nothing = State()
-        kept = tuple(state if ahead >> place & 1 else nothing for place, state in enumerate(states))
+        kept = tuple(state if ahead >> index & 1 else nothing for index, state in enumerate(states))
         return _LevelState(kept, self.running, self.active, self.begun & ahead)
 
 
@@ -150,7 +151,7 @@ def level_courses(
     return LevelCourses(
         frozenset(search.results),
         tuple(search.troubles.values()),
-        frozenset(search.key[place] for place in _places(search.lacking)),
+        frozenset(search.key[index] for index in nodes_in(search.lacking)),
         {key: frozenset(outcomes) for key, outcomes in search.bypassed.items()},
         search.spent,
     )
@@ -163,11 +164,11 @@ class _Courses:
         self, graph: Graph, inside: Mapping[Key, frozenset[Precondition]], *, is_top: bool
     ) -> None:
         self.net = net = Network(graph)
-        self.key = {net.place[action.full_name]: action.key for action in graph.actions}
-        self.watched = sum(1 << place for place, key in self.key.items() if key in inside)
+        self.key = {net.index[action.full_name]: action.key for action in graph.actions}
+        self.watched = sum(1 << index for index, key in self.key.items() if key in inside)
         self.ends = [
-            self._telling(place, inside.get(self.key[place], frozenset(OUTCOMES)), is_top=is_top)
-            for place in range(len(net.nodes))
+            self._telling(index, inside.get(self.key[index], frozenset(OUTCOMES)), is_top=is_top)
+            for index in range(len(net.nodes))
         ]
         self.results: set[Precondition] = set()
         self.troubles: dict[tuple[TroubleKind, Key | None], Trouble] = {}
@@ -176,15 +177,15 @@ class _Courses:
         self.spent = 0
 
     def _telling(
-        self, place: int, results: frozenset[Precondition], *, is_top: bool
+        self, index: int, results: frozenset[Precondition], *, is_top: bool
     ) -> list[Precondition]:
         """The results of an action that can make a difference: a failed one gives nothing and may
         begin anew, and what a bypass hands on, or an inner exit, is the result itself."""
-        told = [edge for edge in self.net.edges[place] if edge is not None]
+        told = [edge for edge in self.net.edges[index] if edge is not None]
         ending = any(edge.child == self.net.exit for edge in told) and not is_top
         if ending or any("bypass" in edge.responses.values() for edge in told):
             return [result for result in OUTCOMES if result in results]
-        gives = bool(self.net.nodes[place].outputs) or any(e.child == place for e in told)
+        gives = bool(self.net.nodes[index].outputs) or any(e.child == index for e in told)
         found: dict[tuple[object, ...], Precondition] = {}
         for result in OUTCOMES:
             if result in results:
@@ -196,37 +197,37 @@ class _Courses:
         """Goes through all of them."""
         net = self.net
         first = _LevelState(tuple(State(has=has) for has in net.has), 0, 0, 0)
-        instant = _Watched(net, first, self.watched)
+        instant = _LevelInstant(net, first, self.watched)
         instant.begin()
         open_ = [then] if (then := self._seen(instant, first, -1, "")) is not None else []
         known = set(open_)
         while open_:
             moment = open_.pop()
-            for place, result in self._ends(moment):
+            for index, result in self._ends(moment):
                 self.spent += len(moment.states)
                 if self.spent > budget:
                     self._tell(Trouble("undecided"))
                     return
-                instant = _Watched(net, moment, self.watched)
-                instant.ends(place, result)
-                then = self._seen(instant, moment, place, result)
+                instant = _LevelInstant(net, moment, self.watched)
+                instant.ends(index, result)
+                then = self._seen(instant, moment, index, result)
                 if then is not None and then not in known:
                     known.add(then)
                     open_.append(then)
 
     def _ends(self, moment: _LevelState) -> Iterator[tuple[int, Precondition]]:
-        for place, state in enumerate(moment.states[:-1]):
+        for index, state in enumerate(moment.states[:-1]):
             if state.does == RUNS:
-                yield from ((place, result) for result in self.ends[place])
+                yield from ((index, result) for result in self.ends[index])
 
     def _tell(self, trouble: Trouble) -> None:
         self.troubles.setdefault((trouble.kind, trouble.action), trouble)
 
     def _seen(
-        self, instant: _Watched, before: _LevelState, place: int, result: str
+        self, instant: _LevelInstant, before: _LevelState, index: int, result: str
     ) -> _LevelState | None:
         """Notes what came of an instant. The state after it, if the graph goes on."""
-        by = self.net.names[place] if place >= 0 else ""
+        by = self.net.names[index] if index >= 0 else ""
         for kind, child in instant.told:
             self._tell(Trouble(kind, self.key.get(child), by, result))
         for child, outcome in instant.bypassed:
@@ -237,7 +238,7 @@ class _Courses:
         then = instant.after(before)
         match instant.end:
             case "finished":
-                self._finished(instant, then, by, result, place)
+                self._finished(instant, then, by, result, index)
                 return None
             case "halted":
                 self._tell(Trouble("halts", None, by, result))
@@ -252,7 +253,7 @@ class _Courses:
                 return then
 
     def _finished(
-        self, instant: _Watched, then: _LevelState, by: str, result: str, place: int
+        self, instant: _LevelInstant, then: _LevelState, by: str, result: str, index: int
     ) -> None:
         if instant.finished is not None:
             self.results.add(instant.finished)
@@ -260,13 +261,6 @@ class _Courses:
             self._tell(Trouble("early", None, by, result))
         if instant.beside:
             self._tell(Trouble("beside", None, by, result))
-        for other in _places(self.watched):
-            if other != place and then.states[other].does == RUNS:
+        for other in nodes_in(self.watched):
+            if other != index and then.states[other].does == RUNS:
                 self._tell(Trouble("ends", self.key[other], by, result))
-
-
-def _places(mask: int) -> Iterator[int]:
-    while mask:
-        lowest = mask & -mask
-        yield lowest.bit_length() - 1
-        mask ^= lowest

@@ -5,13 +5,13 @@ from collections.abc import Iterator
 import pytest
 from hypothesis import HealthCheck, given, settings
 
-from action_assistant.umrf.courses.coverage import OutcomeArrow, arrows_of, coverage, taken
-from action_assistant.umrf.courses.reaching import (
+from action_assistant.umrf.courses.arrow_search import (
     ArrowReached,
     ArrowUndecided,
     ArrowUnreachable,
-    reaching,
+    search_arrow,
 )
+from action_assistant.umrf.courses.coverage import OutcomeArrow, arrows_of, arrows_taken, coverage
 from action_assistant.umrf.facts import SIMULATED
 from action_assistant.umrf.model import (
     ENTRY,
@@ -78,7 +78,7 @@ def every_arrow(graph: Graph, depth: int) -> set[OutcomeArrow]:
         then = []
         for ends in border:
             traces, going = played(graph, ends)
-            found |= taken(graph, traces).arrows
+            found |= arrows_taken(graph, traces).arrows
             then += [(*ends, (number, result)) for number in going for result in RESULTS]
         border = then
     return found
@@ -91,10 +91,10 @@ def test_what_any_ends_take_is_found_and_what_cannot_be_found_is_taken_by_none(
 ) -> None:
     possible = every_arrow(graph, DEPTH)
     for arrow in arrows_of(graph):
-        found = reaching(graph, arrow)
+        found = search_arrow(graph, arrow)
         if isinstance(found, ArrowReached):
             traces = list(simulate(graph, script=found.script, max_events=2_000))
-            assert arrow in taken(graph, traces).arrows
+            assert arrow in arrows_taken(graph, traces).arrows
         elif arrow in possible:
             assert isinstance(found, ArrowUndecided), (arrow, found)
 
@@ -121,7 +121,7 @@ def script_of(found: object) -> dict[str, list[str]]:
 
 def test_the_script_that_is_found_says_how_each_action_ends() -> None:
     graph = chain(Conditions("ignore", "run"), Conditions("ignore", "ignore", "run"))
-    found = reaching(graph, OutcomeArrow("k2", EXIT, "on_true"))
+    found = search_arrow(graph, OutcomeArrow("k2", EXIT, "on_true"))
     said = script_of(found)
     assert said["A0_0"][0] == "on_false"
     assert said["A1_0"][0] == "on_error"
@@ -135,7 +135,7 @@ def test_an_arrow_of_a_stopped_action_is_reached_by_having_it_stopped() -> None:
     both = [Relation(parent=ENTRY, child=key, conditions=ENTRY_CONDITIONS) for key in ("k0", "k1")]
     actions = tuple(Action(key=f"k{n}", name=f"A{n}") for n in range(2))
     graph = Graph(name="g", actions=actions, relations=(*both, stops, after))
-    found = reaching(graph, OutcomeArrow("k0", EXIT, "on_stopped"))
+    found = search_arrow(graph, OutcomeArrow("k0", EXIT, "on_stopped"))
     assert isinstance(found, ArrowReached)
     assert found.script.behaviours["A0_0"][0].never
 
@@ -151,7 +151,7 @@ def test_an_arrow_that_a_bypass_takes_on_its_way_to_the_exit_is_reached() -> Non
     )
     actions = tuple(Action(key=f"k{n}", name=f"A{n}") for n in range(2))
     graph = Graph(name="g", actions=actions, relations=arrows)
-    found = reaching(graph, OutcomeArrow("k1", EXIT, "on_error"))
+    found = search_arrow(graph, OutcomeArrow("k1", EXIT, "on_error"))
     assert not isinstance(found, ArrowUnreachable), found
 
 
@@ -168,25 +168,25 @@ def test_an_arrow_behind_something_that_waits_for_ever_is_unreachable() -> None:
         ),
     )
     for arrow in (OutcomeArrow("k2", EXIT, "on_true"), OutcomeArrow("k2", "k3", "on_true")):
-        assert isinstance(reaching(graph, arrow), ArrowUnreachable)
-    assert isinstance(reaching(graph, OutcomeArrow("k1", "k2", "on_true")), ArrowReached)
+        assert isinstance(search_arrow(graph, arrow), ArrowUnreachable)
+    assert isinstance(search_arrow(graph, OutcomeArrow("k1", "k2", "on_true")), ArrowReached)
 
 
 def test_a_search_that_may_not_go_on_says_that_it_does_not_know() -> None:
     graph = chain(*[Conditions("run", "run", "run")] * 6)
-    found = reaching(graph, OutcomeArrow("k6", EXIT, "on_true"), budget=20)
+    found = search_arrow(graph, OutcomeArrow("k6", EXIT, "on_true"), budget=20)
     assert isinstance(found, ArrowUndecided)
 
 
 @pytest.mark.parametrize("size", [10, 100, 400])
 def test_the_last_arrow_of_a_long_way_is_found(size: int) -> None:
     graph = chain(*[Conditions("ignore", "run", "run")] * size)
-    assert isinstance(reaching(graph, OutcomeArrow(f"k{size}", EXIT, "on_true")), ArrowReached)
+    assert isinstance(search_arrow(graph, OutcomeArrow(f"k{size}", EXIT, "on_true")), ArrowReached)
 
 
 def found_untaken(graph: Graph) -> Iterator[OutcomeArrow]:
     for arrow in arrows_of(graph):
-        if not isinstance(reaching(graph, arrow), ArrowReached):
+        if not isinstance(search_arrow(graph, arrow), ArrowReached):
             yield arrow
 
 
@@ -195,10 +195,10 @@ def found_untaken(graph: Graph) -> Iterator[OutcomeArrow]:
 def test_the_tests_that_are_proposed_cover_all_that_can_be_covered(graph: Graph) -> None:
     courses = []
     for arrow in arrows_of(graph):
-        found = reaching(graph, arrow)
+        found = search_arrow(graph, arrow)
         if isinstance(found, ArrowReached):
             traces = list(simulate(graph, script=found.script, max_events=2_000))
-            courses.append(taken(graph, traces))
+            courses.append(arrows_taken(graph, traces))
     together = coverage(graph, courses)
     assert set(together.untaken) <= set(found_untaken(graph))
     assert together.taken + len(together.untaken) == together.arrows

@@ -25,7 +25,7 @@ from action_assistant.umrf.semantics.values import RemapUnknown, renamed, slots_
 _NAMES: Final = {ENTRY: "the entry", EXIT: "the exit"}
 
 
-class Unlike(NamedTuple):
+class BehaviourDifference(NamedTuple):
     """One thing that is said otherwise. `about`: the action that it concerns, None for the graph."""
 
     about: Key | None
@@ -40,27 +40,27 @@ class _ArrowMeaning(NamedTuple):
     values: Mapping[str, str] | tuple[object, ...]
 
 
-def unlike(graph: Graph, other: Graph) -> Iterator[Unlike]:
+def behaviour_differences(graph: Graph, other: Graph) -> Iterator[BehaviourDifference]:
     """What `other` does not say as `graph` does, both under the same keys."""
     names = {a.key: a.full_name for a in graph.actions} | _NAMES
     mine, theirs = ({a.key: _action(a) for a in each.actions} for each in (graph, other))
     for key in sorted(mine.keys() | theirs.keys()):
         if mine.get(key) != theirs.get(key):
-            yield Unlike(key, f"{names.get(key, key)} itself would be another.")
+            yield BehaviourDifference(key, f"{names.get(key, key)} itself would be another.")
     before, after = _arrows(graph), _arrows(other)
     for pair in sorted(before.keys() | after.keys()):
         parent, child = (names.get(key, key) for key in pair)
         about = pair[1] if pair[1] != EXIT else pair[0]
         match before.get(pair), after.get(pair):
             case None, _:
-                yield Unlike(about, f"{parent} would lead to {child}.")
+                yield BehaviourDifference(about, f"{parent} would lead to {child}.")
             case _, None:
-                yield Unlike(about, f"{parent} would lead to {child} no more.")
+                yield BehaviourDifference(about, f"{parent} would lead to {child} no more.")
             case (_ArrowMeaning() as one, _ArrowMeaning() as two) if one != two:
-                yield Unlike(about, _otherwise(one, two, parent, child))
+                yield BehaviourDifference(about, _otherwise(one, two, parent, child))
     ends = exit_owner(graph), exit_owner(other)
     if len({end.key if end is not None else "" for end in ends}) > 1:
-        yield Unlike(None, "The exit would wait for the outputs of another action.")
+        yield BehaviourDifference(None, "The exit would wait for the outputs of another action.")
 
 
 def _otherwise(one: _ArrowMeaning, two: _ArrowMeaning, parent: str, child: str) -> str:

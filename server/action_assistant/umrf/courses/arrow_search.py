@@ -13,7 +13,7 @@ from typing import Final, NamedTuple, TypeAlias
 import msgspec
 
 from action_assistant.safe_text import hold_names
-from action_assistant.umrf.courses.coverage import OutcomeArrow, taken
+from action_assistant.umrf.courses.coverage import OutcomeArrow, arrows_taken
 from action_assistant.umrf.courses.instants import DUE, Instant, State
 from action_assistant.umrf.courses.network import EdgeQuestion, Network
 from action_assistant.umrf.facts import SIMULATED
@@ -52,13 +52,13 @@ class ArrowUndecided(msgspec.Struct, frozen=True, tag_field="verdict", tag="unde
         hold_names(self, "why")
 
 
-Reaching: TypeAlias = ArrowReached | ArrowUnreachable | ArrowUndecided
+ArrowSearch: TypeAlias = ArrowReached | ArrowUnreachable | ArrowUndecided
 
 
 class _End(NamedTuple):
     """One action ends. `result` counts where it runs."""
 
-    place: int
+    action: int
     result: Precondition
 
 
@@ -70,7 +70,7 @@ class _GraphState(NamedTuple):
     active: int
 
 
-class _Asked(Instant):
+class _RecordingInstant(Instant):
     """An instant that notes which edges were answered with anything but to ignore it."""
 
     __slots__ = ("asked",)
@@ -79,10 +79,10 @@ class _Asked(Instant):
         super().__init__(net, moment.states.__getitem__, 0.0, moment.running, moment.active)
         self.asked: set[tuple[int, int, Precondition]] = set()
 
-    def _ask(self, place: int, edge: EdgeQuestion, result: Precondition) -> bool:
+    def _ask(self, index: int, edge: EdgeQuestion, result: Precondition) -> bool:
         if edge.responses[result] != "ignore":
-            self.asked.add((place, edge.child, result))
-        return super()._ask(place, edge, result)
+            self.asked.add((index, edge.child, result))
+        return super()._ask(index, edge, result)
 
     def _only_ends(self) -> bool:
         return False  # each edge shall be seen, also where it is known to lead to the exit
@@ -90,23 +90,23 @@ class _Asked(Instant):
     def after(self, before: _GraphState) -> _GraphState:
         """The state that follows. Times do not matter: any order of ends is looked at."""
         states = list(before.states)
-        for place, state in self.states.items():
-            states[place] = state._replace(due=0.0)
+        for index, state in self.states.items():
+            states[index] = state._replace(due=0.0)
         return _GraphState(tuple(states), self.running, self.active)
 
 
-def reaching(
+def search_arrow(
     graph: Graph,
     wanted: OutcomeArrow,
     budget: int = BUDGET,
     inside: Mapping[str, Graph] | None = None,
-) -> Reaching:
+) -> ArrowSearch:
     """Search for a script under which an arrow is taken, with these graphs inside. What ends how inside
     is not searched: it is taken as if any end were possible, and proven by the simulator."""
     net = Network(graph)
-    places = {action.key: net.place.get(action.full_name, -2) for action in graph.actions}
-    places |= {ENTRY: -1, EXIT: net.exit}
-    parent, child = places.get(wanted.parent, -2), places.get(wanted.child, -2)
+    indices = {action.key: net.index.get(action.full_name, -2) for action in graph.actions}
+    indices |= {ENTRY: -1, EXIT: net.exit}
+    parent, child = indices.get(wanted.parent, -2), indices.get(wanted.child, -2)
     if -2 in (parent, child):
         return ArrowUnreachable(0)
     search = _Search(net, (parent, child, wanted.outcome), budget)
@@ -126,7 +126,7 @@ def reaching(
         until_ms=DAY_MS,
         max_events=MOST,
     )
-    if wanted in taken(graph, traces).arrows:
+    if wanted in arrows_taken(graph, traces).arrows:
         return ArrowReached(script)
     return ArrowUndecided(search.looked, "The simulator does not go the way that was found.")
 
@@ -146,7 +146,7 @@ class _Search:
     def found(self) -> tuple[_End, ...] | None:
         """The ends after which the arrow is taken, in their order; None if they were not found."""
         first = _first(self._net)
-        instant = _Asked(self._net, first)
+        instant = _RecordingInstant(self._net, first)
         instant.begin()
         if self._wanted in instant.asked:
             return ()
@@ -159,8 +159,8 @@ class _Search:
             _, depth, _, moment = heappop(open_)
             for end in self._ends(moment):
                 self.spent += len(moment.states)
-                instant = _Asked(self._net, moment)
-                instant.ends(end.place, end.result)
+                instant = _RecordingInstant(self._net, moment)
+                instant.ends(end.action, end.result)
                 if self._wanted in instant.asked:
                     return (*_way(known, moment), end)
                 if instant.end is None and (then := instant.after(moment)) not in known:
@@ -173,19 +173,19 @@ class _Search:
     ) -> None:
         self.looked += 1
         active = (n for n, state in enumerate(moment.states) if state.does in DUE)
-        far = min((self._far[place] for place in active), default=_FAR)
+        far = min((self._far[index] for index in active), default=_FAR)
         if far < _FAR:  # else nothing that goes on leads there
             heappush(open_, (2 * far + depth, depth, self.looked, moment))
 
     def _ends(self, moment: _GraphState) -> Iterator[_End]:
-        for place, state in enumerate(moment.states):
+        for index, state in enumerate(moment.states):
             match state.does:
                 case 1:
-                    yield from (_End(place, result) for result in self._results[place])
+                    yield from (_End(index, result) for result in self._results[index])
                 case 2:
-                    yield _End(place, "on_stopped")
+                    yield _End(index, "on_stopped")
                 case 4:
-                    yield _End(place, "on_error")
+                    yield _End(index, "on_error")
                 case _:
                     pass
 
@@ -206,18 +206,18 @@ class _Search:
         visits: dict[int, list[_Visit]] = {}
         before = _first(self._net)
         for step, end in enumerate((None, *ends)):
-            instant = _Asked(self._net, before)
+            instant = _RecordingInstant(self._net, before)
             if end is None:
                 instant.begin()
             else:
-                instant.ends(end.place, end.result)
-                own = visits[end.place]
+                instant.ends(end.action, end.result)
+                own = visits[end.action]
                 own[-1] = own[-1]._replace(ended=step, result=end.result)
             after = instant.after(before)
-            for place, state in instant.states.items():
-                own = visits.setdefault(place, [])
-                is_ended = end is not None and end.place == place
-                was = IDLE if is_ended else before.states[place].does
+            for index, state in instant.states.items():
+                own = visits.setdefault(index, [])
+                is_ended = end is not None and end.action == index
+                was = IDLE if is_ended else before.states[index].does
                 if state.does == RUNS and was != RUNS:
                     own.append(_Visit(step))
                 elif state.does in (STOPS, GIVING_UP) and was not in (STOPS, GIVING_UP):
@@ -272,23 +272,23 @@ def _way(
 def _distances(net: Network, to: int) -> list[int]:
     """How many arrows lead at least from each place to this one."""
     above: dict[int, list[int]] = {}
-    for place, row in enumerate(net.edges):
+    for index, row in enumerate(net.edges):
         for edge in row:
             answers = edge is not None and set(edge.responses.values()) != {"ignore"}
             if edge is not None and answers:
-                above.setdefault(edge.child, []).append(place)
+                above.setdefault(edge.child, []).append(index)
     far = [_FAR] * (len(net.nodes) + 1)
     if to < 0:
         return far  # the entry is asked at the start, and never again
     far[to] = 0
     border = [to]
     while border:
-        border = [p for place in border for p in above.get(place, ()) if _nearer(far, p, place)]
+        border = [p for index in border for p in above.get(index, ()) if _nearer(far, p, index)]
     return far
 
 
-def _nearer(far: list[int], place: int, child: int) -> bool:
-    if far[place] <= far[child] + 1:
+def _nearer(far: list[int], index: int, child: int) -> bool:
+    if far[index] <= far[child] + 1:
         return False
-    far[place] = far[child] + 1
+    far[index] = far[child] + 1
     return True

@@ -35,7 +35,7 @@ class Outcome(NamedTuple):
     endless: Mask = 0
 
 
-class Course:
+class BaselineCourse:
     """Histories by instant: `times`, `roots` (who ended), `touched`, and sums after each. Of each place
     `instants` and `states`: when it was asked or ended, and its state then."""
 
@@ -65,17 +65,17 @@ class Course:
         self.tied = False
         self.outcome = Outcome("never") if self._never_starts() else self._followed()
 
-    def state(self, place: int, before: int) -> State:
+    def state(self, index: int, before: int) -> State:
         """The state of a place before an instant, by its number."""
-        own = self.instants[place]
+        own = self.instants[index]
         found = len(own) if before > (own[-1] if own else -1) else bisect_left(own, before)
-        return self.states[place][found - 1] if found else self.initial[place]
+        return self.states[index][found - 1] if found else self.initial[index]
 
-    def first_end(self, place: int) -> int | None:
+    def first_end(self, index: int) -> int | None:
         """The instant at which an action ends for the first time, unless that is by a stop."""
-        for instant in self.instants[place]:
-            if self.roots[instant] == place:
-                return instant if self.state(place, instant).does == RUNS else None
+        for instant in self.instants[index]:
+            if self.roots[instant] == index:
+                return instant if self.state(index, instant).does == RUNS else None
         return None
 
     def _never_starts(self) -> bool:
@@ -91,16 +91,16 @@ class Course:
         limit = LAPS * len(self.net.nodes) + MORE
         compared, power = self._seen(0.0), 1
         while instant.end is None and self._due and len(self.times) < limit:
-            at, place = heappop(self._due)
-            state = self._now(place)
+            at, index = heappop(self._due)
+            state = self._now(index)
             if state.does not in DUE or state.due != at:
                 continue
             instant = Instant(self.net, self._now, at, self.running[-1], self.active[-1])
-            instant.ends(place, "on_true")
-            self._note(at, place, instant)
+            instant.ends(index, "on_true")
+            self._note(at, index, instant)
             if self.laps:
                 continue
-            if place == compared[0] and self._came == compared[1]:
+            if index == compared[0] and self._came == compared[1]:
                 self.laps = self._seen(at) == compared
             if len(self.times) >= power:
                 compared, power = self._seen(at), 2 * power
@@ -109,20 +109,20 @@ class Course:
     def _outcome(self, last: Instant) -> Outcome:
         if last.end is not None:
             return Outcome(last.end, last.early)
-        if any(self._now(place).does in DUE for _, place in self._due):
+        if any(self._now(index).does in DUE for _, index in self._due):
             return Outcome("endless", cut=not self.laps)
         ended = self._now(self.net.exit)
         return stuck(self.net, self._waiting, ended, self._last)
 
-    def _now(self, place: int) -> State:
-        own = self.states[place]
-        return own[-1] if own else self.initial[place]
+    def _now(self, index: int) -> State:
+        own = self.states[index]
+        return own[-1] if own else self.initial[index]
 
-    def _note(self, at: float, place: int, instant: Instant) -> None:
+    def _note(self, at: float, index: int, instant: Instant) -> None:
         number = len(self.times)
         self.tied = self.tied or bool(self.times and self.times[-1] == at)
         self.times.append(at)
-        self.roots.append(place)
+        self.roots.append(index)
         self.touched.append(tuple(instant.states))
         for each, state in instant.states.items():
             before = self._now(each)

@@ -5,7 +5,7 @@ which stop others as they please, and to hold the two together.
 """
 
 from action_assistant.umrf.components import Mask
-from action_assistant.umrf.courses.course import LAPS, MORE, Kind, Outcome
+from action_assistant.umrf.courses.baseline import LAPS, MORE, Kind, Outcome
 from action_assistant.umrf.courses.network import Network
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics.engine import Engine
@@ -36,30 +36,32 @@ class _Timed(Engine):
         self._instant = -1.0
 
     def _takes_ms(self, node: Node) -> float:
-        return self.net.due(self.net.place[node.full_name], self.now) - self.now
+        return self.net.due(self.net.index[node.full_name], self.now) - self.now
 
     def _stops_ms(self, node: Node) -> float:
-        return self.net.stopping_ms[self.net.place[node.full_name]]
+        return self.net.stopping_ms[self.net.index[node.full_name]]
 
     def _bypass(self, graph: Running, child: Node, result: Result) -> None:
         if self._instant != self.now:
             self._instant = self.now
             self._bypassed.clear()
-        place = self.net.place[child.full_name]
-        self.circles = self.circles or bool(self.net.circling[result] >> place & 1)
+        index = self.net.index[child.full_name]
+        self.circles = self.circles or bool(self.net.circling[result] >> index & 1)
         if (child.full_name, result) not in self._bypassed:
             self._bypassed.add((child.full_name, result))
             super()._bypass(graph, child, result)
 
 
-def whole(net: Network, graph: Graph, full_name: str, result: str) -> tuple[Outcome, int]:
+def simulated_outcome(
+    net: Network, graph: Graph, full_name: str, result: str
+) -> tuple[Outcome, int]:
     """How a graph ends in which the first run of an action ends with `result`, and how many events
     that took. "" is nobody."""
     calls: dict[str, tuple[Behaviour, ...]] = {}
     if full_name:
         calls[full_name] = (Behaviour(result=result), Behaviour())
     engine = _Timed(net, Script(calls))
-    seen = _Seen(net)
+    seen = _TraceReader(net)
     try:
         traces = engine.start(graph, 0.0)
     except GraphRefused:  # nothing of it begins, whoever ends how
@@ -94,13 +96,13 @@ def whole(net: Network, graph: Graph, full_name: str, result: str) -> tuple[Outc
 def _going_on(net: Network, engine: Engine, name: str) -> Mask:
     """The spontaneous actions that run in a graph of this engine, and that nobody has told to stop."""
     return sum(
-        1 << net.place[node.full_name]
+        1 << net.index[node.full_name]
         for node in engine.graphs[name].nodes.values()
         if node.type == "spontaneous" and node.state == "RUNNING"
     )
 
 
-class _Seen:
+class _TraceReader:
     """What a trace told of who waits, and of the end."""
 
     def __init__(self, net: Network) -> None:
@@ -116,13 +118,13 @@ class _Seen:
         for trace in traces:
             match trace:
                 case EdgeEval(edge=edge):
-                    self._asked = self.net.place.get(edge.partition(" => ")[0], -1)
+                    self._asked = self.net.index.get(edge.partition(" => ")[0], -1)
                 case NotReady(node=node):
-                    self.waiting |= 1 << self._place(node)
+                    self.waiting |= 1 << self._index_of(node)
                     if node == EXIT_NODE:
                         self.last = self._asked
                 case Dispatch(node=node):
-                    self.waiting &= ~(1 << self._place(node))
+                    self.waiting &= ~(1 << self._index_of(node))
                 case GraphStateEvent(state="FINISHED"):
                     kind = "finished"
                 case GraphStateEvent(state="HALTED"):
@@ -135,5 +137,5 @@ class _Seen:
                     pass
         return kind
 
-    def _place(self, node: str) -> int:
-        return self.net.exit if node == EXIT_NODE else self.net.place[node]
+    def _index_of(self, node: str) -> int:
+        return self.net.exit if node == EXIT_NODE else self.net.index[node]

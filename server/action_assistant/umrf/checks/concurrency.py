@@ -12,7 +12,7 @@ from functools import cached_property
 from typing import Final
 
 from action_assistant.umrf.checks.places import Subject
-from action_assistant.umrf.components import Mask, reachable
+from action_assistant.umrf.components import Mask, nodes_in, reachable
 from action_assistant.umrf.model import ENTRY, EXIT, PRECONDITIONS, Key, Precondition, Relation
 
 #: Pairs that are looked at; where there are more the rest is not followed: any two may meet, then.
@@ -21,7 +21,7 @@ PAIRS: Final = 400_000
 MOST: Final = 20_000
 
 
-class Together:
+class Concurrency:
     """`runs`: the actions that can run; `reports`: with which outcomes each (or the entry) can report
     an end, its own or one that it passes on when it is bypassed. `known`: whether it was followed; if
     not, anything that can run may run at any time."""
@@ -30,7 +30,7 @@ class Together:
         self, subject: Subject, runs: set[Key], reports: Mapping[Key, set[Precondition]]
     ) -> None:
         self.keys = [action.key for action in subject.real]
-        self.place = {key: number for number, key in enumerate(self.keys)}
+        self.index = {key: number for number, key in enumerate(self.keys)}
         self._subject = subject
         self._runs = runs
         self._reports = reports
@@ -42,7 +42,7 @@ class Together:
         self._behind_kept: dict[Mask, Mask] = {}
         self._lively = {a.key for a in subject.real if a.type == "spontaneous"}
         self._required = {
-            key: [r.parent for r in listed if r.required and r.parent in self.place]
+            key: [r.parent for r in listed if r.required and r.parent in self.index]
             for key, listed in subject.incoming.items()
         }
         if self.known:
@@ -67,41 +67,43 @@ class Together:
         """Whether `key` can run at a moment at which `other` runs."""
         if key not in self._runs or other not in self._runs:
             return False
-        return not self.known or bool(self._with[self.place[other]] >> self.place[key] & 1)
+        return not self.known or bool(self._with[self.index[other]] >> self.index[key] & 1)
 
-    def at_end(self, key: Key, outcome: Precondition, waited: Iterable[Key] = ()) -> set[Key]:
+    def running_after(
+        self, key: Key, outcome: Precondition, waited: Iterable[Key] = ()
+    ) -> set[Key]:
         """Which actions may run just after `key` reported this outcome, those that it starts included,
         when the ones that were `waited` for have reported, too. Of a large graph, any."""
         if outcome not in self._reports.get(key, ()):
             return set()
         if not self.known:
-            return (self._runs & self.place.keys()) - {key}
+            return (self._runs & self.index.keys()) - {key}
         mask = self._when(key, outcome) | self._started(key, outcome)
         for other in waited:
             mask &= self._beside(other)
-        return {self.keys[place] for place in places(mask)} - {key}
+        return {self.keys[index] for index in nodes_in(mask)} - {key}
 
-    def goes_on(self, key: Key, other: Key, outcome: Precondition) -> bool:
+    def may_run_at(self, key: Key, other: Key, outcome: Precondition) -> bool:
         """Whether `key` can be running when `other` reports this outcome."""
         if key not in self._runs or outcome not in self._reports.get(other, ()):
             return False
-        return not self.known or bool(self._when(other, outcome) >> self.place[key] & 1)
+        return not self.known or bool(self._when(other, outcome) >> self.index[key] & 1)
 
-    def outlasts(self, key: Key, outcome: Precondition) -> bool:
+    def may_outlast(self, key: Key, outcome: Precondition) -> bool:
         """Whether `key` itself may go on when it reports this outcome: a spontaneous action begins again,
         and one that is bypassed may be running."""
         if key not in self._runs or outcome not in self._reports.get(key, ()):
             return False
         if not self.known or (key in self._lively and outcome != "on_stopped"):
             return True
-        return bool(self._passing.get((key, outcome), 0) >> self.place[key] & 1)
+        return bool(self._passing.get((key, outcome), 0) >> self.index[key] & 1)
 
     def _when(self, key: Key, outcome: Precondition) -> Mask:
-        own = self._with[self.place[key]] if key in self._runs else 0
+        own = self._with[self.index[key]] if key in self._runs else 0
         return own | self._passing.get((key, outcome), 0)
 
     def _whenever(self, key: Key) -> Mask:
-        found = self._with[self.place[key]] if key in self._runs else 0
+        found = self._with[self.index[key]] if key in self._runs else 0
         for outcome in PRECONDITIONS:
             found |= self._passing.get((key, outcome), 0)
         return found
@@ -109,14 +111,14 @@ class Together:
     @cached_property
     def _first(self) -> Mask:
         """What the graph begins with."""
-        places = {place for place in self._children(ENTRY) if self.keys[place] in self._runs}
-        return sum(1 << place for place in places)
+        indices = {index for index in self._children(ENTRY) if self.keys[index] in self._runs}
+        return sum(1 << index for index in indices)
 
     @cached_property
     def _needs(self) -> list[Mask]:
         """What each action waits for."""
         listed = (self._required.get(key, ()) for key in self.keys)
-        return [sum(1 << self.place[each] for each in set(own)) for own in listed]
+        return [sum(1 << self.index[each] for each in set(own)) for own in listed]
 
     @cached_property
     def _after(self) -> list[Mask]:
@@ -128,23 +130,23 @@ class Together:
         """Actions that may have reported and go on again although nothing leads from them to themselves:
         they are started in several ways, or by what goes round."""
         found = 0
-        for place, after in enumerate(self._after):
-            if after >> place & 1:
+        for index, after in enumerate(self._after):
+            if after >> index & 1:
                 found |= after
             listed = [
                 relation
-                for relation in self._subject.incoming.get(self.keys[place], [])
+                for relation in self._subject.incoming.get(self.keys[index], [])
                 if relation.parent in self._reports
             ]
             optional = sum(not relation.required for relation in listed)
             if optional + (optional < len(listed)) > 1:
-                found |= 1 << place
+                found |= 1 << index
         return found
 
     def _beside(self, required: Key) -> Mask:
         """What may go on once this one has reported, as what waits for it begins."""
-        place = self.place[required]
-        found = self._whenever(required) | self._after[place] | self._repeated & 1 << place
+        index = self.index[required]
+        found = self._whenever(required) | self._after[index] | self._repeated & 1 << index
         # To be bypassed takes no time: what follows on what goes on then comes after it has reported.
         for outcome in PRECONDITIONS:
             found |= self._behind(self._passing.get((required, outcome), 0))
@@ -155,18 +157,18 @@ class Together:
         found = self._behind_kept.get(mask)
         if found is None:
             found = 0
-            for place in places(mask):
-                found |= self._after[place]
+            for index in nodes_in(mask):
+                found |= self._after[index]
             self._behind_kept[mask] = found
         return found
 
     def _children(self, key: Key) -> list[int]:
         listed = self._subject.outgoing.get(key, [])
-        return [self.place[r.child] for r in listed if r.child in self.place]
+        return [self.index[r.child] for r in listed if r.child in self.index]
 
     def _answers(self, key: Key, outcome: Precondition) -> Iterator[tuple[Relation, str]]:
         for relation in self._subject.outgoing.get(key, []):
-            if relation.child in self.place:
+            if relation.child in self.index:
                 run = key == ENTRY
                 yield relation, "run" if run else relation.conditions.answer(outcome)
 
@@ -176,7 +178,7 @@ class Together:
             return self._first
         if outcome not in self._starts:
             self._starts[outcome] = self._all_started(outcome)
-        return self._starts[outcome][self.place[key]]
+        return self._starts[outcome][self.index[key]]
 
     def _all_started(self, outcome: Precondition) -> list[Mask]:
         """Of each action: bypasses are ways, what they start lies at their ends, counted from behind
@@ -186,11 +188,11 @@ class Together:
         for key in self.keys:
             own: list[int] = []
             for relation, answer in self._answers(key, outcome):
-                place = self.place[relation.child]
+                index = self.index[relation.child]
                 if answer == "run" and relation.child in self._runs:
-                    own.append(count + place)
+                    own.append(count + index)
                 elif answer == "bypass":
-                    own.append(place)
+                    own.append(index)
             ways.append(own)
         return [mask >> count for mask in reachable(ways)]
 
@@ -211,7 +213,7 @@ class Together:
 
     def _around(self, key: Key, outcome: Precondition) -> Mask:
         """What goes on already when it reports; a spontaneous one goes on itself."""
-        own = 1 << self.place[key] if key in self._lively else 0
+        own = 1 << self.index[key] if key in self._lively else 0
         return own | self._when(key, outcome)
 
     def _join(self, child: Key) -> None:
@@ -225,9 +227,9 @@ class Together:
     def _begin(self, child: Key, parent: Key, outcome: Precondition) -> None:
         if self._is_enough():
             return
-        place = self.place[child]
+        index = self.index[child]
         around, started = self._around(parent, outcome), self._started(parent, outcome)
-        found = (around | started) & ~self._with[place] & ~(1 << place)
+        found = (around | started) & ~self._with[index] & ~(1 << index)
         if not found:
             return
         self._count(1 + len(self._required.get(child, ())))
@@ -235,20 +237,20 @@ class Together:
             if required != parent:
                 found &= self._beside(required)
         new = found
-        for other in places(found & started & ~around):
+        for other in nodes_in(found & started & ~around):
             self._count(1)
             if self._is_enough():
                 return
-            if not self._is_ready(self.keys[other], parent, place):
+            if not self._is_ready(self.keys[other], parent, index):
                 new ^= 1 << other
         if not new:
             return
-        self._with[place] |= new
+        self._with[index] |= new
         self._again(child)
         self._count(new.bit_count())
-        for other in places(new) if not self._is_enough() else ():
-            if not self._with[other] >> place & 1:
-                self._with[other] |= 1 << place
+        for other in nodes_in(new) if not self._is_enough() else ():
+            if not self._with[other] >> index & 1:
+                self._with[other] |= 1 << index
                 self._again(self.keys[other])
 
     def _is_enough(self) -> bool:
@@ -262,7 +264,7 @@ class Together:
         waits for besides has to have reported by then."""
         listed = self._required.get(key, ())
         again = self._after[beside] | self._repeated
-        if self._needs[self.place[key]] >> beside & ~again >> beside & 1:
+        if self._needs[self.index[key]] >> beside & ~again >> beside & 1:
             return False
         self._count(len(listed))
         return all(
@@ -274,11 +276,3 @@ class Together:
         if key not in self._waiting and key in self._reports:
             self._waiting.add(key)
             self._open.append(key)
-
-
-def places(mask: Mask) -> Iterator[int]:
-    """Yield the places of the bits that are set."""
-    while mask:
-        lowest = mask & -mask
-        yield lowest.bit_length() - 1
-        mask ^= lowest
