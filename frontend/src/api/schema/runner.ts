@@ -82,7 +82,7 @@ export interface RunnerApi {
     };
     /**
      * AlarmShown
-     * @description Something that a person must know now.
+     * @description A message that a person must see now.
      */
     AlarmShown: {
         code: string;
@@ -105,7 +105,7 @@ export interface RunnerApi {
     };
     /**
      * ApprovalRequest
-     * @description A yes to exactly one graph.
+     * @description The body of an approval of exactly one graph.
      */
     ApprovalRequest: {
         digest: string;
@@ -153,8 +153,8 @@ export interface RunnerApi {
     };
     /**
      * AtRestShown
-     * @description How rest was seen where no answer of the engine could prove it: by whom (null: the runner saw
-     *     the end of the engine's process), when, and how.
+     * @description The observation of rest where no answer of the engine could prove it: by whom (null: the
+     *     runner saw the engine's process end), when, and how.
      */
     AtRestShown: {
         by: RunnerApi["Author"] | null;
@@ -164,8 +164,8 @@ export interface RunnerApi {
     };
     /**
      * Author
-     * @description The person behind a command, and from where it came. `address`: on the network; "" for the
-     *     runner's own computer. `by` is "" where it was not recorded.
+     * @description The person behind a command, and where the command came from. `address`: on the network; ""
+     *     for the runner's own computer. `by` is "" where it was not recorded.
      */
     Author: {
         id: string;
@@ -490,8 +490,8 @@ export interface RunnerApi {
     };
     /**
      * GroupRequest
-     * @description One version for several robots at once. Without version, digest and `request_id` it can only
-     *     be looked at.
+     * @description One version for several robots at once. Without version, digest and `request_id` it is only
+     *     good for a pre-flight.
      */
     GroupRequest: {
         /** @description The UMRF graph itself, as approved, or a string that holds its JSON text */
@@ -575,8 +575,8 @@ export interface RunnerApi {
     };
     /**
      * IndexWriteAnswer
-     * @description What is in the folder now: files that were `written` anew, that `replaced` others, and graphs that
-     *     were `there` as they shall be.
+     * @description The state of the folder after a write: files that were `written` anew, files that `replaced`
+     *     others, and graphs that were `there` before in the same form.
      */
     IndexWriteAnswer: {
         folder: string;
@@ -586,8 +586,8 @@ export interface RunnerApi {
     };
     /**
      * IndexWriteRequest
-     * @description The graphs inside of a graph, as a start of it has them: `digest` is that graph's, `tree_digest` of
-     *     all together. `replace`: those that may take the place of another file.
+     * @description The graphs inside of a graph, as a start of it has them. `digest` is that of the graph,
+     *     `tree_digest` that of all together. `replace`: names of graphs that may replace another file.
      */
     IndexWriteRequest: {
         subgraphs: RunnerApi["SentSubgraph"][];
@@ -599,8 +599,8 @@ export interface RunnerApi {
     };
     /**
      * Item
-     * @description One thing that was looked at. A person may override a blocked one where `overridable`, with
-     *     the codes in `codes` and a reason. `folder`: where graphs could be written that the robot lacks.
+     * @description One item of a pre-flight. A person may override a blocked one where `overridable`, with the
+     *     codes in `codes` and a reason. `folder`: where graphs that the robot lacks could be written.
      */
     Item: {
         code: string;
@@ -786,8 +786,8 @@ export interface RunnerApi {
     };
     /**
      * Overridden
-     * @description A problem that stood in the way of a start, as the look before it told it. `aid` and `path`
-     *     are its place in the graph that was sent.
+     * @description A problem that would have blocked a start, worded as in its pre-flight. `aid` and `path` are
+     *     its place in the graph that was sent.
      */
     Overridden: {
         code: string;
@@ -798,7 +798,7 @@ export interface RunnerApi {
     };
     /**
      * Override
-     * @description Problems that a person decided to start in spite of, and why.
+     * @description The codes of problems that a person overrides with a start, and the reason.
      */
     Override: {
         codes: string[];
@@ -842,9 +842,9 @@ export interface RunnerApi {
     };
     /**
      * Preflight
-     * @description What stands between a graph and its start on one engine. `override`: the codes that a person
-     *     would have to answer for; `never`: something cannot be overridden; `digest`: of the graph that was
-     *     looked at, `tree_digest`: of it together with the graphs inside.
+     * @description The pre-flight of a graph on one engine. `override`: the codes that a person would have to
+     *     answer for; `never`: some item cannot be overridden; `digest`: of the graph that was checked,
+     *     `tree_digest`: of it together with the graphs inside.
      */
     Preflight: {
         engine: string;
@@ -1394,8 +1394,8 @@ export interface RunnerApi {
     };
     /**
      * SentSubgraph
-     * @description A graph inside of the one that is sent, by the name of the actions that stand for it. `version`
-     *     and `graph`: where it comes from.
+     * @description A graph inside of the one that is sent. `name` is that of the actions that stand for it;
+     *     `version` and `graph`: where it comes from.
      */
     SentSubgraph: {
         name: string;
@@ -1440,12 +1440,13 @@ export interface RunnerApi {
     };
     /**
      * StartRequest
-     * @description A start: the version by value, and where it shall run.
+     * @description A start: the version by value, and the engine that runs it.
      *
-     *     `digest` is what the person saw; `request_id` is made by the asker, once per intended start.
-     *     `like`: the robot whose engine the simulator plays, with its hazards. `behaviours`: actions that
-     *     have a Python behaviour on the runner do what it does, before what the script says. `subgraphs`: all
-     *     graphs inside, by value, as the version has them; `tree_digest`: of the graph together with them.
+     *     `digest` is that of the graph that the person saw; `request_id` is made by the client, once per
+     *     intended start. `like`: the robot whose engine the simulator plays, with its hazards.
+     *     `behaviours`: actions with a Python behaviour on the runner do what that does, before what the
+     *     script says. `subgraphs`: all graphs inside, by value, as the version has them; `tree_digest`:
+     *     the digest of the graph together with them.
      */
     StartRequest: {
         version: string;
@@ -1548,8 +1549,8 @@ export interface RunnerApi {
     };
     /**
      * SubgraphShown
-     * @description A graph inside of the one that was started, as it was sent along, by the name of the actions that
-     *     stand for it. `graph`: its id; `version`: of it, where there was one.
+     * @description A graph inside of the one that was started, as it was sent along. `name` is that of the
+     *     actions that stand for it; `graph`: its id; `version`: of it, where there was one.
      */
     SubgraphShown: {
         name: string;
@@ -1584,7 +1585,8 @@ export interface RunnerApi {
     };
     /**
      * Took
-     * @description Seconds: at least `least` and at most `most`; null: nothing bounds it from above.
+     * @description A duration in seconds: at least `least` and at most `most`; null: nothing bounds it from
+     *     above.
      */
     Took: {
         least: number;

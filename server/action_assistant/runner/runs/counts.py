@@ -1,9 +1,9 @@
-"""How often each action of a run ran, as far as that is known. Pure.
+"""Counts how often each action of a run ran, as far as that is known. Pure.
 
-An engine counts nothing: what it shows is a state at some moment, and an action that runs again between
-two looks is seen once. So a number of visits is a lower bound, except where transitions were seen, or
-where the graph rules out that the action runs more than once. Arrows force some of what was missed: an
-action that only one other one sets going ran no more often than that.
+An engine counts nothing: it shows states, and an action that runs again between two snapshots is
+seen once. So a number of visits is a lower bound, except where transitions were seen, or where the
+graph rules out that the action runs more than once. Arrows force some of the missed visits: an
+action that only one other one can start ran no more often than that one.
 
 See docs/decisions/099-visits-that-were-missed.md.
 """
@@ -19,7 +19,8 @@ from action_assistant.umrf.laps import Laps
 
 
 class VisitCount(msgspec.Struct, frozen=True):
-    """It ran `least` times; `at_least`: or more often. `seen` of these visits are known one by one."""
+    """An action ran `least` times, with `at_least` perhaps more often. `seen` of these visits are
+    known one by one."""
 
     least: int
     at_least: bool
@@ -27,7 +28,7 @@ class VisitCount(msgspec.Struct, frozen=True):
 
 
 def visit_counts(run: Run) -> dict[str, VisitCount]:
-    """The count of each action of a run."""
+    """Return the count of each action of a run, by its name in the run."""
     seen = {name: each.older + len(each.visits) for name, each in run.actions.items()}
     exact = {name for name, each in run.actions.items() if _is_exact(run, name, each)}
     inside = tuple(_inside(run)) if run.inner else ()
@@ -43,7 +44,7 @@ def visit_counts(run: Run) -> dict[str, VisitCount]:
 
 
 def _is_exact(run: Run, name: str, action: ActionRun) -> bool:
-    """Whether none of its visits can have been missed."""
+    """Return whether no visit of this action can have been missed."""
     if action.by == "" and action.visits:
         return True  # told by transitions
     if "/" in name:
@@ -54,8 +55,8 @@ def _is_exact(run: Run, name: str, action: ActionRun) -> bool:
 
 
 def _inside(run: Run) -> Iterator[tuple[str, str, Laps]]:
-    """The actions of graphs inside, outer ones first: the name, the action around it, and what the
-    arrows of its graph rule out."""
+    """Yield the actions of graphs inside, outer ones first: the name, the action around it, and the
+    laps of its graph."""
     inside: dict[str, list[str]] = {}
     for name in run.actions:
         part, mark, node = name.rpartition("/")
@@ -74,8 +75,8 @@ def _inside(run: Run) -> Iterator[tuple[str, str, Laps]]:
 
 
 def _needs_inside(inside: Iterable[tuple[str, str, Laps]]) -> Iterator[tuple[str, str, int]]:
-    """What actions of graphs inside need: their parents, and the action around them. How often the
-    entry of a graph inside sets one going besides, nobody knows."""
+    """Yield which visits the actions of graphs inside need: of their parents, and of the action
+    around them. How often the entry of a graph inside starts an action besides is not known."""
     needs: dict[str, Mapping[str, str]] = {}
     for name, around, laps in inside:
         part, _, node = name.rpartition("/")
@@ -90,7 +91,7 @@ def _needs_inside(inside: Iterable[tuple[str, str, Laps]]) -> Iterator[tuple[str
 
 
 def _forced(seen: Mapping[str, int], needs: Iterable[tuple[str, str, int]]) -> dict[str, int]:
-    """The numbers of visits that the arrows force, besides those that were seen."""
+    """Return the numbers of visits that were seen or that the arrows force."""
     least = dict(seen)
     parents: dict[str, list[tuple[str, int]]] = {}
     for child, parent, besides in needs:

@@ -1,7 +1,7 @@
-"""Durations, each between two bounds, since robots are not seen at every moment.
+"""Durations between two bounds, since robots are not seen at every moment.
 
-A figure that is told without its bounds is exact. What is not known is no figure: it is neither zero
-nor a failure.
+A duration without bounds is exact. An unknown duration is no number: it is neither zero nor a
+failure.
 """
 
 import math
@@ -17,33 +17,34 @@ _EXACT_S: Final = 0.001
 
 
 class Took(msgspec.Struct, frozen=True, kw_only=True):
-    """Seconds: at least `least` and at most `most`; None: nothing bounds it from above."""
+    """A duration in seconds: at least `least` and at most `most`; None: nothing bounds it from
+    above."""
 
     least: float
     most: float | None
 
     @property
     def exact(self) -> float | None:
-        """The one value that it can have; None where there are several."""
+        """The one value where both bounds lie within a millisecond; None otherwise."""
         known = self.most is not None and self.most - self.least <= _EXACT_S
         return self.most if known else None
 
 
 def took_us(least: int, most: int | None) -> Took:
-    """From microseconds, rounded away from each other."""
+    """Convert bounds in microseconds, each rounded outwards to a millisecond."""
     above = None if most is None else max(0, math.ceil(most / 1000) / 1000)
     return Took(least=max(0, math.floor(least / 1000) / 1000), most=above)
 
 
 def of_visit(visit: Visit) -> Took | None:
-    """How long a visit took; None while it goes on, as far as is known."""
+    """Return how long a visit took; None while no end was seen."""
     return None if visit.until is None else took_us(visit.least, visit.most)
 
 
 def of_run(run: Run) -> Took | None:
-    """From the start to when nothing of it moved any more, whenever that was proven. None of one that
-    was never started. While it goes on nothing bounds it from above; nor does the end of one of which
-    an action may go on still."""
+    """Return the time from the start until nothing of the run moved any more, whenever that was
+    proven; None for a run that was never started. It has no upper bound while the run is open or
+    lost, or while an action may still go on."""
     if run.started_at is None or run.end == "refused":
         return None
     visits = [visit for action in run.actions.values() for visit in action.visits]
@@ -56,8 +57,8 @@ def of_run(run: Run) -> Took | None:
 
 
 def at_rank(spans: Sequence[Took], share: float) -> Took | None:
-    """The smallest that at least `share` of them do not exceed, between its bounds: each bound is that
-    of the bounds. None of nothing."""
+    """Return the smallest duration that at least `share` of them do not exceed, each bound taken by
+    itself; None without durations."""
     if not spans:
         return None
     place = max(0, math.ceil(share * len(spans)) - 1)

@@ -19,8 +19,8 @@ End: TypeAlias = Literal["finished", "halted", "stopped", "error", "refused", "l
 
 
 class Author(msgspec.Struct, frozen=True, omit_defaults=True):
-    """The person behind a command, and from where it came. `address`: on the network; "" for the
-    runner's own computer. `by` is "" where it was not recorded."""
+    """The person behind a command, and where the command came from. `address`: on the network; ""
+    for the runner's own computer. `by` is "" where it was not recorded."""
 
     id: str
     name: str
@@ -29,15 +29,15 @@ class Author(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class Override(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Problems that a person decided to start in spite of, and why."""
+    """The codes of problems that a person overrides with a start, and the reason."""
 
     codes: tuple[str, ...]
     reason: str
 
 
 class Overridden(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """A problem that stood in the way of a start, as the look before it told it. `aid` and `path`
-    are its place in the graph that was sent."""
+    """A problem that would have blocked a start, worded as in its pre-flight. `aid` and `path` are
+    its place in the graph that was sent."""
 
     code: str
     text: str
@@ -46,8 +46,8 @@ class Overridden(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
 
 
 class RunSubgraph(msgspec.Struct, frozen=True, omit_defaults=True):
-    """A graph inside of the one that was started, as it was sent with it, by the name of the actions that
-    stand for it."""
+    """A graph inside of the one that was started, as it was sent with it. `name` is that of the
+    actions that stand for it."""
 
     name: str
     version: str | None
@@ -57,7 +57,7 @@ class RunSubgraph(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class Requested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """Somebody asked for a start and nothing stood in its way. Stored before anything is sent."""
+    """A person asked for a start and it was accepted. Stored before anything is sent."""
 
     kind: ClassVar[str] = "run.requested.v1"
 
@@ -87,8 +87,8 @@ class Requested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
 
 
 class Published(msgspec.Struct, frozen=True, omit_defaults=True):
-    """The one start message has left. `incarnation` names the life of the engine it went to,
-    `process` that engine's process where it is one of the runner's own computer."""
+    """The one start message has left. `incarnation` names the life of the engine that it went to,
+    `process` that engine's process where it is on the runner's own computer."""
 
     kind: ClassVar[str] = "run.published.v1"
 
@@ -98,7 +98,7 @@ class Published(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class Observed(msgspec.Struct, frozen=True, gc=False):
-    """Something of the engine was seen, in this order."""
+    """States, results or snapshots of the engine were seen, in this order."""
 
     kind: ClassVar[str] = "run.observed.v1"
 
@@ -107,7 +107,7 @@ class Observed(msgspec.Struct, frozen=True, gc=False):
 
 
 class PauseRequested(msgspec.Struct, frozen=True):
-    """Somebody wants the run to pause."""
+    """A person wants the run to pause."""
 
     kind: ClassVar[str] = "run.pause_requested.v1"
 
@@ -116,7 +116,7 @@ class PauseRequested(msgspec.Struct, frozen=True):
 
 
 class ResumeRequested(msgspec.Struct, frozen=True):
-    """Somebody wants the run to go on."""
+    """A person wants the run to go on."""
 
     kind: ClassVar[str] = "run.resume_requested.v1"
 
@@ -125,7 +125,7 @@ class ResumeRequested(msgspec.Struct, frozen=True):
 
 
 class ModifyRequested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """Somebody gave the run another version of its graph. Stored before it is sent."""
+    """A person gave the run another version of its graph. Stored before it is sent."""
 
     kind: ClassVar[str] = "run.modify_requested.v1"
 
@@ -139,8 +139,8 @@ class ModifyRequested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=T
 
 
 class ModifyRefused(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """The change that was asked for last was not made: what runs is what ran before, which is told
-    here once more. `actions` are all that were known then."""
+    """The last change of the graph was not made: the version that ran before still runs, and is
+    repeated here. `actions` are all that were known then."""
 
     kind: ClassVar[str] = "run.modify_refused.v1"
 
@@ -152,7 +152,7 @@ class ModifyRefused(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=Tru
 
 
 class StopRequested(msgspec.Struct, frozen=True, omit_defaults=True):
-    """Somebody wants the run stopped. Holds until the run has ended; nothing takes it back."""
+    """A person wants the run stopped. This holds until the run has ended; nothing takes it back."""
 
     kind: ClassVar[str] = "run.stop_requested.v1"
 
@@ -182,7 +182,7 @@ class Proof(msgspec.Struct, frozen=True):
 
 
 class Silent(msgspec.Struct, frozen=True, omit_defaults=True):
-    """The engine answers no get; nothing is known since `since`."""
+    """The engine answers no get; since `since` nothing is known."""
 
     kind: ClassVar[str] = "run.silent.v1"
 
@@ -192,7 +192,7 @@ class Silent(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class Answered(msgspec.Struct, frozen=True):
-    """The engine answers again."""
+    """The engine answers gets again, after a silence."""
 
     kind: ClassVar[str] = "run.answered.v1"
 
@@ -200,7 +200,7 @@ class Answered(msgspec.Struct, frozen=True):
 
 
 class AlarmRaised(msgspec.Struct, frozen=True):
-    """Something that a person must know now."""
+    """A person must know this now."""
 
     kind: ClassVar[str] = "run.alarm_raised.v1"
 
@@ -210,7 +210,8 @@ class AlarmRaised(msgspec.Struct, frozen=True):
 
 
 class EngineSaid(msgspec.Struct, frozen=True):
-    """A line of the engine's own log, from about this run. Evidence for a person, proof of nothing."""
+    """A line of the engine's own log about this run. It is evidence for a person and proves
+    nothing."""
 
     kind: ClassVar[str] = "run.engine_said.v1"
 
@@ -219,8 +220,8 @@ class EngineSaid(msgspec.Struct, frozen=True):
 
 
 class Unconfirmed(msgspec.Struct, frozen=True, omit_defaults=True):
-    """Nothing that the engine says can show any more that the run is at rest, and why. `lost`: the
-    engine does not hold it any more; else it holds actions that did not obey."""
+    """No word of the engine can show any more that the run is at rest. `why` gives the reason;
+    `lost`: the engine does not hold the run any more, else it holds actions that did not obey."""
 
     kind: ClassVar[str] = "run.unconfirmed.v1"
 
@@ -230,8 +231,9 @@ class Unconfirmed(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class Loading(msgspec.Struct, frozen=True, omit_defaults=True):
-    """Nothing of the run moves, but these actions may still be loading, in words in `why`; "" when that
-    is over. They are named by the running name of their graph and their full name."""
+    """No action of the run moves, but these may still be loading; `why` says it in words and is ""
+    when loading is over. Actions are named by the running name of their graph and their full
+    name."""
 
     kind: ClassVar[str] = "run.loading.v1"
 
@@ -241,8 +243,8 @@ class Loading(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class AtRest(msgspec.Struct, frozen=True):
-    """How rest was seen where the engine's word is none: `by` a person who looked, or by the runner
-    itself (None), which saw the engine's process end."""
+    """The observation that ended a run where no answer of the engine proves rest: `by` a person who
+    looked, or by the runner itself (None), which saw the engine's process end."""
 
     by: Author | None
     at: int
@@ -250,8 +252,8 @@ class AtRest(msgspec.Struct, frozen=True):
 
 
 class Ended(msgspec.Struct, frozen=True, omit_defaults=True):
-    """The run is over, and in which state; for `refused` and `lost` `detail` says why. `at_rest`:
-    who saw that, where no answer of the engine could prove it."""
+    """The run is over, in this state; for `refused` and `lost` `detail` says why. `at_rest`: who
+    saw rest where no answer of the engine could prove it."""
 
     kind: ClassVar[str] = "run.ended.v1"
 
@@ -263,8 +265,8 @@ class Ended(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class MovesAgain(msgspec.Struct, frozen=True):
-    """After its end the engine shows the run moving: it is open again, and what was said of its end
-    is taken back. `text` says what moves and what the run had been called."""
+    """The engine shows the run moving after its end: the run is open again and its end is taken
+    back. `text` says what moves and how the run had ended."""
 
     kind: ClassVar[str] = "run.moves_again.v1"
 
@@ -273,7 +275,7 @@ class MovesAgain(msgspec.Struct, frozen=True):
 
 
 class Unknown(msgspec.Struct, frozen=True):
-    """An event of a kind that this version does not know: kept, and passed over."""
+    """An event of a kind that this version does not know. It is kept and skipped."""
 
     kind: ClassVar[str] = ""
 
@@ -300,7 +302,7 @@ RunEvent: TypeAlias = (
     | Unknown
 )
 
-# Made once: to find out what a type looks like takes twice as long as to decode a short body.
+# Made once: a decoder takes twice as long to build as a short body to decode.
 _DECODERS: Final[Mapping[str, msgspec.json.Decoder[RunEvent]]] = {
     each.kind: msgspec.json.Decoder(each)
     for each in (
@@ -327,12 +329,13 @@ _DECODERS: Final[Mapping[str, msgspec.json.Decoder[RunEvent]]] = {
 
 
 def encode(event: RunEvent) -> bytes:
-    """The body of an event."""
+    """Return the body of an event as JSON."""
     return msgspec.json.encode(event)
 
 
 def decode_all(usual: str, events: Iterable[BareEvent]) -> list[RunEvent]:
-    """The events of stored bodies, most of which are of the kind `usual`. Raises as `decode`."""
+    """Decode stored bodies of one stream, most of which are of the kind `usual`: an event without a
+    kind is of that one. Raises msgspec.DecodeError."""
     read = _DECODERS[usual].decode
     try:
         return [read(body) if kind is None else decode(kind, body) for body, kind, _ in events]
@@ -341,7 +344,8 @@ def decode_all(usual: str, events: Iterable[BareEvent]) -> list[RunEvent]:
 
 
 def decode(kind: str, body: bytes) -> RunEvent:
-    """The event of a stored body. Raises msgspec.DecodeError when the body is not of its kind."""
+    """Decode a stored body; an unknown kind gives `Unknown`. Raises msgspec.DecodeError when the
+    body does not match its kind."""
     known = _DECODERS.get(kind)
     try:
         return Unknown() if known is None else known.decode(body)
@@ -349,8 +353,8 @@ def decode(kind: str, body: bytes) -> RunEvent:
         raise msgspec.DecodeError(str(error)) from error
 
 
-#: Fields of events that are for programs, or too large to be read: all other texts are what somebody said or was told.
-_NOT_SAID: Final = frozenset({
+#: Fields of events that are for programs, or too large to be read; people may search all other texts.
+_NOT_SEARCHED: Final = frozenset({
     "actions", "address", "aid", "at", "by", "digest", "graph", "group", "hash", "id", "incarnation", "inner_laps",
     "laps", "path", "process", "request_id", "run", "script", "stop_id", "subgraphs", "tree_digest", "type", "umrf",
     "version",
@@ -358,8 +362,8 @@ _NOT_SAID: Final = frozenset({
 
 
 def said_in(event: RunEvent) -> Iterator[str]:
-    """Yield the texts of an event that people may search for, as they stand in it. What was observed of an engine is
-    not among them: the run that it is folded into has its messages."""
+    """Yield the texts of an event that people may search for. An `Observed` event has none: the run
+    that it is folded into has its messages."""
     if not isinstance(event, Observed):
         yield from _texts_in(msgspec.to_builtins(event))
 
@@ -370,7 +374,7 @@ def _texts_in(value: Any) -> Iterator[str]:
             yield value
         case dict():
             for name, each in value.items():
-                if name not in _NOT_SAID:
+                if name not in _NOT_SEARCHED:
                     yield from _texts_in(each)
         case list() | tuple():
             for each in value:

@@ -49,13 +49,13 @@ from action_assistant.runner.runs.visits import (
     ActionRun,
     Message,
     SnapshotEvidence,
+    after_result,
+    after_snapshot,
+    after_transition,
     awaits_answer,
-    changed,
-    heard,
     is_heard,
-    paused,
-    resulted,
-    shown,
+    with_messages,
+    with_possible_pause,
 )
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.laps import Laps, laps
@@ -68,8 +68,8 @@ _UNSEEN: Final = ActionRun()
 
 
 def replay(events: Iterable[RunEvent], run: Run | None = None) -> Run | None:
-    """The run that these events tell, going on from `run`; None before it was requested. What was
-    observed in a row is folded in one go, since each go copies all actions."""
+    """Fold events in order, going on from `run`; None before a `Requested` event. A row of
+    `Observed` events is folded in one go, since each fold of observations copies all actions."""
     for kind, row in groupby(events, key=type):
         if run is not None and run.end is None and kind is Observed:
             run = observe(run, chain.from_iterable(map(_SEEN, row)))
@@ -83,7 +83,7 @@ def replay(events: Iterable[RunEvent], run: Run | None = None) -> Run | None:
 
 
 def begin(event: Requested) -> Run:
-    """A run at its first event."""
+    """Return the run after its first event."""
     known = event.laps if event.laps is not None else _laps(event.umrf)
     once, joined = frozenset(known.once), frozenset(known.barring_errors)
     return Run(
@@ -114,7 +114,8 @@ def begin(event: Requested) -> Run:
 
 
 def _laps(umrf: str) -> Laps:
-    """For runs that were begun before this was recorded with them."""
+    """Derive which actions run once from the graph, for runs from before this was stored with
+    them."""
     try:
         return laps(codec.read(umrf.encode()).graph)
     except codec.Unreadable:
@@ -122,7 +123,7 @@ def _laps(umrf: str) -> Laps:
 
 
 def follow(run: Run, event: RunEvent) -> Run:
-    """The run after one more event. Total: no event that can be decoded is refused."""
+    """Return the run after one more event. Every event that can be decoded is accepted."""
     if run.end is not None and not isinstance(event, AlarmRaised | MovesAgain):
         return run
     match event:
@@ -170,7 +171,7 @@ def follow(run: Run, event: RunEvent) -> Run:
 
 
 def _desired(run: Run, event: PauseRequested | ResumeRequested | StopRequested) -> Run:
-    """What people want of it: nothing takes a stop back."""
+    """Fold a pause, resume or stop: once a stop is wanted, nothing takes it back."""
     is_stopped = run.desired == "stopped"
     match event:
         case PauseRequested():
@@ -204,7 +205,7 @@ def _with_intervention(
     event: PauseRequested | ResumeRequested | StopRequested | ModifyRequested,
     kind: Literal["stop", "pause", "resume", "modify"],
 ) -> Run:
-    """Note what a person asked for, beside what was known of the run at that moment."""
+    """Note a command of a person together with what was known of the run at that moment."""
     asked = Intervention(
         kind=kind, at=event.at, by=event.author, state=run.state, active=run.active
     )
@@ -212,7 +213,7 @@ def _with_intervention(
 
 
 def _held(run: Run) -> Run:
-    actions = {name: paused(action) for name, action in run.actions.items()}
+    actions = {name: with_possible_pause(action) for name, action in run.actions.items()}
     return replace(run, actions=actions)
 
 
@@ -222,7 +223,7 @@ def _alarmed(run: Run, event: AlarmRaised) -> Run:
 
 
 def _meddled(run: Run, alarm: str) -> Run:
-    """Strangers may do what the graph rules out."""
+    """Fold the alarm of a foreign command: other people may do what the graph rules out."""
     match alarm:
         case "foreign_pause":
             return _held(run)
@@ -237,7 +238,7 @@ def _meddled(run: Run, alarm: str) -> Run:
 
 
 def is_news(run: Run, shown: Snapshot) -> bool:
-    """Whether a snapshot says anything that is not known yet."""
+    """Return whether a snapshot shows a state or a message that is not known yet."""
     own = shown.graph == run.graph_name
     if shown.state != (run.graph_state if own else run.parts.get(shown.graph)):
         return True
@@ -254,8 +255,9 @@ def is_news(run: Run, shown: Snapshot) -> bool:
 
 
 def thin(run: Run, seen: Iterable[Seen]) -> tuple[Seen, ...]:
-    """The same without what is known already: an engine tells its whole graph after every change,
-    and to store that again and again would cost the square of its size. Folds to the same run."""
+    """Drop from snapshots what is known already, with the same fold as before. An engine repeats
+    its whole graph after every change; storing that each time would grow with the square of its
+    size."""
     thinned: list[Seen] = []
     for item in seen:
         less = _thin(run, item) if isinstance(item, Snapshot) and not item.same else item
@@ -266,7 +268,7 @@ def thin(run: Run, seen: Iterable[Seen]) -> tuple[Seen, ...]:
 
 def _thin(run: Run, shown: Snapshot) -> Snapshot:
     if not names_all(run, shown):
-        return shown  # some are gone: of them nothing may be said
+        return shown  # an action is gone: it must not be taken for unchanged
     news: dict[str, str] = {}
     said: dict[str, tuple[str, ...]] = {}
     for node, state in shown.nodes.items():
@@ -297,7 +299,7 @@ def _modified(run: Run, event: ModifyRequested) -> Run:
 
 
 def _unmodified(run: Run, event: ModifyRefused) -> Run:
-    """Actions that only the change would have brought are gone again."""
+    """Fold a refused change: actions that only the change would have brought are removed."""
     actions = {
         name: replace(action, aid=event.actions.get(name, action.aid))
         for name, action in run.actions.items()
@@ -315,7 +317,8 @@ def _unmodified(run: Run, event: ModifyRefused) -> Run:
 
 
 def _reopen(run: Run, event: MovesAgain) -> Run:
-    """What was proven before proves nothing now. What people wanted last is still wanted."""
+    """Fold motion after the end: the proof does not count any more, but what people wanted last
+    still does."""
     alarm = Alarm("moves_again", event.at, event.text)
     return replace(
         run,
@@ -331,7 +334,7 @@ def _reopen(run: Run, event: MovesAgain) -> Run:
 
 
 def _end(run: Run, event: Ended) -> Run:
-    """An end that nothing proves leaves the actions as they were seen last, without an end."""
+    """Fold the end. Actions that nothing proves to have ended stay as they were seen last."""
     return replace(
         run,
         end=event.state,
@@ -349,17 +352,19 @@ def _end(run: Run, event: Ended) -> Run:
 
 
 def observe(run: Run, seen: Iterable[Seen]) -> Run:
-    """The run after this was seen, in this order."""
+    """Return the run after these observations, in this order."""
     actions = dict(run.actions)
     main = run.graph_name
-    run = replace(run, actions=actions)  # nobody else has it yet: the loop fills it
-    going: int | None = None  # when it was seen to go on, until that is noted: a run is large
+    run = replace(run, actions=actions)  # the loop below fills the new dict
+    going: int | None = (
+        None  # newest sight of motion, noted once for a row: copying a run is expensive
+    )
     for item in seen:
         match item:
             case NodeState():
                 name = item.node if item.graph == main else key_of(run, item.graph, item.node)
                 action = actions.get(name, _UNSEEN)
-                actions[name] = changed(action, item.state, item.at, item.inputs)
+                actions[name] = after_transition(action, item.state, item.at, item.inputs)
                 if run.graph_state in TERMINAL:
                     run = _timed(run, item.at, item.at)
                 elif going is None or item.at > going:
@@ -367,7 +372,7 @@ def observe(run: Run, seen: Iterable[Seen]) -> Run:
                 continue
             case NodeResult():
                 name = item.node if item.graph == main else key_of(run, item.graph, item.node)
-                actions[name] = resulted(actions.get(name, _UNSEEN), item)
+                actions[name] = after_result(actions.get(name, _UNSEEN), item)
                 continue
         if going is not None:
             run, going = _timed(run, going, going), None
@@ -379,10 +384,10 @@ def observe(run: Run, seen: Iterable[Seen]) -> Run:
                 run = replace(run, result=item.result) if own else run
             case Snapshot():
                 known = _looked_at(run, max(run.looked.get(item.graph, 0), _before(item)))
-                run = _state_of(_shown(known, actions, item), item.graph, item.state)
+                run = _state_of(_after_snapshot(known, actions, item), item.graph, item.state)
                 run = _timed(run, item.at, _asked_at(item))
             case Hazard():
-                pass  # the alarm that comes with it is an event of its own
+                pass  # its alarm is an event of its own
             case _:
                 assert_never(item)
     return run if going is None else _timed(run, going, going)
@@ -394,9 +399,9 @@ def _state_of(run: Run, graph: str, state: str) -> Run:
     return replace(run, parts=run.parts | {graph: state})
 
 
-def _shown(run: Run, actions: dict[str, ActionRun], item: Snapshot) -> Run:
-    """What a snapshot says of its actions. What a failure or a sub-graph may do to others counts
-    first, since both may be told together."""
+def _after_snapshot(run: Run, actions: dict[str, ActionRun], item: Snapshot) -> Run:
+    """Fold a snapshot into the actions of its graph. Failures and sub-graphs are noted first, since
+    they change what is known of the other actions in the same snapshot."""
     own = item.graph == run.graph_name
     failed = run.failed or not own or "ERROR" in item.nodes.values()
     looked = max(run.looked.get(item.graph, 0), _before(item))
@@ -413,23 +418,23 @@ def _shown(run: Run, actions: dict[str, ActionRun], item: Snapshot) -> Run:
             stoppable=run.stoppable or run.desired == "stopped" or not own,
             followed=item.since_asked is not None,
         )
-        action = shown(action, state, sight, item.inputs.get(node))
-        actions[name] = heard(action, item.messages.get(node, ()), item.at)
+        action = after_snapshot(action, state, sight, item.inputs.get(node))
+        actions[name] = with_messages(action, item.messages.get(node, ()), item.at)
     if asked is not None and (item.same or names_all(run, item)):
         looked = max(looked, asked)
     return replace(run, looked=run.looked | {item.graph: looked}, failed=failed)
 
 
 def _looked_at(run: Run, looked: int) -> Run:
-    """Answers have shown it as it was known until now: those that were asked for since."""
+    """Note that answers asked for until `looked` showed the run as it was known."""
     if run.over_at is not None or looked <= max(run.going_at, run.reopened_at):
         return run
     return replace(run, going_at=looked)
 
 
 def _timed(run: Run, at: int, asked: int | None) -> Run:
-    """Since when it is over, as far as that is seen. Only when the graph says so is it worth a look
-    at every action."""
+    """Note since when the run is over, as far as that was seen. All actions are only examined when
+    the graph's own state is a final one."""
     if run.graph_state in TERMINAL and run.apparent_end is not None:
         return run if run.over_at is not None else replace(run, over_at=at)
     if run.over_at is None and (asked is None or asked <= run.going_at):
@@ -439,7 +444,7 @@ def _timed(run: Run, at: int, asked: int | None) -> Run:
 
 
 def names_all(run: Run, item: Snapshot) -> bool:
-    """Whether a snapshot leaves out no action that is known of its graph."""
+    """Return whether a snapshot names every action that is known of its graph."""
     return all(name in item.nodes for name in _known_of(run, item.graph))
 
 
@@ -451,19 +456,22 @@ def _known_of(run: Run, graph: str) -> Iterator[str]:
 
 
 def key_of(run: Run, graph: str, node: str) -> str:
-    """The name of an action in a run: nodes of sub-graphs stand behind the name of theirs."""
+    """Return the name of an action in a run: its full name, behind the running name of its
+    sub-graph if it is in one."""
     return node if graph == run.graph_name else f"{graph}/{node}"
 
 
 def _asked_at(item: Snapshot) -> int | None:
-    """Not before when an answer shows things; None for feedback, which may be of any age."""
+    """Return a moment before which the snapshot was not taken: when its answer was asked for. None
+    for feedback, which may be of any age."""
     if item.source == "feedback":
         return None
     return item.asked_at if item.asked_at is not None else item.at - _ASKED_US
 
 
 def _before(item: Snapshot) -> int:
-    """When the answer before this was asked for; older streams have only when it came."""
+    """Return when the answer before this snapshot was asked for. Older streams only have the time
+    at which it came."""
     if item.since_asked is not None:
         return item.since_asked
     return 0 if item.since is None else item.since - _ASKED_US

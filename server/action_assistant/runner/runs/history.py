@@ -1,4 +1,4 @@
-"""Runs as the journal has them: those that are over, and those that an earlier process left."""
+"""Reads runs from the journal: those that are over, and those that an earlier process left open."""
 
 from collections.abc import Awaitable, Callable, Sequence
 from typing import Any, Protocol, TypeAlias
@@ -15,48 +15,50 @@ from action_assistant.runner.runs.run import Run
 
 
 class RunnerJournal(Store, Protocol):
-    """What the runner asks of its journal."""
+    """The journal of the runner: streams, and queries of its tables."""
 
     async def query(self, statement: Select[Any]) -> list[Row[Any]]:
-        """Rows of the tables. Raises Unavailable."""
+        """Return rows of the tables. Raises Unavailable."""
         ...
 
 
-#: Reads a run that is over, and the seq of its last event: all of it, or only what people are
-#: shown. Raises NotFound.
+#: Reads a run that is over, and the seq of its last event. The flag asks for the run with all visits; without
+#: it, only with those that people are shown. Raises NotFound.
 Past: TypeAlias = Callable[[str, bool], Awaitable[tuple[Run, int]]]
 
 
 class RunHistory:
-    """Reads runs. Raises Unavailable while the journal cannot be read. `past` reads those that are
-    over; without it they are folded here."""
+    """Reads runs. `past` reads those that are over in a worker; without it they are folded here.
+    Raises Unavailable while the journal cannot be read."""
 
     def __init__(self, journal: RunnerJournal, past: Past | None = None) -> None:
         self._journal = journal
         self._past = past
 
     async def followed(self, run: str) -> tuple[Run | None, int]:
-        """A run to go on with, and the seq of its last event. Raises msgspec.DecodeError."""
+        """Return a run with all its visits, so that it can go on, and the seq of its last event.
+        Raises msgspec.DecodeError."""
         if self._past is not None:
             return await self._past(run, True)
         return await self.replayed(run)
 
     async def replayed(self, run: str) -> tuple[Run | None, int]:
-        """The same, folded here and now: for the time before anybody can ask for anything."""
+        """Fold a run here, without a worker, and return it with the seq of its last event: used
+        before the runner takes requests."""
         events = await self._journal.read(stream_of(run))
         found = replay(decode(each.kind, each.body) for each in events)
         return found, events[-1].seq if events else 0
 
     async def left(self, run: str) -> tuple[Run | None, int, bool]:
-        """A run that an earlier process left, the seq of its last event, and whether all of them could
-        be read; those that cannot are passed over."""
+        """Return a run that an earlier process left, the seq of its last event, and whether all
+        events could be read; damaged ones are skipped."""
         events = await self._journal.read(stream_of(run))
         read = [_decoded(each) for each in events]
         told = [event for event in read if event is not None]
         return replay(told), events[-1].seq if events else 0, len(told) == len(read)
 
     async def run(self, run: str) -> Run:
-        """A run. Raises NotFound."""
+        """Return a run as people are shown it. Raises NotFound."""
         if self._past is not None:
             return (await self._past(run, False))[0]
         found, _ = await self.replayed(run)
@@ -65,11 +67,11 @@ class RunHistory:
         return found
 
     async def umrf(self, run: str) -> str:
-        """The graph as it was sent. Raises NotFound."""
+        """Return the graph as it was sent. Raises NotFound."""
         return (await self.requested(run)).umrf
 
     async def requested(self, run: str) -> Requested:
-        """The start, as it was asked for. Raises NotFound."""
+        """Return the first event of a run, its accepted start. Raises NotFound."""
         first = await self._journal.read(stream_of(run), limit=1)
         event = decode(first[0].kind, first[0].body) if first else None
         if not isinstance(event, Requested):
@@ -77,11 +79,11 @@ class RunHistory:
         return event
 
     async def events(self, run: str, after: int, limit: int) -> Sequence[Event]:
-        """Stored events of a run with `seq > after`."""
+        """Return stored events of a run with `seq > after`, at most `limit`."""
         return await self._journal.read(stream_of(run), after=after, limit=limit)
 
     async def rows(self, statement: Select[Any]) -> list[Row[Any]]:
-        """Rows of the tables."""
+        """Return rows of the tables. Raises Unavailable."""
         return await self._journal.query(statement)
 
 
@@ -93,8 +95,8 @@ def _decoded(event: Event) -> RunEvent | None:
 
 
 async def sent_of(store: Store, run: Run) -> str | None:
-    """The graph that a run has now: as it was sent, or changed since. None when it cannot be told.
-    Raises Unavailable."""
+    """Return the graph that a run has now, as it was sent or changed since; None when no stored
+    event has it. Raises Unavailable."""
     stored = await store.read(stream_of(run.id))
     sent = {Requested.kind, ModifyRequested.kind}
     for each in reversed(stored):

@@ -1,7 +1,7 @@
-"""What is asked of the runner's tables: runs, labels, robots.
+"""Queries of the runner's tables: runs, labels, robots.
 
-Open runs live in memory; the table answers for those that are over, and says which were open when
-the process ended.
+Open runs live in memory; the table has those that are over, and tells which were open when the
+process ended.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -27,37 +27,37 @@ OPEN: Final = "open"
 
 
 def open_runs() -> Select[Any]:
-    """Ids of the runs that have no end yet, oldest first."""
+    """Select the ids of the runs that have no end yet, oldest first."""
     return select(run.c.id).where(run.c.state == OPEN).order_by(run.c.number)
 
 
 def last_number() -> Select[Any]:
-    """The highest run number given so far."""
+    """Select the highest run number given so far, 0 without runs."""
     return select(func.coalesce(func.max(run.c.number), 0))
 
 
 def of_run(run_id: str) -> Select[Any]:
-    """A run: state, simulated."""
+    """Select `state` and `simulated` of a run."""
     return select(run.c.state, run.c.simulated).where(run.c.id == run_id)
 
 
 def by_request(request_id: str) -> Select[Any]:
-    """The run that a request has become: id, digest, engine, tree_digest."""
+    """Select the run that a request has become: id, digest, engine, tree_digest."""
     fields = (run.c.id, run.c.digest, run.c.engine, run.c.tree_digest)
     return select(*fields).where(run.c.request_id == request_id)
 
 
 def of_start(request_id: str) -> Select[Any]:
-    """Ids of the runs that a start has become, also one on several robots: those have a request each,
-    which begins with that of their group."""
+    """Select the ids of the runs that a start has become. A start on several robots has a request
+    each, whose id begins with that of their group."""
     group = and_(run.c.request_id > f"{request_id}/", run.c.request_id < f"{request_id}0")
     return select(run.c.id).where(or_(run.c.request_id == request_id, group)).order_by(run.c.number)
 
 
 class Filter(msgspec.Struct, frozen=True, kw_only=True):
-    """Which runs are asked for; None asks for all. `failed`: refused, lost, halted, or ended in
-    error; the other ones are over as well. `graph` is an id or a name, `person` an id or a
-    part of a name, `text` a part of a name or of what was said, `before` a run's id."""
+    """The runs that are wanted; None means all. `failed`: refused, lost, halted, or ended in error;
+    false: over otherwise. `graph` is an id or a name, `person` an id or a part of a name, `text` a
+    part of a name or of what was said, `before` the id of a run."""
 
     graph: str | None = None
     engine: str | None = None
@@ -74,9 +74,9 @@ class Filter(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def listed(wanted: Filter, limit: int, among: Iterable[int] | None = None) -> Select[Any]:
-    """Runs and what was noted about them, newest first; `among`: numbers of the only ones that may be
-    wanted. Which of its states an open run is in the table does not know: with `states` all open ones
-    are there, too."""
+    """Select runs with their marks, newest first, at most `limit`. `among`: numbers of the only
+    runs that can match. The table does not know the states of open runs, so that `states` selects
+    all open ones as well."""
     query = select(run, review.c.pinned, review.c.note)
     query = query.outerjoin(review, review.c.run == run.c.id)
     if among is not None:
@@ -86,7 +86,7 @@ def listed(wanted: Filter, limit: int, among: Iterable[int] | None = None) -> Se
     if wanted.graph is None:
         return _newest(query, wanted, limit)
     ids = select(run.c.id).outerjoin(review, review.c.run == run.c.id)
-    # each by an index in the order of the numbers: one question for both would read all runs
+    # Two queries, each by an index in the order of the numbers: one with OR would read all runs.
     named = union_all(
         *(
             select(_newest(ids.where(column == wanted.graph), wanted, limit).subquery())
@@ -142,17 +142,17 @@ def _conditions(wanted: Filter) -> Iterator[ColumnElement[bool]]:
 
 
 def labels_of(runs: Sequence[str]) -> Select[Any]:
-    """The labels of these runs."""
+    """Select the labels of these runs."""
     query = select(run_label).where(run_label.c.run.in_(runs))
     return query.order_by(run_label.c.run, run_label.c.label)
 
 
 def all_labels() -> Select[Any]:
-    """Every label, the most used first."""
+    """Select up to 200 labels, the most used first."""
     query = select(run_label.c.label).group_by(run_label.c.label)
     return query.order_by(func.count().desc(), run_label.c.label).limit(200)
 
 
 def all_robots() -> Select[Any]:
-    """Registered robots by name."""
+    """Select the registered robots by name."""
     return select(robot).where(robot.c.retired_at.is_(None)).order_by(robot.c.name)

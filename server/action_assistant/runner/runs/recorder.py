@@ -1,7 +1,7 @@
-"""Appends the events of one stream in order, without making anybody wait.
+"""Appends the events of a stream in order, in the background: nobody waits for the journal.
 
-What happens to a robot is shown first and stored at once. When the journal fails the recorder says so
-(`recorded` is false) and goes on trying with the same events, in the same order.
+Facts about robots are shown first and stored at once. When the journal fails, `recorded` is false
+and the appender goes on trying with the same events, in the same order.
 """
 
 import logging
@@ -23,33 +23,34 @@ _AT_THE_END_S: Final = 1.0  # for what is left when writing is cancelled
 
 
 class Store(Protocol):
-    """What the runner asks of a journal."""
+    """The parts of a journal that recorders use."""
 
     async def append(
         self, stream: str, drafts: Sequence[Draft], *, expected: int | None = None
     ) -> int:
-        """Store; returns the last seq. Raises Conflict, Unavailable."""
+        """Store drafts and return the seq of the last one. Raises Conflict when the stream does not
+        end at `expected`, Unavailable."""
         ...
 
     async def read(
         self, stream: str, *, after: int = 0, upto: int | None = None, limit: int | None = None
     ) -> list[Event]:
-        """Events of a stream in order."""
+        """Return events of a stream, `after` < seq ≤ `upto`, in order."""
         ...
 
     async def newest(self, stream: str) -> int:
-        """The last seq of a stream; 0 when there is none."""
+        """Return the last seq of a stream; 0 when it is empty."""
         ...
 
 
 def stream_of(run: str) -> str:
-    """The stream of a run."""
+    """Return the name of the stream of a run."""
     return f"run/{run}"
 
 
 class StreamAppender:
-    """Appends to a stream that ends at `seq`, negative while that is not known. `changed` is called
-    when `seq` or `recorded` have changed."""
+    """Appends to a stream that ends at `seq`, which is negative while that is not known. `changed`
+    is called after each change of `seq` or `recorded`."""
 
     def __init__(
         self, store: Store, stream: str, seq: int, changed: Callable[[], None] = lambda: None
@@ -64,27 +65,27 @@ class StreamAppender:
         self._done = anyio.Event()
 
     def add(self, draft: Draft) -> None:
-        """Store soon."""
+        """Queue an event for storing."""
         self._waiting.append(draft)
         self._more.set()
 
     @property
     def idle(self) -> bool:
-        """Whether everything is stored."""
+        """True while every event that was added is stored."""
         return not self._waiting
 
     @property
     def waiting(self) -> int:
-        """How much is not stored."""
+        """The number of events that are not stored yet."""
         return len(self._waiting)
 
     async def flushed(self) -> None:
-        """Wait until everything that was put so far is stored."""
+        """Wait until all events are stored."""
         while self._waiting:
             await self._done.wait()
 
     async def find_end(self) -> None:
-        """Learn where the stream ends, however long that takes."""
+        """Ask the journal for the end of the stream until it answers."""
         failures = 0
         while True:
             try:
@@ -97,7 +98,7 @@ class StreamAppender:
                 return
 
     async def run(self) -> None:
-        """Write until cancelled, and then, for a second at most, what is left."""
+        """Write until cancelled; then write the rest for a second at most."""
         try:
             while True:
                 await self._more.wait()
@@ -112,7 +113,7 @@ class StreamAppender:
             raise
 
     async def _write_all(self) -> None:
-        """However long that takes."""
+        """Write all waiting events, with retries until the journal takes them."""
         if self.seq < 0:
             await self.find_end()
         failures = 0
@@ -124,7 +125,8 @@ class StreamAppender:
                 failures += 1
 
     async def _write(self) -> bool:
-        """One transaction. `expected` keeps a commit whose answer got lost from being repeated."""
+        """Store one batch in a transaction; return whether it is stored. `expected` prevents that a
+        commit whose answer got lost is repeated."""
         batch = [self._waiting[i] for i in range(min(len(self._waiting), _BATCH))]
         try:
             try:
@@ -164,5 +166,5 @@ class RunRecorder(StreamAppender):
         super().__init__(store, stream_of(run), seq, changed)
 
     def put(self, event: RunEvent, author: str) -> None:
-        """Store soon."""
+        """Queue an event of the run for storing."""
         self.add(Draft(event.kind, author, encode(event)))

@@ -1,8 +1,9 @@
-"""The words in which an engine's log refuses a start. Pure.
+"""Recognizes in an engine's log that it refused a start, and why. Pure.
 
-No message carries an error, so these lines are the only place that has the reason. They name no run:
-what they prove rests on their order. The thread that takes messages in says "Received request …" and,
-before anything else of its own, why it did not follow; only the end of some graph may come between.
+No message carries an error, so the log alone has the reason. Its lines name no run: they prove
+something by their order only. The thread that takes messages logs "Received request …" and, before
+any other line of its own, why it did not follow; only the end of some graph may be logged in
+between.
 """
 
 import re
@@ -11,9 +12,9 @@ from typing import Final
 from action_assistant.runner.links.engine_text import RECEIVED_START
 from action_assistant.runner.runs.run import Run
 
-#: The alarm with the engine's words. It is journaled, so that they outlive this process.
+#: Code of the alarm with the engine's words; it is stored, so that a restart keeps them.
 REFUSED: Final = "start_refused"
-#: The alarm of an engine that refused a start and yet shows some of it going on.
+#: Code of the alarm for an engine that refused a start and still shows some of it running.
 HALF_BEGUN: Final = "half_begun"
 
 _STARTED_BY_OTHERS: Final = frozenset({"foreign_start", "foreign_other"})
@@ -29,27 +30,27 @@ _LONGEST: Final = 300  # characters of the engine's words in a sentence
 
 
 class StartLog:
-    """The lines about the one start of `run`, from the moment on that it is handed over.
+    """Follows the engine's lines about the one start of `run`, from when it is handed over.
 
-    `words`: why the engine refused it; "" while it has not, or nobody can tell whose start it was. A
-    runner that takes a run up has not heard everything, so that lines prove nothing to it any more;
-    what was proven before is an alarm of the run.
+    `words`: the engine's reason for a refusal; "" while it has not refused, or where the start may
+    have been somebody else's. After a restart the runner has not heard every line, so that none
+    proves anything; a refusal that was proven before is an alarm of the run.
     """
 
     def __init__(self, run: Run) -> None:
         self._graph = run.graph_name
-        self._next = False  # the next line tells what became of it
+        self._next = False  # the next line tells whether the start was refused
         told = next((each for each in run.alarms if each.code == REFUSED), None)
         self._over = True
         others = any(each.code in _STARTED_BY_OTHERS for each in run.alarms)
         self.words = "" if told is None or others else _between_quotes(told.text)
 
     def begins(self) -> None:
-        """The start is handed over now: lines from here on may be about it."""
+        """Take the start as handed over: lines from here on may be about it."""
         self._over = False
 
     def hear(self, text: str) -> bool:
-        """One more line. Whether it says that the start was refused."""
+        """Read one more line; return whether it says that the start was refused."""
         if self._over or _OF_OTHERS.fullmatch(text):
             return False
         if not self._next:
@@ -61,23 +62,24 @@ class StartLog:
         return bool(self.words)
 
     def doubt(self) -> None:
-        """Somebody else has started something there, too: the lines may be about that."""
+        """Ignore all lines: somebody else has started a graph there, too, and they may be about
+        that one."""
         self._over, self.words = True, ""
 
 
 def words_of(line: str) -> str:
-    """What an error of the engine says, without where in its sources it arose."""
+    """Return the first line of an engine's error, without the place in its sources."""
     first = line.strip().partition("\n")[0]
     return _ORIGIN.sub("", first)[:_LONGEST].removesuffix(".")
 
 
 def in_words(engine: str, words: str) -> str:
-    """The alarm of a refusal. What follows from it is not known yet."""
+    """Return the text of the alarm for a refusal, before its effect is known."""
     return f"{engine} says of this start: “{words}”"
 
 
 def why_refused(engine: str, words: str) -> str:
-    """Why a run is over that never began; what `map::at` means is known from real engines."""
+    """Return why a run is over that never began, with a hint for the error `map::at`."""
     hint = _MEANT if words == "map::at" else ""
     return f"{engine} refused the start: {words}.{hint}"
 

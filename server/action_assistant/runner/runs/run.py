@@ -1,4 +1,4 @@
-"""A run: all that is known of it, as a value."""
+"""A run: all that is known of it, as one frozen value."""
 
 from typing import Final, Literal, TypeAlias
 
@@ -39,7 +39,7 @@ _END_OF: Final[dict[str, End]] = {
 
 
 class Alarm(msgspec.Struct, frozen=True):
-    """Something that a person must know now."""
+    """A message that a person must see now."""
 
     code: str
     at: int
@@ -47,8 +47,8 @@ class Alarm(msgspec.Struct, frozen=True):
 
 
 class Intervention(msgspec.Struct, frozen=True, kw_only=True):
-    """What a person asked of the run at `at`. `state` and `active` are what was known at that moment:
-    the state of the run, and the actions that had been seen running and not seen to end."""
+    """A command of a person to the run at `at`. `state` and `active` are what was known at that
+    moment: the state of the run, and the actions that had been seen running and not seen to end."""
 
     kind: Literal["stop", "pause", "resume", "modify"]
     at: int
@@ -58,7 +58,7 @@ class Intervention(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Run(msgspec.Struct, frozen=True, kw_only=True):
-    """All that is known of one run. Times are microseconds UTC."""
+    """The state of one run, folded from its events. Times are microseconds UTC."""
 
     id: str
     number: int
@@ -84,16 +84,20 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     actions: dict[str, ActionRun] = {}
     inner: dict[str, Laps] = {}  # which actions of graphs inside run once, by the graphs' own names
     needs: tuple[tuple[str, str, int], ...] = ()  # as `Laps.needs`
-    looked: dict[str, int] = {}  # asking for the newest answer that showed a graph to be as here
-    reshaped: bool = False  # what its arrows rule out may have happened nevertheless
-    failed: bool = False  # an action has, or may have in a sub-graph
-    stoppable: bool = False  # something or somebody may have stopped an action
+    looked: dict[
+        str, int
+    ] = {}  # by graph: when the newest answer that showed it in this state was asked for
+    reshaped: bool = (
+        False  # its arrows rule nothing out any more: it was modified, or others set it going
+    )
+    failed: bool = False  # an action has failed, or may have in a sub-graph
+    stoppable: bool = False  # an arrow or a person may have stopped an action
     result: str | None = None
     started_at: int | None = None
     ended_at: int | None = None
-    going_at: int = 0  # it was not over at that moment, or any before
+    going_at: int = 0  # until this moment it was not over
     reopened_at: int = 0  # feedback, which may be old, said then that it was not over after all
-    over_at: int | None = None  # nothing of it moved any more when that was seen first
+    over_at: int | None = None  # when it was first seen that nothing of it moved any more
     end: End | None = None
     detail: str = ""
     unknown_since: int | None = None
@@ -101,7 +105,7 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     unconfirmed: str = ""  # why nothing that the engine says shows rest any more
     loading: str = ""  # which actions may still be loading although nothing moves, in words
     loading_since: int | None = None  # when that was noted first
-    lost: str = ""  # why the engine does not hold it any more; nobody has seen it at rest
+    lost: str = ""  # why the engine does not hold it any more, without a proof of rest
     at_rest: AtRest | None = None
     moves_again_at: int | None = None  # it had ended, and was seen to move; until its next end
     stop_requested_at: int | None = None
@@ -113,7 +117,7 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def state(self) -> State:
-        """One word for where the run is."""
+        """The one word for the state of the run, derived from all other fields."""
         if self.end is not None:
             return self.end
         if self.lost:
@@ -136,17 +140,18 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def doubt(self) -> str:
-        """Why nothing that the engine says now shows rest; "" where it may."""
+        """The reason why no answer of the engine shows rest now; "" where one can."""
         return self.unconfirmed or self.loading
 
     @property
     def active(self) -> tuple[str, ...]:
-        """Actions that move or may move again."""
+        """Actions that move or may move again, by name."""
         return tuple(name for name, action in self.actions.items() if action.state in ACTIVE)
 
     @property
     def apparent_end(self) -> End | None:
-        """How the run would end if what was seen last is all there is."""
+        """The end that the last observations show, if nothing follows them; None while the run
+        moves or has ended."""
         if self.end is not None or self.graph_state is None or self.active:
             return None
         if any(state in {"RUNNING", "STOPPING", "PAUSED"} for state in self.parts.values()):

@@ -20,7 +20,7 @@ from action_assistant.umrf.json.embedded import UmrfGraph
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.run_size import MOST_BYTES, MOST_INSIDE
 
-#: Bytes of a body that carries graphs: what their texts may have, and room for all else that a start says.
+#: Bytes of a body that carries graphs: their texts, and everything else of a start.
 MOST: Final = MOST_BYTES + 100_000
 
 SentGraph: TypeAlias = Annotated[
@@ -35,15 +35,14 @@ SentGraph: TypeAlias = Annotated[
 
 
 def counted(body: bytes) -> int:
-    """The length that a body has at least without the escapes of a graph that is a string."""
+    """Return a lower bound of a body's length without the escapes of a graph that is sent as a
+    string."""
     return len(body) - body.count(b"\\")
 
 
 def read_sent(umrf: bytes) -> tuple[bytes, codec.Reading]:
-    """The text of a graph, byte for byte as it was meant, and what it says. For workers.
-
-    Raises BadInput, NotUmrf with the place, TooLarge.
-    """
+    """Return the text of a graph, byte for byte as it was meant, and the reading of it. For
+    workers. Raises BadInput, NotUmrf with the place, TooLarge."""
     text = _text_of(umrf)
     if len(text) > MOST_BYTES:
         raise TooLarge(
@@ -70,8 +69,8 @@ def _text_of(umrf: bytes) -> bytes:
 
 
 class SentSubgraph(msgspec.Struct, frozen=True, kw_only=True):
-    """A graph inside of the one that is sent, by the name of the actions that stand for it. `version`
-    and `graph`: where it comes from."""
+    """A graph inside of the one that is sent. `name` is that of the actions that stand for it;
+    `version` and `graph`: where it comes from."""
 
     name: str
     digest: str = ""
@@ -90,12 +89,13 @@ def read_inside(
     *,
     approved: bool = True,
 ) -> tuple[tuple[RunSubgraph, ...], dict[str, Graph]]:
-    """What was sent, as it is recorded, and the graphs by name. `own`: the digest of the graph around
-    them; `tree`: of all together, if it is known. Before a graph is `approved` nobody needs to know
-    digests. For workers. Raises BadInput, NotUmrf, TooLarge, Conflict with the place."""
+    """Return the graphs inside as they are recorded, and their readings by name. `own`: the digest
+    of the graph around them; `tree`: of all together, None or "" if it is not known. Before a graph
+    is `approved` digests may be left out. For workers. Raises BadInput, NotUmrf, TooLarge, Conflict
+    with the place."""
     if len(sent) > MOST_INSIDE:
         raise TooLarge(f"A graph that is sent has at most {MOST_INSIDE} graphs inside.")
-    told: list[RunSubgraph] = []
+    recorded: list[RunSubgraph] = []
     graphs: dict[str, Graph] = {}
     for place, each in enumerate(sent):
         text, graph, found = _read(place, each)
@@ -111,13 +111,13 @@ def read_inside(
                 where={"path": f"/subgraphs/{place}/digest"},
             )
         graphs[each.name] = graph
-        told.append(RunSubgraph(each.name, each.version, found, text.decode(), each.graph))
-    _require_tree(told, own, tree)
-    return tuple(told), graphs
+        recorded.append(RunSubgraph(each.name, each.version, found, text.decode(), each.graph))
+    _require_tree(recorded, own, tree)
+    return tuple(recorded), graphs
 
 
 def graphs_in(subgraphs: Sequence[RunSubgraph]) -> dict[str, Graph]:
-    """The recorded graphs by name; those that can be read. For workers."""
+    """Return the recorded graphs by name, without those that cannot be read. For workers."""
     found: dict[str, Graph] = {}
     for each in subgraphs:
         try:
@@ -128,7 +128,7 @@ def graphs_in(subgraphs: Sequence[RunSubgraph]) -> dict[str, Graph]:
 
 
 def tree_of(own: str, subgraphs: Sequence[RunSubgraph]) -> str:
-    """The digest of a graph together with those inside of it."""
+    """Return the digest of a graph together with those inside of it."""
     return tree_digest(own, ((each.name, each.digest) for each in subgraphs))
 
 
@@ -143,8 +143,8 @@ def _read(place: int, sent: SentSubgraph) -> tuple[bytes, Graph, str]:
     return text, reading.graph, digest(reading.graph)
 
 
-def _require_tree(told: Sequence[RunSubgraph], own: str, tree: str | None) -> None:
-    found = tree_of(own, told)
+def _require_tree(recorded: Sequence[RunSubgraph], own: str, tree: str | None) -> None:
+    found = tree_of(own, recorded)
     if tree and found != tree:
         raise Conflict(
             "The graphs inside that were sent are not those that were approved: the digest of all "
@@ -154,8 +154,8 @@ def _require_tree(told: Sequence[RunSubgraph], own: str, tree: str | None) -> No
 
 
 class SubgraphShown(msgspec.Struct, frozen=True):
-    """A graph inside of the one that was started, as it was sent along, by the name of the actions that
-    stand for it. `graph`: its id; `version`: of it, where there was one."""
+    """A graph inside of the one that was started, as it was sent along. `name` is that of the
+    actions that stand for it; `graph`: its id; `version`: of it, where there was one."""
 
     name: str
     version: str | None
@@ -165,7 +165,8 @@ class SubgraphShown(msgspec.Struct, frozen=True):
 
 
 class Sent(msgspec.Struct, frozen=True):
-    """A graph as it was sent, and the values of its actions."""
+    """A graph as it was sent, the values of its actions (by full name and flat name, as texts), and
+    the graphs inside."""
 
     umrf: str
     values: dict[str, dict[str, str]]
@@ -174,12 +175,12 @@ class Sent(msgspec.Struct, frozen=True):
 
 
 def sent_of(start: Requested) -> Sent:
-    """For workers: reads the graph."""
+    """Read the graph of a start. For workers."""
     return Sent(start.umrf, sent(start.umrf), start.subgraphs, start.tree_digest)
 
 
 def subgraphs_shown(start: Sent) -> list[SubgraphShown]:
-    """The graphs inside."""
+    """Return the graphs inside as answers show them."""
     return [
         SubgraphShown(
             each.name, each.version, each.digest, msgspec.Raw(each.umrf.encode()), each.graph

@@ -1,8 +1,8 @@
-"""Stalls: a graph that runs while none of its actions does, and what it waits for.
+"""Stalls: a graph is running while none of its actions is, and waits for something.
 
-The engine says nothing of it (docs/umrf-and-the-engine.md 2.3; H7, H8). What it waits for follows
-from the graph that was sent and from what was seen: results are not told, so that an arrow counts by
-all that its parent may have ended with. Pure.
+The engine says nothing about it (docs/umrf-and-the-engine.md 2.3; H7, H8). The reasons follow from
+the graph that was sent and from what was seen. Engines do not tell results, so an arrow counts with
+every outcome that its parent may have had. Pure.
 """
 
 from collections.abc import Iterator, Sequence
@@ -28,22 +28,20 @@ from action_assistant.umrf.model import (
 )
 from action_assistant.umrf.semantics.values import RemapUnknown, Slot, renamed, slots_of
 
-#: The alarm of it.
+#: Code of the alarm for a stalled run.
 STALLED: Final = "stalled"
 
-_AFTER_S: Final = (
-    6.0  # an action that loads for longer is rare, and then the alarm is no lie either
-)
+_AFTER_S: Final = 6.0  # few actions load for longer, and for these the alarm is true as well
 _LOOKS: Final = 4
-_TOLD: Final = 3  # reasons in one sentence
+_NAMED: Final = 3  # reasons in one sentence
 _OUTCOMES: Final[dict[str, Precondition]] = {
     "true": "on_true", "false": "on_false", "error": "on_error", "stopped": "on_stopped",
 }  # fmt: skip
 
 
 class ForParent(msgspec.Struct, frozen=True, tag="parent", tag_field="for"):
-    """`action` (None: the end of the graph) needs `parent` to have ended, which was not seen; nor was
-    its begin, unless it had `begun`."""
+    """`action` (None: the end of the graph) needs `parent` to have ended. That was not seen; its
+    begin was seen only if it had `begun`."""
 
     action: str | None
     parent: str
@@ -51,8 +49,8 @@ class ForParent(msgspec.Struct, frozen=True, tag="parent", tag_field="for"):
 
 
 class ForInput(msgspec.Struct, frozen=True, tag="input", tag_field="for"):
-    """`action` has no value for a required input, and nothing that has ended gives it one. The end of
-    a graph (None) needs what `giver` gives, the last action that leads to it."""
+    """`action` has no value for a required input, and no action that has ended gives one. The end
+    of a graph (None) needs an output of `giver`, the last action that leads to it."""
 
     action: str | None
     input: str
@@ -60,8 +58,8 @@ class ForInput(msgspec.Struct, frozen=True, tag="input", tag_field="for"):
 
 
 class ForOutcome(msgspec.Struct, frozen=True, tag="outcome", tag_field="for"):
-    """`parent` has ended, and its arrow to `action` answers with `response` instead of running it.
-    `certain`: however it ended; else the engine does not tell whether it ended so."""
+    """`parent` has ended, and its arrow to `action` responds with `response` instead of running it.
+    `certain`: for every outcome; else it depends on an outcome that the engine does not tell."""
 
     action: str | None
     parent: str
@@ -70,7 +68,8 @@ class ForOutcome(msgspec.Struct, frozen=True, tag="outcome", tag_field="for"):
 
 
 class ForPart(msgspec.Struct, frozen=True, tag="part", tag_field="for"):
-    """`action` is a sub-graph in which nothing moves; it is in this state, "" for what has been."""
+    """`action` is a sub-graph in which nothing moves. `state`: of the sub-graph, "" for a moment in
+    the past."""
 
     action: str
     state: str
@@ -80,24 +79,24 @@ Wait: TypeAlias = ForParent | ForInput | ForOutcome | ForPart
 
 
 class Standstill:
-    """Counts looks at a graph that runs while none of its actions does."""
+    """Decides from several looks whether a graph that is running stands still."""
 
     def __init__(self) -> None:
         self._since: float | None = None
         self._looks = 0
 
     def forget(self) -> None:
-        """It was not seen, or moves."""
+        """Start over: the graph moves, or was not seen."""
         self._since, self._looks = None, 0
 
     @property
     def lasts(self) -> bool:
-        """Whether it still stands still."""
+        """True while the last look showed a standstill."""
         return self._since is not None
 
     def seen(self, shown: Sequence[Snapshot], asked: float) -> bool:
-        """After one more look, asked for at `asked`, at a graph and then its sub-graphs: whether it
-        has stood still for so long that a person must know."""
+        """Note one more look, asked for at `asked` (seconds), at a graph and then its sub-graphs;
+        return whether it has stood still for so long that a person must know."""
         if shown[0].state != "RUNNING" or moves(shown):
             self.forget()
             return False
@@ -107,7 +106,8 @@ class Standstill:
 
 
 def packed(run: Run) -> bytes:
-    """What `told_of` needs of a run: the whole of a large one takes long to send."""
+    """Encode the part of a run that `told_of` needs: a whole large run takes long to send to a
+    worker."""
     actions = {
         name: replace(each, visits=each.visits[-1:], messages=())
         for name, each in run.actions.items()
@@ -116,15 +116,16 @@ def packed(run: Run) -> bytes:
 
 
 def told_of(run: bytes, umrf: str | None) -> str:
-    """As `told`, of a packed run and its graph as it was sent. For workers."""
+    """Return the alarm text of a packed run and its graph as it was sent. For workers."""
     return told(msgspec.msgpack.decode(run, type=Run), None if umrf is None else _read(umrf))
 
 
 def lacking_in_words(umrf: str) -> str:
-    """Why an engine that holds this graph has not begun it; "" where it lacks nothing. For workers."""
+    """Return why an engine that holds this graph has not begun it, in sentences; "" where no value
+    is lacking. For workers."""
     graph = _read(umrf)
     found = () if graph is None else unbegun(graph)
-    return " ".join(in_words(each) for each in found[:_TOLD])
+    return " ".join(in_words(each) for each in found[:_NAMED])
 
 
 def _read(umrf: str) -> Graph | None:
@@ -135,7 +136,8 @@ def _read(umrf: str) -> Graph | None:
 
 
 def moves(shown: Sequence[Snapshot]) -> bool:
-    """Whether an action does something. One that is a sub-graph does what that does."""
+    """Return whether an action is active. An action that is a sub-graph counts by the actions of
+    that."""
     held = {each.graph for each in shown}
     return any(
         state in ACTIVE and _part(each.graph, node) not in held
@@ -150,7 +152,8 @@ def _part(graph: str, node: str) -> str:
 
 
 def unbegun(graph: Graph) -> tuple[ForInput, ...]:
-    """Why an engine that holds a graph has not begun it: entry actions that lack a value (H7)."""
+    """Return why an engine that holds a graph has not begun it: required inputs of entry actions
+    without a value (H7)."""
     entries = {each.child for each in graph.relations if each.parent == ENTRY}
     return tuple(
         ForInput(action.full_name, name)
@@ -162,19 +165,22 @@ def unbegun(graph: Graph) -> tuple[ForInput, ...]:
 
 
 def waits(run: Run, graph: Graph, moment: int | None = None) -> tuple[Wait, ...]:
-    """What the actions of a graph in which nothing moves wait for, as far as what was seen says it.
-    Those that nothing has reached yet are left out: they wait for one that is named. `moment`: what
-    they waited for then, microseconds UTC; nothing may have begun since."""
-    it = _Stalled(run, graph, moment)
-    found: list[Wait] = [*it.parts()]
+    """Return what the actions of a standing graph wait for, as far as observations show. Actions
+    that no arrow has reached yet are left out: they wait for one that is named. `moment`:
+    microseconds UTC of a standstill in the past; no action may have begun since."""
+    stalled = _Stalled(run, graph, moment)
+    found: list[Wait] = [*stalled.parts()]
     for action in graph.actions:
-        if not action.missing and not it.moves(action.full_name):
-            found += it.waits_of(action)
-    found += it.waits_of(None)
+        if not action.missing and not stalled.moves(action.full_name):
+            found += stalled.waits_of(action)
+    found += stalled.waits_of(None)
     return tuple(dict.fromkeys(found))
 
 
 class _Stalled:
+    """The arrows of a graph against what was seen of its run, at present or at a moment in the
+    past."""
+
     def __init__(self, run: Run, graph: Graph, moment: int | None) -> None:
         self._run = run
         self._moment = moment
@@ -195,6 +201,8 @@ class _Stalled:
                 yield ForPart(name, part if self._moment is None else "")
 
     def waits_of(self, action: Action | None) -> list[Wait]:
+        """Return what one action waits for, or the end of the graph (None); empty where no arrow
+        has reached it."""
         key = EXIT if action is None else action.key
         name = None if action is None else action.full_name
         arrows = [each for each in self._graph.relations if each.child == key]
@@ -212,7 +220,7 @@ class _Stalled:
         return lacking or [*self._unsure(name, running)]
 
     def _fired(self, arrow: Relation, child: str | None) -> bool:
-        """Whether its parent has ended and the child has not begun since."""
+        """Return whether the arrow's parent has ended and the child has not begun since."""
         if not self._has_ended(arrow.parent):
             return False
         begun = [] if child is None else [each.start for each in self._seen(child).visits]
@@ -230,7 +238,8 @@ class _Stalled:
         return bool(visits) and visits[-1].until is not None and not self.moves(self._name(key))
 
     def _answers(self, arrow: Relation) -> set[Response]:
-        """What the arrow may have said, by all that its parent may have ended with."""
+        """Return the responses that an arrow may have given, for every outcome that its parent may
+        have had."""
         if arrow.parent == ENTRY:
             return {"run"}
         name = self._name(arrow.parent)
@@ -239,11 +248,13 @@ class _Stalled:
         if known is not None:
             return {arrow.conditions.answer(known)}
         is_part = _part(self._run.graph_name, name) in self._run.parts
-        possible = PRECONDITIONS[:3] if is_part else PRECONDITIONS[:2]  # a part may have failed
+        possible = (
+            PRECONDITIONS[:3] if is_part else PRECONDITIONS[:2]
+        )  # a sub-graph may have failed
         return {arrow.conditions.answer(outcome) for outcome in possible}
 
     def _unanswered(self, name: str | None, fired: list[Relation]) -> Iterator[Wait]:
-        """Arrows that do something else than begin it: of no use for what does not run."""
+        """Yield the arrows that respond with something else than running the action."""
         for arrow in fired:
             answers = self._answers(arrow) - {"bypass"}
             if answers:
@@ -251,7 +262,7 @@ class _Stalled:
                 yield ForOutcome(name, self._name(arrow.parent), said, certain=True)
 
     def _lacking(self, action: Action | None, fired: list[Relation]) -> Iterator[ForInput]:
-        """Required inputs that none of the parents that have ended gives."""
+        """Yield required inputs that no parent that has ended gives."""
         giver = self._last_exit() if action is None else None
         if action is None and giver is None:
             return
@@ -280,7 +291,8 @@ class _Stalled:
         }
 
     def _last_exit(self) -> Action | None:
-        """The end of a graph needs the outputs of the action that is listed last.
+        """Return the action that is listed last among those that lead to the end: the end of a
+        graph needs its outputs.
 
         See docs/umrf-and-the-engine.md 2.6.
         """
@@ -291,7 +303,8 @@ class _Stalled:
         return self._actions.get(ends[-1].parent) if ends else None
 
     def _unsure(self, name: str | None, fired: list[Relation]) -> Iterator[ForOutcome]:
-        """Nothing is lacking, but whether the arrow ran it depends on what the engine keeps."""
+        """Yield the arrows that ran the action for some outcomes only, while nothing else is
+        lacking."""
         for arrow in fired:
             others = self._answers(arrow) - {"run"}
             if others and arrow.child != EXIT:
@@ -305,7 +318,7 @@ class _Stalled:
 
 
 def in_words(wait: Wait) -> str:
-    """One plain sentence."""
+    """Return the reason to wait as one sentence."""
     who = wait.action if wait.action is not None else "The end of the graph"
     match wait:
         case ForParent(parent=parent, begun=True):
@@ -336,10 +349,11 @@ def in_words(wait: Wait) -> str:
 
 
 def told(run: Run, graph: Graph | None) -> str:
-    """The alarm of a run that stands still. The same for as long as nothing changes."""
+    """Return the alarm text of a run that stands still. It is the same for as long as the reasons
+    are."""
     found = waits(run, graph) if graph is not None else ()
-    why = " ".join(in_words(each) for each in found[:_TOLD])
-    more = f" And {len(found) - _TOLD} more." if len(found) > _TOLD else ""
+    why = " ".join(in_words(each) for each in found[:_NAMED])
+    more = f" And {len(found) - _NAMED} more." if len(found) > _NAMED else ""
     unknown = "What it waits for cannot be told from what was seen."
     return (
         f"NOTHING MOVES: {run.engine} calls {run.graph_name} running, and none of its actions runs. "

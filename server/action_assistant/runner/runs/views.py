@@ -75,7 +75,7 @@ class ActionShown(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class AlarmShown(msgspec.Struct, frozen=True):
-    """Something that a person must know now."""
+    """A message that a person must see now."""
 
     code: str
     at: datetime
@@ -86,8 +86,8 @@ class AlarmShown(msgspec.Struct, frozen=True):
 
 
 class AtRestShown(msgspec.Struct, frozen=True):
-    """How rest was seen where no answer of the engine could prove it: by whom (null: the runner saw
-    the end of the engine's process), when, and how."""
+    """The observation of rest where no answer of the engine could prove it: by whom (null: the
+    runner saw the engine's process end), when, and how."""
 
     by: Author | None
     at: datetime

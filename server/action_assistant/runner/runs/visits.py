@@ -1,28 +1,28 @@
 """The visits of one action: exact from transitions, within bounds from snapshots.
 
-A visit is one execution of an action's own code. Of its begin and its end the fold keeps a lower and
-an upper bound each, and a bound that nothing proves is none:
+A visit is one execution of an action's own code. The fold keeps a lower and an upper bound of its
+begin and of its end. A bound that nothing proves is not set:
 
 - An answer that was asked for at `asked_at` and came at `at` shows a state of some moment in between.
-  Feedback that came at `at` shows a state of some moment before; how long before, nothing tells: the
+  Feedback that came at `at` shows a state of some earlier moment; how much earlier is not known: the
   engine empties its ring twice a second, a stop holds it up for seconds, networks delay.
-- It has begun by the arrival of whatever shows it running, and not before the asking for the last
-  answer that showed it at rest; before any answer, not before the run was requested.
-- It has ended by the arrival of whatever shows it at rest again, and not before the asking for the
-  last answer that showed it running. That needs that both sights are of the same visit, which only
-  the graph can tell (`once`, umrf.laps); of an action that may have begun anew in between, nothing
-  but its begin bounds the end from below. Nor does a sight count after a pause: code that returns
+- A visit has begun by the arrival of any snapshot that shows it running. It has not begun before the last
+  answer that showed the action at rest was asked for; before any answer, not before the run was requested.
+- A visit has ended by the arrival of any snapshot that shows the action at rest again, and not before the
+  last answer that showed it running was asked for. That needs both snapshots to be of the same visit,
+  which only the graph can tell (`once`, umrf.laps). For an action that may have begun anew in between, its
+  begin alone bounds the end from below. A snapshot does not count after a pause either: code that returns
   while it is paused is shown running until it is resumed.
-- ERROR is no end where a stop may have reached the action, which did not obey or threw at it: its code
-  may go on, so nothing bounds the end from above.
+- ERROR is no end where a stop may have reached the action, which did not obey or threw: its code may go
+  on, so that nothing bounds the end from above.
 - Feedback may be older than an answer that came before it. An action that runs at most once only goes
-  forward, so what looks older is older. Of any other, feedback does not tell the end of what an answer
-  has shown, and borrows no lower bound from a recent answer (`_OLD_US`); answers, which are ordered
-  among themselves, do both, and one is asked for as soon as feedback comes.
-- The engine calls an action RUNNING a moment before its code begins, and for a moment after it ended;
-  `MOMENT_US` is added to what such a sight proves.
+  forward, so that a state which looks older is older. For any other action, feedback does not prove the
+  end of a visit that an answer has shown, and borrows no lower bound from a recent answer (`_OLD_US`).
+  Answers do both, since they are in order, and one is asked for as soon as feedback comes.
+- The engine calls an action RUNNING a moment before its code begins, and a moment after it has ended;
+  `MOMENT_US` is added to what such a snapshot proves.
 
-Pure, and part of the fold of a run: what stands in old streams folds by the same rules.
+Pure, and part of the fold of a run: old streams fold by the same rules.
 """
 
 from typing import Final, Literal, TypeAlias, TypeVar
@@ -37,14 +37,14 @@ T = TypeVar("T")
 Outcome: TypeAlias = Literal["true", "false", "error", "stopped"]
 How: TypeAlias = Literal["observed", "inferred"]
 
-#: Visits and messages of one action that a run carries; older ones are in its events.
+#: Visits and messages of one action that a run keeps; older ones are in its events.
 KEPT: Final = 100
 #: Messages of one action that an engine keeps.
 _RING: Final = 10
-#: What may lie between a state of the engine and the action's code, in microseconds.
+#: Microseconds that the engine's state may be ahead of, or behind, the action's code.
 MOMENT_US: Final = 100_000
-#: Feedback of actions that may run again is taken to be younger than this: twice what a stop that is
-#: not obeyed holds an engine up for.
+#: Microseconds within which feedback of an action that may run again is taken to have come: twice as long as a
+#: stop that is not obeyed blocks an engine.
 _OLD_US: Final = 10_000_000
 
 _OUTCOMES: Final[dict[str, Outcome]] = {
@@ -61,8 +61,8 @@ class Visit(msgspec.Struct, frozen=True, gc=False, kw_only=True):
     It began at `not_before` or later and at `start` or earlier; it ended at `until` or later (None:
     no end was seen) and at `not_after` or earlier (None: as far as is known it may still go on). So
     `until` may lie before `start`: then no moment is known at which it was going on for certain.
-    `how` says whether start and result were seen or follow from other things. `inputs`: the values
-    that the engine reported while it went on; None when nobody saw them.
+    `how` says whether start and result were seen or inferred. `inputs`: the values that the engine
+    reported during the visit; None when nobody saw them.
     """
 
     start: int
@@ -75,21 +75,26 @@ class Visit(msgspec.Struct, frozen=True, gc=False, kw_only=True):
 
     @property
     def least(self) -> int:
-        """It took at least so long. Microseconds."""
+        """The shortest time that it can have taken, in microseconds."""
         return max(0, (self.until or self.start) - self.start)
 
     @property
     def most(self) -> int | None:
-        """It took at most so long; None when its end has no upper bound."""
+        """The longest time that it can have taken, in microseconds; None when its end has no upper
+        bound."""
         return None if self.not_after is None else self.not_after - self.not_before
 
 
 class SnapshotEvidence(msgspec.Struct, frozen=True, gc=False, kw_only=True):
-    """A snapshot as evidence. `asked`: when it was asked for; None for feedback. `looked`: when the
-    newest answer was asked for that showed the graph as it was known until now. `begun`: when nothing
-    can have happened before. `once`: the action runs at most once. `stoppable`: somebody or something
-    may have stopped it. `followed`: an answer that comes after it is recorded, if that says more;
-    older streams left out answers that said the same as feedback had."""
+    """The facts about a snapshot that decide what it proves of an action. Times are microseconds
+    UTC.
+
+    `asked`: when it was asked for; None for feedback. `looked`: when the newest answer was asked
+    for that showed the graph as it was known until now. `begun`: the action cannot have begun
+    before. `once`: it runs at most once. `stoppable`: a person or an arrow may have stopped it.
+    `followed`: an answer after this snapshot is recorded if it says more; older streams left out
+    answers that repeated feedback.
+    """
 
     at: int
     asked: int | None
@@ -101,22 +106,22 @@ class SnapshotEvidence(msgspec.Struct, frozen=True, gc=False, kw_only=True):
 
 
 class Message(msgspec.Struct, frozen=True, gc=False):
-    """What an action had to say."""
+    """A message of an action, or a line of the engine's log."""
 
     at: int
     text: str
 
 
 class RestEvidence(msgspec.Struct, frozen=True, gc=False, array_like=True):
-    """When answers were asked for that showed an action at rest: the newest, and two older ones that
-    lie at least `_OLD_US` apart."""
+    """Times at which answers were asked for that showed an action at rest: the newest, and two
+    older ones that lie at least `_OLD_US` apart."""
 
     newest: int = 0
     older: int = 0
     oldest: int = 0
 
     def and_at(self, asked: int) -> "RestEvidence":
-        """With one more."""
+        """Return this evidence with one more answer."""
         if asked <= self.newest:
             return self
         if asked - self.older >= _OLD_US:
@@ -124,17 +129,18 @@ class RestEvidence(msgspec.Struct, frozen=True, gc=False, array_like=True):
         return RestEvidence(asked, self.older, self.oldest)
 
     def by(self, moment: int) -> int:
-        """The newest of these that is not later than `moment`."""
+        """Return the newest of these times that is not later than `moment`; 0 without one."""
         kept = (self.newest, self.older, self.oldest)
         return next((each for each in kept if each <= moment), 0)
 
 
 class ActionRun(msgspec.Struct, frozen=True, gc=False, kw_only=True):
-    """One action of the run. `older` counts visits that are not listed any more.
+    """The state of one action of a run. `older` counts visits that are not listed any more.
 
-    `going`: the visit that is open ended at that moment or later. `since`: up to which answer (the
-    time of its asking) states before the present one were shown. `by`, `changed_at`: what showed the
-    present state first, and when that came. `held`: it was paused during the visit.
+    `heard`: how many messages the engine has shown. `going`: the open visit ends at that moment or
+    later. `since`: answers asked for until then showed the states before the present one. `by`,
+    `changed_at`: what showed the present state first ("" for a transition), and when that came.
+    `held`: it may have been paused during the visit. `joined`: it runs once unless an action fails.
     """
 
     aid: str | None = None
@@ -154,21 +160,25 @@ class ActionRun(msgspec.Struct, frozen=True, gc=False, kw_only=True):
     rests: RestEvidence = RestEvidence()
 
 
-def changed(
+def after_transition(
     action: ActionRun, state: str, at: int, inputs: dict[str, str] | None = None
 ) -> ActionRun:
-    """After an exact transition."""
+    """Return the action after an exact transition to `state`."""
     visits, older = action.visits, action.older
     if state in ACTIVE:
         if not is_open(action):
             visits, older = _kept(visits, older, Visit(start=at, not_before=at, inputs=inputs))
-        elif inputs is not None and visits[-1].inputs is None:  # an answer had shown it before
+        elif (
+            inputs is not None and visits[-1].inputs is None
+        ):  # an answer has shown this visit before
             visits = _and(visits[:-1], replace(visits[-1], inputs=inputs))
     elif is_open(action):
         result = visits[-1].result or _implied(action.state, state)
-        after = None if state == "ERROR" and action.state == "STOPPING" else at  # its code goes on
+        after = (
+            None if state == "ERROR" and action.state == "STOPPING" else at
+        )  # its code may go on
         visits = _and(visits[:-1], replace(visits[-1], until=at, not_after=after, result=result))
-    elif state == "ERROR" and action.state != "ERROR":  # thrown while it was made ready
+    elif state == "ERROR" and action.state != "ERROR":  # it threw before it ran
         visit = Visit(start=at, not_before=at, until=at, not_after=at, result="error")
         visits, older = _kept(visits, older, visit)
     rests = action.rests if state in ACTIVE else action.rests.and_at(at)
@@ -185,8 +195,9 @@ def changed(
     )
 
 
-def resulted(action: ActionRun, item: NodeResult) -> ActionRun:
-    """After an exact result; it comes while the visit is still open, or right after its end."""
+def after_result(action: ActionRun, item: NodeResult) -> ActionRun:
+    """Return the action after an exact result, which comes while the visit is open or right after
+    its end."""
     visits = action.visits
     if visits:
         visits = _and(visits[:-1], replace(visits[-1], result=_OUTCOMES.get(item.result)))
@@ -196,20 +207,21 @@ def resulted(action: ActionRun, item: NodeResult) -> ActionRun:
     return replace(action, visits=visits, messages=messages)
 
 
-def paused(action: ActionRun) -> ActionRun:
-    """Somebody may have paused it: from now on no sight of it proves that its code goes on."""
+def with_possible_pause(action: ActionRun) -> ActionRun:
+    """Return an open action as one that may be paused: from now on no snapshot of it proves that
+    its code goes on."""
     return replace(action, held=True) if is_open(action) else action
 
 
-def shown(
+def after_snapshot(
     action: ActionRun, state: str, sight: SnapshotEvidence, inputs: dict[str, str] | None = None
 ) -> ActionRun:
-    """After a snapshot, which says how things are but not when they became so."""
+    """Return the action after a snapshot, which shows a state but not when that began."""
     if state == action.state:
         return _confirmed(action, sight)
     action = _looked_at(action, sight)
     if _is_no_news(action, state, sight):
-        asked = sight.asked or 0  # it does not show the state that is known
+        asked = sight.asked or 0  # until then the known state was not shown
         return replace(action, since=max(action.since, asked)) if asked else action
     if state in ACTIVE:
         after = action if is_open(action) else _opened(action, sight, inputs)
@@ -232,17 +244,17 @@ def shown(
 
 
 def awaits_answer(action: ActionRun) -> bool:
-    """Whether an answer that shows the same as feedback did before would still say more."""
+    """Return whether an answer that repeats the state of feedback would still prove more."""
     return not action.once and action.by == "feedback" and is_open(action)
 
 
 def is_open(action: ActionRun) -> bool:
-    """Whether a visit goes on, as far as is known."""
+    """Return whether the last visit has no end, as far as is known."""
     return bool(action.visits) and action.visits[-1].until is None
 
 
 def _looked_at(action: ActionRun, sight: SnapshotEvidence) -> ActionRun:
-    """Once answers have shown it in its present state: what that proves."""
+    """Apply the proofs of earlier answers that showed the present state."""
     if sight.looked <= action.since:
         return action
     if not is_open(action):
@@ -254,7 +266,7 @@ def _looked_at(action: ActionRun, sight: SnapshotEvidence) -> ActionRun:
 
 
 def _is_no_news(action: ActionRun, state: str, sight: SnapshotEvidence) -> bool:
-    """Whether this may be older than what is known, and so changes nothing."""
+    """Return whether a snapshot may be older than what is known, and so changes nothing."""
     if sight.once and _goes_back(action, state):
         return sight.asked is None or sight.asked < action.changed_at
     if sight.asked is not None:
@@ -269,8 +281,9 @@ def _goes_back(action: ActionRun, state: str) -> bool:
 
 
 def _confirmed(action: ActionRun, sight: SnapshotEvidence) -> ActionRun:
-    """An answer shows running what only feedback has shown so far: it is the visit of that answer
-    from now on, which began after the last answer that showed rest."""
+    """Return an action whose visit only feedback has shown so far, after an answer shows it
+    running: the visit is the one of that answer, and began after the last answer that showed
+    rest."""
     if sight.asked is None or not awaits_answer(action) or sight.asked < action.changed_at:
         return action
     last = action.visits[-1]
@@ -308,13 +321,13 @@ def _closed(action: ActionRun, state: str, sight: SnapshotEvidence) -> ActionRun
 
 
 def _ran_meanwhile(action: ActionRun, sight: SnapshotEvidence) -> bool:
-    """Whether one state of rest after another says that it ran in between. Feedback that was older
-    than an answer may have told the first."""
+    """Return whether an action that goes from one state of rest to another ran in between. It may
+    not have, where feedback that was older than an answer told the first state."""
     return sight.once or action.by != "feedback" or FAR.get(action.state, 0) == 0
 
 
 def _missed(action: ActionRun, state: str, sight: SnapshotEvidence) -> ActionRun:
-    """It has ended, and was never seen going on."""
+    """Return the action with a visit that has ended and was never seen going on."""
     before = _not_before(action, sight)
     visit = Visit(
         start=sight.at,
@@ -329,19 +342,20 @@ def _missed(action: ActionRun, state: str, sight: SnapshotEvidence) -> ActionRun
 
 
 def _not_before(action: ActionRun, sight: SnapshotEvidence) -> int:
-    """Since when it may have begun."""
+    """Return the earliest moment at which the new visit can have begun."""
     told = sight.once or sight.asked is not None
     rest = action.rests.newest if told else action.rests.by(sight.at - _OLD_US)
     return min(sight.at, max(rest, sight.begun))
 
 
 def _not_after(state: str, sight: SnapshotEvidence) -> int | None:
-    """When its code had ended; None of one that was told to stop and failed, which may go on."""
+    """Return the moment by which the action's code had ended; None for one that was told to stop
+    and failed, since it may go on."""
     return None if state == "ERROR" and sight.stoppable else sight.at
 
 
-def heard(action: ActionRun, messages: tuple[str, ...], at: int) -> ActionRun:
-    """A snapshot repeats all messages so far; only the new ones are added."""
+def with_messages(action: ActionRun, messages: tuple[str, ...], at: int) -> ActionRun:
+    """Add the new ones of these messages: a snapshot repeats all that the engine still keeps."""
     first = len(messages) if is_heard(action, messages) else _known(action, messages)
     if first == len(messages):
         return action if first == action.heard else replace(action, heard=first)
@@ -350,8 +364,8 @@ def heard(action: ActionRun, messages: tuple[str, ...], at: int) -> ActionRun:
 
 
 def is_heard(action: ActionRun, messages: tuple[str, ...]) -> bool:
-    """Whether none of these messages is new. An engine keeps the last ten: then the oldest goes with
-    each new one, which shows as long as they do not all say the same."""
+    """Return whether none of these messages is new. An engine keeps the last ten, so that with each
+    new one the oldest goes; that is seen unless all of them have the same text."""
     if len(messages) != action.heard or not messages:
         return len(messages) <= action.heard
     last = action.messages[-len(messages) :]
@@ -359,7 +373,7 @@ def is_heard(action: ActionRun, messages: tuple[str, ...]) -> bool:
 
 
 def _known(action: ActionRun, messages: tuple[str, ...]) -> int:
-    """How many of these messages, from the first on, are those that were heard last."""
+    """Return how many of these messages, from the first on, are known already."""
     if len(messages) > action.heard:
         return action.heard
     last = tuple(each.text for each in action.messages[-len(messages) :])
@@ -367,7 +381,7 @@ def _known(action: ActionRun, messages: tuple[str, ...]) -> int:
 
 
 def _implied(before: str, after: str) -> Outcome | None:
-    """The result that a pair of states leaves no doubt about."""
+    """Return the result that a pair of states leaves no doubt about."""
     if after == "ERROR":
         return "error"
     return "stopped" if before == "STOPPING" else None

@@ -1,8 +1,8 @@
-"""The words of runs, by which a search finds the few that may hold a text.
+"""The index of words of runs: it finds the few runs that may hold a text.
 
-A search is for a part of what was said, wherever in a word it begins. What the index names is compared
-with the texts themselves, so it may name too many runs, and never one too few. Where words are so
-common that it names very many, a list of the newest ones is found sooner without it.
+A search is for a part of what was said, wherever in a word it begins. Runs that the index names are
+compared with the text afterwards, so that it may name too many runs but never one too few. Where a
+word is so common that it names very many, a list of the newest runs is quicker without the index.
 """
 
 import re
@@ -14,9 +14,9 @@ from sqlalchemy import Connection, Executable, Select, delete, func, insert, lit
 
 from action_assistant.schema.runner_tables import review, run, run_word, unindexed_run, word
 
-#: Runs that may be named, before no use is made of them.
+#: The index is not used for a word that more runs hold.
 MOST: Final = 2_000
-#: As `lower` and `like` of SQLite, which know no other letters than those of ASCII.
+#: A word, for `lower` and `like` of SQLite, which know only the letters of ASCII.
 _WORD: Final = re.compile("[0-9a-z\x80-\U0010ffff]+")
 _KNOWN: Final = text("INSERT OR IGNORE INTO word (text) SELECT value FROM json_each(:words)")
 _HELD: Final = text(
@@ -26,14 +26,16 @@ _HELD: Final = text(
 
 
 class Piece(msgspec.Struct, frozen=True):
-    """A word of what is searched for, and where in a word of a run it has to stand."""
+    """A word of the searched text, and its position in a word of a run: "begin" if a word of the
+    run begins with it, and so on."""
 
     text: str
     place: Literal["all", "end", "begin", "within"]
 
 
 def holds(run_id: str, *texts: str) -> Sequence[Executable]:
-    """That these texts are a run's: statements for the transaction that stores them."""
+    """Return the statements that put the words of these texts into the index, for the transaction
+    that stores the texts."""
     words = sorted({each for told in texts for each in _WORD.findall(_lower(told))})
     if not words:
         return ()
@@ -42,14 +44,15 @@ def holds(run_id: str, *texts: str) -> Sequence[Executable]:
 
 
 def will_be_indexed(run_id: str, number: int) -> Executable:
-    """That the words of a run are to be found later, if there is no such run yet."""
+    """Return the statement that marks a run as not indexed yet, unless there is such a run
+    already."""
     chosen = select(literal(number)).where(~select(run.c.id).where(run.c.id == run_id).exists())
     return insert(unindexed_run).prefix_with("OR IGNORE").from_select(["number"], chosen)
 
 
 def index_some(connection: Connection, most: int) -> bool:
-    """Find the words of some runs that are not in the index yet, the newest first; whether there were
-    any."""
+    """Index the words of at most `most` runs that are marked as not indexed, the newest first;
+    return whether there were any."""
     texts = (run.c.graph_name, run.c.engine, run.c.author_name, review.c.words, review.c.note)
     chosen = (
         select(unindexed_run.c.number, run.c.id, *texts)
@@ -68,9 +71,9 @@ def index_some(connection: Connection, most: int) -> bool:
 
 
 def pieces(wanted: str) -> list[Piece]:
-    """The words of what is searched for, those first that fewer runs hold; none where only reading all
-    runs tells."""
-    if "\0" in wanted:  # ends a text, to `like`
+    """Split a searched text into words, those first that fewer runs hold; empty where only reading
+    all runs can answer."""
+    if "\0" in wanted:  # `like` takes it for the end of the text
         return []
     lowered = _lower(wanted)
     found = [
@@ -81,7 +84,7 @@ def pieces(wanted: str) -> list[Piece]:
 
 
 def holding(piece: Piece) -> Select[Any]:
-    """Numbers of runs that hold such a word: all of them, or more than `MOST`."""
+    """Select the numbers of runs that hold such a word: all of them, or `MOST` + 1."""
     match piece.place:
         case "all":
             fits = word.c.text == piece.text
@@ -91,18 +94,19 @@ def holding(piece: Piece) -> Select[Any]:
             fits = func.substr(word.c.text, -len(piece.text)) == piece.text
         case "within":
             fits = func.instr(word.c.text, piece.text) > 0
-    words = select(word.c.id).where(fits)  # not joined: all words of all runs would be read
+    words = select(word.c.id).where(fits)  # a join would read all words of all runs
     held = select(run_word.c.number).where(run_word.c.word.in_(words))
     return held.distinct().limit(MOST + 1)
 
 
 def unindexed() -> Select[Any]:
-    """Numbers of runs of which the index knows nothing yet: all of them, or more than `MOST`."""
+    """Select the numbers of runs that are not indexed: all of them, or `MOST` + 1."""
     return select(unindexed_run.c.number).limit(MOST + 1)
 
 
 def _place(begins: bool, ends: bool) -> Literal["all", "end", "begin", "within"]:
-    """Of a word with something before it, or after it."""
+    """Return the position of a word: `begins` and `ends` are true where another character stands
+    before, or after, it."""
     if begins and ends:
         return "all"
     if begins:

@@ -1,1 +1,1 @@
-"""Starts: reading, checking, looking at the robot, storing once."""
+"""Starts: requests, their checks, approvals, and what is stored of them."""

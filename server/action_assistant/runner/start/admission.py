@@ -1,4 +1,5 @@
-"""The rules of admission: what a start must satisfy before it is stored or sent. Pure."""
+"""The requests of starts, and the rules that a start has to satisfy before it is stored or sent.
+Pure."""
 
 import re
 from collections.abc import Sequence
@@ -31,18 +32,19 @@ T = TypeVar("T")
 
 _Name = Annotated[str, msgspec.Meta(min_length=1, max_length=100)]
 
-_SHOWN: Final = 20  # problems in an answer
+_MOST_SHOWN: Final = 20  # problems in one refusal
 _MOST_ENGINES: Final = 20  # of one group
-_KEPT: Final = 40  # problems of a kind that somebody could be shown
+_MOST_KEPT: Final = 40  # errors, and warnings, that a prepared start keeps
 
 
 class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A start: the version by value, and where it shall run.
+    """A start: the version by value, and the engine that runs it.
 
-    `digest` is what the person saw; `request_id` is made by the asker, once per intended start.
-    `like`: the robot whose engine the simulator plays, with its hazards. `behaviours`: actions that
-    have a Python behaviour on the runner do what it does, before what the script says. `subgraphs`: all
-    graphs inside, by value, as the version has them; `tree_digest`: of the graph together with them.
+    `digest` is that of the graph that the person saw; `request_id` is made by the client, once per
+    intended start. `like`: the robot whose engine the simulator plays, with its hazards.
+    `behaviours`: actions with a Python behaviour on the runner do what that does, before what the
+    script says. `subgraphs`: all graphs inside, by value, as the version has them; `tree_digest`:
+    the digest of the graph together with them.
     """
 
     version: str
@@ -60,8 +62,8 @@ class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
 
 
 class GroupRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """One version for several robots at once. Without version, digest and `request_id` it can only
-    be looked at."""
+    """One version for several robots at once. Without version, digest and `request_id` it is only
+    good for a pre-flight."""
 
     umrf: SentGraph
     version: str = ""
@@ -93,8 +95,8 @@ class GroupRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
 
 
 class Admitted(msgspec.Struct, frozen=True, kw_only=True):
-    """A start that nothing about its graph stands in the way of. `problems`: warnings, and what
-    was overridden."""
+    """A start whose graph passed all checks. `problems`: warnings, and errors that are
+    overridden."""
 
     graph: Graph
     graph_id: str | None
@@ -107,9 +109,10 @@ class Admitted(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Prepared(msgspec.Struct, frozen=True, kw_only=True):
-    """An admitted start without its graph, which only workers read: its name, the aid of each action
-    by full name, and the text that will be sent, with the identity of the run in it. `problems`: as
-    many as anybody is shown. `inner`: the names of actions inside of `subgraphs`."""
+    """An admitted start without its graph, which only workers read: the name of the graph, the aid
+    of each action by full name, and the text that will be sent, with the identity of the run in it.
+    `problems`: at most as many as anybody is shown. `inner`: the names of actions inside of
+    `subgraphs`."""
 
     run: str
     name: str
@@ -127,12 +130,13 @@ class Prepared(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def read_request(body: bytes) -> StartRequest:
-    """The body of a start. Raises BadInput with the place."""
+    """Decode the body of a start. Raises BadInput with the place."""
     return decoded(body, StartRequest)
 
 
 def read_group(body: bytes) -> GroupRequest:
-    """The body of a start on several robots, or of a look. Raises BadInput with the place."""
+    """Decode the body of a start on several robots, or of a pre-flight. Raises BadInput with the
+    place."""
     group = decoded(body, GroupRequest)
     if len(set(group.engines)) < len(group.engines):
         raise BadInput("A robot is named twice.", where={"path": "/engines"})
@@ -140,7 +144,7 @@ def read_group(body: bytes) -> GroupRequest:
 
 
 def decoded(body: bytes, kind: type[T]) -> T:
-    """A body that is read by hand. Raises BadInput with the place."""
+    """Decode a JSON body as this type. Raises BadInput with the place."""
     try:
         return msgspec.json.decode(body, type=kind)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
@@ -148,28 +152,30 @@ def decoded(body: bytes, kind: type[T]) -> T:
         raise BadInput(message, where=where) from error
 
 
-def admit(asked: StartRequest, facts: EngineFacts, *, approved: bool = True) -> Admitted:
-    """Check text, digest, size and problems. What is refused of the graph itself, but for its size, is a
-    problem that the check tells everywhere else, too. Raises BadInput, NotUmrf, TooLarge, Conflict. Before a graph is
-    `approved` nobody needs to know its digest."""
-    text, reading = read_sent(bytes(asked.umrf))
+def admit(request: StartRequest, facts: EngineFacts, *, approved: bool = True) -> Admitted:
+    """Check text, digest, size and problems of a start. Each refusal of the graph itself, but for
+    its size, is a problem that the check shows everywhere else, too. Before a graph is `approved`
+    its digest may be left out. Raises BadInput, NotUmrf, TooLarge, Conflict."""
+    text, reading = read_sent(bytes(request.umrf))
     stamp = codec.stamp_of(text)
     found = digest(reading.graph)
-    if found != asked.digest and (approved or asked.digest):
+    if found != request.digest and (approved or request.digest):
         raise Conflict(
             "The graph that was sent is not the one that was approved: its digest is "
-            f"{found[:12]}…, not {asked.digest[:12]}…. Nothing was started.",
+            f"{found[:12]}…, not {request.digest[:12]}…. Nothing was started.",
             where={"path": "/digest"},
         )
-    subgraphs, inside = read_inside(asked.subgraphs, found, asked.tree_digest, approved=approved)
+    subgraphs, inside = read_inside(
+        request.subgraphs, found, request.tree_digest, approved=approved
+    )
     _check_size(text, reading.graph, subgraphs, inside)
-    found_in_it = check(reading.graph, None, facts, inside)
-    problems = [*reading.problems, *reading.placed(found_in_it)]
-    _check_problems(problems, asked.override)
-    script, script_text = _script(asked)
+    graph_problems = check(reading.graph, None, facts, inside)
+    problems = [*reading.problems, *reading.placed(graph_problems)]
+    _check_problems(problems, request.override)
+    script, script_text = _script(request)
     return Admitted(
         graph=reading.graph,
-        graph_id=asked.graph or stamp.graph,
+        graph_id=request.graph or stamp.graph,
         script=script,
         script_text=script_text,
         digest=found,
@@ -180,10 +186,11 @@ def admit(asked: StartRequest, facts: EngineFacts, *, approved: bool = True) -> 
 
 
 def prepared(
-    asked: StartRequest, facts: EngineFacts, run: str, *, approved: bool = True
+    request: StartRequest, facts: EngineFacts, run: str, *, approved: bool = True
 ) -> Prepared:
-    """As `admit`, for a start that becomes this run. For workers: takes its time with large graphs."""
-    admitted = admit(asked, facts, approved=approved)
+    """Admit a start and write the text that will be sent as this run. For workers: it takes long
+    with large graphs. Raises what `admit` raises."""
+    admitted = admit(request, facts, approved=approved)
     graph = admitted.graph
     inside = [action for each in admitted.inside.values() for action in each.actions]
     errors = [each for each in admitted.problems if each.severity == "error"]
@@ -192,13 +199,13 @@ def prepared(
         run=run,
         name=graph.name,
         actions={each.full_name: each.key for each in graph.actions if not each.missing},
-        umrf=codec.write(graph, codec.Stamp(admitted.graph_id, asked.version, run)),
+        umrf=codec.write(graph, codec.Stamp(admitted.graph_id, request.version, run)),
         graph_id=admitted.graph_id,
         script=admitted.script_text,
         digest=admitted.digest,
         laps=laps(graph),
         inner_laps={name: laps(each, inside=True) for name, each in admitted.inside.items()},
-        problems=(*errors[:_KEPT], *warnings[:_KEPT]),
+        problems=(*errors[:_MOST_KEPT], *warnings[:_MOST_KEPT]),
         subgraphs=admitted.subgraphs,
         inner=tuple(sorted({each.name for each in inside if not each.missing})),
         tree_digest=tree_of(admitted.digest, admitted.subgraphs),
@@ -206,7 +213,7 @@ def prepared(
 
 
 def _check_size(text: bytes, graph: Graph, subgraphs: Sequence[RunSubgraph], inside: Inner) -> None:
-    """Refuse what the editor refuses to publish. Raises TooLarge."""
+    """Refuse sizes that the editor refuses to publish. Raises TooLarge."""
     texts = len(text) + sum(len(each.umrf.encode()) for each in subgraphs)
     actions = sum(len(each.actions) for each in (graph, *inside.values()))
     too_large = excess(RunSize(texts, actions, len(inside)))
@@ -221,28 +228,28 @@ def _check_problems(problems: Sequence[Problem], override: Override | None) -> N
     left = blocking(list(problems), overridden=codes)
     if not left:
         return
-    never = sorted({problem.code for problem in left if is_final(problem)})
+    final = sorted({problem.code for problem in left if is_final(problem)})
     first = left[0]
     more = f" (and {len(left) - 1} more)" if len(left) > 1 else ""
     rule = (
-        f" {', '.join(never)} cannot be overridden."
-        if never
+        f" {', '.join(final)} cannot be overridden."
+        if final
         else " A person may override this with a reason."
     )
     raise Conflict(
         f"{first.message}{more}{rule}",
         where={
             "path": f"/umrf{first.where.path}",
-            "problems": msgspec.to_builtins(left[:_SHOWN]),
+            "problems": msgspec.to_builtins(left[:_MOST_SHOWN]),
         },
     )
 
 
-def _script(asked: StartRequest) -> tuple[Script, str]:
-    raw = bytes(asked.script).strip()
+def _script(request: StartRequest) -> tuple[Script, str]:
+    raw = bytes(request.script).strip()
     if raw in {b"", b"null"}:
         return Script({}), ""
-    if asked.engine != SIMULATOR:
+    if request.engine != SIMULATOR:
         raise BadInput("Only the simulator follows a script.", where={"path": "/script"})
     try:
         script = script_from(msgspec.json.decode(raw))
@@ -252,7 +259,8 @@ def _script(asked: StartRequest) -> tuple[Script, str]:
 
 
 def _placed(text: str) -> tuple[str, dict[str, object] | None]:
-    """msgspec says `… - at `$.a[0]`` where it can; the same as text and JSON pointer."""
+    """Split a message of msgspec, which may end with "- at `$.a[0]`", into its text and the place as a JSON
+    pointer."""
     message, found, place = text.partition(" - at `$")
     if not found:
         return text, None

@@ -1,7 +1,8 @@
-"""Who said yes to which graph, by its digest: what a robot may demand before it takes a start.
+"""Approvals: the yes of a second person to a graph, by its digest, which a robot may demand before
+a start.
 
-A yes is a person's word about exactly one graph. It stands in a stream of its own, is never taken
-back, and says nothing about any other graph.
+An approval is a person's word about exactly one graph. It stands in a stream of its own, is never
+taken back, and says nothing about any other graph.
 """
 
 from collections import defaultdict
@@ -20,15 +21,15 @@ from action_assistant.runner.start.preflight import Item
 from action_assistant.umrf.facts import SECOND_PERSON
 from action_assistant.web.auth import caller
 
-#: The stream of all of them.
+#: The stream of all approvals.
 STREAM: Final = "approvals"
 
 _DIGEST: Final = frozenset("0123456789abcdef")
 
 
 class ApprovalGiven(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """Somebody said yes to the graph with this digest. `graph` and `version` say where they saw it;
-    `device` is their browser, "" where that is not known."""
+    """The event of an approval of the graph with this digest. `graph` and `version` say where the
+    person saw it; `device` is their browser, "" where that is not known."""
 
     kind: ClassVar[str] = "approval.given.v1"
 
@@ -42,7 +43,7 @@ class ApprovalGiven(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=Tru
 
 
 class ApprovalRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A yes to exactly one graph."""
+    """The body of an approval of exactly one graph."""
 
     digest: Annotated[str, msgspec.Meta(min_length=64, max_length=64)]
     graph: Annotated[str, msgspec.Meta(max_length=100)] | None = None
@@ -51,7 +52,8 @@ class ApprovalRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
 
 
 class Approvals:
-    """All of them. Raises Unavailable while the journal cannot be read."""
+    """Stores approvals and reads them, each event once. Raises Unavailable while the journal cannot
+    be read."""
 
     def __init__(self, journal: RunnerJournal, clock_us: ClockUs) -> None:
         self._journal = journal
@@ -60,20 +62,21 @@ class Approvals:
         self._by_digest: defaultdict[str, list[ApprovalGiven]] = defaultdict(list)
         self._reading = anyio.Lock()
 
-    async def give(self, asked: ApprovalRequest, author: Author) -> ApprovalGiven:
-        """Somebody says yes. Saying it twice is saying it once. Raises BadInput, Unavailable."""
-        if not _DIGEST.issuperset(asked.digest):
+    async def give(self, request: ApprovalRequest, author: Author) -> ApprovalGiven:
+        """Store an approval; a second one of the same person is the first one again. Raises
+        BadInput, Unavailable."""
+        if not _DIGEST.issuperset(request.digest):
             raise BadInput("This is no digest of a graph.", where={"path": "/digest"})
-        for known in await self.of(asked.digest):
+        for known in await self.of(request.digest):
             if known.author.id == author.id:
                 return known
         given = ApprovalGiven(
             at=self._clock_us(),
-            digest=asked.digest,
+            digest=request.digest,
             author=author,
-            graph=asked.graph,
-            version=asked.version,
-            note=asked.note.strip(),
+            graph=request.graph,
+            version=request.version,
+            note=request.note.strip(),
             device=caller.device(),
         )
         draft = Draft(given.kind, author.id, msgspec.json.encode(given))
@@ -81,7 +84,7 @@ class Approvals:
         return given
 
     async def of(self, digest: str) -> tuple[ApprovalGiven, ...]:
-        """Who said yes to a graph, in order of time."""
+        """Return the approvals of a graph, in order of time."""
         async with self._reading:
             while events := await self._journal.read(STREAM, after=self._seq, limit=500):
                 for event in events:
@@ -92,8 +95,9 @@ class Approvals:
         return tuple(self._by_digest.get(digest, ()))
 
     async def item(self, robot: Registration, digest: str, starter: str) -> Item | None:
-        """Whether somebody else than the starter, by id, has said yes, with another browser than the one
-        that asks for the start; None where the robot does not ask."""
+        """Return the pre-flight item about approval; None where the robot asks for none. It passes
+        when somebody else than the starter has approved the graph with another browser than the one
+        of this request."""
         if robot.profile.get(SECOND_PERSON) is not True:
             return None
         named = [each for each in await self.of(digest) if each.author.id != starter]
@@ -114,7 +118,7 @@ class Approvals:
         )
 
     async def require(self, robot: Registration, digest: str, starter: str) -> None:
-        """Raises Conflict where the robot asks for a yes that nobody else has given."""
+        """Raise Conflict where the robot asks for an approval that nobody else has given."""
         item = await self.item(robot, digest, starter)
         if item is not None and item.verdict == "blocked":
             raise Conflict(item.text, where={"path": "/engine", "item": item.code})

@@ -1,8 +1,10 @@
-"""Libraries of actions in the workspace that is sourced here, and whether they are older than their source.
+"""Action libraries in the workspace that is sourced here, and whether they are older than their
+sources.
 
-An engine says what it has indexed, which is the file of an action, and nothing of its library
-(docs/umrf-and-the-engine.md 5). Where the workspace lies on this computer, colcon's folders tell:
-`install/…/lib/libNAME.so`, and in `build/PACKAGE` the library as it was linked and where its source is.
+An engine tells which file of an action it has indexed, and nothing about the action's library
+(docs/umrf-and-the-engine.md 5). For a workspace on this computer, the folders of colcon tell:
+`install/…/lib/libNAME.so`, and in `build/PACKAGE` the library as it was linked and the path of its
+source.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -13,14 +15,15 @@ from action_assistant.ros_workspace import source_of
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.packages.naming import snake_case
 
-#: What a library is compiled of. Other files change without it being linked anew.
+#: Endings of files that a library is compiled from. A change of any other file does not link it anew.
 _COMPILED: Final = frozenset({".cpp", ".cc", ".cxx", ".c", ".hpp", ".hh", ".hxx", ".h"})
 _ABOVE: Final = 3  # folders between a `lib` and its workspace: install, or install/PACKAGE
-_MOST: Final = 2_000  # files of one package that are looked at
+_MOST: Final = 2_000  # source files of one package that are compared
 
 
 class OlderLibrary(NamedTuple):
-    """The library of an action, and a file of its source that was changed after it was built."""
+    """An action's library, and a file of its source that was changed after the library was
+    built."""
 
     action: str
     library: Path
@@ -28,13 +31,15 @@ class OlderLibrary(NamedTuple):
 
 
 def older_libraries(graph: Graph, prefixes: Sequence[Path]) -> list[OlderLibrary]:
-    """Those of a graph's actions, by name. `prefixes` as in AMENT_PREFIX_PATH, the nearest first."""
+    """Return the outdated libraries of a graph's actions, by name. `prefixes` as in
+    AMENT_PREFIX_PATH, the nearest first."""
     names = sorted({action.name for action in graph.actions if not action.missing})
     return [found for name in names if (found := _older(name, prefixes)) is not None]
 
 
 def _older(name: str, prefixes: Iterable[Path]) -> OlderLibrary | None:
-    """Of the library that is found first, as an engine's loader would find it."""
+    """Return the outdated library of one action. The first prefix that has the library counts, as
+    for the engine's loader."""
     file = f"lib{snake_case(name)}.so"
     for prefix in prefixes:
         installed = prefix / "lib" / file
@@ -47,7 +52,8 @@ def _older(name: str, prefixes: Iterable[Path]) -> OlderLibrary | None:
 
 
 def _built(prefix: Path, file: str) -> Iterator[Path]:
-    """The library in the build folder of the workspace that a prefix belongs to."""
+    """Yield the copies of a library in the build folder of the workspace that a prefix belongs
+    to."""
     for above in [*prefix.parents][:_ABOVE]:
         found = sorted((above / "build").glob(f"*/{file}"))
         if found:
@@ -56,7 +62,8 @@ def _built(prefix: Path, file: str) -> Iterator[Path]:
 
 
 def _newer(built: Path) -> Path | None:
-    """The file of a library's source that was changed last, if that was after it was linked."""
+    """Return the source file of a library that was changed last, if that was after the library was
+    linked."""
     home = source_of(built.parent)
     if home is None:
         return None
@@ -72,7 +79,7 @@ def _newer(built: Path) -> Path | None:
 
 
 def _sources(home: Path) -> Iterator[Path]:
-    """What is compiled into a library; tests are not."""
+    """Yield the files that a library is compiled from, without those of tests."""
     for path in home.rglob("*"):
         if path.suffix in _COMPILED and "test" not in path.relative_to(home).parts:
             yield path

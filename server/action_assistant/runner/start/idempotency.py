@@ -1,4 +1,4 @@
-"""A start becomes a run: stored before anything is sent, once for each request id."""
+"""Claims and stores starts: once for each request id, and stored before anything is sent."""
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -20,55 +20,59 @@ from action_assistant.web.auth.caller import BackgroundTasks
 
 
 class StopOrder:
-    """What was stopped, and in which order: a start that was asked for before does not leave after
-    it. Robots and groups go by their names, and "" is everything."""
+    """Counts Stops, so that a start that was asked for before a Stop does not leave after it.
+    Robots and groups are known by their names; "" stands for everything."""
 
     def __init__(self) -> None:
         self.count = 0
         self._newest: dict[str, tuple[int, Author, str]] = {}
 
     def note(self, what: str, author: Author, stop_id: str = "") -> None:
-        """Somebody has stopped this."""
+        """Count a Stop of this robot or group, or of everything."""
         self.count += 1
         self._newest[what] = self.count, author, stop_id
 
     def since(self, count: int, *names: str) -> tuple[Author, str] | None:
-        """The newest stop of any of these, or of everything, after so many; None without one."""
+        """Return author and id of the newest Stop of any of these, or of everything, after the
+        first `count` Stops; None when there was none."""
         known = [self._newest[each] for each in ("", *names) if each in self._newest]
         found = max(known, key=lambda each: each[0], default=None)
         return None if found is None or found[0] <= count else found[1:]
 
 
 class IdempotentStarts:
-    """Where starts are written down."""
+    """Holds the lock of each request that is being carried out, and stores starts in the
+    journal."""
 
     def __init__(self, journal: RunnerJournal, tasks: BackgroundTasks, clock_us: ClockUs) -> None:
         self._journal = journal
         self._tasks = tasks
         self._clock_us = clock_us
-        self._asking: WeakValueDictionary[str, anyio.Lock] = WeakValueDictionary()
+        self._locks: WeakValueDictionary[str, anyio.Lock] = WeakValueDictionary()
 
     @asynccontextmanager
     async def once(self, request: str) -> AsyncIterator[None]:
-        """One at a time for each request."""
-        lock = self._asking.get(request)
+        """Hold the lock of this request id: whoever asks again at the same time waits for the
+        first."""
+        lock = self._locks.get(request)
         if lock is None:
-            lock = self._asking[request] = anyio.Lock()
+            lock = self._locks[request] = anyio.Lock()
         async with lock:
             yield
 
     def under_way(self, request: str) -> bool:
-        """Whether a start, or one of several robots, is being carried out at this moment."""
-        return request in self._asking
+        """Return whether this start, or start of a group, is being carried out at this moment."""
+        return request in self._locks
 
-    async def run_of(self, asked: StartRequest) -> str | None:
-        """The run that a request has become. Raises Conflict when it was another start."""
-        rows = await self._journal.query(queries.by_request(asked.request_id))
+    async def run_of(self, request: StartRequest) -> str | None:
+        """Return the id of the run that a request has become; None when there is none. Raises
+        Conflict when the id belongs to another start."""
+        rows = await self._journal.query(queries.by_request(request.request_id))
         if not rows:
             return None
         row = rows[0]
-        other_tree = asked.tree_digest and row.tree_digest not in {None, asked.tree_digest}
-        if (row.digest, row.engine) != (asked.digest, asked.engine) or other_tree:
+        other_tree = request.tree_digest and row.tree_digest not in {None, request.tree_digest}
+        if (row.digest, row.engine) != (request.digest, request.engine) or other_tree:
             raise Conflict(
                 "This request_id belongs to another start.", where={"path": "/request_id"}
             )
@@ -76,7 +80,8 @@ class IdempotentStarts:
         return found
 
     async def store(self, requested: Requested) -> Run:
-        """What cannot be recorded is not started."""
+        """Append a start to the journal and return its run. A start that cannot be stored is not
+        sent. Raises Unavailable."""
         stream = stream_of(requested.run)
         draft = Draft(requested.kind, requested.author.id, encode(requested))
         try:
@@ -89,7 +94,8 @@ class IdempotentStarts:
         return begin(requested)
 
     async def _disown(self, run: str) -> None:
-        """A commit whose answer got lost may still have happened: then say that nothing was sent."""
+        """Store that a run was refused, in case its start was committed although the answer got
+        lost."""
         stream = stream_of(run)
         end = Ended(self._clock_us(), "refused", None, "It could not be recorded in time.")
         while True:

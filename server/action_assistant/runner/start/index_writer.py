@@ -1,4 +1,5 @@
-"""Graphs inside of a task, written where a robot's engine looks them up (docs/decisions/085-written-into-the-index.md)."""
+"""Writes the graphs inside of a task into the folder that a robot's engine indexes
+(docs/decisions/085-written-into-the-index.md)."""
 
 import os
 from collections import defaultdict
@@ -46,13 +47,13 @@ from action_assistant.umrf.model import Graph
 from action_assistant.umrf.run_size import MOST_INSIDE
 from action_assistant.web.workers.lanes import RunInWorker
 
-#: Something that waits for a disk, done apart from the loop.
+#: Runs a function that waits for a disk in a thread, beside the event loop.
 OnDisk = Callable[..., Awaitable[Any]]
 
 
 class IndexWriteRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The graphs inside of a graph, as a start of it has them: `digest` is that graph's, `tree_digest` of
-    all together. `replace`: those that may take the place of another file."""
+    """The graphs inside of a graph, as a start of it has them. `digest` is that of the graph,
+    `tree_digest` that of all together. `replace`: names of graphs that may replace another file."""
 
     subgraphs: Annotated[tuple[SentSubgraph, ...], msgspec.Meta(min_length=1)]
     digest: str
@@ -61,8 +62,8 @@ class IndexWriteRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True,
 
 
 class IndexWriteAnswer(msgspec.Struct, frozen=True, kw_only=True):
-    """What is in the folder now: files that were `written` anew, that `replaced` others, and graphs that
-    were `there` as they shall be."""
+    """The state of the folder after a write: files that were `written` anew, files that `replaced`
+    others, and graphs that were `there` before in the same form."""
 
     folder: str
     written: tuple[WrittenFile, ...]
@@ -71,7 +72,7 @@ class IndexWriteAnswer(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class WritePlan(msgspec.Struct, frozen=True):
-    """What has to be written, and what has not."""
+    """The files to write, and the graphs that are `there` already."""
 
     files: tuple[NewFile, ...]
     graphs: tuple[AskedGraph, ...]
@@ -79,7 +80,7 @@ class WritePlan(msgspec.Struct, frozen=True):
 
 
 def folder_trouble(robot: str, folder: Path) -> str:
-    """Return why the folder of a robot cannot be read, a sentence; "" where it can."""
+    """Return a sentence that says why the folder of a robot cannot be read; "" where it can."""
     try:
         with os.scandir(folder):
             return ""
@@ -89,61 +90,62 @@ def folder_trouble(robot: str, folder: Path) -> str:
 
 
 def read_index_write(body: bytes) -> IndexWriteRequest:
-    """The body of a wish. Raises BadInput with the place."""
-    asked = decoded(body, IndexWriteRequest)
-    sent = {each.name for each in asked.subgraphs}
-    if unknown := [name for name in asked.replace if name not in sent]:
+    """Decode the body of a write. Raises BadInput with the place."""
+    request = decoded(body, IndexWriteRequest)
+    sent = {each.name for each in request.subgraphs}
+    if unknown := [name for name in request.replace if name not in sent]:
         raise BadInput(
             f"{unknown[0][:80]!r} is not among the graphs that were sent.",
-            where={"path": f"/replace/{asked.replace.index(unknown[0])}"},
+            where={"path": f"/replace/{request.replace.index(unknown[0])}"},
         )
-    return asked
+    return request
 
 
 def planned(
-    asked: IndexWriteRequest, folder: Path, index: EngineIndex, facts: EngineFacts
+    request: IndexWriteRequest, folder: Path, index: EngineIndex, facts: EngineFacts
 ) -> WritePlan:
-    """What a wish comes to, all of it or nothing. For workers. Raises BadInput, NotUmrf, TooLarge, Conflict
-    with the place, Unavailable."""
-    told, graphs = read_inside(asked.subgraphs, asked.digest, asked.tree_digest)
+    """Plan a write: all of its graphs can be written, or it is refused. For workers. Raises
+    BadInput, NotUmrf, TooLarge, Conflict with the place, Unavailable."""
+    recorded, graphs = read_inside(request.subgraphs, request.digest, request.tree_digest)
     for place, graph in enumerate(graphs.values()):
         _require_sound(place, graph, graphs, facts)
-    digests = {each.name: each.digest for each in told}
+    digests = {each.name: each.digest for each in recorded}
     files = scanned(folder, graphs.keys())
     states = {name: folder_state(each, files, index, facts) for name, each in graphs.items()}
-    _require_free(states, asked.replace, folder)
+    _require_free(states, request.replace, folder)
     new: list[NewFile] = []
-    asked_for: list[AskedGraph] = []
+    graphs_to_write: list[AskedGraph] = []
     for name, state in states.items():
         text = codec.write(graphs[name]).encode()
         match state:
             case Lacking():
                 new.append(NewFile(name, text))
-                asked_for.append(AskedGraph(name, digests[name]))
+                graphs_to_write.append(AskedGraph(name, digests[name]))
             case Differing(file):
                 new.append(NewFile(name, text, file.path, sha(file.text)))
-                asked_for.append(AskedGraph(name, digests[name], file.shown))
+                graphs_to_write.append(AskedGraph(name, digests[name], file.shown))
             case There() | Hindered():
                 continue
     there = tuple(name for name, state in states.items() if isinstance(state, There))
-    return WritePlan(tuple(new), tuple(asked_for), there)
+    return WritePlan(tuple(new), tuple(graphs_to_write), there)
 
 
 def _require_sound(
     place: int, graph: Graph, inside: Mapping[str, Graph], facts: EngineFacts
 ) -> None:
-    """Nothing gets into an index that an engine must not read. Raises Conflict."""
+    """Refuse a graph that an engine must not read. Raises Conflict."""
     wrong = blocking(check(graph, None, facts, inside))
-    never = [each for each in wrong if is_final(each)]
-    if never:
+    final = [each for each in wrong if is_final(each)]
+    if final:
         raise Conflict(
-            f"{graph.name} cannot be written: {never[0].message}",
-            where={"path": f"/subgraphs/{place}/umrf{never[0].where.path}"},
+            f"{graph.name} cannot be written: {final[0].message}",
+            where={"path": f"/subgraphs/{place}/umrf{final[0].where.path}"},
         )
 
 
 def _require_free(states: Mapping[str, FileState], replace: Sequence[str], folder: Path) -> None:
-    """Raises Conflict with all that stands in the way; then nothing is written."""
+    """Refuse a write that other files stand in the way of, with all of them; nothing is written
+    then. Raises Conflict."""
     hindered = {name: each.why for name, each in states.items() if isinstance(each, Hindered)}
     others = {
         name: each.file.shown
@@ -152,22 +154,22 @@ def _require_free(states: Mapping[str, FileState], replace: Sequence[str], folde
     }
     where: dict[str, object] = {"folder": shown_path(str(folder))}
     if hindered:
-        told = " ".join(f"{name} cannot be written. {why}" for name, why in hindered.items())
+        reasons = " ".join(f"{name} cannot be written. {why}" for name, why in hindered.items())
         where |= {"path": "/subgraphs", "hindered": hindered}
-        raise Conflict(f"{told} Nothing was written.", where=where)
+        raise Conflict(f"{reasons} Nothing was written.", where=where)
     if others:
-        told = ", ".join(f"{path} ({name})" for name, path in others.items())
+        reasons = ", ".join(f"{path} ({name})" for name, path in others.items())
         where |= {"path": "/replace", "files": others}
         raise Conflict(
-            f"Other files would be replaced: {told}. Name their graphs in `replace` to do that. "
+            f"Other files would be replaced: {reasons}. Name their graphs in `replace` to do that. "
             "Nothing was written.",
             where=where,
         )
 
 
 class IndexWriter:
-    """Writes into the `folders` of robots that whoever started the runner has named; into one of them one
-    wish at a time."""
+    """Writes into the index folders of robots that the command line of the runner names
+    (`folders`), one request at a time for each folder."""
 
     def __init__(
         self,
@@ -185,8 +187,11 @@ class IndexWriter:
         self._on_disk = on_disk
         self._locks: Final = defaultdict[str, anyio.Lock](anyio.Lock)
 
-    async def write(self, robot: str, asked: IndexWriteRequest, author: Author) -> IndexWriteAnswer:
-        """Write what is lacking. Raises NotFound, Conflict, Unavailable and what reading raises."""
+    async def write(
+        self, robot: str, request: IndexWriteRequest, author: Author
+    ) -> IndexWriteAnswer:
+        """Write the graphs that are lacking or may be replaced. Raises NotFound, Conflict,
+        Unavailable and what reading raises."""
         known = self._robots.registration(robot)
         folder = self._folders.get(robot)
         if folder is None:
@@ -200,11 +205,13 @@ class IndexWriter:
         async with self._locks[str(folder)]:
             index = await self._robots.index(robot)
             plan: WritePlan = await self._run_in_worker(
-                planned, asked, folder, index, facts_of(known.profile)
+                planned, request, folder, index, facts_of(known.profile)
             )
             outcome = WritingOutcome(())
             if plan.files:
-                with anyio.CancelScope(shield=True):  # what was begun is told whoever has gone
+                with anyio.CancelScope(
+                    shield=True
+                ):  # a write that has begun is recorded, also when its client has gone
                     outcome = await self._written(robot, folder, plan, author)
         if outcome.failed:
             done = ", ".join(each.path for each in outcome.written)
@@ -222,12 +229,13 @@ class IndexWriter:
     async def _written(
         self, robot: str, folder: Path, plan: WritePlan, author: Author
     ) -> WritingOutcome:
-        """What cannot be recorded is not written. Raises Unavailable."""
-        wish = IndexWriteAsked(
+        """Record the request, write the files, record the outcome. A write that cannot be recorded
+        first does not happen. Raises Unavailable."""
+        request_event = IndexWriteAsked(
             at=self._clock_us(), author=author, folder=shown_path(str(folder)), graphs=plan.graphs
         )
         try:
-            await self._robots.robot_log.record(robot, wish, author.id)
+            await self._robots.robot_log.record(robot, request_event, author.id)
         except Unavailable as refused:
             raise Unavailable(f"{refused.detail} Nothing was written.") from refused
         outcome: WritingOutcome = await self._on_disk(write, folder, plan.files)
@@ -241,8 +249,7 @@ class IndexWriter:
             ),
             why=outcome.failed,
         )
-        with suppress(
-            Unavailable
-        ):  # it is done; the log says that it is not being recorded, and goes on
+        # The files are written in any case; the robot's log itself shows that it cannot record.
+        with suppress(Unavailable):
             await self._robots.robot_log.record(robot, done, author.id)
         return outcome

@@ -1,7 +1,8 @@
-"""The pre-flight: the items that are checked before a start. Pure: answers come in as values.
+"""The pre-flight: the items that are checked before a start. A start is refused by the same items
+that the page shows.
 
-The page shows the items, a start refuses by the same ones: nobody is told something else than what
-then happens.
+Answers of engines come in as values. `engine_items` also reads this computer's disk, and runs in a
+worker.
 """
 
 import os
@@ -41,19 +42,19 @@ from action_assistant.umrf.model import Graph, Problem
 
 Verdict: TypeAlias = Literal["passed", "warned", "blocked"]
 
-#: Problems that the index of an engine shows.
-_OF_INDEX: Final = frozenset(
+#: Codes of problems that the index of an engine shows.
+_INDEX_CODES: Final = frozenset(
     {"unknown-action", "signature", "parameter-type", "recursion", "subgraph-twice"}
 )
-#: Those that no index makes better: the engine refuses the graph whatever a person says.
-_REFUSED: Final = frozenset({"recursion", "subgraph-twice"})
-_SHOWN: Final = 20
+#: Codes that cannot be overridden: the engine refuses such a graph in any case.
+_NEVER_TAKEN: Final = frozenset({"recursion", "subgraph-twice"})
+_SHOWN: Final = 20  # problems of one item
 _NAMED: Final = 3  # names in one sentence
 
 
 class Item(msgspec.Struct, frozen=True, kw_only=True):
-    """One thing that was looked at. A person may override a blocked one where `overridable`, with
-    the codes in `codes` and a reason. `folder`: where graphs could be written that the robot lacks."""
+    """One item of a pre-flight. A person may override a blocked one where `overridable`, with the
+    codes in `codes` and a reason. `folder`: where graphs that the robot lacks could be written."""
 
     code: str
     verdict: Verdict
@@ -68,9 +69,9 @@ class Item(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Preflight(msgspec.Struct, frozen=True):
-    """What stands between a graph and its start on one engine. `override`: the codes that a person
-    would have to answer for; `never`: something cannot be overridden; `digest`: of the graph that was
-    looked at, `tree_digest`: of it together with the graphs inside."""
+    """The pre-flight of a graph on one engine. `override`: the codes that a person would have to
+    answer for; `never`: some item cannot be overridden; `digest`: of the graph that was checked,
+    `tree_digest`: of it together with the graphs inside."""
 
     engine: str
     digest: str
@@ -81,8 +82,8 @@ class Preflight(msgspec.Struct, frozen=True):
 
 
 class Settled(msgspec.Struct, frozen=True):
-    """A run of ours that somebody has seen at rest: the actions that were in ERROR then, by running name
-    of their graph and full name, in this life of the engine."""
+    """A run of this runner that a person has seen at rest. `places`: the actions that were in ERROR
+    then, by running name of their graph and full name; `incarnation`: the life of the engine."""
 
     engine: str
     run: str
@@ -91,9 +92,10 @@ class Settled(msgspec.Struct, frozen=True):
 
 
 class EngineView(msgspec.Struct, frozen=True, kw_only=True):
-    """An engine at the moment of a pre-flight. `took_ms`: until it answered a get sent for it;
-    `open_runs`: runs of ours that go on there; `settled`: those that somebody has seen at rest;
-    `index_folder`: what it indexes, where the runner may write there."""
+    """An engine at the moment of a pre-flight. `took_ms`: milliseconds until it answered a get sent
+    for it; `open_runs`: ids of this runner's runs that have no end yet; `settled`: runs that people
+    have seen at rest; `index_folder`: the folder that it indexes, where the runner may write
+    there."""
 
     name: str
     facts: EngineFacts
@@ -107,7 +109,8 @@ class EngineView(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def with_verdict(engine: str, items: Sequence[Item], digest: str = "", tree: str = "") -> Preflight:
-    """The items of one engine with what follows from them."""
+    """Return the items of one engine with the codes to override, and whether one cannot be
+    overridden."""
     blocked = [item for item in items if item.verdict == "blocked"]
     codes = sorted({code for item in blocked if item.overridable for code in item.codes})
     never = any(not item.overridable for item in blocked)
@@ -115,15 +118,15 @@ def with_verdict(engine: str, items: Sequence[Item], digest: str = "", tree: str
 
 
 def with_items(look: Preflight, more: Sequence[Item]) -> Preflight:
-    """The same with items that stand in nobody's way."""
+    """Return a pre-flight with more items, which only warn."""
     return msgspec.structs.replace(look, items=(*look.items, *more))
 
 
 def refusal_item(code: str, refused: Refused) -> Item:
-    """A refusal as an item. Problems that a person may answer for stay so."""
+    """Return a refusal as an item. Its problems may be overridden as they could be elsewhere."""
     where = refused.where or {}
-    found = where.get("problems")
-    problems = msgspec.convert(found, tuple[Problem, ...]) if isinstance(found, list) else ()
+    listed = where.get("problems")
+    problems = msgspec.convert(listed, tuple[Problem, ...]) if isinstance(listed, list) else ()
     codes = tuple(sorted({problem.code for problem in problems}))
     return Item(
         code=code,
@@ -136,12 +139,12 @@ def refusal_item(code: str, refused: Refused) -> Item:
 
 
 def graph_item(admitted: Admitted | Prepared) -> Item:
-    """The graph has been admitted; what warns does not stand in the way."""
+    """Return the item for an admitted graph: passed, or with warnings and overridden errors."""
     warned = tuple(each for each in admitted.problems if each.severity == "warning")[:_SHOWN]
-    over = tuple(each for each in admitted.problems if each.severity == "error")[:_SHOWN]
-    if over:
-        text = f"{len(over)} certain problems are overridden."
-        return Item(code="graph", verdict="warned", text=text, problems=(*over, *warned))
+    overridden = tuple(each for each in admitted.problems if each.severity == "error")[:_SHOWN]
+    if overridden:
+        text = f"{len(overridden)} certain problems are overridden."
+        return Item(code="graph", verdict="warned", text=text, problems=(*overridden, *warned))
     loud = sum(each.code not in QUIET for each in warned)
     if loud:
         text = f"No certain hazard; {_count(loud, 'possible one')}."
@@ -159,10 +162,13 @@ def free_item(
     longest_loading_ms: int = 0,
     now_us: int = 0,
 ) -> Item:
-    """Return the item for a run that goes on there; there is one run per robot. One of which only may be
-    that an action still loads can be answered for once the time has passed that a person has set, by a
-    start of another name: the Stop of that run goes on. `graph_name`: of the graph that is to start;
-    `longest_loading_ms`: the time that was set, 0 for none."""
+    """Return the item for another run on the engine: an engine has one run at a time.
+
+    A run of which at most an action is still loading can be overridden, after the longest loading
+    time that a person has set for the robot (`longest_loading_ms`, 0 for none), by a start of a
+    graph of another name: the Stop of that run goes on. `graph_name` is that of the graph to start;
+    `now_us` is microseconds UTC.
+    """
     if other is None:
         return Item(code="free", verdict="passed", text=f"{engine} has no other run from here.")
     text = (
@@ -186,13 +192,14 @@ def free_item(
 
 
 def _is_only_loading(run: Run) -> bool:
-    """Return whether nothing of a run moves, as far as answers show, but an action that may load."""
+    """Return whether nothing of a run moves, as far as answers show, except an action that may be
+    loading."""
     is_known = run.unknown_since is None and not run.lost and not run.unconfirmed
     return bool(run.loading) and is_known and not run.active
 
 
 def answer_item(view: EngineView) -> Item:
-    """It has answered a get sent now."""
+    """Return the item for an engine that has answered a get."""
     return Item(
         code="answers",
         verdict="passed",
@@ -201,13 +208,14 @@ def answer_item(view: EngineView) -> Item:
 
 
 def silence_item(engine: str, why: str) -> Item:
-    """It has not."""
+    """Return the item for an engine that has not answered, with the reason `why`."""
     text = f"{engine} does not answer, so a stop could not be confirmed either. Nothing was sent. {why}"
     return Item(code="answers", verdict="blocked", text=text.rstrip())
 
 
 def robot_items(view: EngineView, graph: Graph) -> tuple[Item, ...]:
-    """All that an answering robot is looked at for."""
+    """Return the items for a robot that has answered, as far as its answer and its standing decide
+    them."""
     return (
         answer_item(view),
         _proof(view),
@@ -221,7 +229,7 @@ def robot_items(view: EngineView, graph: Graph) -> tuple[Item, ...]:
 
 
 def require_clear(items: Sequence[Item], overridden: Collection[str]) -> None:
-    """Refuse a start that an item stands in the way of. Raises Conflict."""
+    """Refuse a start that an item blocks. Raises Conflict."""
     for item in items:
         if not is_blocking(item, overridden):
             continue
@@ -233,13 +241,14 @@ def require_clear(items: Sequence[Item], overridden: Collection[str]) -> None:
 
 
 def is_blocking(item: Item, overridden: Collection[str]) -> bool:
-    """Return whether an item blocks a start that somebody answers for with these codes."""
+    """Return whether an item blocks a start that overrides these codes."""
     is_answered = item.overridable and set(item.codes) <= set(overridden)
     return item.verdict == "blocked" and not is_answered
 
 
 def _proof(view: EngineView) -> Item:
-    """A stop can be proven, and the messages are those that we speak."""
+    """Check that one engine answers, hears commands, and speaks this generation of messages: a Stop
+    can be proven."""
     standing, name = view.standing, view.name
     if standing.generation == "older":
         text = (
@@ -271,7 +280,7 @@ def _proof(view: EngineView) -> Item:
 
 
 def _actions(view: EngineView, graph: Graph) -> Item:
-    """It has the actions, with the same parameters."""
+    """Check that the engine has indexed the actions of the graph, with the same parameters."""
     index = view.index
     if graph.name in index.graphs:
         text = (
@@ -286,7 +295,7 @@ def _actions(view: EngineView, graph: Graph) -> Item:
     problems = tuple(
         each
         for each in check(graph, index.actions, view.facts, index.graphs)
-        if each.code in _OF_INDEX and (each.where.aid is None or each.where.aid in own)
+        if each.code in _INDEX_CODES and (each.where.aid is None or each.where.aid in own)
     )
     if not problems:
         text = f"{view.name} knows all {_count(len(own), 'action')}, with the same parameters."
@@ -298,27 +307,27 @@ def _actions(view: EngineView, graph: Graph) -> Item:
         verdict="blocked",
         text=f"{view.name} would refuse the graph: {problems[0].message}{more}",
         codes=tuple(sorted(codes)),
-        overridable=not codes & _REFUSED,
+        overridable=not codes & _NEVER_TAKEN,
         problems=problems[:_SHOWN],
     )
 
 
 def _again(view: EngineView, graph: Graph) -> Item:
-    """The engine does not hold a graph of this name already, or survives that it is started again.
+    """Check that the engine does not hold a graph of this name, or can start it again.
 
-    Whoever started that one, and however it ended: the name is held until the engine is restarted.
+    An engine holds a name until it is restarted, whoever started the graph and however it ended.
     """
     held = {each.graph for each in view.answer.graphs}
     if graph.name not in held:
         text = f"{view.name} holds no graph called {graph.name} from an earlier start."
         return Item(code="again", verdict="passed", text=text)
-    lost = not_matched(graph, view.facts, view.index, held)
-    if not lost:
+    unmatched = not_matched(graph, view.facts, view.index, held)
+    if not unmatched:
         text = f"{view.name} can start {graph.name} again: nothing in it has to be looked up."
         return Item(code="again", verdict="passed", text=text)
     text = (
         f"{view.name} holds a graph called {graph.name} from an earlier start. Its engine does not "
-        f"look up {_listed(lost)} when a name is started again: it aborts with every running graph, or "
+        f"look up {_listed(unmatched)} when a name is started again: it aborts with every running graph, or "
         "does nothing. Restart the engine, or give the graph another name."
     )
     return Item(code="again", verdict="blocked", text=text)
@@ -327,9 +336,10 @@ def _again(view: EngineView, graph: Graph) -> Item:
 def not_matched(
     graph: Graph, facts: EngineFacts, index: EngineIndex, held: Collection[str]
 ) -> tuple[str, ...]:
-    """The full names of what an engine cannot build when it takes a graph without looking anything up
-    in its index (a start of a name that it holds, a modify): sub-graphs, and what it does not know.
-    Of one that names nothing, those sub-graphs that it `held`. Empty where it looks them up."""
+    """Return the full names of actions that an engine cannot build in a graph that it takes without
+    its index: a start of a name that it holds, or a modify. These are sub-graphs and unknown
+    actions. For an engine that names no index, only sub-graphs that it `held` are known. Empty
+    where the engine looks actions up."""
     if facts.restart_matches:
         return ()
     silent = not index.actions and not index.graphs
@@ -348,17 +358,17 @@ def not_matched(
 def not_matched_in(
     umrf: str, facts: EngineFacts, index: EngineIndex, held: Collection[str]
 ) -> tuple[str, ...]:
-    """As `not_matched`, of a graph as it will be sent. For workers."""
+    """Read a graph as it will be sent and return its `not_matched`. For workers."""
     return not_matched(codec.read(umrf).graph, facts, index, held)
 
 
 def _listed(names: Sequence[str]) -> str:
-    shown = ", ".join(names[:3])
-    return shown if len(names) <= 3 else f"{shown} and {len(names) - 3} more"
+    first = ", ".join(names[:_NAMED])
+    return first if len(names) <= _NAMED else f"{first} and {len(names) - _NAMED} more"
 
 
 def _quiet(view: EngineView, graph: Graph) -> Item:
-    """Nothing of somebody else runs there."""
+    """Check that no graph of somebody else runs on the engine."""
     moving = foreign_graphs(view.answer, view.open_runs)
     if graph.name in moving:
         text = (
@@ -374,8 +384,9 @@ def _quiet(view: EngineView, graph: Graph) -> Item:
 
 
 def _rest(view: EngineView) -> Item:
-    """Nothing there may still move that its engine calls ERROR. Runs of ours stand in the way as runs,
-    until somebody has seen them at rest."""
+    """Check that no graph on the engine may still move although the engine calls it ERROR. Open
+    runs of this runner are left out: they block as runs. So are runs that a person has seen at
+    rest."""
     doubted = sorted(
         each.graph
         for each in view.answer.graphs
@@ -394,8 +405,8 @@ def _rest(view: EngineView) -> Item:
 
 
 def _is_settled(view: EngineView, shown: Snapshot) -> bool:
-    """Whether somebody has seen at rest just what is in doubt here: the graph of that run or a part of
-    it, in the same life of the engine, with no other action in ERROR."""
+    """Return whether a person has seen at rest exactly what is in doubt here: the graph of that run
+    or a part of it, in the same life of the engine, with no other action in ERROR."""
     marks = {each.graph: each.run for each in view.answer.graphs if each.run is not None}
     for each in view.settled:
         top = next((name for name, run in marks.items() if run == each.run), None)
@@ -407,7 +418,7 @@ def _is_settled(view: EngineView, shown: Snapshot) -> bool:
 
 
 def _others(view: EngineView) -> Item:
-    """Nobody else publishes starts."""
+    """Check that nobody else publishes start messages to the engine."""
     others = view.standing.others
     if others == 0:
         return Item(code="others", verdict="passed", text="Nobody else can start something there.")
@@ -417,7 +428,7 @@ def _others(view: EngineView) -> Item:
 
 
 def _actors(view: EngineView, graph: Graph) -> Item:
-    """The actions are this robot's, or the engines synchronise."""
+    """Check that all actions belong to this robot, or that its engine synchronises with others."""
     named = {action.actor for action in graph.actions if not action.missing} - {""}
     foreign = sorted(named - {view.name, view.standing.actor})
     if not foreign or view.facts.synchronises:
@@ -430,7 +441,8 @@ def _actors(view: EngineView, graph: Graph) -> Item:
 
 
 def subgraph_items(view: EngineView, pinned: Mapping[str, Graph]) -> tuple[Item, ...]:
-    """Whether it has indexed the graphs that were sent along; nothing where there are none. Pure."""
+    """Return the item about the graphs inside: an engine runs what it has indexed under a name,
+    whatever was sent (docs/umrf-and-the-engine.md 2.6). Empty where there are no graphs inside."""
     if not pinned:
         return ()
     index = view.index
@@ -444,17 +456,19 @@ def subgraph_items(view: EngineView, pinned: Mapping[str, Graph]) -> tuple[Item,
     if not lacking and not other:
         text = f"{view.name} has indexed {_listed(sorted(pinned))} as this version has it."
         return (Item(code="subgraphs", verdict="passed", text=text),)
-    told: list[str] = []
+    sentences: list[str] = []
     if lacking:
-        told.append(f"{view.name} has not indexed {_listed(lacking)}, and so refuses the graph.")
+        sentences.append(
+            f"{view.name} has not indexed {_listed(lacking)}, and so refuses the graph."
+        )
     if other:
-        told.append(
+        sentences.append(
             f"{view.name} has indexed {_listed(other)} otherwise than this version has it, and would "
             "run what it has."
         )
     codes = (*(["subgraph-differs"] if other else []), *(["unknown-action"] if lacking else []))
     item = Item(
-        code="subgraphs", verdict="blocked", text=" ".join(told), codes=codes, overridable=True
+        code="subgraphs", verdict="blocked", text=" ".join(sentences), codes=codes, overridable=True
     )
     return (item,)
 
@@ -462,7 +476,8 @@ def subgraph_items(view: EngineView, pinned: Mapping[str, Graph]) -> tuple[Item,
 def differing_subgraphs(
     view: EngineView, pinned: Mapping[str, Graph]
 ) -> tuple[list[str], list[str]]:
-    """The names of graphs that the engine has not indexed, and of those that it has otherwise."""
+    """Return the names of graphs that the engine has not indexed, and of those that it has indexed
+    with other contents."""
     index = view.index
     lacking = [each for each in sorted(pinned) if not _is_known(each, index)]
     other = [
@@ -476,7 +491,7 @@ def differing_subgraphs(
 def folder_state(
     graph: Graph, files: IndexedFiles, index: EngineIndex, facts: EngineFacts
 ) -> FileState:
-    """How a graph is in the folder of an engine that has named this index."""
+    """Return the state of a graph's file in the folder of an engine with this index."""
     return held_against(graph, files, facts, actions=index.actions, graphs=index.graphs)
 
 
@@ -485,24 +500,27 @@ def _is_known(name: str, index: EngineIndex) -> bool:
 
 
 def _is_same(name: str, graph: Graph, index: EngineIndex, facts: EngineFacts) -> bool:
-    """Whether the engine would run just this; an action of that name comes before a graph."""
+    """Return whether the engine would run exactly this graph; it takes an action of that name
+    before a graph."""
     if name in index.actions:
         return False
     return same_to_engine(graph, index.graphs[name], facts)
 
 
 def engine_items(view: EngineView, ready: Prepared, prefixes: Sequence[Path]) -> tuple[Item, ...]:
-    """Every item of this start. `prefixes`: of the workspace that is sourced here."""
+    """Return all items for a robot that has answered, also those that need this computer's disk.
+    `prefixes`: those of the workspace that is sourced here. For workers."""
     graph, pinned = codec.read(ready.umrf).graph, graphs_in(ready.subgraphs)
     return (
         *robot_items(view, graph),
-        *_built(view, graph, prefixes),
+        *_library_items(view, graph, prefixes),
         *(_with_folder(each, view, pinned) for each in subgraph_items(view, pinned)),
     )
 
 
-def _built(view: EngineView, graph: Graph, prefixes: Sequence[Path]) -> tuple[Item, ...]:
-    """No library of its actions is older than its source, as far as this computer has the workspace."""
+def _library_items(view: EngineView, graph: Graph, prefixes: Sequence[Path]) -> tuple[Item, ...]:
+    """Return the item about action libraries that are older than their sources, if the workspace on
+    this computer has any."""
     older = older_libraries(graph, prefixes)
     if not older:
         return ()
@@ -518,7 +536,8 @@ def _built(view: EngineView, graph: Graph, prefixes: Sequence[Path]) -> tuple[It
 
 
 def _with_folder(item: Item, view: EngineView, pinned: Mapping[str, Graph]) -> Item:
-    """The item with what could be done about it where the runner has the folder itself."""
+    """Return a blocked item with the files that could be written, where the runner may write into
+    the index folder."""
     if item.verdict != "blocked" or view.index_folder is None:
         return item
     folder = view.index_folder
@@ -541,17 +560,18 @@ def _with_folder(item: Item, view: EngineView, pinned: Mapping[str, Graph]) -> I
         why = f"The runner may not write into {shown_path(str(folder))}."
         hindered |= {each.graph: why for each in writable}
         writable = []
-    look = FolderLook(
+    found = FolderLook(
         path=shown_path(str(folder)),
         writable=tuple(writable),
         waiting=tuple(waiting),
         hindered=hindered,
     )
-    return msgspec.structs.replace(item, folder=look)
+    return msgspec.structs.replace(item, folder=found)
 
 
 def course_items(found: CheckedCourses) -> tuple[Item, ...]:
-    """Whether the graph goes as it is expected to; nothing where nothing is expected."""
+    """Return the item about the expected courses of the graph: it warns and never blocks. Empty
+    without courses."""
     courses = found.courses
     if not courses:
         return ()
@@ -560,19 +580,19 @@ def course_items(found: CheckedCourses) -> tuple[Item, ...]:
     if not other and not unknown:
         text = f"It goes as expected: {_count(len(courses), 'expected course')}."
         return (Item(code="courses", verdict="passed", text=text),)
-    told = [f"{each.name}: {each.why}" for each in other[:_NAMED]]
+    sentences = [f"{each.name}: {each.why}" for each in other[:_NAMED]]
     if len(other) > _NAMED:
-        told.append(f"{len(other) - _NAMED} more go another way.")
+        sentences.append(f"{len(other) - _NAMED} more go another way.")
     if unknown:
-        told.append(f"{_count(unknown, 'expected course')} could not be looked at in time.")
+        sentences.append(f"{_count(unknown, 'expected course')} could not be looked at in time.")
     if other:
-        of = _count(len(courses), "expected course")
-        told.insert(0, f"It does not go as expected, in {len(other)} of {of}.")
-    return (Item(code="courses", verdict="warned", text=" ".join(told)),)
+        total = _count(len(courses), "expected course")
+        sentences.insert(0, f"It does not go as expected, in {len(other)} of {total}.")
+    return (Item(code="courses", verdict="warned", text=" ".join(sentences)),)
 
 
 def unknown_courses_item(why: str) -> Item:
-    """Whether it goes as expected is not known."""
+    """Return the item for expected courses that could not be checked, with the reason."""
     text = f"Whether it goes as expected is not known. {why}"
     return Item(code="courses", verdict="warned", text=text)
 
