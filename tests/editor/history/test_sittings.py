@@ -46,6 +46,13 @@ def test_a_graph_that_was_read_from_a_file_was_imported() -> None:
     assert _told(found) == [("imported", "ada", None, 1)]
 
 
+def test_a_large_file_that_was_stored_before_its_graph_is_one_entry_too() -> None:
+    created = Step("created", "ada", _MORNING, 1)
+    imported = created._replace(kind="imported", seq=None)
+    found = sittings([imported, created, _edit("ada", 9, 2)])
+    assert _told(found) == [("imported", "ada", None, 1), ("edited", "ada", 2, 2)]
+
+
 @given(
     st.lists(
         st.tuples(

@@ -27,6 +27,7 @@ from action_assistant.web.workers.lanes import RunInWorker, run_here
 
 NAME_LIMIT: Final = 200  # characters
 DESCRIPTION_LIMIT: Final = 10_000
+_LARGE_FILE: Final = 256 * 1024  # bytes of an imported file that is stored in a commit of its own
 
 
 class DraftOf(msgspec.Struct, frozen=True):
@@ -151,8 +152,8 @@ class Catalogue:
             author,
             h.GraphCreated(about.name, about.description, found.dialect, found.notes),
         )
-        drafts = [made, Draft(h.IMPORTED, author, body)]
-        return await self._add(found.update, about, drafts, author), found.reading
+        file = Draft(h.IMPORTED, author, body)
+        return await self._add(found.update, about, [made], author, file), found.reading
 
     async def describe(
         self, graph: str, author: str, *, name: str | None, description: str | None
@@ -215,10 +216,10 @@ class Catalogue:
     ) -> GraphView:
         """The document of an action of the library; with the file that it came from, if it did."""
         graph = Graph(name=action.name, actions=(action,), direction="right")
-        drafts = [h.draft(h.CREATED, author, about)]
-        if file is not None:
-            drafts.append(Draft(h.IMPORTED, author, file))
-        return await self._add(changes.first(graph), info_of(graph, check(graph)), drafts, author)
+        created = h.draft(h.CREATED, author, about)
+        came = None if file is None else Draft(h.IMPORTED, author, file)
+        info = info_of(graph, check(graph))
+        return await self._add(changes.first(graph), info, [created], author, came)
 
     async def add_draft(self, origin: str, seq: int, name: str, author: str) -> GraphView:
         """A graph that begins as another one was after its change `seq`, with the same keys. What people
@@ -233,10 +234,21 @@ class Catalogue:
         return await self._add(update, about, drafts, author)
 
     async def _add(
-        self, update: bytes, of: GraphInfo, about: list[Draft], author: str
+        self,
+        update: bytes,
+        of: GraphInfo,
+        about: list[Draft],
+        author: str,
+        file: Draft | None = None,
     ) -> GraphView:
+        """Store a new graph. A large `file`, from which it was read, is stored in a commit of its own before the
+        graph is there: others' edits wait for every commit."""
         made = random_id()
         document = Draft(h.UPDATED, author, update)
+        if file is not None and len(file.body) > _LARGE_FILE:
+            await self._journal.append(h.about_stream(made), [file])
+        elif file is not None:
+            about = [*about, file]
         await self._journal.append_all(
             [
                 Addition(h.about_stream(made), tuple(about)),

@@ -80,8 +80,8 @@ async def _opened(document: bytes, run_in_worker: RunInWorker) -> Replica | None
     replica = Replica()
     try:
         for piece in await _pieces(kept.state, run_in_worker):
-            replica.open_piece(piece)
-            await asyncio.sleep(0)
+            # The writer's thread needs the interpreter, too: a turn of the loop alone would not be enough.
+            await asyncio.sleep(replica.open_piece(piece))
         replica.go_on(kept, kept.state)
     except (Malformed, Panicked):
         return None

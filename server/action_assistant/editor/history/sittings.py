@@ -58,6 +58,10 @@ def sittings(steps: Iterable[Step]) -> list[Sitting]:
         if step.kind == "imported" and done:
             before = done.popitem()[1]
             done[number] = replace(before, kind="imported")
+        elif (
+            step.kind == "created" and done
+        ):  # a large file is stored before the graph that was made of it
+            continue
         elif step.kind == "edited":
             mine = done.pop(open_of.get(step.author, -1), None)
             if mine is not None and (step.at - mine.until).total_seconds() >= _ONE_GO:

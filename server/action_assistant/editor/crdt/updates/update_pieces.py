@@ -10,7 +10,7 @@ from typing import Final
 from action_assistant.editor.crdt.messages import ByteReader, Malformed, number
 from action_assistant.editor.crdt.updates.update_scan import Scan
 
-PIECE_BYTES: Final = 256 * 1024
+PIECE_BYTES: Final = 64 * 1024
 _SKIP: Final = 10
 
 
