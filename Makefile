@@ -157,6 +157,7 @@ workspace: setup ## a sourced ROS 2 as Ubuntu 24.04 lays it out, in a root of it
 pictures: setup ## take the pictures of the documentation from the running product
 	@$(BROWSER)
 	@PICTURES=1 $(NPM) run --silent e2e -- e2e/pictures.spec.ts e2e/tutorial-pictures.spec.ts
+	@$(BIN)/python bench/picture_age.py --taken
 
 .PHONY: screens
 screens: setup ## take every page on every screen, to be looked at: frontend/screens, or TO=DIR

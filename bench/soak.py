@@ -158,6 +158,12 @@ PARTS: Final[dict[str, Part]] = {
         (),
         PLAYWRIGHT,
     ),
+    "pictures": Part(
+        "whether the pictures of the documents show the page of today",
+        {},
+        ("bench/picture_age.py",),
+        (sys.executable,),
+    ),
     "clients": Part(
         "stock clients in a room that is silent for a minute",
         {"TEST_IDLE_SECONDS": "61"},
