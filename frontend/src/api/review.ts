@@ -154,7 +154,7 @@ export function useStatistics(runner: string | undefined, graph: string) {
   });
 }
 
-export type InjectedFault = NonNullable<RunnerApi["Fit"]["fault"]>;
+export type InjectedFault = NonNullable<RunnerApi["ScriptRequest"]["fault"]>;
 
 /** What a run did, as a script for the simulator; with `fault` one action fails at its last visit. */
 export function recordedScriptOf(

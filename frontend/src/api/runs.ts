@@ -9,7 +9,7 @@ import type { RunnerApi } from "./schema/runner";
 /** Who asked for something, and from where: `address` is missing for the runner's own computer. */
 export type Requester = RunnerApi["Author"];
 /** Seconds: at least `least`, at most `most`; null: nothing bounds it from above. */
-export type DurationBounds = RunnerApi["Took"];
+export type DurationBounds = RunnerApi["DurationBounds"];
 /** One execution: it began between `not_before` and `from`, and ended between `until` and
  * `not_after` (null: it may go on still). Where `until` lies before `from`, no moment is known at
  * which it went on for certain. */

@@ -78,7 +78,7 @@ async def open_services(
             services.connection_limits = ConnectionLimits(limits=settings.limits, keeps_one=True)
             services.journal = journal
             services.review_service = ReviewService(
-                control, archive_store, on_disk, utc_us, services.asked
+                control, archive_store, on_disk, utc_us, services.worker_queries
             )
             services.retention = Retention(
                 journal,
@@ -129,7 +129,7 @@ async def _executing(
             ) as control,
         ):
             asked.opened = ours.opened = control.open
-            services.asked, services.control = asked, control
+            services.worker_queries, services.control = asked, control
             services.hub = Hub(control, utc_us)
             services.index_writer = IndexWriter(
                 control.robots,

@@ -24,7 +24,7 @@ from action_assistant.runner.analysis import (
 from action_assistant.runner.archives.archive_store import ArchiveStore
 from action_assistant.runner.review.service import ReviewService
 from action_assistant.runner.runs import views
-from action_assistant.runner.runs.durations import Took, at_rank, took_us
+from action_assistant.runner.runs.durations import DurationBounds, at_rank, duration_bounds
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.runner.runs.run import Run
 from action_assistant.umrf.files import codec
@@ -39,7 +39,7 @@ SCRIPTS = st.dictionaries(
 ROUNDED = 0.0005
 
 
-def holds(took: Took, us: float) -> bool:
+def holds(took: DurationBounds, us: float) -> bool:
     """Whether so many microseconds lie between the bounds."""
     s = us / 1e6
     return took.least - ROUNDED <= s <= (s if took.most is None else took.most) + ROUNDED
@@ -109,12 +109,14 @@ def test_the_truth_lies_inside_of_every_figure(
     for row in csv.DictReader(io.StringIO(exports.intervals(run).decode())):
         if row["action"] in real and row["seconds_least"]:
             most = float(row["seconds_most"]) if row["seconds_most"] else None
-            assert holds(Took(least=float(row["seconds_least"]), most=most), real[row["action"]])
+            assert holds(
+                DurationBounds(least=float(row["seconds_least"]), most=most), real[row["action"]]
+            )
             assert (
                 not row["seconds"] or abs(float(row["seconds"]) - real[row["action"]] / 1e6) < 0.002
             )
     for name, least, most in shown_spans(run):
-        assert name not in real or holds(Took(least=least, most=most), real[name])
+        assert name not in real or holds(DurationBounds(least=least, most=most), real[name])
     if run.end is None:
         return
     found = figures(told)
@@ -207,9 +209,9 @@ def test_a_percentile_of_ranges_holds_that_of_what_was_true(
     share: float, spans: list[tuple[int, int, float]]
 ) -> None:
     true = sorted(least + more * part for least, more, part in spans)
-    took = [took_us(1000 * least, 1000 * (least + more)) for least, more, _ in spans]
+    took = [duration_bounds(1000 * least, 1000 * (least + more)) for least, more, _ in spans]
     found = at_rank(took, share)
-    exact = at_rank([Took(least=each, most=each) for each in true], share)
+    exact = at_rank([DurationBounds(least=each, most=each) for each in true], share)
     assert found is not None
     assert exact is not None
     assert found.most is not None

@@ -200,7 +200,7 @@ def test_a_recording_that_cannot_be_looked_at_does_not_end_what_puts_old_ones_aw
             clock_us=clock_us,
             run_in_worker=at_once,
         )
-        retention._left_over = False
+        retention._may_be_unfinished = False
         with anyio.move_on_after(3 * 3_600) as waited:
             await retention.run()
         assert waited.cancelled_caught

@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from action_assistant.errors import BadInput, Conflict
-from action_assistant.runner.index_folders.comparison import There, held_against
+from action_assistant.runner.index_folders.comparison import Present, file_state
 from action_assistant.runner.index_folders.scan import scanned, shown_path
 from action_assistant.runner.index_folders.writing import NewFile, WritingOutcome, sha, write
 from action_assistant.runner.robots.engine import EngineIndex
@@ -32,7 +32,7 @@ from support.doses import examples
 
 def is_there(folder: Path, graph: Graph) -> bool:
     files = scanned(folder, {graph.name})
-    return held_against(graph, files, PINNED, actions=(), graphs={}) == There()
+    return file_state(graph, files, PINNED, actions=(), graphs={}) == Present()
 
 
 def test_what_is_lacking_is_written_and_what_is_there_is_not_touched(tmp_path: Path) -> None:

@@ -43,9 +43,9 @@ async def test_each_beat_tells_when_an_idle_robot_answered_although_nothing_has_
         hub = Hub(control, clock_us)
         changes: list[None] = []
         control.watch_robots(lambda: changes.append(None))
-        first = msgspec.json.decode(hub.beat())["heard"]["David"]
+        first = msgspec.json.decode(hub.heartbeat())["heard"]["David"]
         await anyio.sleep(15)
-        assert msgspec.json.decode(hub.beat())["heard"]["David"] > first
+        assert msgspec.json.decode(hub.heartbeat())["heard"]["David"] > first
         assert changes == []
 
 

@@ -4,7 +4,7 @@ import type { Inside } from "../runs";
 import type { RunnerApi } from "../schema/runner";
 
 /** As the runner has it, and what could be written there. */
-export type IndexFolderLook = RunnerApi["FolderLook"];
+export type IndexFolderLook = RunnerApi["IndexFolderState"];
 
 /** Has graphs inside of a task written there. */
 export function writeIntoIndex(

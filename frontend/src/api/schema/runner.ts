@@ -92,7 +92,7 @@ export interface RunnerApi {
     };
     /**
      * Approval
-     * @description Somebody's yes to exactly the graph with this digest.
+     * @description A person's yes to exactly the graph with this digest.
      */
     Approval: {
         digest: string;
@@ -115,6 +115,17 @@ export interface RunnerApi {
         version?: string;
         /** @default  */
         note?: string;
+    };
+    /**
+     * ArchiveRequest
+     * @description A request to archive runs and raw messages that are older than so many days; null leaves them
+     *     here.
+     */
+    ArchiveRequest: {
+        /** @default null */
+        runs?: number | null;
+        /** @default null */
+        raw?: number | null;
     };
     /**
      * ArchivedShown
@@ -196,23 +207,6 @@ export interface RunnerApi {
         next_at: string | null;
         keep: string | null;
         is_late: boolean;
-    };
-    /**
-     * Beat
-     * @description Once a second: the link is alive. `seen`: when each open run was last shown by its engine;
-     *     `heard`: when each robot last answered.
-     */
-    Beat: {
-        /** @enum {string} */
-        type: "beat";
-        /** Format: date-time */
-        at: string;
-        seen: {
-            [key: string]: string;
-        };
-        heard: {
-            [key: string]: string;
-        };
     };
     /**
      * Behaviour
@@ -383,8 +377,17 @@ export interface RunnerApi {
         text: string;
     };
     /**
+     * DurationBounds
+     * @description A duration in seconds: at least `least` and at most `most`; null: nothing bounds it from
+     *     above.
+     */
+    DurationBounds: {
+        least: number;
+        most: number | null;
+    };
+    /**
      * EnginesMessage
-     * @description All engines, since one is not as it was.
+     * @description All engines, sent when one of them has changed.
      */
     EnginesMessage: {
         /** @enum {string} */
@@ -450,36 +453,9 @@ export interface RunnerApi {
         after: unknown;
     };
     /**
-     * Fit
-     * @description Another version of the graph of a run; `action` (a name of the run) may have a `fault`.
-     */
-    Fit: {
-        /** @description The UMRF graph itself, as approved, or a string that holds its JSON text */
-        umrf: {
-            [key: string]: unknown;
-        } | string;
-        /** @default null */
-        action?: string | null;
-        /** @default null */
-        fault?: ("error" | "false" | "hang" | "init_error") | null;
-    };
-    /**
-     * FolderLook
-     * @description The folder that the robot's engine indexes, as the runner has it. `writable`: what can be written
-     *     there; `waiting`: graphs that are there as they shall be, and that the engine has not indexed;
-     *     `hindered`: why others cannot be written, as sentences by graph.
-     */
-    FolderLook: {
-        path: string;
-        writable: RunnerApi["WritableGraph"][];
-        waiting: string[];
-        hindered: {
-            [key: string]: string;
-        };
-    };
-    /**
      * GraphFile
-     * @description A file that was written there. `kept`: where the one that it replaced is now.
+     * @description A file that was written into an index folder. `kept`: the path to which the file that it
+     *     replaced was moved.
      */
     GraphFile: {
         graph: string;
@@ -520,7 +496,7 @@ export interface RunnerApi {
     };
     /**
      * GroupShown
-     * @description Runs that were started together. `failed`: robots that nothing was sent to, and why.
+     * @description The runs that were started together. `failed`: robots that nothing was sent to, and why.
      */
     GroupShown: {
         id: string;
@@ -539,10 +515,27 @@ export interface RunnerApi {
         commit: string | null;
     };
     /**
+     * Heartbeat
+     * @description Sent once a second while the link is alive. `seen`: when each open run was last shown by its
+     *     engine; `heard`: when each robot last answered.
+     */
+    Heartbeat: {
+        /** @enum {string} */
+        type: "beat";
+        /** Format: date-time */
+        at: string;
+        seen: {
+            [key: string]: string;
+        };
+        heard: {
+            [key: string]: string;
+        };
+    };
+    /**
      * HeldGraph
-     * @description A graph that an engine holds, ended ones too. `run`: the run of ours that it is.
+     * @description A graph that an engine holds, ended ones too. `run`: the id of this runner's run that it is.
      *
-     *     `stopping`: why a stop of it is not proven yet, "" at first; null when nobody wants that.
+     *     `stopping`: why a Stop of it is not proven yet, "" at first; null when no Stop of it is wanted.
      */
     HeldGraph: {
         graph: string;
@@ -553,7 +546,7 @@ export interface RunnerApi {
     };
     /**
      * Hello
-     * @description The first message.
+     * @description The first message: all engines and all open runs.
      */
     Hello: {
         /** @enum {string} */
@@ -572,6 +565,20 @@ export interface RunnerApi {
         /** Format: date-time */
         at: string;
         body: unknown;
+    };
+    /**
+     * IndexFolderState
+     * @description The folder that the robot's engine indexes, as the runner sees it. `writable`: graphs that
+     *     can be written there; `waiting`: graphs that are there already, and that the engine has not
+     *     indexed yet; `hindered`: why others cannot be written, as sentences by graph.
+     */
+    IndexFolderState: {
+        path: string;
+        writable: RunnerApi["WritableGraph"][];
+        waiting: string[];
+        hindered: {
+            [key: string]: string;
+        };
     };
     /**
      * IndexWriteAnswer
@@ -610,7 +617,7 @@ export interface RunnerApi {
         codes: string[];
         overridable: boolean;
         problems: RunnerApi["Problem"][];
-        folder: RunnerApi["FolderLook"] | null;
+        folder: RunnerApi["IndexFolderState"] | null;
     };
     /**
      * JournalState
@@ -676,7 +683,7 @@ export interface RunnerApi {
         requested_at: string;
         started_at: string | null;
         ended_at: string | null;
-        took: RunnerApi["Took"] | null;
+        took: RunnerApi["DurationBounds"] | null;
         stopped_by: RunnerApi["Author"] | null;
         detail: string;
         alarms: RunnerApi["AlarmShown"][];
@@ -932,8 +939,8 @@ export interface RunnerApi {
     };
     /**
      * RawHour
-     * @description An hour of raw messages: its name, bytes (gzipped), and, when it is not here any more, since
-     *     when it is archived and in which file of the folder of archives.
+     * @description An hour of raw messages: its name, its size in bytes (gzipped), and, once it is archived,
+     *     since when and in which file of the folder of archives.
      */
     RawHour: {
         name: string;
@@ -943,8 +950,8 @@ export interface RunnerApi {
     };
     /**
      * RawMessages
-     * @description The raw messages of `robot` from the hours of a run, the oldest first. `text`: what there is to
-     *     say about it.
+     * @description The raw messages of `robot` from the hours of a run, the oldest first. `text`: a note about
+     *     them for people, "" where all are here.
      */
     RawMessages: {
         robot: string;
@@ -953,8 +960,9 @@ export interface RunnerApi {
     };
     /**
      * ReachStatus
-     * @description All engines. `no_reach`: why this runner reaches none over ROS 2; "" when it can. `behaviours`:
-     *     those that simulated runs can have; null where nobody has named a folder of them.
+     * @description All engines. `no_reach`: why this runner reaches none over ROS 2; "" when it can.
+     *     `behaviours`: the Python behaviours that simulated runs can have; null where the runner was
+     *     started without a folder of them.
      */
     ReachStatus: {
         engines: RunnerApi["Robot"][];
@@ -985,7 +993,7 @@ export interface RunnerApi {
     };
     /**
      * Recording
-     * @description A file: its name (the hour, UTC) and its size in bytes.
+     * @description A file of recordings: its name (the hour, UTC) and its size in bytes.
      */
     Recording: {
         name: string;
@@ -993,7 +1001,7 @@ export interface RunnerApi {
     };
     /**
      * RefusedMessage
-     * @description Why a message was not followed.
+     * @description The reason why a message was not followed.
      */
     RefusedMessage: {
         /** @enum {string} */
@@ -1083,9 +1091,9 @@ export interface RunnerApi {
      * Robot
      * @description An engine as people see it. `why` explains any state but `answering`.
      *
-     *     `servers`: how many answer on the path of its get; `others`: publishers of starts beside us.
-     *     `actions`, `graphs`: how many it has indexed; null before its first answer. `pauses`: whether
-     *     pausing is safe there.
+     *     `servers`: how many engines answer on the path of its get; `others`: publishers of starts
+     *     besides this runner. `actions`, `graphs`: how many it has indexed; null before its first answer.
+     *     `pauses`: whether pausing is safe there.
      */
     Robot: {
         name: string;
@@ -1114,7 +1122,7 @@ export interface RunnerApi {
     };
     /**
      * RobotChange
-     * @description What shall be different about a robot.
+     * @description The fields of a registration to change; null leaves a field as it is.
      */
     RobotChange: {
         /** @default null */
@@ -1130,7 +1138,8 @@ export interface RunnerApi {
     };
     /**
      * RobotKnowledge
-     * @description What a robot can do. `unread`: files of its index that cannot be read.
+     * @description The actions and graphs that a robot has indexed. `unread`: how many files of its index cannot
+     *     be read.
      */
     RobotKnowledge: {
         actions: RunnerApi["KnownAction"][];
@@ -1149,8 +1158,8 @@ export interface RunnerApi {
     };
     /**
      * RobotLogLine
-     * @description A line of a robot's flight record. `has_graph`: its graph can be fetched; `graphs`: names of graphs
-     *     for its index; `files`: what was written for it.
+     * @description A line of a robot's flight record. `has_graph`: its graph can be fetched; `graphs`: names of
+     *     graphs for its index; `files`: the files that were written for it.
      */
     RobotLogLine: {
         seq: number;
@@ -1171,7 +1180,8 @@ export interface RunnerApi {
     };
     /**
      * RobotStopped
-     * @description What a Stop of a robot concerns: runs of ours, and graphs that others started.
+     * @description The graphs that a Stop of a robot concerns: this runner's runs, and graphs that others
+     *     started.
      */
     RobotStopped: {
         runs: string[];
@@ -1228,7 +1238,7 @@ export interface RunnerApi {
         state: "error" | "finished" | "halted" | "lost" | "paused" | "published" | "refused" | "requested" | "running" | "stopped" | "stopping" | "unknown";
         result: ("on_error" | "on_false" | "on_halted" | "on_stopped" | "on_true") | null;
         took: number | null;
-        span: RunnerApi["Took"] | null;
+        span: RunnerApi["DurationBounds"] | null;
     };
     /**
      * RunReplay
@@ -1274,7 +1284,7 @@ export interface RunnerApi {
         requested_at: string;
         started_at: string | null;
         ended_at: string | null;
-        took: RunnerApi["Took"] | null;
+        took: RunnerApi["DurationBounds"] | null;
         stopped_by: RunnerApi["Author"] | null;
         detail: string;
         alarms: RunnerApi["AlarmShown"][];
@@ -1317,7 +1327,7 @@ export interface RunnerApi {
         requested_at: string;
         started_at: string | null;
         ended_at: string | null;
-        took: RunnerApi["Took"] | null;
+        took: RunnerApi["DurationBounds"] | null;
         stopped_by: RunnerApi["Author"] | null;
         detail: string;
         alarms: RunnerApi["AlarmShown"][];
@@ -1355,7 +1365,7 @@ export interface RunnerApi {
         requested_at: string;
         started_at: string | null;
         ended_at: string | null;
-        took: RunnerApi["Took"] | null;
+        took: RunnerApi["DurationBounds"] | null;
         stopped_by: RunnerApi["Author"] | null;
         detail: string;
         alarms: RunnerApi["AlarmShown"][];
@@ -1381,7 +1391,7 @@ export interface RunnerApi {
         subgraphs: RunnerApi["SubgraphShown"][];
         tree_digest: string | null;
     };
-    RunnerMessage: RunnerApi["Hello"] | RunnerApi["RunMessage"] | RunnerApi["EnginesMessage"] | RunnerApi["Beat"] | RunnerApi["Stopping"] | RunnerApi["RefusedMessage"];
+    RunnerMessage: RunnerApi["Hello"] | RunnerApi["RunMessage"] | RunnerApi["EnginesMessage"] | RunnerApi["Heartbeat"] | RunnerApi["Stopping"] | RunnerApi["RefusedMessage"];
     /**
      * Script
      * @description Behaviours by key: one entry per call, the last repeats.
@@ -1391,6 +1401,20 @@ export interface RunnerApi {
         behaviours?: {
             [key: string]: RunnerApi["Behaviour"][];
         };
+    };
+    /**
+     * ScriptRequest
+     * @description Another version of the graph of a run; `action` (a name of the run) may have a `fault`.
+     */
+    ScriptRequest: {
+        /** @description The UMRF graph itself, as approved, or a string that holds its JSON text */
+        umrf: {
+            [key: string]: unknown;
+        } | string;
+        /** @default null */
+        action?: string | null;
+        /** @default null */
+        fault?: ("error" | "false" | "hang" | "init_error") | null;
     };
     /**
      * SentSubgraph
@@ -1433,10 +1457,10 @@ export interface RunnerApi {
      * @description Durations of an action, each between its bounds.
      */
     Spans: {
-        p50: RunnerApi["Took"] | null;
-        p90: RunnerApi["Took"] | null;
-        p99: RunnerApi["Took"] | null;
-        longest: RunnerApi["Took"] | null;
+        p50: RunnerApi["DurationBounds"] | null;
+        p90: RunnerApi["DurationBounds"] | null;
+        p99: RunnerApi["DurationBounds"] | null;
+        longest: RunnerApi["DurationBounds"] | null;
     };
     /**
      * StartRequest
@@ -1499,7 +1523,8 @@ export interface RunnerApi {
     };
     /**
      * StopBody
-     * @description `stop_id` is made by the page, once per press; the same press may come by several ways.
+     * @description The body of a Stop. The page makes `stop_id` once per press; the same press may arrive by
+     *     several ways.
      */
     StopBody: {
         /** @default  */
@@ -1507,7 +1532,8 @@ export interface RunnerApi {
     };
     /**
      * StopMessage
-     * @description The one thing that a page may say.
+     * @description A Stop, the only message that a page may send. `run`: the id of a run or a group, or
+     *     "all".
      */
     StopMessage: {
         /** @enum {string} */
@@ -1517,8 +1543,8 @@ export interface RunnerApi {
     };
     /**
      * Stopping
-     * @description What a Stop concerns: runs, and when everything is stopped `graphs` of others by robot.
-     *     `unknown`: why nothing is known of what a robot runs, by robot.
+     * @description The runs that a Stop concerns and, when everything is stopped, `graphs` of others by robot.
+     *     `unknown`: by robot, why it is not known what that runs.
      */
     Stopping: {
         /** @enum {string} */
@@ -1563,34 +1589,15 @@ export interface RunnerApi {
         graph: string | null;
     };
     /**
-     * Sweep
-     * @description Put away what is older than so many days; null leaves it here.
+     * SweepResult
+     * @description The result of a sweep: how many runs and hours of raw messages were archived; `more`: others
+     *     are due; `problems`: what stays here, and why.
      */
-    Sweep: {
-        /** @default null */
-        runs?: number | null;
-        /** @default null */
-        raw?: number | null;
-    };
-    /**
-     * Swept
-     * @description What was put away: runs, hours of raw messages; `more`: there is more to do; `problems`: what
-     *     stays here, and why.
-     */
-    Swept: {
+    SweepResult: {
         runs: number;
         raw: number;
         more: boolean;
         problems: string[];
-    };
-    /**
-     * Took
-     * @description A duration in seconds: at least `least` and at most `most`; null: nothing bounds it from
-     *     above.
-     */
-    Took: {
-        least: number;
-        most: number | null;
     };
     /**
      * VisitShown
@@ -1630,8 +1637,8 @@ export interface RunnerApi {
     };
     /**
      * WritableGraph
-     * @description A graph that can be written. `replaces`: the path of the file that would be put aside, from the
-     *     folder; "" for none.
+     * @description A graph that can be written. `replaces`: the path, in the folder, of the file that it would
+     *     replace; "" for none.
      */
     WritableGraph: {
         graph: string;
@@ -1639,7 +1646,8 @@ export interface RunnerApi {
     };
     /**
      * WrittenFile
-     * @description A file that was written, and where the one that it replaced is kept.
+     * @description A file that was written. `kept`: the path to which the file that it replaced was moved, ""
+     *     for none.
      */
     WrittenFile: {
         graph: string;

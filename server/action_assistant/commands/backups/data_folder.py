@@ -26,7 +26,7 @@ from action_assistant.journal.events import Fold
 from action_assistant.journal.journal import Journal
 from action_assistant.journal.removal import StreamRemoved
 from action_assistant.private_files import opener
-from action_assistant.runner.archives.raw_messages import RawPut
+from action_assistant.runner.archives.raw_messages import RawArchived
 from action_assistant.schema.runner_tables import runner_event
 from action_assistant.settings import ARCHIVE, RESTORING
 from action_assistant.system import file_locks
@@ -179,7 +179,7 @@ def archived(runner: Path) -> dict[str, str]:
     if not runner.exists():
         return {}
     event = runner_event.c
-    kinds = event.kind.in_([StreamRemoved.kind, RawPut.kind])
+    kinds = event.kind.in_([StreamRemoved.kind, RawArchived.kind])
     places = {}
     for row in rows_of(
         runner, select(event.kind, event.body).where(kinds).order_by(event.position)
@@ -188,7 +188,7 @@ def archived(runner: Path) -> dict[str, str]:
             removed = msgspec.json.decode(row.body, type=StreamRemoved)
             places[removed.kept] = removed.sha256
         else:
-            put = msgspec.json.decode(row.body, type=RawPut)
+            put = msgspec.json.decode(row.body, type=RawArchived)
             places[put.file] = put.sha256
     return places
 

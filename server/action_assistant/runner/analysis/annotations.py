@@ -16,7 +16,7 @@ from action_assistant.journal.events import Draft, Event
 from action_assistant.runner.analysis.cause_texts import words
 from action_assistant.runner.analysis.causes import causes
 from action_assistant.runner.runs.counts import VisitCount, visit_counts
-from action_assistant.runner.runs.durations import Took, of_run, of_visit, took_us
+from action_assistant.runner.runs.durations import DurationBounds, duration_bounds, of_run, of_visit
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.visits import ActionRun
@@ -67,7 +67,7 @@ class ActionSum(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     results: dict[str, int] = {}
     inferred: int = 0
     took: tuple[int, ...] = ()
-    spans: tuple[Took, ...] = ()
+    spans: tuple[DurationBounds, ...] = ()
 
 
 class SummedUp(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -80,14 +80,14 @@ class SummedUp(msgspec.Struct, frozen=True, omit_defaults=True):
     actions: dict[str, ActionSum]
     words: str = ""
     cause: str = ""
-    took: Took | None = None
+    took: DurationBounds | None = None
     figures: int = 0
 
     def __post_init__(self) -> None:
         hold_names(self, "words", "cause")
 
 
-class Put(msgspec.Struct, frozen=True):
+class RunArchived(msgspec.Struct, frozen=True):
     """The events of a run were put into an archive and taken out of the journal. `file` lies in the
     folder of archives; `by` is the number of the removal; `row` is the run as lists show it."""
 
@@ -110,7 +110,7 @@ def is_about(stream: str) -> bool:
     return stream.startswith(_PREFIX)
 
 
-def draft(event: Marked | SummedUp | Put) -> Draft:
+def draft(event: Marked | SummedUp | RunArchived) -> Draft:
     """The event before it has a place."""
     author = event.author.id if isinstance(event, Marked) else ""
     return Draft(event.kind, author, msgspec.json.encode(event))
@@ -157,8 +157,8 @@ def fold(event: Event) -> Sequence[Executable]:
             return _mark(run, msgspec.json.decode(event.body, type=Marked).marks)
         case SummedUp.kind:
             return _put_sum(run, msgspec.json.decode(event.body, type=SummedUp))
-        case Put.kind:
-            return _put_away(run, msgspec.json.decode(event.body, type=Put))
+        case RunArchived.kind:
+            return _put_away(run, msgspec.json.decode(event.body, type=RunArchived))
         case _:
             return ()
 
@@ -199,7 +199,7 @@ def _put_sum(run: str, summed: SummedUp) -> Sequence[Executable]:
     ]
 
 
-def _put_away(run_id: str, put: Put) -> Sequence[Executable]:
+def _put_away(run_id: str, put: RunArchived) -> Sequence[Executable]:
     """The row stays, also when it is made again without the events."""
     row: Mapping[str, Any] = {**put.row, "archived_at": put.at, "archived_as": put.file}
     statement = upsert(runs).values(id=run_id, **row)
@@ -228,5 +228,5 @@ def _told(run: str, summed: SummedUp) -> Sequence[Executable]:
     return (change.values(summary=func.json_set(runs.c.summary, *told)),)
 
 
-def _spans(action: ActionSum) -> Sequence[Took]:
-    return action.spans or tuple(took_us(each, None) for each in action.took)
+def _spans(action: ActionSum) -> Sequence[DurationBounds]:
+    return action.spans or tuple(duration_bounds(each, None) for each in action.took)

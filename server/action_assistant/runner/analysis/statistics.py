@@ -8,7 +8,7 @@ from sqlalchemy import Row, Select, select, union_all
 
 from action_assistant.runner.analysis.annotations import AT_LEAST
 from action_assistant.runner.analysis.levels import LevelPlace, places
-from action_assistant.runner.runs.durations import Took, at_rank, took_us
+from action_assistant.runner.runs.durations import DurationBounds, at_rank, duration_bounds
 from action_assistant.runner.runs.run import Result, State
 from action_assistant.schema.runner_tables import action_sum, run
 from action_assistant.umrf.model import EXIT, PRECONDITIONS, Graph, Relation
@@ -25,16 +25,16 @@ class RunPoint(msgspec.Struct, frozen=True):
     state: State
     result: Result | None
     took: float | None
-    span: Took | None
+    span: DurationBounds | None
 
 
 class Spans(msgspec.Struct, frozen=True, kw_only=True):
     """Durations of an action, each between its bounds."""
 
-    p50: Took | None
-    p90: Took | None
-    p99: Took | None
-    longest: Took | None
+    p50: DurationBounds | None
+    p90: DurationBounds | None
+    p99: DurationBounds | None
+    longest: DurationBounds | None
 
 
 class ActionStatistics(msgspec.Struct, frozen=True, kw_only=True):
@@ -132,7 +132,7 @@ def statistics(
 
 def _point(row: Row[Any]) -> RunPoint:
     kept = row.summary.get("took")
-    span = None if kept is None else Took(least=kept["least"], most=kept["most"])
+    span = None if kept is None else DurationBounds(least=kept["least"], most=kept["most"])
     took = None if span is None else span.exact
     return RunPoint(row.id, row.number, row.state, row.result, took, span)
 
@@ -189,14 +189,14 @@ def _action(place: LevelPlace, rows: Sequence[Row[Any]]) -> ActionStatistics:
     )
 
 
-def _took(kept: Any) -> Took:
+def _took(kept: Any) -> DurationBounds:
     """Rows of older versions have the microseconds that it took at least."""
     if isinstance(kept, list):
-        return Took(least=kept[0], most=kept[1])
-    return took_us(kept, None)
+        return DurationBounds(least=kept[0], most=kept[1])
+    return duration_bounds(kept, None)
 
 
-def _exact(span: Took | None) -> float | None:
+def _exact(span: DurationBounds | None) -> float | None:
     return None if span is None else span.exact
 
 

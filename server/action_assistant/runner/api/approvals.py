@@ -1,4 +1,5 @@
-"""Routes of yeses: what a second person says before a graph may start on robots that demand it."""
+"""The routes of approvals: the yes of a second person to a graph, which some robots demand before a
+start."""
 
 from datetime import datetime
 from typing import Annotated, Any
@@ -17,7 +18,7 @@ from action_assistant.web.auth.access import Needs
 
 
 class Approval(msgspec.Struct, frozen=True, kw_only=True):
-    """Somebody's yes to exactly the graph with this digest."""
+    """A person's yes to exactly the graph with this digest."""
 
     digest: str
     author: Author
@@ -28,13 +29,13 @@ class Approval(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
-    """Both of them."""
+    """Return the routes to read and to give approvals."""
 
-    @get("/api/approvals", summary="Who has said yes to a graph, by its digest")
+    @get("/api/approvals", summary="The approvals of a graph, by its digest")
     async def approvals(
         digest: Annotated[str, Parameter(min_length=64, max_length=64)],
     ) -> list[Approval]:
-        return [_shown(each) for each in await services.control.approvals.of(digest)]
+        return [_view(each) for each in await services.control.approvals.of(digest)]
 
     @post(
         "/api/approvals",
@@ -43,12 +44,12 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
         guards=[Needs("operate")],
     )
     async def approve(data: ApprovalRequest, request: Request[Any, Any, Any]) -> Approval:
-        return _shown(await services.control.approvals.give(data, author_of(request)))
+        return _view(await services.control.approvals.give(data, author_of(request)))
 
     return [approvals, approve]
 
 
-def _shown(given: ApprovalGiven) -> Approval:
+def _view(given: ApprovalGiven) -> Approval:
     return Approval(
         digest=given.digest,
         author=given.author,

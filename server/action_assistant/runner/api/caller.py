@@ -1,4 +1,4 @@
-"""The caller of a route: who asks the runner, from where, and the body they send."""
+"""The caller of a route: the person, the address, and the body that they send."""
 
 import ipaddress
 from collections.abc import AsyncIterator
@@ -21,13 +21,14 @@ from action_assistant.web.network.connection_limits import ConcurrencyLimit
 SMALL: Final = 100_000
 #: Bytes of one with a graph: twice `sent_graphs.MOST`, since as a string its text may be escaped.
 GRAPH_BODY: Final = 2 * MOST
-#: For `opt=` of such a route: how much of it counts.
+#: For `opt=` of such a route: the limit that OpenAPI and refusals tell.
 COUNTED: Final[dict[str, object]] = {BODY_LIMIT_TOLD: MOST}
 _BODY_S: Final = 60.0
 
 
 def author_of(connection: ASGIConnection[Any, Any, Any, Any]) -> Author:
-    """The person behind a request or a socket. Programs send the token, browsers have a session."""
+    """Return the person behind a request or a socket. Programs send the token, browsers have a
+    session."""
     person = person_of(connection)
     return Author(
         person.id,
@@ -41,8 +42,8 @@ def author_of(connection: ASGIConnection[Any, Any, Any, Any]) -> Author:
 async def body_of(
     request: Request[Any, Any, Any], body_limit: ConcurrencyLimit
 ) -> AsyncIterator[bytes]:
-    """A body that carries a graph: of one person few are in memory at a time, and it has to come in
-    time. Raises TooLarge, Unavailable, Litestar's RequestEntityTooLarge."""
+    """Read a body that carries a graph, which has to arrive in time; of each person few are in
+    memory at once. Raises TooLarge, Unavailable, Litestar's RequestEntityTooLarge."""
     async with body_limit.turn(person_of(request).id):
         try:
             with anyio.fail_after(_BODY_S):
@@ -55,7 +56,7 @@ async def body_of(
 
 
 async def start_of(request: Request[Any, Any, Any], most: int, seconds: float) -> bytes:
-    """What comes of a body soon, `most` bytes of it at most."""
+    """Return the part of a body that arrives within so many seconds, `most` bytes of it at most."""
     found = b""
     with anyio.move_on_after(seconds):
         async for part in request.stream():
@@ -66,7 +67,8 @@ async def start_of(request: Request[Any, Any, Any], most: int, seconds: float) -
 
 
 def _address(host: str) -> str:
-    """An address on the network; "" for this computer itself, and for what is no address."""
+    """Return an address on the network; "" for this computer itself, and for text that is no
+    address."""
     try:
         address = ipaddress.ip_address(host)
     except ValueError:

@@ -1,4 +1,4 @@
-"""The routes of expected courses: saved, dropped, held against a graph, and proposed."""
+"""The routes of expected courses: saved, removed, checked against a graph, and proposed."""
 
 from typing import Any, Protocol
 
@@ -27,27 +27,29 @@ _Asking = Request[Any, Any, Any]
 
 
 class CourseServices(Protocol):
-    """What these routes work on; all of it is there before the first request."""
+    """The services of these routes."""
 
     review_service: ReviewService
-    asked: WorkerQueries
+    worker_queries: WorkerQueries
     run_in_worker: RunInWorker
     body_limit: ConcurrencyLimit
 
 
 def routes(services: CourseServices) -> list[ControllerRouterHandler]:
-    """All routes."""
+    """Return the routes of expected courses."""
     return [*_saving(services), *_checking(services)]
 
 
 def _saving(services: CourseServices) -> list[ControllerRouterHandler]:
-    @get("/api/expectations", summary="Courses that graphs shall take for ever")
+    @get("/api/expectations", summary="Courses that graphs are expected to take")
     async def listed() -> Response[list[Expectation]]:
-        return json_of(await services.asked.text(ReviewService.expectations), list[Expectation])
+        return json_of(
+            await services.worker_queries.text(ReviewService.expectations), list[Expectation]
+        )
 
     @post(
         "/api/expectations",
-        summary="Save the course of a run, or of a dry-run, as what is expected",
+        summary="Save the course of a run, or of a dry-run, as an expected course",
         opt=reads(Expect) | COUNTED,
         guards=[Needs("edit")],
         request_max_body_size=GRAPH_BODY,
@@ -57,7 +59,9 @@ def _saving(services: CourseServices) -> list[ControllerRouterHandler]:
             wanted = decoded(body, Expect)
             return await services.review_service.expect(wanted, author_of(request))
 
-    @delete("/api/expectations/{name:str}", summary="Expect it no more", guards=[Needs("edit")])
+    @delete(
+        "/api/expectations/{name:str}", summary="Remove an expected course", guards=[Needs("edit")]
+    )
     async def retire(name: str, request: _Asking) -> None:
         await services.review_service.retire(name, author_of(request))
 
@@ -75,9 +79,12 @@ def _checking(services: CourseServices) -> list[ControllerRouterHandler]:
     )
     async def check(request: _Asking) -> Response[CheckedCourses]:
         async with body_of(request, services.body_limit) as body:
-            asked = decoded(body, CheckRequest)
-            text = await services.asked.text(
-                ReviewService.checked_courses, asked.graph, bytes(asked.umrf), asked.subgraphs
+            check_request = decoded(body, CheckRequest)
+            text = await services.worker_queries.text(
+                ReviewService.checked_courses,
+                check_request.graph,
+                bytes(check_request.umrf),
+                check_request.subgraphs,
             )
         return json_of(text, CheckedCourses)
 
@@ -91,9 +98,9 @@ def _checking(services: CourseServices) -> list[ControllerRouterHandler]:
     )
     async def proposal(request: _Asking) -> ArrowProposal:
         async with body_of(request, services.body_limit) as body:
-            asked = decoded(body, ProposalRequest)
+            wanted = decoded(body, ProposalRequest)
             return await services.run_in_worker(
-                propose, bytes(asked.umrf), asked.arrow, asked.subgraphs
+                propose, bytes(wanted.umrf), wanted.arrow, wanted.subgraphs
             )
 
     return [check, proposal]

@@ -1,7 +1,8 @@
-"""The live socket: the state of runs and engines to every page; Stop, from any of them.
+"""The live socket: sends the states of runs and engines to every page, and takes a Stop from any of
+them.
 
-Nothing queues up behind a slow page: of each run only the newest state waits, and the answer to a
-Stop goes before it.
+Slow pages get no queue: of each run only the newest state waits, and the answer to a Stop is sent
+before it.
 """
 
 import logging
@@ -35,9 +36,9 @@ log: Final = logging.getLogger(__name__)
 
 _GAP_S: Final = 0.05  # between two states of one run
 _SHARE: Final = 20  # at most one part in so many of the time goes into encoding one run
-_BEAT_S: Final = 1.0
+_HEARTBEAT_S: Final = 1.0
 _SEND_S: Final = 15.0
-_AT_ONCE: Final = 250  # actions that are put together without letting go
+_AT_ONCE: Final = 250  # actions whose views are made in one turn of the event loop
 _ENGINES_GAP_S: Final = 0.25  # between two lists of engines
 _MOST_ANSWERS: Final = 64
 _TOO_SLOW: Final = 1013
@@ -45,15 +46,16 @@ _LONGEST: Final = 10_000  # characters of a message from the page
 
 
 class StopMessage(msgspec.Struct, frozen=True, tag="stop", tag_field="type"):
-    """The one thing that a page may say."""
+    """A Stop, the only message that a page may send. `run`: the id of a run or a group, or
+    "all"."""
 
     run: str
     stop_id: str = ""
 
 
 class Stopping(msgspec.Struct, frozen=True, tag="stopping", tag_field="type"):
-    """What a Stop concerns: runs, and when everything is stopped `graphs` of others by robot.
-    `unknown`: why nothing is known of what a robot runs, by robot."""
+    """The runs that a Stop concerns and, when everything is stopped, `graphs` of others by robot.
+    `unknown`: by robot, why it is not known what that runs."""
 
     stop_id: str
     runs: list[str]
@@ -62,12 +64,12 @@ class Stopping(msgspec.Struct, frozen=True, tag="stopping", tag_field="type"):
 
     @classmethod
     def everything(cls, stop_id: str, stopped: StoppedAll) -> "Stopping":
-        """The answer to a stop of everything."""
+        """Return the answer to a Stop of everything."""
         return cls(stop_id, stopped.runs, stopped.graphs, stopped.unknown)
 
 
 class RefusedMessage(msgspec.Struct, frozen=True, tag="refused", tag_field="type"):
-    """Why a message was not followed."""
+    """The reason why a message was not followed."""
 
     stop_id: str
     detail: str
@@ -77,7 +79,7 @@ class RefusedMessage(msgspec.Struct, frozen=True, tag="refused", tag_field="type
 
 
 class Hello(msgspec.Struct, frozen=True, tag="hello", tag_field="type"):
-    """The first message."""
+    """The first message: all engines and all open runs."""
 
     engines: list[Robot]
     runs: list[views.RunShown]
@@ -90,27 +92,30 @@ class RunMessage(msgspec.Struct, frozen=True, tag="run", tag_field="type"):
 
 
 class EnginesMessage(msgspec.Struct, frozen=True, tag="engines", tag_field="type"):
-    """All engines, since one is not as it was."""
+    """All engines, sent when one of them has changed."""
 
     engines: list[Robot]
 
 
-class Beat(msgspec.Struct, frozen=True, tag="beat", tag_field="type"):
-    """Once a second: the link is alive. `seen`: when each open run was last shown by its engine;
-    `heard`: when each robot last answered."""
+class Heartbeat(msgspec.Struct, frozen=True, tag="beat", tag_field="type"):
+    """Sent once a second while the link is alive. `seen`: when each open run was last shown by its
+    engine; `heard`: when each robot last answered."""
 
     at: datetime
     seen: dict[str, datetime]
     heard: dict[str, datetime]
 
 
-#: What the runner says over the socket, and what a page may say.
-RunnerMessage: TypeAlias = Hello | RunMessage | EnginesMessage | Beat | Stopping | RefusedMessage
+#: The messages of the runner over the socket, and those of a page.
+RunnerMessage: TypeAlias = (
+    Hello | RunMessage | EnginesMessage | Heartbeat | Stopping | RefusedMessage
+)
 PageMessage: TypeAlias = StopMessage
 
 
 class EncodedRun(msgspec.Struct, frozen=True):
-    """An encoded run, what encoding it took (seconds), and when it may be encoded again."""
+    """An encoded run, the seconds that encoding took (`cost`), and when it may be encoded again
+    (`next`, in the loop's time)."""
 
     revision: int
     text: str
@@ -119,7 +124,7 @@ class EncodedRun(msgspec.Struct, frozen=True):
 
 
 class Hub:
-    """Everybody who watches."""
+    """Keeps the outbox of each page and encodes runs and engines once for all of them."""
 
     def __init__(self, control: ExecutionService, clock_us: ClockUs) -> None:
         self.control = control
@@ -137,64 +142,66 @@ class Hub:
             box.mark_engines()
 
     def engines(self) -> str:
-        """All engines as text; encoded once for everybody."""
+        """Return all engines as a message; it is encoded once per change."""
         if self._engines is None:
             message = EnginesMessage(list(self.control.robots.all()))
             self._engines = msgspec.json.encode(message).decode()
         return self._engines
 
-    def beat(self) -> str:
-        """A sign of life."""
+    def heartbeat(self) -> str:
+        """Return a heartbeat as a message."""
         seen = {
             run: views.time(opened.watch.seen_at)
             for run, opened in self.control.open.items()
             if opened.watch.seen_at is not None
         }
         heard = {name: views.time(at) for name, at in self.control.robots.heard().items()}
-        return _text(Beat(views.time(self.clock_us()), seen, heard))
+        return _text(Heartbeat(views.time(self.clock_us()), seen, heard))
 
     def _changed(self, opened: OpenRun) -> None:
         for box in self.boxes:
             box.mark(opened)
 
     def frame(self, opened: OpenRun) -> EncodedRun:
-        """A run as text; encoded once for everybody."""
+        """Return a run as a message; each revision is encoded once."""
         frame = self._frames.get(opened)
         if frame is None or frame.revision != opened.revision:
             began = anyio.current_time()
-            text = msgspec.json.encode(RunMessage(self.shown(opened))).decode()
+            text = msgspec.json.encode(RunMessage(self.run_view(opened))).decode()
             now = anyio.current_time()
             frame = EncodedRun(opened.revision, text, now - began, now + _SHARE * (now - began))
             self._frames[opened] = frame
         return frame
 
     def due(self, opened: OpenRun) -> float:
-        """When a run may be encoded again: however many watch, it takes a share of the time."""
+        """Return when a run may be encoded again: encoding takes a bounded share of the time,
+        however many pages watch."""
         frame = self._frames.get(opened)
         return 0.0 if frame is None or frame.revision == opened.revision else frame.next
 
     async def hello(self) -> str:
-        """All that goes on now. Nobody waits while many large runs are put together."""
+        """Return the first message for a page. The event loop stays free while large runs are
+        prepared."""
         for opened in tuple(self.control.open.values()):
-            await self.work_out(opened)
-        runs = [self.shown(opened) for opened in self.control.open.values()]
+            await self.prepare_view(opened)
+        runs = [self.run_view(opened) for opened in self.control.open.values()]
         return msgspec.json.encode(Hello(list(self.control.robots.all()), runs)).decode()
 
-    async def work_out(self, opened: OpenRun) -> None:
-        """Make sure that showing a run takes little time now."""
-        await work_out(opened.run, self.view_cache(opened))
+    async def prepare_view(self, opened: OpenRun) -> None:
+        """Fill the cache of a run's view, so that encoding it takes little time."""
+        await prepare_view(opened.run, self.view_cache(opened))
 
     def view_cache(self, opened: OpenRun) -> views.ActionViewCache:
-        """What was shown of a run so far."""
+        """Return the cache of the view of a run."""
         return self._view_caches.setdefault(opened, views.ActionViewCache())
 
-    def shown(self, opened: OpenRun) -> views.RunShown:
-        """A run as it is now."""
+    def run_view(self, opened: OpenRun) -> views.RunShown:
+        """Return the view of an open run."""
         recorded = opened.recorder.recorded
         return views.run_view(opened.run, recorded=recorded, cache=self.view_cache(opened))
 
     async def follow(self, text: str, author: Author) -> str:
-        """Do what a page says; the answer."""
+        """Carry out a message of a page and return the answer."""
         stop_id = ""
         try:
             if len(text) > _LONGEST:
@@ -211,14 +218,14 @@ class Hub:
         return _text(Stopping(stop_id, runs))
 
 
-async def work_out(run: Run, cache: views.ActionViewCache) -> None:
-    """Know how a run is shown, without doing nothing else meanwhile."""
+async def prepare_view(run: Run, cache: views.ActionViewCache) -> None:
+    """Fill the cache of a run's view, with turns of the event loop in between."""
     for _ in cache.prepare(run, _AT_ONCE):
         await anyio.lowlevel.checkpoint()
 
 
 class Outbox:
-    """What waits for one page: answers in order, and which runs have changed."""
+    """The messages that wait for one page: answers in order, and the runs that have changed."""
 
     def __init__(self, hub: Hub, is_allowed: Callable[[], bool]) -> None:
         self._hub = hub
@@ -231,33 +238,33 @@ class Outbox:
         self._news = anyio.Event()
 
     def mark(self, opened: OpenRun) -> None:
-        """A run has changed."""
+        """Note that a run has changed."""
         if self._changed.get(opened.run.id) is not opened:
             self._changed[opened.run.id] = opened
             self._news.set()
 
     def mark_engines(self) -> None:
-        """A robot has changed."""
+        """Note that a robot has changed."""
         if self._engines_at == math.inf:
             self._engines_at = self._engines_next
             self._news.set()
 
     def post(self, text: str) -> bool:
-        """An answer; false when the page has left too many unread."""
+        """Queue an answer; return False when the page has left too many unread."""
         self._answers.append(text)
         self._news.set()
         return len(self._answers) <= _MOST_ANSWERS
 
     async def deliver(self, send: Callable[[str], Awaitable[None]]) -> None:
-        """Send until cancelled. `TimeoutError` when the page does not read."""
-        beat = anyio.current_time() + _BEAT_S
+        """Send messages until cancelled. Raises TimeoutError when the page does not read."""
+        beat = anyio.current_time() + _HEARTBEAT_S
         while True:
             self._news = anyio.Event()
             while (text := self._pick(beat)) is not None:
                 with anyio.fail_after(_SEND_S):
                     await send(text)
                 if text.startswith('{"type":"beat"'):
-                    beat = anyio.current_time() + _BEAT_S
+                    beat = anyio.current_time() + _HEARTBEAT_S
             runs = (self._due(run, opened) for run, opened in self._changed.items())
             due = min([beat, self._engines_at, *runs])
             with anyio.move_on_after(max(0.0, due - anyio.current_time())):
@@ -267,12 +274,13 @@ class Outbox:
         return max(self._next.get(run, 0.0), self._hub.due(opened))
 
     def _pick(self, beat: float) -> str | None:
-        """The next thing to send: answers, then a beat, then runs whose turn has come."""
+        """Return the next message: answers first, then a heartbeat, engines, and runs that may be
+        sent again."""
         now = anyio.current_time()
         if self._answers:
             return self._answers.popleft()
         if now >= beat:
-            return self._hub.beat()
+            return self._hub.heartbeat()
         if not self._is_allowed():
             self._changed.clear()
             self._engines_at = math.inf
@@ -293,8 +301,8 @@ class Outbox:
 
 
 async def attend(socket: WebSocket[Any, Any, Any], hub: Hub) -> None:
-    """Serve one page until it goes away. The Stop of an expired session is followed, but it is
-    shown nothing more."""
+    """Serve one page until it disconnects. An expired session may still stop, but is sent no more
+    states."""
     session = session_of(socket)
     author = author_of(socket)
     box = Outbox(hub, lambda: session is None or not session.expired)
@@ -332,12 +340,12 @@ async def _write(socket: WebSocket[Any, Any, Any], box: Outbox) -> None:
     try:
         await box.deliver(socket.send_text)
     except TimeoutError:
-        log.info("a page does not read; its live socket is closed")
+        log.info("a page does not read its messages; its live socket is closed")
         with anyio.move_on_after(1):
             await socket.close(code=_TOO_SLOW, reason="too slow")
     except (WebSocketDisconnect, WebSocketException, OSError):
         pass
 
 
-def _text(message: Stopping | RefusedMessage | Beat) -> str:
+def _text(message: Stopping | RefusedMessage | Heartbeat) -> str:
     return msgspec.json.encode(message).decode()

@@ -1,4 +1,4 @@
-"""The runner as monitoring sees it: what goes on, metrics of runs and robots, and readiness."""
+"""The runner as monitoring sees it: metrics of runs and robots, activity, and readiness."""
 
 import logging
 import time
@@ -29,7 +29,8 @@ _UNCONFIRMED: Final = "stop_unconfirmed"
 
 
 class StopTimes:
-    """What is known of the Stop of one open run: when it was asked for, and what was noted of it."""
+    """The Stop of one open run: when it was asked for (monotonic seconds), and which of its steps
+    were counted."""
 
     def __init__(self) -> None:
         self.asked_at = time.monotonic()
@@ -37,7 +38,7 @@ class StopTimes:
 
 
 class RunMetrics(Collector):
-    """Of all runs of a process, and of its robots."""
+    """Counts ends of runs, times Stops, and gives the gauges of runs and robots."""
 
     def __init__(self, control: ExecutionService) -> None:
         self._control = control
@@ -51,7 +52,7 @@ class RunMetrics(Collector):
     def _changed(self, opened: OpenRun) -> None:
         try:
             self._note(opened)
-        except Exception:  # a count is never worth a run
+        except Exception:  # a fault in counting must not end a run
             log.exception("run %s was not counted", opened.run.id)
 
     def _note(self, opened: OpenRun) -> None:
@@ -74,17 +75,17 @@ class RunMetrics(Collector):
             self._proven.observe(time.monotonic() - stop.asked_at)
 
     def collect(self) -> Iterator[Metric]:
-        """As a registry asks."""
+        """Yield the histograms of Stops, for the registry of prometheus_client."""
         yield from self._sent.collect()
         yield from self._proven.collect()
 
     def families(self) -> Iterator[Family]:
-        """What is so now."""
-        yield from self._of_runs()
-        yield from self._of_stops()
-        yield from self._of_robots()
+        """Yield the gauges of this moment."""
+        yield from self._run_families()
+        yield from self._stop_families()
+        yield from self._robot_families()
 
-    def _of_runs(self) -> Iterator[Family]:
+    def _run_families(self) -> Iterator[Family]:
         opened = tuple(self._control.open.values())
         going = [each.run for each in opened if each.run.end is None]
         yield Family("runs_open", "Runs that are not over, or not stored yet.", len(opened))
@@ -111,7 +112,7 @@ class RunMetrics(Collector):
 
     @property
     def unconfirmed(self) -> Counter[str]:
-        """What the page calls STOP UNCONFIRMED, by engine."""
+        """The number of STOP UNCONFIRMED that the page shows, by engine."""
         going = (each.run for each in self._control.open.values() if each.run.end is None)
         found = Counter(
             run.engine
@@ -122,7 +123,7 @@ class RunMetrics(Collector):
             found[robot] += bool(why)
         return found
 
-    def _of_stops(self) -> Iterator[Family]:
+    def _stop_families(self) -> Iterator[Family]:
         going = (each.run for each in self._control.open.values() if each.run.end is None)
         engines = [SIMULATOR, *self._control.robots.names]
         stopping = Counter(run.engine for run in going if run.desired == "stopped")
@@ -141,7 +142,7 @@ class RunMetrics(Collector):
             ("engine",),
         )
 
-    def _of_robots(self) -> Iterator[Family]:
+    def _robot_families(self) -> Iterator[Family]:
         robots = self._control.robots
         yield Family(
             "engine_state",
@@ -167,7 +168,7 @@ def _histogram(name: str, until: str, buckets: tuple[float, ...]) -> Histogram:
 
 
 class WatchedRunner(Watched):
-    """An open runner."""
+    """An open runner, for monitoring."""
 
     def __init__(self, services: RunnerServices, folders: Mapping[str, Path]) -> None:
         self._control, self._hub = services.control, services.hub
@@ -175,7 +176,8 @@ class WatchedRunner(Watched):
         super().__init__(services.journal, services.lanes, (self._metrics,), folders)
 
     def activity(self) -> Activity:
-        """What goes on."""
+        """Return how many pages, runs and unconfirmed Stops there are, and the state of each
+        robot."""
         heard = self._control.robots.heard()
         robots = [
             RobotLink(
@@ -195,7 +197,8 @@ class WatchedRunner(Watched):
         )
 
     async def parts(self) -> Parts:
-        """Whether what happens is recorded, and whether registered robots can be reached from here."""
+        """Return the parts that readiness depends on, each with its trouble or None: recording, and
+        ROS 2 for registered robots."""
         unrecorded = [each for each in self._control.open.values() if not each.recorder.recorded]
         robots = self._control.robots
         return {
@@ -204,6 +207,6 @@ class WatchedRunner(Watched):
         }
 
     def families(self) -> Iterator[Family]:
-        """Runs, robots, and who watches them."""
+        """Yield the gauges of runs, robots and live sockets."""
         yield Family("live_sockets", "Pages that watch runs.", len(self._hub.boxes))
         yield from self._metrics.families()

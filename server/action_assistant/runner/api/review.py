@@ -1,4 +1,4 @@
-"""The routes of review: replays, marks, comparisons, statistics, files."""
+"""The routes of review: replays, marks, comparisons, statistics, files, archiving."""
 
 import time
 from collections.abc import AsyncIterator
@@ -20,7 +20,7 @@ from action_assistant.runner.analysis.statistics import Statistics
 from action_assistant.runner.api.caller import COUNTED, GRAPH_BODY, author_of, body_of
 from action_assistant.runner.archives import examples
 from action_assistant.runner.archives.raw_messages import RawMessages
-from action_assistant.runner.archives.retention import Retention, Swept
+from action_assistant.runner.archives.retention import Retention, SweepResult
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.review.service import (
     CauseShown,
@@ -47,11 +47,11 @@ _TYPES: Final[dict[str, str]] = {
 
 
 def json_of(text: bytes, _: type[T]) -> Response[T]:
-    """An answer that was encoded elsewhere; the type is for those who read the interface."""
+    """Return encoded JSON as a response. The type is for OpenAPI only."""
     return cast("Response[T]", Response(text, media_type=MediaType.JSON))
 
 
-class Fit(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class ScriptRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Another version of the graph of a run; `action` (a name of the run) may have a `fault`."""
 
     umrf: SentGraph
@@ -59,50 +59,54 @@ class Fit(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     fault: expected_runs.Fault | None = None
 
 
-class Sweep(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Put away what is older than so many days; null leaves it here."""
+class ArchiveRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A request to archive runs and raw messages that are older than so many days; null leaves them
+    here."""
 
     runs: Annotated[float, msgspec.Meta(ge=0)] | None = None
     raw: Annotated[float, msgspec.Meta(ge=0)] | None = None
 
 
 class ReviewServices(Protocol):
-    """What these routes work on; all of it is there before the first request. What only reads is
-    `asked` of a worker."""
+    """The services of these routes. `worker_queries` answers questions in a worker."""
 
     control: ExecutionService
     review_service: ReviewService
-    asked: WorkerQueries
+    worker_queries: WorkerQueries
     retention: Retention
     body_limit: ConcurrencyLimit
 
 
 def routes(services: ReviewServices) -> list[ControllerRouterHandler]:
-    """All routes."""
-    return [*_of_one(services), *_of_many(services), _archiving(services)]
+    """Return the routes of review."""
+    return [*_one_run(services), *_many_runs(services), _archiving(services)]
 
 
 def _archiving(services: ReviewServices) -> ControllerRouterHandler:
     @post(
         "/api/archive",
         status_code=200,
-        summary="Put some of what is old into archives; ask again while there is more",
+        summary="Archive some old runs and raw messages; ask again while `more` is true",
         guards=[Needs("restore")],
     )
-    async def archive(data: Sweep) -> Swept:
+    async def archive(data: ArchiveRequest) -> SweepResult:
         return await services.retention.sweep(data.runs, data.raw)
 
     return archive
 
 
-def _of_one(services: ReviewServices) -> list[ControllerRouterHandler]:
-    @get("/api/runs/{run:str}/film", summary="What every event of a run changed, a page at a time")
+def _one_run(services: ReviewServices) -> list[ControllerRouterHandler]:
+    @get("/api/runs/{run:str}/film", summary="The changes of a run by each event, page by page")
     async def film(run: str, after: Annotated[int, Parameter(ge=0)] = 0) -> Response[RunReplay]:
-        return json_of(await services.asked.text(ReviewService.replay, run, after), RunReplay)
+        return json_of(
+            await services.worker_queries.text(ReviewService.replay, run, after), RunReplay
+        )
 
-    @get("/api/runs/{run:str}/causes", summary="What is proven to be behind the end of a run")
+    @get("/api/runs/{run:str}/causes", summary="The proven causes of a run's end")
     async def found_causes(run: str) -> Response[list[CauseShown]]:
-        return json_of(await services.asked.text(ReviewService.causes, run), list[CauseShown])
+        return json_of(
+            await services.worker_queries.text(ReviewService.causes, run), list[CauseShown]
+        )
 
     @get(
         "/api/runs/{run:str}/umrf",
@@ -110,9 +114,9 @@ def _of_one(services: ReviewServices) -> list[ControllerRouterHandler]:
         responses={200: answer(UmrfGraph)},
     )
     async def umrf(run: str) -> Response[bytes]:
-        return json_of(await services.asked.value(ReviewService.umrf, run), bytes)
+        return json_of(await services.worker_queries.value(ReviewService.umrf, run), bytes)
 
-    @get("/api/runs/{run:str}/marks", summary="What people noted about a run")
+    @get("/api/runs/{run:str}/marks", summary="The marks that people gave a run")
     async def marks(run: str) -> RunMarks:
         return await services.review_service.marks(run)
 
@@ -120,26 +124,28 @@ def _of_one(services: ReviewServices) -> list[ControllerRouterHandler]:
     async def mark(run: str, data: annotations.Marks, request: _Asking) -> RunMarks:
         return await services.review_service.mark(run, data, author_of(request))
 
-    @get("/api/runs/{run:str}/script", summary="What a run did, as a script for the simulator")
+    @get("/api/runs/{run:str}/script", summary="The course of a run, as a script for the simulator")
     async def script(
         run: str, action: str | None = None, fault: expected_runs.Fault | None = None
     ) -> Response[expected_runs.Recorded]:
-        text = await services.asked.text(ReviewService.script, run, _fault(action, fault))
+        text = await services.worker_queries.text(ReviewService.script, run, _fault(action, fault))
         return json_of(text, expected_runs.Recorded)
 
     @post(
         "/api/runs/{run:str}/script",
         status_code=200,
-        summary="What a run did, as a script for another version of its graph",
-        opt=reads(Fit) | COUNTED,
+        summary="The course of a run, as a script for another version of its graph",
+        opt=reads(ScriptRequest) | COUNTED,
         guards=[Needs("see")],
         request_max_body_size=GRAPH_BODY,
     )
     async def fit(run: str, request: _Asking) -> Response[expected_runs.Recorded]:
         async with body_of(request, services.body_limit) as body:
-            asked = decoded(body, Fit)
-            fault = _fault(asked.action, asked.fault)
-            text = await services.asked.text(ReviewService.script, run, fault, bytes(asked.umrf))
+            wanted = decoded(body, ScriptRequest)
+            fault = _fault(wanted.action, wanted.fault)
+            text = await services.worker_queries.text(
+                ReviewService.script, run, fault, bytes(wanted.umrf)
+            )
         return json_of(text, expected_runs.Recorded)
 
     @get(
@@ -152,33 +158,37 @@ def _of_one(services: ReviewServices) -> list[ControllerRouterHandler]:
     ) -> Response[bytes] | Stream:
         head = {"content-disposition": f'attachment; filename="run.{form}"'}
         if form == "jsonl":
-            seq, first = await services.asked.value(ReviewService.lines, run, 0)
-            lines = _lines(services.asked, run, seq, first)
+            seq, first = await services.worker_queries.value(ReviewService.lines, run, 0)
+            lines = _lines(services.worker_queries, run, seq, first)
             return Stream(lines, media_type=_TYPES[form], headers=head)
-        content = await services.asked.value(ReviewService.export, run, form)
+        content = await services.worker_queries.value(ReviewService.export, run, form)
         return Response(content, media_type=_TYPES[form], headers=head)
 
-    @get("/api/runs/{run:str}/raw", summary="Where the raw messages from the time of a run are")
+    @get("/api/runs/{run:str}/raw", summary="The places of the raw messages from the time of a run")
     async def raw(run: str) -> Response[RawMessages]:
         found = await services.control.find(run)
         kept = services.control.robots.recordings
         here = [] if found.simulated or kept is None else await kept.listed(found.engine)
-        text = await services.asked.text(ReviewService.raw, run, here, time.time_ns() // 1000)
+        text = await services.worker_queries.text(
+            ReviewService.raw, run, here, time.time_ns() // 1000
+        )
         return json_of(text, RawMessages)
 
     return [film, found_causes, umrf, marks, mark, script, fit, export, raw]
 
 
-async def _lines(asked: WorkerQueries, run: str, seq: int, page: bytes) -> AsyncIterator[bytes]:
+async def _lines(queries: WorkerQueries, run: str, seq: int, page: bytes) -> AsyncIterator[bytes]:
     while page:
         yield page
-        seq, page = await asked.value(ReviewService.lines, run, seq)
+        seq, page = await queries.value(ReviewService.lines, run, seq)
 
 
-def _of_many(services: ReviewServices) -> list[ControllerRouterHandler]:
+def _many_runs(services: ReviewServices) -> list[ControllerRouterHandler]:
     @get("/api/comparison", summary="Two runs side by side, and where they part")
     async def comparison(a: str, b: str) -> Response[RunComparison]:
-        return json_of(await services.asked.text(ReviewService.compare, a, b), RunComparison)
+        return json_of(
+            await services.worker_queries.text(ReviewService.compare, a, b), RunComparison
+        )
 
     @get("/api/statistics", summary="The newest runs of a graph together")
     async def statistics(
@@ -187,7 +197,8 @@ def _of_many(services: ReviewServices) -> list[ControllerRouterHandler]:
         last: Annotated[int, Parameter(ge=1, le=1000)] = 200,
     ) -> Response[Statistics]:
         return json_of(
-            await services.asked.text(ReviewService.statistics, graph, robot, last), Statistics
+            await services.worker_queries.text(ReviewService.statistics, graph, robot, last),
+            Statistics,
         )
 
     @post(

@@ -1,4 +1,5 @@
-"""The routes of robots: the registry, their state, commands of others, checks before starts."""
+"""The routes of robots: the registry, their state, commands of others, pre-flights, starts on
+several robots."""
 
 from datetime import datetime
 from typing import Any, Final, Literal, Protocol, assert_never
@@ -49,7 +50,7 @@ _Asking = Request[Any, Any, Any]
 
 
 class RobotServices(Protocol):
-    """What these routes work on."""
+    """The services of these routes."""
 
     control: ExecutionService
     body_limit: ConcurrencyLimit
@@ -59,8 +60,9 @@ class RobotServices(Protocol):
 
 
 class ReachStatus(msgspec.Struct, frozen=True):
-    """All engines. `no_reach`: why this runner reaches none over ROS 2; "" when it can. `behaviours`:
-    those that simulated runs can have; null where nobody has named a folder of them."""
+    """All engines. `no_reach`: why this runner reaches none over ROS 2; "" when it can.
+    `behaviours`: the Python behaviours that simulated runs can have; null where the runner was
+    started without a folder of them."""
 
     engines: list[Robot]
     no_reach: str
@@ -68,7 +70,7 @@ class ReachStatus(msgspec.Struct, frozen=True):
 
 
 class RobotChange(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What shall be different about a robot."""
+    """The fields of a registration to change; null leaves a field as it is."""
 
     domain: int | None = None
     rmw: str | None = None
@@ -85,7 +87,8 @@ class KnownAction(msgspec.Struct, frozen=True):
 
 
 class RobotKnowledge(msgspec.Struct, frozen=True):
-    """What a robot can do. `unread`: files of its index that cannot be read."""
+    """The actions and graphs that a robot has indexed. `unread`: how many files of its index cannot
+    be read."""
 
     actions: list[KnownAction]
     graphs: list[str]
@@ -93,8 +96,8 @@ class RobotKnowledge(msgspec.Struct, frozen=True):
 
 
 class RobotLogLine(msgspec.Struct, frozen=True, kw_only=True):
-    """A line of a robot's flight record. `has_graph`: its graph can be fetched; `graphs`: names of graphs
-    for its index; `files`: what was written for it."""
+    """A line of a robot's flight record. `has_graph`: its graph can be fetched; `graphs`: names of
+    graphs for its index; `files`: the files that were written for it."""
 
     seq: int
     at: datetime
@@ -123,14 +126,15 @@ class RobotLogLine(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class RobotStopped(msgspec.Struct, frozen=True):
-    """What a Stop of a robot concerns: runs of ours, and graphs that others started."""
+    """The graphs that a Stop of a robot concerns: this runner's runs, and graphs that others
+    started."""
 
     runs: list[str]
     graphs: list[str]
 
 
 class GroupShown(msgspec.Struct, frozen=True, kw_only=True):
-    """Runs that were started together. `failed`: robots that nothing was sent to, and why."""
+    """The runs that were started together. `failed`: robots that nothing was sent to, and why."""
 
     id: str
     runs: list[views.RunShown]
@@ -138,7 +142,7 @@ class GroupShown(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def routes(services: RobotServices) -> list[ControllerRouterHandler]:
-    """All of them."""
+    """Return the routes of robots."""
     return [
         *_registry(services),
         *_one_robot(services),
@@ -152,7 +156,9 @@ def _registry(services: RobotServices) -> list[ControllerRouterHandler]:
     async def robots() -> list[Robot]:
         return list(services.control.robots.all())
 
-    @get("/api/reach", summary="Whether robots can be reached over ROS 2 from here")
+    @get(
+        "/api/reach", summary="All engines, and whether robots can be reached over ROS 2 from here"
+    )
     async def reach() -> ReachStatus:
         robots = services.control.robots
         return ReachStatus(list(robots.all()), robots.no_reach, await _behaviours(services))
@@ -166,7 +172,7 @@ def _registry(services: RobotServices) -> list[ControllerRouterHandler]:
 
     @get(
         "/api/candidates/now",
-        summary="The same as far as it is known now, and for how long others may still come into sight",
+        summary="Engines in sight now that nobody registered yet, and for how long others may still appear",
     )
     async def sighting() -> Sighting:
         return await services.control.robots.sighting()
@@ -182,10 +188,10 @@ def _registry(services: RobotServices) -> list[ControllerRouterHandler]:
         fields = {k: v for k, v in msgspec.structs.asdict(data).items() if v is not None}
         changed = msgspec.structs.asdict(known) | fields
         try:
-            asked = msgspec.convert(changed, Registration)
+            registration = msgspec.convert(changed, Registration)
         except msgspec.ValidationError as wrong:
             raise BadInput(str(wrong)) from wrong
-        return await services.control.register(asked, author_of(request))
+        return await services.control.register(registration, author_of(request))
 
     @delete("/api/robots/{name:str}", summary="Forget a robot", guards=[Needs("register")])
     async def remove(name: str, request: _Asking) -> None:
@@ -220,11 +226,11 @@ def _one_robot(services: RobotServices) -> list[ControllerRouterHandler]:
         file = await services.run_in_worker(write_action, found)
         return Response(file.encode(), media_type="application/json")
 
-    @get("/api/robots/{name:str}/events", summary="What others told a robot, newest first")
+    @get("/api/robots/{name:str}/events", summary="The flight record of a robot, newest first")
     async def events(name: str) -> list[RobotLogLine]:
         services.control.robots.registration(name)
         found = await services.control.robots.robot_log.newest(name, _EVENTS)
-        return [_told(seq, event) for seq, event in reversed(found)]
+        return [_line(seq, event) for seq, event in reversed(found)]
 
     @get(
         "/api/robots/{name:str}/events/{seq:int}/umrf",
@@ -241,10 +247,14 @@ def _one_robot(services: RobotServices) -> list[ControllerRouterHandler]:
         responses={200: answer(UmrfGraph)},
     )
     async def held(name: str, graph: str) -> Response[bytes]:
-        """Without its run state: a graph that carries one must not be sent again."""
+        """The graph comes without its run state: one that carries a state must not be sent
+        again."""
         return await _umrf(services, services.control.robots.held(name, graph))
 
-    @get("/api/robots/{name:str}/recordings", summary="What an engine said, hour by hour")
+    @get(
+        "/api/robots/{name:str}/recordings",
+        summary="Recordings of an engine's messages, by the hour",
+    )
     async def recorded(name: str) -> list[Recording]:
         services.control.robots.registration(name)
         kept = services.control.robots.recordings
@@ -252,7 +262,7 @@ def _one_robot(services: RobotServices) -> list[ControllerRouterHandler]:
 
     @get(
         "/api/robots/{name:str}/recordings/{file:str}",
-        summary="An hour, as JSON lines, gzipped",
+        summary="A recording of one hour, as JSON lines, gzipped",
         responses={200: answer(FileBytes, media="application/gzip")},
     )
     async def recording(name: str, file: str) -> Response[bytes]:
@@ -278,7 +288,7 @@ def _starts(services: RobotServices) -> list[ControllerRouterHandler]:
     @post(
         "/api/preflight",
         status_code=200,
-        summary="What stands between a graph and its start, engine by engine",
+        summary="The pre-flight of a start, engine by engine",
         opt=reads(GroupRequest) | COUNTED,
         guards=[Needs("simulate")],
         request_max_body_size=GRAPH_BODY,
@@ -316,8 +326,8 @@ def _index(services: RobotServices) -> ControllerRouterHandler:
     )
     async def write_into_index(name: str, request: _Asking) -> IndexWriteAnswer:
         async with body_of(request, services.body_limit) as body:
-            asked = read_index_write(body)
-            return await services.index_writer.write(name, asked, author_of(request))
+            write_request = read_index_write(body)
+            return await services.index_writer.write(name, write_request, author_of(request))
 
     return write_into_index
 
@@ -326,7 +336,7 @@ def _action(name: str, signature: Signature) -> KnownAction:
     return KnownAction(name, signature.inputs, signature.outputs)
 
 
-def _told(seq: int, event: RobotEvent) -> RobotLogLine:
+def _line(seq: int, event: RobotEvent) -> RobotLogLine:
     at = views.time(event.at)
     match event:
         case Commanded():
@@ -369,7 +379,8 @@ def _told(seq: int, event: RobotEvent) -> RobotLogLine:
 
 
 async def _behaviours(services: RobotServices) -> BehaviourList | None:
-    """What there is; an answer without it would look like a runner that is out of reach."""
+    """Return the list of behaviours; a folder that cannot be read is a problem in it, since a
+    refusal would look like a runner that cannot be reached."""
     if services.behaviours is None:
         return None
     try:
@@ -383,7 +394,8 @@ async def _umrf(services: RobotServices, text: str) -> Response[bytes]:
 
 
 def canonical(text: str) -> bytes:
-    """A graph as it can be imported. Raises NotFound when it cannot be read at all. For workers."""
+    """Write a graph so that it can be imported. Raises NotFound when it cannot be read at all. For
+    workers."""
     try:
         graph = codec.read(text).graph
     except codec.Unreadable as wrong:

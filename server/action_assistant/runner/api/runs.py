@@ -1,4 +1,4 @@
-"""The routes of the runner."""
+"""The routes of runs: starts, commands, queries, and the live socket."""
 
 from collections.abc import AsyncIterator
 from datetime import UTC, datetime
@@ -22,7 +22,7 @@ from action_assistant.runner.api.live import (
     RunnerMessage,
     Stopping,
     attend,
-    work_out,
+    prepare_view,
 )
 from action_assistant.runner.api.review import json_of
 from action_assistant.runner.api.services import RunnerServices
@@ -39,23 +39,24 @@ from action_assistant.web.server.openapi import answer, exchanges, reads
 
 _PAGE: Final = 500  # events read at once
 _STOP_BYTES: Final = 4_096  # of the body of a Stop; whatever comes after them is not read
-_STOP_S: Final = 1.0  # that a Stop waits for its body
-_ALIVE_S: Final = 15.0  # between two signs of life of an event stream
+_STOP_S: Final = 1.0  # for which a Stop waits for its body
+_ALIVE_S: Final = 15.0  # between two comments that keep an event stream open
 _Asking = Request[Any, Any, Any]
 
 
 class StopBody(msgspec.Struct, frozen=True):
-    """`stop_id` is made by the page, once per press; the same press may come by several ways."""
+    """The body of a Stop. The page makes `stop_id` once per press; the same press may arrive by
+    several ways."""
 
     stop_id: str = ""
 
 
 def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
-    """All routes."""
+    """Return all routes of the runner."""
     return [
         *_starts(services),
-        *_moves(services),
-        *_reads(services),
+        *_commands(services),
+        *_queries(services),
         *robots.routes(services),
         *approvals.routes(services),
         *courses.routes(services),
@@ -75,30 +76,32 @@ def _starts(services: RunnerServices) -> list[ControllerRouterHandler]:
     )
     async def start(request: _Asking) -> Response[views.RunShown]:
         async with body_of(request, services.body_limit) as body:
-            asked = read_request(body)
-            if asked.engine != SIMULATOR:
+            start_request = read_request(body)
+            if start_request.engine != SIMULATOR:
                 require(request, "operate")
-            started = await services.control.start(asked, author_of(request))
+            started = await services.control.start(start_request, author_of(request))
         return Response(
-            await _shown(services, started.run),
+            await _run_view(services, started.run),
             status_code=201 if started.fresh else 200,
             headers={"location": f"/api/runs/{started.run.id}"},
         )
 
-    @get("/api/starts/{request_id:str}", summary="What has become of a start, by its request_id")
+    @get(
+        "/api/starts/{request_id:str}",
+        summary="The runs that a start has become, by its request_id",
+    )
     async def started(request_id: str) -> views.StartShown:
-        under_way = services.control.under_way(
-            request_id
-        )  # before: what it becomes is stored by then
+        # Before the query: a start that is not under way any more is stored.
+        under_way = services.control.under_way(request_id)
         rows = await services.control.history.rows(queries.of_start(request_id))
         runs = [await services.control.find(row.id) for row in rows]
-        found = [await _shown(services, run) for run in runs]
+        found = [await _run_view(services, run) for run in runs]
         return views.StartShown(request_id=request_id, under_way=under_way, runs=found)
 
     return [start, started]
 
 
-def _moves(services: RunnerServices) -> list[ControllerRouterHandler]:
+def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
     @post(
         "/api/stop",
         status_code=202,
@@ -129,7 +132,7 @@ def _moves(services: RunnerServices) -> list[ControllerRouterHandler]:
         guards=[Needs("simulate")],
     )
     async def pause(run: str, request: _Asking) -> views.RunShown:
-        await _require_hand_on(services, run, request)
+        await _require_command_role(services, run, request)
         return views.run_view(await services.control.pause(run, author_of(request)))
 
     @post(
@@ -139,7 +142,7 @@ def _moves(services: RunnerServices) -> list[ControllerRouterHandler]:
         guards=[Needs("simulate")],
     )
     async def resume(run: str, request: _Asking) -> views.RunShown:
-        await _require_hand_on(services, run, request)
+        await _require_command_role(services, run, request)
         return views.run_view(await services.control.resume(run, author_of(request)))
 
     @post(
@@ -151,7 +154,7 @@ def _moves(services: RunnerServices) -> list[ControllerRouterHandler]:
         request_max_body_size=GRAPH_BODY,
     )
     async def modify(run: str, request: _Asking) -> views.RunShown:
-        await _require_hand_on(services, run, request)
+        await _require_command_role(services, run, request)
         async with body_of(request, services.body_limit) as body:
             return views.run_view(await services.control.modify(run, body, author_of(request)))
 
@@ -169,7 +172,7 @@ def _moves(services: RunnerServices) -> list[ControllerRouterHandler]:
     return [stop_all, stop, pause, resume, modify, at_rest]
 
 
-def _reads(services: RunnerServices) -> list[ControllerRouterHandler]:
+def _queries(services: RunnerServices) -> list[ControllerRouterHandler]:
     @get("/api/runs", summary="Runs, newest first")
     async def listed(
         graph: str | None = None,
@@ -201,11 +204,11 @@ def _reads(services: RunnerServices) -> list[ControllerRouterHandler]:
             until=_us(until),
             before=before,
         )
-        going = {
+        open_runs = {
             run: views.summary(opened.run, recorded=opened.recorder.recorded)
             for run, opened in services.control.open.items()
         }
-        found = await services.asked.text(listing.listed, wanted, limit, going)
+        found = await services.worker_queries.text(listing.listed, wanted, limit, open_runs)
         return json_of(found, list[views.Listed])
 
     @get("/api/labels", summary="Labels of runs, the most used first")
@@ -217,11 +220,13 @@ def _reads(services: RunnerServices) -> list[ControllerRouterHandler]:
     async def one(run: str) -> Response[views.RunWhole]:
         opened = services.control.open.get(run)
         if opened is None:
-            return json_of(await services.asked.text(ReviewService.whole, run), views.RunWhole)
+            return json_of(
+                await services.worker_queries.text(ReviewService.whole, run), views.RunWhole
+            )
         if opened not in services.sent:
-            services.sent[opened] = await services.asked.value(ReviewService.sent, run)
+            services.sent[opened] = await services.worker_queries.value(ReviewService.sent, run)
         opened = services.control.open.get(run, opened)
-        await services.hub.work_out(opened)
+        await services.hub.prepare_view(opened)
         whole = views.whole_view(
             opened.run,
             services.sent[opened],
@@ -241,13 +246,13 @@ def _reads(services: RunnerServices) -> list[ControllerRouterHandler]:
     async def events(run: str, request: _Asking) -> Stream | Response[None]:
         after = _last_event_id(request)
         opened = services.control.open.get(run)
-        # Asked first: what has ended and is stored by now is in what is read afterwards.
+        # Before `newest`: a run that is over and stored by now has all its events in that.
         is_over = opened is None or (opened.run.end is not None and opened.recorder.idle)
-        newest = await services.asked.newest(run)
+        newest = await services.worker_queries.newest(run)
         if not newest:
             raise NotFound("There is no such run.")
         if newest <= after and is_over:
-            return Response(None, status_code=204)  # tells an EventSource not to come again
+            return Response(None, status_code=204)  # tells an EventSource not to reconnect
         return Stream(
             _tail(services, run, after),
             media_type="text/event-stream",
@@ -270,14 +275,15 @@ def _live(services: RunnerServices) -> ControllerRouterHandler:
     return live
 
 
-async def _require_hand_on(services: RunnerServices, run: str, request: _Asking) -> None:
-    """Who may steer this run: more is needed for one on a robot. Raises Forbidden, NotFound."""
+async def _require_command_role(services: RunnerServices, run: str, request: _Asking) -> None:
+    """Require the role that may command this run: a run on a robot needs more than a simulated one.
+    Raises Forbidden, NotFound."""
     if not await services.control.simulates(run):
         require(request, "operate")
 
 
 async def _stop_id(request: _Asking) -> str:
-    """Whatever the body is: a Stop is never refused for its form."""
+    """Return the stop_id of a body, "" for any other body: a Stop is never refused for its form."""
     try:
         body = await start_of(request, _STOP_BYTES, _STOP_S)
         return msgspec.json.decode(body, type=StopBody).stop_id[:100]
@@ -285,19 +291,19 @@ async def _stop_id(request: _Asking) -> str:
         return ""
 
 
-async def _shown(services: RunnerServices, run: Run) -> views.RunShown:
-    """As it is now, put together without holding up others."""
+async def _run_view(services: RunnerServices, run: Run) -> views.RunShown:
+    """Return the present view of a run, with turns of the event loop in between."""
     opened = services.control.open.get(run.id)
     if opened is not None:
-        await services.hub.work_out(opened)
-        return services.hub.shown(opened)
+        await services.hub.prepare_view(opened)
+        return services.hub.run_view(opened)
     cache = views.ActionViewCache()
-    await work_out(run, cache)
+    await prepare_view(run, cache)
     return views.run_view(run, cache=cache)
 
 
 def _states(asked: str | None) -> tuple[str, ...]:
-    """States, separated by commas. Raises BadInput."""
+    """Split states at commas. Raises BadInput for one that does not exist."""
     states = tuple(each.strip() for each in (asked or "").split(",") if each.strip())
     if unknown := [each for each in states if each not in get_args(State)]:
         raise BadInput(f"No run is ever {unknown[0]!r}.", where={"path": "/state"})
@@ -319,12 +325,12 @@ def _last_event_id(request: _Asking) -> int:
 
 
 async def _tail(services: RunnerServices, run: str, after: int) -> AsyncIterator[bytes]:
-    """Stored events, then those that come, until the run is over."""
+    """Yield stored events as an event stream, then those that follow, until the run is over."""
     while True:
         opened = services.control.open.get(run)
         revision = opened.revision if opened is not None else 0
-        if await services.asked.newest(run) > after:
-            after, page = await services.asked.value(listing.streamed, run, after)
+        if await services.worker_queries.newest(run) > after:
+            after, page = await services.worker_queries.value(listing.streamed, run, after)
             yield page
             continue
         if opened is None:

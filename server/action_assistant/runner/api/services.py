@@ -1,4 +1,4 @@
-"""What the routes of the runner work on."""
+"""The services that the routes of the runner use."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -18,18 +18,18 @@ from action_assistant.runner.start.index_writer import IndexWriter
 from action_assistant.web.network.connection_limits import ConcurrencyLimit, ConnectionLimits
 from action_assistant.web.workers.lanes import Lane, RunInWorker
 
-_BODIES: Final = 4  # large ones of a person at a time
+_BODIES: Final = 4  # large bodies of one person in memory at once
 
 
 class RunnerServices:
-    """What the routes work on; filled when the process is up, before the first request."""
+    """The services of the routes; filled while the process starts, before the first request."""
 
     control: ExecutionService
     hub: Hub
     connection_limits: ConnectionLimits
     journal: Journal
     review_service: ReviewService
-    asked: WorkerQueries
+    worker_queries: WorkerQueries
     retention: Retention
     body_limit: ConcurrencyLimit
     run_in_worker: RunInWorker

@@ -1,1 +1,1 @@
-"""Runs in files: archives, retention, raw messages, shipped examples."""
+"""Runs and raw messages in files: archives, retention, shipped examples."""

@@ -1,8 +1,8 @@
-"""The archive file of a run: gzipped JSON lines that prove themselves and can be read by anybody.
+"""The archive file of a run: gzipped JSON lines with checksums, readable by any program.
 
-The first line says what it is, each further one is an event as it was stored, the last one has the
-SHA-256 of all before it. The chain runs through the events as it does in the journal, so a bundle
-holds what was in the log, or it is refused.
+The first line is a title, each further line an event as it was stored, and the last one has the
+SHA-256 of all lines before it. The chain of hashes through the events is that of the journal, so
+that a file holds what was in the log, or is refused.
 """
 
 import gzip
@@ -34,8 +34,8 @@ class Damaged(Refused):
 
 
 class Title(msgspec.Struct, frozen=True, kw_only=True):
-    """The first line. `place` is where the file belongs in the folder of archives; the stream ends at
-    `events` with `chain` (hex)."""
+    """The first line. `place` is the path of the file in the folder of archives; the stream ends at
+    `events` with the hash `chain` (hex)."""
 
     format: int
     version: str
@@ -46,7 +46,7 @@ class Title(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def end(self) -> Head:
-        """Where the stream ends."""
+        """The end of the stream: seq and chain."""
         return Head(self.events, bytes.fromhex(self.chain))
 
 
@@ -57,7 +57,7 @@ class _ArchiveLine(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True
     at: int
     position: int
     body: msgspec.Raw = msgspec.Raw(b"null")
-    base64: str | None = None  # a body that is no line of JSON
+    base64: str | None = None  # a body that is not JSON in one line
 
 
 class _Footer(msgspec.Struct, frozen=True):
@@ -65,13 +65,13 @@ class _Footer(msgspec.Struct, frozen=True):
 
 
 class ArchiveFile:
-    """A bundle that is being written. Whatever interrupts it leaves nothing under its name."""
+    """Writes an archive file. An interruption leaves no file under its name."""
 
     def __init__(self, path: Path, stream: str, place: str, end: Head) -> None:
         self._path = path
         self._part = path.with_name(f".{path.name}.part")
         self._end = end
-        self._seen = NOTHING
+        self._end_so_far = NOTHING
         self._hash = hashlib.sha256()
         make_folder(path.parent)
         self._raw = open(self._part, "wb", opener=opener)  # noqa: SIM115 - closed at its end
@@ -87,16 +87,16 @@ class ArchiveFile:
         self._write(title)
 
     def add(self, events: list[Event]) -> None:
-        """The next events."""
+        """Write the events that follow those written so far."""
         for event in events:
-            self._seen = Head(event.seq, link(self._seen.chain, event))
+            self._end_so_far = Head(event.seq, link(self._end_so_far.chain, event))
             self._write(_line(event))
 
     def close(self) -> str:
-        """Everything is there: prove it, and put it into its place; the SHA-256 of the file. Raises
-        Damaged when it is not what the journal says, OSError."""
+        """Verify the complete file, rename it to its name and return its SHA-256. Raises Damaged
+        when it differs from the journal's chain, OSError."""
         try:
-            if self._seen != self._end:
+            if self._end_so_far != self._end:
                 raise Damaged("The journal does not hold what its chain says; `verify` tells more.")
             self._write(_Footer(self._hash.hexdigest()))
             self._file.close()
@@ -107,13 +107,13 @@ class ArchiveFile:
                 pass
             digest = sha256_of(self._part)
             self._part.replace(self._path)
-            _settle(self._path.parent)
+            _sync_folder(self._path.parent)
         finally:
             self.abandon()
         return digest
 
     def abandon(self) -> None:
-        """Leave nothing behind that is not complete."""
+        """Remove the file unless it is complete."""
         self._raw.close()
         self._part.unlink(missing_ok=True)
 
@@ -124,8 +124,8 @@ class ArchiveFile:
 
 
 def read(path: Path) -> Iterator[Event]:
-    """The events of a bundle, from the first. Raises Damaged as soon as something is not as it was
-    written, at the latest after the last event; OSError."""
+    """Yield the events of an archive file, from the first. Raises Damaged at the first difference,
+    at the latest after the last event; OSError."""
     title = title_of(path)
     seen, digest = NOTHING, hashlib.sha256()
     try:
@@ -149,7 +149,7 @@ def read(path: Path) -> Iterator[Event]:
 
 
 def title_of(path: Path) -> Title:
-    """What a bundle says of itself. Raises Damaged, OSError."""
+    """Return the title of an archive file. Raises Damaged, OSError."""
     try:
         with gzip.open(path) as file:
             title = msgspec.json.decode(file.readline(_LONGEST), type=Title)
@@ -164,7 +164,7 @@ def title_of(path: Path) -> Title:
 
 
 def put(source: Path, target: Path) -> str:
-    """Copy a file so that it is either there as a whole or not at all; its SHA-256. Raises OSError."""
+    """Copy a file as a whole or not at all, and return its SHA-256. Raises Damaged, OSError."""
     make_folder(target.parent)
     part = target.with_name(f".{target.name}.part")
     try:
@@ -177,20 +177,20 @@ def put(source: Path, target: Path) -> str:
         if digest != sha256_of(source):
             raise Damaged(f"{source.name} is not the same after it was copied.")
         part.replace(target)
-        _settle(target.parent)
+        _sync_folder(target.parent)
     finally:
         part.unlink(missing_ok=True)
     return digest
 
 
 def sha256_of(path: Path) -> str:
-    """Of a file. Raises OSError."""
+    """Return the SHA-256 of a file, in hex. Raises OSError."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _settle(folder: Path) -> None:
-    """What was renamed has to be found after a power cut, too."""
+def _sync_folder(folder: Path) -> None:
+    """Sync a folder, so that a rename in it survives a power cut."""
     descriptor = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(descriptor)

@@ -1,6 +1,4 @@
-"""The store of runs, of which older ones may be in archives: read as if they were in the
-journal.
-"""
+"""The store of runs: a run in an archive is read as if it were in the journal."""
 
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
@@ -28,7 +26,7 @@ from action_assistant.schema.runner_tables import run
 from action_assistant.web.workers.lanes import RunInWorker
 
 _PREFIX: Final = "run/"
-_KEPT: Final = 64 << 20  # bytes of events from archives in memory
+_CACHED: Final = 64 << 20  # bytes of archived events in memory
 
 
 class Archived(Refused):
@@ -39,58 +37,61 @@ class Archived(Refused):
 
 
 class Journaled(SnapshotJournal, Protocol):
-    """The journal itself."""
+    """The journal with the operations that retention needs."""
 
     async def end(self, stream: str) -> Head:
-        """The last event of a stream, and the chain up to it."""
+        """Return the end of a stream: seq and chain."""
         ...
 
     async def take_out(self, removed: StreamRemoved, also: Callable[[int], Addition]) -> int:
-        """Say that a stream is kept elsewhere from now on. Raises Conflict, Unavailable."""
+        """Record that a stream is kept elsewhere from now on, and return the position of that
+        record. `also` makes events to store with it. Raises Conflict, Unavailable."""
         ...
 
     async def delete_some(self, stream: str, by: int) -> bool:
-        """Delete some of its events; whether any are left."""
+        """Delete some events of a stream that was taken out; return whether any are left."""
         ...
 
 
 class ArchiveStore:
-    """Reads a run from its archive in `folder` once it stands there. Everything else is the
-    journal's."""
+    """Reads a run from its archive in `folder` once it was archived. All other calls go to the
+    journal."""
 
     def __init__(self, journal: SnapshotJournal, folder: Path, run_in_worker: RunInWorker) -> None:
         self.folder = folder
         self._journal = journal
         self._run_in_worker = run_in_worker
-        self._read: OrderedDict[str, tuple[list[Event], int]] = OrderedDict()
+        self._cache: OrderedDict[str, tuple[list[Event], int]] = OrderedDict()
 
     async def append(
         self, stream: str, drafts: Sequence[Draft], *, expected: int | None = None
     ) -> int:
-        """As the journal's."""
+        """Append to the journal, as `Journal.append`."""
         return await self._journal.append(stream, drafts, expected=expected)
 
     async def newest(self, stream: str) -> int:
-        """As the journal's, which knows the end of what was taken out."""
+        """Return the last seq of a stream; the journal knows it for archived ones, too."""
         return await self._journal.newest(stream)
 
     async def query(self, statement: Select[Any]) -> list[Row[Any]]:
-        """As the journal's."""
+        """Return rows of the tables. Raises Unavailable."""
         return await self._journal.query(statement)
 
     async def snapshot(self, stream: str) -> StreamSnapshot | None:
-        """None for a run in an archive: its keyframes went with it."""
+        """Return the stored keyframes of a stream; None for an archived run, whose keyframes were
+        deleted with its events."""
         return None if await self.place(stream) else await self._journal.snapshot(stream)
 
     async def keep_snapshot(self, stream: str, seq: int, state: bytes) -> None:
-        """Not for a run in an archive."""
+        """Store keyframes of a stream, unless it is an archived run."""
         if await self.place(stream) is None:
             await self._journal.keep_snapshot(stream, seq, state)
 
     async def read(
         self, stream: str, *, after: int = 0, upto: int | None = None, limit: int | None = None
     ) -> list[Event]:
-        """Events of a stream in order. Raises Archived when its archive is not here, Damaged."""
+        """Return events of a stream, `after` < seq ≤ `upto`, in order. Raises Archived when its
+        archive is not here, Damaged."""
         place = await self.place(stream)
         if place is None:
             return await self._journal.read(stream, after=after, upto=upto, limit=limit)
@@ -99,13 +100,14 @@ class ArchiveStore:
         return list(islice(events, after, last if limit is None else min(last, after + limit)))
 
     async def bare(self, stream: str, usual: str, *, after: int, upto: int) -> list[BareEvent]:
-        """As `read`, without what is usual."""
+        """Return the events of `read` as bodies; the kind is None where it is `usual`."""
         if await self.place(stream) is None:
             return await self._journal.bare(stream, usual, after=after, upto=upto)
         return bare(await self.read(stream, after=after, upto=upto), usual)
 
     async def place(self, stream: str) -> Row[Any] | None:
-        """Number of a run, when it was archived and as which file; None when it is here."""
+        """Return number, time and file of an archived run; None when its events are in the
+        journal."""
         if not stream.startswith(_PREFIX):
             return None
         wanted = select(run.c.number, run.c.archived_at, run.c.archived_as).where(
@@ -115,7 +117,7 @@ class ArchiveStore:
         return rows[0] if rows else None
 
     async def _events(self, stream: str, place: Row[Any]) -> list[Event]:
-        if stream not in self._read:
+        if stream not in self._cache:
             path = self.folder / place.archived_as
             try:
                 events = await self._run_in_worker(lambda: list(archive_file.read(path)))
@@ -127,8 +129,8 @@ class ArchiveStore:
                 ) from error
             if not events or events[0].stream != stream:
                 raise archive_file.Damaged(f"{place.archived_as} holds another run.")
-            self._read[stream] = events, sum(len(each.body) + 200 for each in events)
-        self._read.move_to_end(stream)
-        while len(self._read) > 1 and sum(size for _, size in self._read.values()) > _KEPT:
-            self._read.popitem(last=False)
-        return self._read[stream][0]
+            self._cache[stream] = events, sum(len(each.body) + 200 for each in events)
+        self._cache.move_to_end(stream)
+        while len(self._cache) > 1 and sum(size for _, size in self._cache.values()) > _CACHED:
+            self._cache.popitem(last=False)
+        return self._cache[stream][0]

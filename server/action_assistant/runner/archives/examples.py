@@ -1,7 +1,8 @@
-"""Runs as files that can be imported: the examples that the product ships.
+"""Recorded runs as files that can be imported: the examples that the product ships.
 
-One JSON object per line and event: `kind`, `author`, `at` (microseconds UTC) and `body`. What is taken
-in was recorded elsewhere, so it is marked: no robot of this place moved.
+One JSON object per line and event: `kind`, `author`, `at` (microseconds UTC) and `body`. An
+imported run was recorded elsewhere, so it is labelled, and counts as simulated: no robot of this
+runner moved.
 """
 
 from collections.abc import Iterable, Sequence
@@ -27,13 +28,13 @@ class _Line(msgspec.Struct, frozen=True):
 
 
 def written(events: Iterable[Event]) -> bytes:
-    """A stream as a file."""
+    """Return the events of a stream as the contents of a file."""
     lines = (_Line(each.kind, each.author, each.at, msgspec.Raw(each.body)) for each in events)
     return b"".join(msgspec.json.encode(line) + b"\n" for line in lines)
 
 
 def read(text: bytes) -> tuple[Requested, tuple[Draft, ...]]:
-    """The first event of a file, and those that follow. Raises BadInput."""
+    """Return the first event of a file, and those that follow. Raises BadInput."""
     try:
         lines = [msgspec.json.decode(each, type=_Line) for each in text.splitlines() if each]
         first = decode(lines[0].kind, bytes(lines[0].body)) if lines else None
@@ -46,7 +47,7 @@ def read(text: bytes) -> tuple[Requested, tuple[Draft, ...]]:
 
 
 def numbered(first: Requested, number: int) -> Draft:
-    """The first event as it is stored here, under the next free number."""
+    """Return the first event as it is stored here, under this run number."""
     here = msgspec.structs.replace(
         first, number=number, simulated=True, graph=None, request_id=f"example/{first.run}"
     )
@@ -54,6 +55,6 @@ def numbered(first: Requested, number: int) -> Draft:
 
 
 def shipped(folder: Path) -> Sequence[bytes]:
-    """The examples, in the order of their beginning."""
+    """Return the contents of the example files, in the order of their first events."""
     texts = [path.read_bytes() for path in folder.glob(f"*{ENDING}")]
     return sorted(texts, key=lambda text: read(text)[0].at)

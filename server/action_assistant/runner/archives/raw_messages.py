@@ -1,4 +1,4 @@
-"""The raw messages of a robot from the time of a run: here, in an archive, or nowhere."""
+"""The raw messages of a robot from the time of a run: in the recordings, in an archive, or gone."""
 
 from collections.abc import Iterable, Sequence
 from datetime import datetime
@@ -11,7 +11,7 @@ from action_assistant.runner.runs import views
 from action_assistant.runner.runs.run import Run
 
 
-class RawPut(msgspec.Struct, frozen=True):
+class RawArchived(msgspec.Struct, frozen=True):
     """An hour of raw messages of a robot was put into an archive and deleted here."""
 
     kind: ClassVar[str] = "raw.archived.v1"
@@ -25,13 +25,13 @@ class RawPut(msgspec.Struct, frozen=True):
 
 
 def stream_of_raw(robot: str) -> str:
-    """The stream that tells where raw messages of a robot are kept."""
+    """Return the stream that records which raw messages of a robot were archived."""
     return f"raw/{robot}"
 
 
 class RawHour(msgspec.Struct, frozen=True):
-    """An hour of raw messages: its name, bytes (gzipped), and, when it is not here any more, since
-    when it is archived and in which file of the folder of archives."""
+    """An hour of raw messages: its name, its size in bytes (gzipped), and, once it is archived,
+    since when and in which file of the folder of archives."""
 
     name: str
     bytes: int
@@ -40,16 +40,20 @@ class RawHour(msgspec.Struct, frozen=True):
 
 
 class RawMessages(msgspec.Struct, frozen=True):
-    """The raw messages of `robot` from the hours of a run, the oldest first. `text`: what there is to
-    say about it."""
+    """The raw messages of `robot` from the hours of a run, the oldest first. `text`: a note about
+    them for people, "" where all are here."""
 
     robot: str
     hours: list[RawHour]
     text: str
 
 
-def raw_of(run: Run, here: Sequence[Recording], gone: Iterable[RawPut], until: int) -> RawMessages:
-    """What there is. `here` and `gone` are of its robot, `here` of its time alone."""
+def raw_of(
+    run: Run, here: Sequence[Recording], gone: Iterable[RawArchived], until: int
+) -> RawMessages:
+    """Return the raw messages of a run. `here`: recordings of its robot from its time; `gone`: what
+    was archived of its robot, from any time; `until`: microseconds UTC at which the run ends, or
+    now."""
     if run.simulated:
         return RawMessages(run.engine, [], "A simulated engine sends no messages.")
     first, last = hours(run.started_at or run.requested_at, until)

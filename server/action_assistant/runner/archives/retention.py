@@ -1,8 +1,9 @@
-"""Keeps what is old in archives: written, read back and proven before anything is deleted.
+"""Moves old runs and raw messages to archives, which are read back and verified before anything is
+deleted.
 
-A run goes in four steps, each of which may be the last one: its archive is written under another name;
-it is proven and renamed; the log says where the events are kept; they are deleted, some at a time. So
-every event is in the log, or in an archive that is complete.
+A run goes in four steps, each of which may be the last before a crash: its archive is written under
+another name; it is verified and renamed; the log records where the events are kept; the events are
+deleted, some at a time. So every event is in the log, or in an archive that is complete.
 """
 
 import logging
@@ -22,7 +23,7 @@ from action_assistant.journal.removal import StreamRemoved
 from action_assistant.runner.analysis import annotations
 from action_assistant.runner.archives import archive_file
 from action_assistant.runner.archives.archive_store import Journaled
-from action_assistant.runner.archives.raw_messages import RawPut, stream_of_raw
+from action_assistant.runner.archives.raw_messages import RawArchived, stream_of_raw
 from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.runs import views
@@ -35,14 +36,14 @@ log: Final = logging.getLogger(__name__)
 
 _DAY_US: Final = 86_400_000_000
 _EVERY_S: Final = 3_600.0
-_BREATH_S: Final = 0.02  # between two steps: others come first
+_PAUSE_S: Final = 0.02  # between two steps, for other work of the journal
 _PAGE: Final = 500
 _AT_ONCE: Final = 20
 
 
-class Swept(msgspec.Struct, frozen=True, kw_only=True):
-    """What was put away: runs, hours of raw messages; `more`: there is more to do; `problems`: what
-    stays here, and why."""
+class SweepResult(msgspec.Struct, frozen=True, kw_only=True):
+    """The result of a sweep: how many runs and hours of raw messages were archived; `more`: others
+    are due; `problems`: what stays here, and why."""
 
     runs: int = 0
     raw: int = 0
@@ -51,7 +52,7 @@ class Swept(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Retention:
-    """Puts away what is old. Nothing here waits for a run or is waited for by one."""
+    """Archives what is old. It waits for no run, and no run waits for it."""
 
     def __init__(
         self,
@@ -70,28 +71,29 @@ class Retention:
         self._clock_us = clock_us
         self._run_in_worker = run_in_worker
         self._one = anyio.Lock()
-        self._left_over = True  # an earlier process may have ended between two steps
+        self._may_be_unfinished = True  # an earlier process may have ended between two steps
 
     async def run(self) -> None:
-        """Now and then, until cancelled."""
+        """Sweep every hour until cancelled, and at once again while there is more."""
         while True:
             try:
                 swept = await self.sweep(self.keep.runs, self.keep.raw)
             except Refused as refused:
-                swept = Swept(problems=[refused.detail])
-            except Exception as error:  # whatever lies in its folders, runs go on
-                log.exception("what is old cannot be put away")
-                swept = Swept(problems=[str(error)])
+                swept = SweepResult(problems=[refused.detail])
+            except Exception as error:  # a fault in these folders must not end the runner
+                log.exception("old runs and messages cannot be archived")
+                swept = SweepResult(problems=[str(error)])
             for problem in swept.problems:
                 log.warning("%s", problem)
             if not swept.more or swept.problems:
                 await anyio.sleep(_EVERY_S)
 
-    async def sweep(self, run_days: float | None, raw_days: float | None) -> Swept:
-        """Put away some of what is older than so many days. Raises Unavailable."""
+    async def sweep(self, run_days: float | None, raw_days: float | None) -> SweepResult:
+        """Archive some of the runs and raw messages that are older than so many days; None keeps
+        them. Raises Unavailable."""
         async with self._one:
             await self._finish()
-            found = Swept()
+            found = SweepResult()
             if raw_days is not None:
                 found = await self._sweep_raw(raw_days)
             if run_days is None:
@@ -104,16 +106,16 @@ class Retention:
                 if self._is_open(row.id):
                     continue
                 try:
-                    await self._put_away(row)
+                    await self._archive_run(row)
                     done += 1
                 except (Refused, OSError) as why:
                     detail = why.detail if isinstance(why, Refused) else str(why)
                     problems.append(f"Run {row.number} stays here: {detail}")
             more = len(rows) > _AT_ONCE and done > 0
-            return Swept(runs=done, raw=found.raw, more=more, problems=problems)
+            return SweepResult(runs=done, raw=found.raw, more=more, problems=problems)
 
-    async def _put_away(self, row: Row[Any]) -> None:
-        """One run. Raises Refused, OSError; then it is here as before."""
+    async def _archive_run(self, row: Row[Any]) -> None:
+        """Archive one run. Raises Refused, OSError; then its events are here as before."""
         stream = stream_of(row.id)
         end = await self._journal.end(stream)
         place = _place(row)
@@ -126,73 +128,75 @@ class Retention:
             while events := await self._journal.read(stream, after=after, limit=_PAGE):
                 await self._run_in_worker(partial(written.add, events))
                 after = events[-1].seq
-                await anyio.sleep(_BREATH_S)
+                await anyio.sleep(_PAUSE_S)
             digest = await self._run_in_worker(written.close)
         finally:
             written.abandon()
         at = self._clock_us()
         removed = StreamRemoved(stream, end.seq, end.chain.hex(), place, digest)
 
-        def told(by: int) -> Addition:
-            put = annotations.Put(at, place, digest, by, _fields(row))
-            return Addition(annotations.stream_about(row.id), (annotations.draft(put),))
+        def recorded(by: int) -> Addition:
+            archived = annotations.RunArchived(at, place, digest, by, _fields(row))
+            return Addition(annotations.stream_about(row.id), (annotations.draft(archived),))
 
         if await self._journal.query(_pinned(row.id)):
             raise Conflict("Somebody has pinned it meanwhile.")
-        self._left_over = True
-        by = await self._journal.take_out(removed, told)
+        self._may_be_unfinished = True
+        by = await self._journal.take_out(removed, recorded)
         await self._clear(stream, by)
-        self._left_over = False
+        self._may_be_unfinished = False
 
     async def _clear(self, stream: str, by: int) -> None:
         left = True
         while left:
             left = await self._journal.delete_some(stream, by)
-            await anyio.sleep(_BREATH_S)
+            await anyio.sleep(_PAUSE_S)
 
     async def _finish(self) -> None:
-        """Delete what an earlier process had said to be kept elsewhere, and then not deleted."""
-        if not self._left_over:
+        """Delete events that an earlier process recorded as archived, but did not delete."""
+        if not self._may_be_unfinished:
             return
         for row in await self._journal.query(_unfinished()):
-            told = await self._journal.read(annotations.stream_about(row.id))
-            put = next(event for event in reversed(told) if event.kind == annotations.Put.kind)
-            by = msgspec.json.decode(put.body, type=annotations.Put).by
+            events = await self._journal.read(annotations.stream_about(row.id))
+            archived = next(
+                event for event in reversed(events) if event.kind == annotations.RunArchived.kind
+            )
+            by = msgspec.json.decode(archived.body, type=annotations.RunArchived).by
             await self._clear(stream_of(row.id), by)
-        self._left_over = False
+        self._may_be_unfinished = False
 
     # --- raw messages -------------------------------------------------------------------------
 
-    async def _sweep_raw(self, days: float) -> Swept:
+    async def _sweep_raw(self, days: float) -> SweepResult:
         kept = self._recordings
         if kept is None:
-            return Swept()
+            return SweepResult()
         problems: list[str] = []
         done = 0
         for path in await self._run_in_worker(lambda: kept.due(days)):
             try:
-                await self._put_raw_away(path)
+                await self._archive_raw(path)
                 done += 1
             except (Refused, OSError) as why:
                 detail = why.detail if isinstance(why, Refused) else str(why)
                 problems.append(f"Raw messages {path.parent.name}/{path.name} stay here: {detail}")
-            await anyio.sleep(_BREATH_S)
-        return Swept(raw=done, problems=problems)
+            await anyio.sleep(_PAUSE_S)
+        return SweepResult(raw=done, problems=problems)
 
-    async def _put_raw_away(self, path: Path) -> None:
+    async def _archive_raw(self, path: Path) -> None:
         robot = path.parent.name
         file = f"raw/{robot}/{path.name}"
         target = self.keep.folder / file
         size = (await anyio.Path(path).stat()).st_size
         digest = await self._run_in_worker(lambda: archive_file.put(path, target))
-        put = RawPut(self._clock_us(), robot, path.name, file, size, digest)
-        draft = Draft(put.kind, "", msgspec.json.encode(put))
+        archived = RawArchived(self._clock_us(), robot, path.name, file, size, digest)
+        draft = Draft(archived.kind, "", msgspec.json.encode(archived))
         await self._journal.append(stream_of_raw(robot), [draft])
         await self._run_in_worker(path.unlink)
 
 
 def _due(before: int, most: int) -> Select[Any]:
-    """Runs that are over and summed up for so long, pinned ones left out; the oldest first."""
+    """Select runs that ended before this moment, are summed up and not pinned; the oldest first."""
     return (
         select(run)
         .join(review, review.c.run == run.c.id)

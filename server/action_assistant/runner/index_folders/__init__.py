@@ -1,1 +1,1 @@
-"""The folders whose files the engines of robots index, where the runner has them, too."""
+"""The folders that the engines of robots index, where the runner can reach them."""

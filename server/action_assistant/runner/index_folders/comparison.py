@@ -1,11 +1,12 @@
-"""The graphs inside of a task held against the files that an engine indexes. Pure.
+"""Compares the graphs inside of a task with the files that an engine indexes. Pure.
 
-A graph is there, lacks, is another one there, or is kept from being written. An engine takes the first
-file of a name that it finds, in no order, and an action before a graph; so what would leave two is refused.
+A graph is present, lacking, defined differently, or cannot be written. An engine takes the first
+file of a name that it finds, in no order, and an action before a graph, so a write that would leave
+two definitions is refused.
 """
 
 from collections.abc import Collection, Mapping
-from typing import TypeAlias
+from typing import Final, TypeAlias
 
 import msgspec
 
@@ -18,11 +19,11 @@ from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 
-_TOLD = 5  # paths in a sentence
+_NAMED: Final = 5  # paths in one sentence
 
 
-class There(msgspec.Struct, frozen=True):
-    """An engine that indexes the folder has just this graph."""
+class Present(msgspec.Struct, frozen=True):
+    """An engine that indexes the folder has exactly this graph."""
 
 
 class Lacking(msgspec.Struct, frozen=True):
@@ -44,21 +45,21 @@ class Hindered(msgspec.Struct, frozen=True):
         hold_names(self, "why")
 
 
-FileState: TypeAlias = There | Lacking | Differing | Hindered
+FileState: TypeAlias = Present | Lacking | Differing | Hindered
 
 
 class WritableGraph(msgspec.Struct, frozen=True):
-    """A graph that can be written. `replaces`: the path of the file that would be put aside, from the
-    folder; "" for none."""
+    """A graph that can be written. `replaces`: the path, in the folder, of the file that it would
+    replace; "" for none."""
 
     graph: str
     replaces: str = ""
 
 
-class FolderLook(msgspec.Struct, frozen=True, kw_only=True):
-    """The folder that the robot's engine indexes, as the runner has it. `writable`: what can be written
-    there; `waiting`: graphs that are there as they shall be, and that the engine has not indexed;
-    `hindered`: why others cannot be written, as sentences by graph."""
+class IndexFolderState(msgspec.Struct, frozen=True, kw_only=True):
+    """The folder that the robot's engine indexes, as the runner sees it. `writable`: graphs that
+    can be written there; `waiting`: graphs that are there already, and that the engine has not
+    indexed yet; `hindered`: why others cannot be written, as sentences by graph."""
 
     path: str
     writable: tuple[WritableGraph, ...] = ()
@@ -67,11 +68,11 @@ class FolderLook(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def same_to_engine(ours: Graph, theirs: Graph, facts: EngineFacts) -> bool:
-    """Whether an engine makes no difference between two graphs."""
+    """Return whether an engine makes no difference between two graphs."""
     return digest(echo(ours, facts)) == digest(echo(theirs, facts))
 
 
-def held_against(
+def file_state(
     graph: Graph,
     files: IndexedFiles,
     facts: EngineFacts,
@@ -79,7 +80,8 @@ def held_against(
     actions: Collection[str],
     graphs: Mapping[str, Graph],
 ) -> FileState:
-    """How it is with one graph. `actions`, `graphs`: what the engine itself has named."""
+    """Return the state of one graph's file. `actions`, `graphs`: those that the engine itself has
+    named."""
     name = graph.name
     if defining := files.actions.get(name, ()):
         return Hindered(
@@ -88,30 +90,30 @@ def held_against(
     if name in actions:
         return Hindered(f"It has an action {name}, which comes before a graph.")
     if files.unread:
-        unread = "; ".join(files.unread[:_TOLD])
+        unread = "; ".join(files.unread[:_NAMED])
         return Hindered(f"Whether another file defines {name} is not known: {unread}.")
     found = files.graphs.get(name, ())
     if found and all(_is_same(graph, each, facts) for each in found):
-        return There()
+        return Present()
     if len(found) > 1:
         return Hindered(
             f"{len(found)} files define {name}, and nobody knows which of them is taken: "
             f"{_listed(found)}. Leave one of them."
         )
     if found:
-        return _of_another(name, found[0])
+        return _state_of_other(name, found[0])
     known = graphs.get(name)
     if known is None:
         return Lacking()
     if same_to_engine(graph, known, facts):
-        return There()
+        return Present()
     return Hindered(
         f"It has another {name}, of which no file is here: it looks elsewhere, or has not looked since."
     )
 
 
 def _is_same(graph: Graph, file: DefiningFile, facts: EngineFacts) -> bool:
-    """Whether an engine reads just this graph from the file."""
+    """Return whether an engine reads exactly this graph from the file."""
     try:
         reading = codec.read(file.text)
     except codec.Unreadable:
@@ -120,7 +122,7 @@ def _is_same(graph: Graph, file: DefiningFile, facts: EngineFacts) -> bool:
     return is_read and same_to_engine(graph, reading.graph, facts)
 
 
-def _of_another(name: str, file: DefiningFile) -> FileState:
+def _state_of_other(name: str, file: DefiningFile) -> FileState:
     if file.linked:
         return Hindered(
             f"{file.shown} defines another {name} and is a link, or behind one: what it leads to is not "
@@ -130,5 +132,5 @@ def _of_another(name: str, file: DefiningFile) -> FileState:
 
 
 def _listed(files: tuple[DefiningFile, ...]) -> str:
-    more = f" and {len(files) - _TOLD} more" if len(files) > _TOLD else ""
-    return f"{', '.join(each.shown for each in files[:_TOLD])}{more}"
+    more = f" and {len(files) - _NAMED} more" if len(files) > _NAMED else ""
+    return f"{', '.join(each.shown for each in files[:_NAMED])}{more}"

@@ -1,7 +1,7 @@
-"""What of a folder an engine indexes: the files that define given names. Reads only; for workers.
+"""Finds the files in an index folder that define given names. It only reads; for workers.
 
-As an engine looks: each file with `graph.json` or `umrf.json` in its name, links followed, down to two
-folders below the first (docs/umrf-and-the-engine.md 1.5, 4).
+Files are found as an engine finds them: each file with `graph.json` or `umrf.json` in its name,
+links followed, down to two folders below the first (docs/umrf-and-the-engine.md 1.5, 4).
 """
 
 import os
@@ -15,14 +15,15 @@ import msgspec
 from action_assistant.safe_text import printable
 from action_assistant.umrf.files.file_names import ACTION_MARK, GRAPH_MARK
 
-DEEP: Final = 2  # folders below the first one
+DEEP: Final = 2  # levels of folders below the first one
 _LARGEST: Final = 8 << 20  # bytes of a file
 _MOST: Final = 50_000  # files and folders
 _BOM: Final = b"\xef\xbb\xbf"
 
 
 class DefiningFile(msgspec.Struct, frozen=True):
-    """A file that defines a name. `path` leads there from the folder; `linked`: by way of a link."""
+    """A file that defines a name. `path` is relative to the folder; `linked`: a link leads
+    there."""
 
     path: str
     linked: bool
@@ -30,13 +31,13 @@ class DefiningFile(msgspec.Struct, frozen=True):
 
     @property
     def shown(self) -> str:
-        """The path, as people read it."""
+        """The path as people read it, in one line."""
         return shown_path(self.path)
 
 
 class IndexedFiles(msgspec.Struct, frozen=True):
-    """The files that define names, by these. `unread`: what cannot be read, and why, so that what it
-    defines is not known."""
+    """The files that define names, by name. `unread`: files and folders that cannot be read, with
+    the reason, so that their definitions are not known."""
 
     graphs: dict[str, tuple[DefiningFile, ...]] = {}
     actions: dict[str, tuple[DefiningFile, ...]] = {}
@@ -49,12 +50,12 @@ class _NamedText(msgspec.Struct):
 
 
 def shown_path(path: str) -> str:
-    """A path of a file system, which is bytes, as text of one line."""
+    """Return a path of a file system, which is bytes, as text of one line."""
     return printable(os.fsencode(path).decode(errors="replace")).replace("\n", "\\n")
 
 
 def scanned(folder: Path, names: Collection[str]) -> IndexedFiles:
-    """The files below that define one of these names. Never raises."""
+    """Return the files in the folder that define one of these names. Never raises."""
     graphs: dict[str, tuple[DefiningFile, ...]] = {}
     actions: dict[str, tuple[DefiningFile, ...]] = {}
     unread: list[str] = []
@@ -77,7 +78,7 @@ def scanned(folder: Path, names: Collection[str]) -> IndexedFiles:
 
 
 def _marked(folder: Path, unread: list[str]) -> Iterator[tuple[str, bool]]:
-    """The paths of files that an engine would read, and whether a link leads there."""
+    """Yield the paths of files that an engine would read, and whether a link leads there."""
     left, seen = [("", False, 0)], 0
     while left:
         below, linked, depth = left.pop()
@@ -112,7 +113,7 @@ def _is_folder(entry: "os.DirEntry[str]") -> bool:
 
 
 def _is_dangling(entry: "os.DirEntry[str]") -> bool:
-    """A link to nothing, which defines nothing."""
+    """Return whether an entry is a link that leads nowhere: it defines nothing."""
     try:
         entry.stat()
     except OSError:
@@ -121,7 +122,7 @@ def _is_dangling(entry: "os.DirEntry[str]") -> bool:
 
 
 def _text(path: Path) -> bytes:
-    """What is in a regular file. Raises OSError."""
+    """Return the contents of a regular file, b"" of any other. Raises OSError."""
     with os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as opened:
         if not stat.S_ISREG(os.fstat(opened.fileno()).st_mode):
             return b""  # an engine cannot read it either
@@ -132,7 +133,7 @@ def _text(path: Path) -> bytes:
 
 
 def _names(text: bytes) -> _NamedText:
-    """What a text names; nothing where it is no JSON object, which engines skip, too."""
+    """Return the names in a text; none where it is no JSON object, which engines skip, too."""
     try:
         return msgspec.json.decode(text.removeprefix(_BOM), type=_NamedText)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):

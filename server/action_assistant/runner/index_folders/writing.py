@@ -1,7 +1,8 @@
-"""Files put into a folder that an engine indexes: whole or not at all, and nothing of others is lost.
+"""Writes files into a folder that an engine indexes: each as a whole or not at all, without losing
+files of others.
 
-Under its name a file is whole from the first moment on. One that is replaced is put aside first, under a
-name that no engine looks for, and stays there. No link below the folder is followed.
+A file is complete from the moment on at which it has its name. A file that is replaced is renamed
+first, to a name that no engine looks for, and stays there. No link below the folder is followed.
 """
 
 import hashlib
@@ -18,13 +19,13 @@ import msgspec
 from action_assistant.runner.index_folders.scan import shown_path
 from action_assistant.umrf.files.file_names import graph_file_name, unmarked
 
-_NUMBERS: Final = 1_000  # names that are tried
-_KEPT: Final = 120  # bytes of the name of a file that is put aside
+_MOST_NAMES: Final = 1_000  # that are tried for a new file
+_KEPT_NAME: Final = 120  # bytes of the old name in that of a file that was moved away
 
 
 class NewFile(msgspec.Struct, frozen=True):
-    """The file of a graph. `replaces`: the path of the one that goes aside, "" for none; `old`: the SHA-256
-    of what that has in it, in hex."""
+    """The file of a graph. `replaces`: the path of the file that it replaces, "" for none; `old`:
+    the SHA-256 of that one's contents, in hex."""
 
     graph: str
     text: bytes
@@ -33,7 +34,8 @@ class NewFile(msgspec.Struct, frozen=True):
 
 
 class WrittenFile(msgspec.Struct, frozen=True, omit_defaults=True):
-    """A file that was written, and where the one that it replaced is kept."""
+    """A file that was written. `kept`: the path to which the file that it replaced was moved, ""
+    for none."""
 
     graph: str
     path: str
@@ -41,14 +43,16 @@ class WrittenFile(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class WritingOutcome(msgspec.Struct, frozen=True):
-    """What was written; `failed`: why the rest was not, a sentence, "" where all was."""
+    """The files that were written; `failed`: a sentence that says why the others were not, "" where
+    all were."""
 
     written: tuple[WrittenFile, ...]
     failed: str = ""
 
 
 class _Prepared(msgspec.Struct):
-    """A file that is on the disk under a name of its own, in the folder that is open there."""
+    """A file that is on the disk under a temporary name (`fresh`), in the open folder `folder` (a
+    descriptor)."""
 
     file: NewFile
     folder: int
@@ -56,11 +60,11 @@ class _Prepared(msgspec.Struct):
 
 
 class _Changed(Exception):
-    """Somebody else was quicker; the message is a sentence."""
+    """Another program has changed a file meanwhile; the message is a sentence."""
 
 
 def write(folder: Path, files: Sequence[NewFile]) -> WritingOutcome:
-    """Write them. All are on the disk before the first of them gets its name. Never raises."""
+    """Write all files: each is on the disk before the first of them gets its name. Never raises."""
     written: list[WrittenFile] = []
     place = str(folder)
     try:
@@ -86,18 +90,19 @@ def write(folder: Path, files: Sequence[NewFile]) -> WritingOutcome:
 
 
 def sha(text: bytes) -> str:
-    """The SHA-256 of a text, in hex."""
+    """Return the SHA-256 of a text, in hex."""
     return hashlib.sha256(text).hexdigest()
 
 
 def _as_folder() -> int:
-    """How a folder is opened. Windows, which has no runner, lacks the name."""
+    """Return the flags to open a folder. A function, since Windows, which has no runner, lacks one
+    of them."""
     return os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC
 
 
 @contextmanager
 def _opened(folder: Path) -> Iterator[int]:
-    """The folder as the administrator named it, be that a link."""
+    """Open the index folder, which may be a link itself."""
     found = os.open(folder, _as_folder())
     try:
         yield found
@@ -107,7 +112,7 @@ def _opened(folder: Path) -> Iterator[int]:
 
 @contextmanager
 def _entered(top: int, path: str) -> Iterator[int]:
-    """The folder of a file, by no link. Raises OSError."""
+    """Open the folder of a file, following no link. Raises OSError."""
     found = os.dup(top)
     try:
         for name in path.split("/")[:-1]:
@@ -122,8 +127,9 @@ def _entered(top: int, path: str) -> Iterator[int]:
 
 
 def _mode(folder: int, path: str) -> int:
-    """The permissions of the file that is replaced; of a new one those of its folder, which the engine
-    reads, whatever this process keeps to itself. Raises OSError, _Changed."""
+    """Return the permissions for a file: those of the one that it replaces, or of a new one those
+    of its folder, so that the engine can read it whatever the umask is. Raises OSError,
+    _Changed."""
     if not path:
         return os.fstat(folder).st_mode & 0o666
     try:
@@ -135,7 +141,8 @@ def _mode(folder: int, path: str) -> int:
 
 @contextmanager
 def _fresh(folder: int, text: bytes, mode: int) -> Iterator[str]:
-    """A file with this text, on the disk, under a name that is gone afterwards. Raises OSError."""
+    """Write a file with this text to the disk, under a temporary name that is removed afterwards.
+    Raises OSError."""
     name = f".action-assistant-{secrets.token_hex(8)}.new"
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
     opened = os.open(name, flags, 0o600, dir_fd=folder)
@@ -151,8 +158,8 @@ def _fresh(folder: int, text: bytes, mode: int) -> Iterator[str]:
 
 
 def _added(each: _Prepared) -> WrittenFile:
-    """Under a name that nothing has."""
-    for number in range(1, _NUMBERS):
+    """Give a new file the first name that is free."""
+    for number in range(1, _MOST_NAMES):
         name = graph_file_name(each.file.graph, number)
         try:
             _link(each.folder, each.fresh, name)
@@ -163,10 +170,12 @@ def _added(each: _Prepared) -> WrittenFile:
 
 
 def _replaced(each: _Prepared) -> WrittenFile:
-    """In the place of a file that is still what it was."""
+    """Put a new file in the place of one that still has the old contents."""
     path, folder = each.file.replaces, each.folder
     name, above = _base(path), path[: len(path) - len(_base(path))]
-    kept = os.fsdecode(os.fsencode(unmarked(name))[:_KEPT]) + f".{secrets.token_hex(4)}.replaced"
+    kept = (
+        os.fsdecode(os.fsencode(unmarked(name))[:_KEPT_NAME]) + f".{secrets.token_hex(4)}.replaced"
+    )
     aside = shown_path(above + kept)
     changed = _changed(path)
     _require_same(folder, name, each.file.old, changed)
@@ -174,7 +183,7 @@ def _replaced(each: _Prepared) -> WrittenFile:
     try:
         _require_same(folder, kept, each.file.old, changed)
         _link(folder, each.fresh, name)
-    except FileExistsError as quicker:  # what somebody has written anew stays
+    except FileExistsError as quicker:  # a new file of another program stays
         raise _Changed(f"{changed} What was there before is {aside}.") from quicker
     except (OSError, _Changed) as failed:
         if not _put_back(folder, kept, name):
@@ -188,7 +197,7 @@ def _changed(path: str) -> str:
 
 
 def _require_same(folder: int, name: str, old: str, changed: str) -> None:
-    """Raises _Changed, OSError."""
+    """Raise _Changed unless the file still has the old contents; OSError."""
     try:
         if _sha_of(folder, name) == old:
             return
@@ -198,13 +207,14 @@ def _require_same(folder: int, name: str, old: str, changed: str) -> None:
 
 
 def _put_back(folder: int, kept: str, name: str) -> bool:
-    """Whether what was put aside has its name again; not where something else has it by now."""
+    """Give a file that was moved away its name back; return False where another file has the name
+    by now."""
     try:
         _link(folder, kept, name)
         os.unlink(kept, dir_fd=folder)
     except FileExistsError:
         return False
-    except OSError:  # where there are no second names
+    except OSError:  # a file system without hard links
         os.rename(kept, name, src_dir_fd=folder, dst_dir_fd=folder)
     return True
 
@@ -214,7 +224,7 @@ def _link(folder: int, old: str, new: str) -> None:
 
 
 def _sha_of(folder: int, name: str) -> str:
-    """Of a regular file; "" of anything else. Raises OSError."""
+    """Return the SHA-256 of a regular file, in hex; "" of anything else. Raises OSError."""
     flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
     with os.fdopen(os.open(name, flags, dir_fd=folder), "rb") as opened:
         if not stat.S_ISREG(os.fstat(opened.fileno()).st_mode):

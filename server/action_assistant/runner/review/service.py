@@ -20,7 +20,12 @@ from action_assistant.runner.analysis.keyframes import KeyframeStore
 from action_assistant.runner.analysis.replay import RunReplay, run_replay
 from action_assistant.runner.archives import examples
 from action_assistant.runner.archives.archive_store import Archived, ArchiveStore
-from action_assistant.runner.archives.raw_messages import RawMessages, RawPut, raw_of, stream_of_raw
+from action_assistant.runner.archives.raw_messages import (
+    RawArchived,
+    RawMessages,
+    raw_of,
+    stream_of_raw,
+)
 from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.review.background_loops import KeyframeLoop, SumUpLoop
 from action_assistant.runner.review.ongoing_runs import OngoingRuns, settled
@@ -222,7 +227,7 @@ class ReviewService:
             if not run_.simulated and first <= each.name[: len(first)] <= last
         ]
         told = await self._journal.read(stream_of_raw(run_.engine))
-        gone = (msgspec.json.decode(event.body, type=RawPut) for event in told)
+        gone = (msgspec.json.decode(event.body, type=RawArchived) for event in told)
         return raw_of(run_, here, gone, until)
 
     async def replay(self, run_id: str, after: int) -> RunReplay:

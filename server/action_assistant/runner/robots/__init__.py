@@ -1,1 +1,1 @@
-"""Robots: their engines as watched, registrations, what others told them."""
+"""Robots: their registration, the watch of their engines, and the log of what others told them."""

@@ -1,7 +1,7 @@
-"""The engine of one robot as watched: whether it answers, its graphs, its index.
+"""The engine of one robot, watched: whether it answers, which graphs it holds, what it has indexed.
 
-A link around the link. Runs use it like any other, and everything that is heard on the way is noted,
-so that nobody asks twice.
+`KnownEngine` is a link around the robot's link. Runs use it like any other, and each answer or
+report that passes is noted, so that nothing is asked twice.
 """
 
 import asyncio
@@ -43,20 +43,20 @@ _AROUND_S: Final = 1.0
 _AFTERWARDS_S: Final = 30.0
 _GET_S: Final = 1.0
 _SHARE: Final = 20  # at most one part in so many of the time goes into asking an idle engine
-#: An engine that indexes while it runs may die of each get and start that comes meanwhile (H15), so that it
-#: is asked this much more rarely, and not at all for `_INDEXES_S` after its folder was written: twice what
-#: the node takes from one indexing to the next, unless it is told otherwise, and some.
+#: An engine that indexes while it runs may die of a get or a start that comes meanwhile (H15). So it is asked
+#: this many times more rarely, and not at all for `_INDEXES_S` after its folder was written, which is more
+#: than twice the node's default interval of indexing.
 _RARELY: Final = 6
 _INDEXES_S: Final = 5.0
-_FRESH_S: Final = 60.0  # for so long an engine that came back is called restarted
+_FRESH_S: Final = 60.0  # an engine that came back is called restarted for so long
 
 T = TypeVar("T")
 RunInAnyWay = Callable[..., Awaitable[T]]
 
 
 class EngineIndex(msgspec.Struct, frozen=True, kw_only=True):
-    """What an engine can do: actions and graphs that it has indexed, by name. `described`: what the
-    files of these actions say. `unread`: texts of its index that cannot be read."""
+    """The actions and graphs that an engine has indexed, by name. `described`: the contents of the
+    files of these actions. `unread`: how many texts of the index cannot be read."""
 
     actions: dict[str, Signature] = {}
     described: dict[str, Action] = {}
@@ -65,12 +65,12 @@ class EngineIndex(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class KnownEngine:
-    """Watched from `watch` on, until that is cancelled.
+    """Watches an engine from `watch` on, until that is cancelled.
 
-    `changed` is called whenever people would see something else; `foreign` for each command of
-    somebody else; `became` when the engine is in another state than before; `shows` for all graphs
-    that an answer or feedback shows. `indexes`: the runner writes into the folder that it indexes, so that
-    it does so while it runs.
+    `changed` is called whenever people would see another state; `foreign` with each command of
+    somebody else; `became` when the engine has changed its state; `shows` with all graphs that an
+    answer or feedback shows. `indexes`: the runner writes into the folder that the engine indexes,
+    so that the engine indexes while it runs.
     """
 
     def __init__(
@@ -117,17 +117,17 @@ class KnownEngine:
 
     @property
     def simulated(self) -> bool:
-        """Whether nothing moves in the world."""
+        """True where no robot moves."""
         return self._link.simulated
 
     @property
     def pauses(self) -> bool:
-        """Whether pausing is safe: the profile says so, and the link can."""
+        """True where pausing is safe: the profile says so, and the link can."""
         return self._link.pauses
 
     @property
     def standing(self) -> Standing:
-        """What is known without asking."""
+        """The facts that the link knows of the engine without asking it."""
         return self._link.standing
 
     async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
@@ -151,41 +151,43 @@ class KnownEngine:
         await self._link.modify(order, continue_from)
 
     async def get(self) -> Answer:
-        """Ask what the engine holds, and note it. Raises NoAnswer."""
+        """Send a get and note the answer. Raises NoAnswer."""
         began = self._tried_at = anyio.current_time()
         try:
             answer = await self._link.get()
         except NoAnswer as nothing:
             self._silent(str(nothing))
             raise
-        except Exception as error:  # a link that breaks is one without an answer
+        except Exception as error:  # a broken link counts as no answer
             why = f"The link failed: {error!r}"
             if why != self.why:
                 log.exception("the link to %s failed", self.registration.name)
             self._silent(why)
             raise NoAnswer(why) from error
         except anyio.get_cancelled_exc_class():
-            if anyio.current_time() - began >= 0.9 * _GET_S:  # somebody's deadline, not the end
+            if (
+                anyio.current_time() - began >= 0.9 * _GET_S
+            ):  # the deadline of this get, not the end of its task
                 self._silent("")
             raise
         self._heard(answer, anyio.current_time() - began)
         return answer
 
     async def run(self) -> None:
-        """The watch keeps the link going."""
+        """Wait for ever: the watch keeps the link going."""
         await anyio.sleep_forever()
 
     def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:
-        """Be told everything that the engine shows by itself."""
+        """Call `hear` with every report of the engine, as long as the context is open."""
         return self._link.listen(hear)
 
     async def aclose(self) -> None:
-        """The link is let go of by whoever ends the watch."""
+        """Do nothing: the watch closes the link."""
 
     # --- the watch ----------------------------------------------------------------------------
 
     async def watch(self) -> None:
-        """Keep the link going and know how the engine is, until cancelled."""
+        """Keep the link going and the state of the engine known, until cancelled."""
         self.look_closely()
         with self._link.listen(self._hear):
             try:
@@ -206,7 +208,8 @@ class KnownEngine:
             await anyio.sleep(0.5)
 
     async def _look_around(self) -> None:
-        """Who else is there changes without a word of the engine."""
+        """Announce changes of the link's standing, such as other publishers, which the engine does
+        not report."""
         told = self._link.standing
         while True:
             await anyio.sleep(_AROUND_S)
@@ -216,7 +219,8 @@ class KnownEngine:
                 self._changed()
 
     async def _ask(self) -> None:
-        """Every ten seconds, more rarely when answers are dear, at once when there is news."""
+        """Send a get every ten seconds: more rarely where answers are slow or the engine indexes,
+        at once after news."""
         while True:
             pace = _CLOSE_S if anyio.current_time() < self._close_until else _IDLE_S
             rest = max(pace * self._rarely, _SHARE * (self.took_ms or 0) / 1000)
@@ -225,7 +229,7 @@ class KnownEngine:
                 with anyio.move_on_after(due) as waited:
                     await self._look.wait()
                 if waited.cancelled_caught:
-                    continue  # somebody else may have asked meanwhile
+                    continue  # another get may have been sent meanwhile
             await self.indexed()
             self._look = anyio.Event()
             try:
@@ -238,21 +242,21 @@ class KnownEngine:
                 await anyio.sleep(0.5)
 
     def look_closely(self) -> None:
-        """A run has ended there, or others told it something: what comes of that is asked more
-        often for a while."""
+        """Ask more often for a while: a run has ended there, or others have told the engine to do
+        something."""
         now = _now()
         if now >= self._close_until:
             self._look.set()
         self._close_until = now + _AFTERWARDS_S
 
     def let_index(self) -> None:
-        """What it indexes was just written: ask it again when it has read that, and not before. Gets that
-        a run or a Stop needs go on."""
+        """Let the engine read what was just written into its index folder, and only then ask it
+        again. Gets of runs and Stops go on meanwhile."""
         self._indexing_until = _now() + _INDEXES_S
         self._look.set()
 
     async def indexed(self) -> None:
-        """Wait until the engine has read what was written last."""
+        """Wait until the engine has had time to read what was written last."""
         await anyio.sleep_until(self._indexing_until)
 
     def _hear(self, report: Report) -> None:
@@ -267,7 +271,7 @@ class KnownEngine:
                 self._recordings.fed(self.registration.name, report)
             case ForeignCommand():
                 self._foreign(self, report)
-                self._look.set()  # and later, too: it may be obeyed after the answer
+                self._look.set()  # the engine may obey after that answer: ask again later
                 self.look_closely()
             case _:
                 return
@@ -305,7 +309,8 @@ class KnownEngine:
         self._changed()
 
     async def index(self, run_in_worker: "RunInAnyWay[EngineIndex]") -> EngineIndex:
-        """What the engine has indexed, as its last answer says; read when it has changed."""
+        """Return the engine's index as of its last answer; it is decoded in a worker when it has
+        changed."""
         answer = self.answer
         if answer is None:
             return EngineIndex()
@@ -316,12 +321,13 @@ class KnownEngine:
 
 
 def _now() -> float:
-    """Return what `anyio.current_time` does, also where what comes by itself is heard: in no task."""
+    """Return the time of `anyio.current_time`, also outside of any task, where reports are
+    heard."""
     return asyncio.get_running_loop().time()
 
 
 def read_index(actions: tuple[str, ...], graphs: tuple[str, ...]) -> EngineIndex:
-    """The index of an engine from its texts. What cannot be read is counted."""
+    """Decode the index of an engine. Texts that cannot be read are counted."""
     described: dict[str, Action] = {}
     whole: dict[str, Graph] = {}
     unread = 0
@@ -344,8 +350,9 @@ def read_index(actions: tuple[str, ...], graphs: tuple[str, ...]) -> EngineIndex
 
 
 def foreign_graphs(answer: Answer, going: Collection[str]) -> list[str]:
-    """The graphs that an engine runs and that are no runs of ours `going` on there: also those of
-    which no action has begun yet, or none moves right now. Sub-graphs are named by their graph."""
+    """Return the graphs that an engine runs and that are no runs of this runner (`going`: their
+    ids). A graph counts as running also before its first action, and between two actions. A
+    sub-graph counts for its graph."""
     held = {each.graph for each in answer.graphs}
     tops = {
         each.graph
@@ -357,7 +364,7 @@ def foreign_graphs(answer: Answer, going: Collection[str]) -> list[str]:
 
 
 def _within(name: str, graphs: Collection[str]) -> bool:
-    """Whether it is a sub-graph of one of them."""
+    """Return whether a graph is a sub-graph of one of these."""
     return any(name.startswith(f"{each}__") for each in graphs)
 
 

@@ -1,8 +1,8 @@
-"""Recordings of raw messages of engines, by the hour.
+"""Recordings of raw messages of engines, in one file per hour.
 
-Beside the journal and with its own retention: one folder per robot, one file of JSON lines per hour,
-compressed. Of an answer only the graphs that are otherwise than in the one before are kept. A file is
-a row of gzip members, so that a crash costs the last seconds and nothing else.
+They are kept beside the journal and with their own retention: one folder per robot, with compressed
+files of JSON lines. Of an answer only the graphs that differ from the answer before are kept. A
+file is a row of gzip members, so that a crash costs the last seconds only.
 """
 
 import gzip
@@ -26,14 +26,15 @@ from action_assistant.web.workers.lanes import RunInWorker
 log: Final = logging.getLogger(__name__)
 
 _EVERY_S: Final = 2.0
-_WAITING: Final = 2_000  # lines in memory; then the oldest go
+_WAITING: Final = 2_000  # lines in memory; beyond that the oldest are dropped
 _KEPT_DAYS: Final = 7
 _KEPT_BYTES: Final = 500_000_000
 _ENDING: Final = ".jsonl.gz"
 
 
 class GetLine(msgspec.Struct, frozen=True, omit_defaults=True, tag="get", tag_field="kind"):
-    """An answer: graphs that are not as before, as the engine wrote them, and those that have gone."""
+    """An answer: graphs that have changed, as the engine wrote them, and the names of those that
+    have gone."""
 
     at: int
     asked_at: int
@@ -43,7 +44,7 @@ class GetLine(msgspec.Struct, frozen=True, omit_defaults=True, tag="get", tag_fi
 
 
 class FeedbackLine(msgspec.Struct, frozen=True, tag="feedback", tag_field="kind"):
-    """What came by itself, oldest first."""
+    """A message of feedback, with its snapshots, oldest first."""
 
     at: int
     actor: str
@@ -51,15 +52,15 @@ class FeedbackLine(msgspec.Struct, frozen=True, tag="feedback", tag_field="kind"
 
 
 class Recording(msgspec.Struct, frozen=True):
-    """A file: its name (the hour, UTC) and its size in bytes."""
+    """A file of recordings: its name (the hour, UTC) and its size in bytes."""
 
     name: str
     bytes: int
 
 
 class Recordings:
-    """Writes while `run` goes. `kept_bytes` bounds all robots together. Unless it `prunes`, somebody
-    else has to take away what is `due`."""
+    """Writes recordings while `run` runs. `kept_bytes` bounds all robots together. Without
+    `prunes`, the caller has to remove the files that are `due`."""
 
     def __init__(
         self,
@@ -79,7 +80,7 @@ class Recordings:
         self._texts: dict[str, dict[str, str]] = {}
 
     def heard(self, robot: str, answer: Answer) -> None:
-        """An answer has come."""
+        """Record the graphs of an answer that have changed."""
         before = self._texts.get(robot, {})
         changed = {name: text for name, text in answer.texts.items() if before.get(name) != text}
         gone = tuple(sorted(before.keys() - answer.texts.keys()))
@@ -90,15 +91,15 @@ class Recordings:
         self._waiting.append((robot, answer.at, msgspec.json.encode(line)))
 
     def fed(self, robot: str, feedback: Feedback) -> None:
-        """Feedback has come."""
+        """Record feedback; a message without snapshots is left out."""
         if feedback.snapshots:
             at = feedback.snapshots[-1].at
             line = FeedbackLine(at, feedback.actor, feedback.snapshots)
             self._waiting.append((robot, at, msgspec.json.encode(line)))
 
     async def run(self) -> None:
-        """Write until cancelled. A full disk loses recordings, never a run."""
-        told = False
+        """Write every two seconds until cancelled. A full disk loses recordings, never a run."""
+        is_logged = False
         while True:
             await anyio.sleep(_EVERY_S)
             lines, self._waiting = self._waiting, deque(maxlen=_WAITING)
@@ -106,11 +107,11 @@ class Recordings:
                 continue
             try:
                 await self._run_in_worker(partial(self._write, lines))
-                told = False
+                is_logged = False
             except Exception:
-                if not told:
+                if not is_logged:
                     log.exception("recordings of robots cannot be written")
-                told = True
+                is_logged = True
 
     def _write(self, lines: Iterable[tuple[str, int, bytes]]) -> None:
         files: dict[Path, list[bytes]] = {}
@@ -127,8 +128,8 @@ class Recordings:
                     each.unlink()
 
     def due(self, kept_days: float) -> list[Path]:
-        """What has been kept long enough: by age, then by what all of it takes; the oldest first.
-        The newest hour never is."""
+        """Return the files to remove, the oldest first: those that are too old, and those beyond
+        the bound of bytes. The newest file never is."""
         named = ((path, _hour_of(path)) for path in self._folder.glob(f"*/*{_ENDING}"))
         dated = {path: hour for path, hour in named if hour is not None}
         found = sorted(dated, key=lambda path: path.name)
@@ -143,13 +144,14 @@ class Recordings:
         return due
 
     async def of(self, robot: str, since: int, until: int) -> list[Recording]:
-        """The files of a robot that may hold anything from these moments (microseconds UTC)."""
+        """Return the files of a robot that may hold messages from between these moments
+        (microseconds UTC)."""
         first, last = hours(since, until)
         found = await self.listed(robot)
         return [each for each in found if first <= each.name.removesuffix(_ENDING) <= last]
 
     async def listed(self, robot: str) -> list[Recording]:
-        """The files of a robot, newest first."""
+        """Return the files of a robot, newest first."""
         folder = self._folder / robot
 
         def read() -> list[Recording]:
@@ -159,20 +161,22 @@ class Recordings:
         return await self._run_in_worker(read)
 
     async def file(self, robot: str, name: str) -> bytes:
-        """One of them, compressed. Raises NotFound."""
+        """Return the compressed contents of a file. Raises NotFound."""
         if name not in {each.name for each in await self.listed(robot)}:
             raise NotFound("There is no such recording.")
         return await self._run_in_worker((self._folder / robot / name).read_bytes)
 
 
 def hours(since: int, until: int) -> tuple[str, str]:
-    """The names of the first and the last hour (UTC) between two moments, without the ending."""
+    """Return the names, without ending, of the first and the last hour (UTC) between two
+    moments."""
     first, last = (datetime.fromtimestamp(each / 1e6, UTC) for each in (since, until))
     return f"{first:%Y-%m-%dT%H}", f"{last:%Y-%m-%dT%H}"
 
 
 def _hour_of(path: Path) -> datetime | None:
-    """None for a file that somebody else put there: it is not ours to take away."""
+    """Return the hour of a file; None for a file that was not written here and must not be
+    removed."""
     try:
         return datetime.strptime(path.name, f"%Y-%m-%dT%H{_ENDING}").replace(tzinfo=UTC)
     except ValueError:

@@ -1,4 +1,4 @@
-"""The registration of a robot, and the robot as pages see it."""
+"""The registration of a robot, and the view of a robot that pages get."""
 
 import re
 from collections.abc import Callable
@@ -26,7 +26,7 @@ RobotState: TypeAlias = EngineState | Literal["no_link"]
 
 
 class RobotRegistered(msgspec.Struct, frozen=True, kw_only=True):
-    """Somebody registered a robot, or registered it anew."""
+    """A person registered a robot, or changed its registration."""
 
     kind: ClassVar[str] = "robot.registered.v1"
 
@@ -39,7 +39,7 @@ class RobotRegistered(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class RobotRemoved(msgspec.Struct, frozen=True, kw_only=True):
-    """Somebody took a robot out of the registry. Its runs stay."""
+    """A person took a robot out of the registry. Its runs stay."""
 
     kind: ClassVar[str] = "robot.removed.v1"
 
@@ -48,9 +48,9 @@ class RobotRemoved(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class HeldGraph(msgspec.Struct, frozen=True, kw_only=True):
-    """A graph that an engine holds, ended ones too. `run`: the run of ours that it is.
+    """A graph that an engine holds, ended ones too. `run`: the id of this runner's run that it is.
 
-    `stopping`: why a stop of it is not proven yet, "" at first; None when nobody wants that.
+    `stopping`: why a Stop of it is not proven yet, "" at first; None when no Stop of it is wanted.
     """
 
     graph: str
@@ -63,9 +63,9 @@ class HeldGraph(msgspec.Struct, frozen=True, kw_only=True):
 class Robot(msgspec.Struct, frozen=True, kw_only=True):
     """An engine as people see it. `why` explains any state but `answering`.
 
-    `servers`: how many answer on the path of its get; `others`: publishers of starts beside us.
-    `actions`, `graphs`: how many it has indexed; None before its first answer. `pauses`: whether
-    pausing is safe there.
+    `servers`: how many engines answer on the path of its get; `others`: publishers of starts
+    besides this runner. `actions`, `graphs`: how many it has indexed; None before its first answer.
+    `pauses`: whether pausing is safe there.
     """
 
     name: str
@@ -91,7 +91,7 @@ class Robot(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def registration_of(row: Row[Any]) -> Registration:
-    """A registration as the table has it."""
+    """Return the registration in a row of the table."""
     return Registration(
         name=row.name,
         domain=row.domain,
@@ -101,26 +101,30 @@ def registration_of(row: Row[Any]) -> Registration:
     )
 
 
-def check_registration(asked: Registration) -> None:
-    """Refuse what cannot be on the wire or true of an engine. Raises BadInput, Conflict."""
-    if asked.name.lower() == SIMULATOR:
+def check_registration(registration: Registration) -> None:
+    """Refuse a registration that ROS 2 does not allow, or whose profile is not valid. Raises
+    BadInput, Conflict."""
+    if registration.name.lower() == SIMULATOR:
         raise Conflict("The simulator is always there; a robot needs a name of its own.")
-    if not _NAME.fullmatch(asked.name):
+    if not _NAME.fullmatch(registration.name):
         raise BadInput(
             "A robot's name starts with a letter and has letters, digits, _ and - only, "
             "64 at most.",
             where={"path": "/name"},
         )
-    if not _SERVICE.fullmatch(asked.get_service):
+    if not _SERVICE.fullmatch(registration.get_service):
         raise BadInput("This is no name of a ROS 2 service.", where={"path": "/get_service"})
     try:
-        facts_of(asked.profile)
+        facts_of(registration.profile)
     except BadProfile as wrong:
         raise BadInput(wrong.message, where={"path": f"/profile{wrong.path}"}) from wrong
 
 
-def seen(plain: Robot, engine: KnownEngine, stopping: Callable[[str, str], str | None]) -> Robot:
-    """A robot with what is known of its engine."""
+def with_engine(
+    plain: Robot, engine: KnownEngine, stopping: Callable[[str, str], str | None]
+) -> Robot:
+    """Return a robot with what is known of its engine. `stopping(robot, graph)` tells why a Stop is
+    not proven."""
     answer, standing = engine.answer, engine.standing
     known = replace(
         plain,

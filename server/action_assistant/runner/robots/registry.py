@@ -29,7 +29,7 @@ from action_assistant.runner.robots.registration import (
     RobotRegistered,
     RobotRemoved,
     check_registration,
-    seen,
+    with_engine,
 )
 from action_assistant.runner.robots.robot_events import (
     Commanded,
@@ -54,38 +54,40 @@ _TOLD: Final = 500  # newest entries of a flight record
 
 
 class ForeignStops(Protocol):
-    """What stops graphs that were not started from here."""
+    """The part of `ForeignStopLoop` that the registry uses: it stops graphs that were not started
+    from here."""
 
     def trouble(self, robot: str, graph: str) -> str | None:
-        """None when the graph is not being stopped; else why that is not proven yet, "" at first."""
+        """Return why a Stop of this graph is not proven yet, "" at first; None when no Stop of it
+        is wanted."""
         ...
 
     def going(self, robot: str) -> bool:
-        """Whether something is being stopped there."""
+        """Return whether a graph is being stopped there."""
         ...
 
     def graphs(self) -> dict[str, list[str]]:
-        """The graphs that are being stopped, by robot."""
+        """Return the graphs that are being stopped, by robot."""
         ...
 
     def all_going(self) -> Iterator[tuple[str, str]]:
-        """The robot of each graph that is being stopped, and why that is not proven yet."""
+        """Yield the robot of each graph that is being stopped, and why that is not proven yet."""
         ...
 
     def stop(self, engine: KnownEngine, graph: str, author: Author) -> None:
-        """Want a graph stopped. Never waits."""
+        """Begin to stop a graph. Never waits."""
         ...
 
     def take_up(self, robot: str, asked: StopAsked) -> None:
-        """Go on with a stop that an earlier process has left without a proof. Never waits."""
+        """Continue a Stop that an earlier process has left without a proof. Never waits."""
         ...
 
     def hear_of(self, robot: str, command: ForeignCommand) -> None:
-        """Somebody else may just have set it going."""
+        """Note a command of somebody else, which may have set the graph going again."""
         ...
 
     def shows(self, engine: KnownEngine, snapshots: tuple[Snapshot, ...]) -> None:
-        """An engine shows these graphs, in an answer or by feedback. Never waits."""
+        """Note the graphs that an engine shows in an answer or by feedback. Never waits."""
         ...
 
 
@@ -94,8 +96,9 @@ Present: TypeAlias = Callable[[str], KnownEngine | None]
 
 
 class RegistryContext(msgspec.Struct, frozen=True):
-    """What the registry stands on. `foreign` hears of each command of somebody else,
-    `shows` of all graphs that an engine shows; `stops` makes what stops foreign graphs."""
+    """The services that the registry uses. `foreign` is called with each command of somebody else
+    and returns its event; `shows` with all graphs that an engine shows; `stops` makes the object
+    that stops foreign graphs."""
 
     journal: RunnerJournal
     tasks: BackgroundTasks
@@ -110,9 +113,9 @@ class RegistryContext(msgspec.Struct, frozen=True):
 
 
 class Robots:
-    """The registry. `reach` makes links, or says why there are none; `links` are there already.
-    `recordings` keep what engines say, where they are kept. `indexing`: the robots into whose index folder
-    the runner writes."""
+    """Keeps the registered robots and watches their engines. `reach` makes links, or is the reason
+    why there are none; `links` exist already, by robot. `recordings` store raw messages.
+    `indexing`: the robots whose index folder the runner writes into."""
 
     def __init__(
         self,
@@ -128,80 +131,81 @@ class Robots:
         self._registered: dict[str, Registration] = {}
         self._engines: dict[str, KnownEngine] = {}
         self._scopes: dict[str, anyio.CancelScope] = {}
-        self._ground: RegistryContext | None = None
+        self._context: RegistryContext | None = None
         self._robot_log: RobotLog | None = None
         self._foreign_stops: ForeignStops | None = None
 
-    def open(self, ground: RegistryContext) -> None:
-        """Watch what was given, and from now on whatever is added."""
-        self._ground = ground
-        self._robot_log = RobotLog(ground.journal, ground.tasks)
-        self._foreign_stops = ground.stops(
-            ground.tasks,
-            ground.clock_us,
-            ground.run_in_worker,
+    def open(self, context: RegistryContext) -> None:
+        """Start to watch the robots of `links`, and from now on every robot that is added."""
+        self._context = context
+        self._robot_log = RobotLog(context.journal, context.tasks)
+        self._foreign_stops = context.stops(
+            context.tasks,
+            context.clock_us,
+            context.run_in_worker,
             self._robot_log.note,
-            lambda: ground.changed(),
+            lambda: context.changed(),
             self.present,
         )
         if self.recordings is not None:
-            ground.tasks.start_soon(self.recordings.run)
+            context.tasks.start_soon(self.recordings.run)
         for name in self._given:
             self.add(Registration(name=name))
 
     async def take_up_stops(self) -> None:
-        """Go on with the stops of graphs of others that an earlier process left without a proof. Waits
-        for no engine; a log that cannot be read keeps nothing else from being taken up."""
+        """Continue the Stops of foreign graphs that an earlier process left without a proof. Waits
+        for no engine; a robot whose log cannot be read is skipped."""
         for name in self.names:
             try:
-                told = await self.robot_log.newest(name, _TOLD)
-            except Exception:  # the other robots' stops are to go on
+                stored = await self.robot_log.newest(name, _TOLD)
+            except Exception:  # the Stops on other robots must go on
                 log.exception("whether something was being stopped on %s cannot be read", name)
                 continue
-            for asked in left_unproven(event for _, event in told):
+            for asked in left_unproven(event for _, event in stored):
                 self.foreign_stops.take_up(name, asked)
 
     # --- the registry -------------------------------------------------------------------------
 
-    async def register(self, asked: Registration, author: Author) -> Robot:
-        """Take a robot in, or change it. Raises BadInput, Conflict, Unavailable."""
-        check_registration(asked)
-        ground = self._standing()
-        body = RobotRegistered(at=ground.clock_us(), **msgspec.structs.asdict(asked))
+    async def register(self, registration: Registration, author: Author) -> Robot:
+        """Store a registration, new or changed, and link to the robot. Raises BadInput, Conflict,
+        Unavailable."""
+        check_registration(registration)
+        context = self._open_context()
+        body = RobotRegistered(at=context.clock_us(), **msgspec.structs.asdict(registration))
         draft = Draft(body.kind, author.id, msgspec.json.encode(body))
-        await ground.journal.append(STREAM, [draft])
-        self.add(asked)
-        ground.changed()
-        return self.robot(asked.name)
+        await context.journal.append(STREAM, [draft])
+        self.add(registration)
+        context.changed()
+        return self.robot(registration.name)
 
     async def remove(self, name: str, author: Author) -> None:
-        """Take a robot out. Raises NotFound, Unavailable."""
+        """Store that a robot is removed, and close its link. Raises NotFound, Unavailable."""
         self.registration(name)
-        ground = self._standing()
-        body = RobotRemoved(at=ground.clock_us(), name=name)
+        context = self._open_context()
+        body = RobotRemoved(at=context.clock_us(), name=name)
         draft = Draft(body.kind, author.id, msgspec.json.encode(body))
-        await ground.journal.append(STREAM, [draft])
-        self._let_go(name)
+        await context.journal.append(STREAM, [draft])
+        self._close(name)
         del self._registered[name]
-        ground.changed()
+        context.changed()
 
     def add(self, registration: Registration) -> None:
-        """Take in a robot that is stored; an older link to it is let go of."""
+        """Link to a robot that is stored, and close an older link to it."""
         name = registration.name
         if self._registered.get(name) == registration and name in self._engines:
             return
-        self._let_go(name)
+        self._close(name)
         self._registered[name] = registration
         link, facts = self._link(registration)
         if link is None:
             return
-        ground = self._standing()
+        context = self._open_context()
         engine = KnownEngine(
             registration,
             facts,
             link,
-            clock_us=ground.clock_us,
-            changed=ground.changed,
+            clock_us=context.clock_us,
+            changed=context.changed,
             became=self._note_state,
             foreign=self._note_command,
             shows=self._show,
@@ -210,12 +214,12 @@ class Robots:
         )
         self._engines[name] = engine
         scope = self._scopes[name] = anyio.CancelScope()
-        ground.tasks.start_soon(self._watch, engine, scope)
+        context.tasks.start_soon(self._watch, engine, scope)
 
     def _link(self, registration: Registration) -> tuple[Link | None, EngineFacts]:
         try:
             facts = facts_of(registration.profile)
-        except BadProfile:  # stored before it was checked: then nothing good is believed of it
+        except BadProfile:  # of an earlier version, which did not check it
             log.warning("the profile of %s cannot be read", registration.name)
             facts = PINNED
         given = self._given.get(registration.name)
@@ -225,7 +229,7 @@ class Robots:
             return None, facts
         return self._reach.link(registration, facts), facts
 
-    def _let_go(self, name: str) -> None:
+    def _close(self, name: str) -> None:
         self._engines.pop(name, None)
         scope = self._scopes.pop(name, None)
         if scope is not None:
@@ -236,14 +240,14 @@ class Robots:
         with scope:
             await engine.watch()
 
-    def _standing(self) -> RegistryContext:
-        if self._ground is None:
+    def _open_context(self) -> RegistryContext:
+        if self._context is None:
             raise RuntimeError("the registry is not open")
-        return self._ground
+        return self._context
 
     @property
     def foreign_stops(self) -> ForeignStops:
-        """Stops of what others run there."""
+        """The Stops of graphs that others run on robots."""
         if self._foreign_stops is None:
             raise RuntimeError("the registry is not open")
         return self._foreign_stops
@@ -251,23 +255,24 @@ class Robots:
     def silence(
         self, author: Author, going: Callable[[str], Collection[str]], name: str | None = None
     ) -> list[str]:
-        """Stop whatever robots run that is no run of ours `going` on there: on all of them, or on
-        one. The names of the graphs. Never waits. Raises NotFound."""
+        """Begin to stop all foreign graphs, on one robot or on all of them, and return each as
+        "robot: graph". `going(robot)`: ids of this runner's open runs there. Never waits. Raises
+        NotFound."""
         if name is not None:
             self.registration(name)
-        told: list[str] = []
+        stopped: list[str] = []
         for robot, engine in self._engines.items():
             if name in {None, robot}:
                 answer = engine.answer
                 for graph in [] if answer is None else foreign_graphs(answer, going(robot)):
                     self.foreign_stops.stop(engine, graph, author)
-                    told.append(f"{robot}: {graph}")
-        return told
+                    stopped.append(f"{robot}: {graph}")
+        return stopped
 
     # --- what there is ------------------------------------------------------------------------
 
     def all(self) -> Iterator[Robot]:
-        """Every engine, the simulator first."""
+        """Yield every engine, the simulator first."""
         yield Robot(
             name=SIMULATOR, simulated=True, state="answering", generation="current", pauses=True
         )
@@ -275,7 +280,7 @@ class Robots:
             yield self.robot(name)
 
     def robot(self, name: str) -> Robot:
-        """One robot as people see it. Raises NotFound."""
+        """Return one robot as people see it. Raises NotFound."""
         known = self.registration(name)
         engine = self._engines.get(name)
         plain = Robot(
@@ -290,10 +295,10 @@ class Robots:
         )
         if engine is None:
             return plain
-        return seen(plain, engine, self.foreign_stops.trouble)
+        return with_engine(plain, engine, self.foreign_stops.trouble)
 
     def unheard(self) -> dict[str, str]:
-        """Why nothing is known of what a robot runs now, for each of which that is so."""
+        """Return the robots of which it is not known now what they run, with the reason."""
         found: dict[str, str] = {}
         for name in self.names:
             engine = self._engines.get(name)
@@ -305,11 +310,12 @@ class Robots:
 
     @property
     def names(self) -> list[str]:
-        """Of all that are registered."""
+        """The names of all registered robots, sorted."""
         return sorted(self._registered)
 
     def heard(self) -> dict[str, int]:
-        """When each robot last answered, microseconds UTC; those that never did are left out."""
+        """Return when each robot last answered, microseconds UTC; robots that never did are left
+        out."""
         return {
             name: engine.answer.at
             for name, engine in self._engines.items()
@@ -317,14 +323,15 @@ class Robots:
         }
 
     def registration(self, name: str) -> Registration:
-        """How a robot is reached. Raises NotFound."""
+        """Return the registration of a robot. Raises NotFound."""
         known = self._registered.get(name)
         if known is None:
             raise NotFound(f"No robot is called {name!r}.")
         return known
 
     def reachable(self, name: str) -> KnownEngine:
-        """The engine of a robot. Raises BadInput for an unknown name, Conflict without a link."""
+        """Return the engine of a robot for a start. Raises BadInput for an unknown name, Conflict
+        without a link."""
         engine = self._engines.get(name)
         if engine is not None:
             return engine
@@ -338,24 +345,26 @@ class Robots:
         )
 
     def present(self, name: str) -> KnownEngine | None:
-        """The engine of a robot as it is reached now, None without a link. Raises NotFound."""
+        """Return the engine of a robot, None without a link. Raises NotFound."""
         self.registration(name)
         return self._engines.get(name)
 
     def link(self, name: str) -> KnownEngine | None:
-        """The engine of a robot, if there is a link."""
+        """Return the engine of a robot; None without a link or for an unknown name."""
         return self._engines.get(name)
 
     async def index(self, name: str) -> EngineIndex:
-        """What a robot can do, as far as is known. Raises NotFound."""
+        """Return the index of a robot's engine; empty without a link. Raises NotFound."""
         self.registration(name)
         engine = self._engines.get(name)
         return (
-            EngineIndex() if engine is None else await engine.index(self._standing().run_in_worker)
+            EngineIndex()
+            if engine is None
+            else await engine.index(self._open_context().run_in_worker)
         )
 
     def held(self, name: str, graph: str) -> str:
-        """A graph as the engine wrote it in its last answer. Raises NotFound."""
+        """Return a graph as the engine wrote it in its last answer. Raises NotFound."""
         self.registration(name)
         engine = self._engines.get(name)
         answer = None if engine is None else engine.answer
@@ -365,13 +374,14 @@ class Robots:
         return text
 
     async def candidates(self) -> tuple[Candidate, ...]:
-        """Return the engines in sight that nobody registered yet, once discovery has had its time."""
+        """Return the engines in sight that are not registered, once discovery has had its time."""
         if isinstance(self._reach, str):
             return ()
         return self._strangers(await self._reach.candidates())
 
     async def sighting(self) -> Sighting:
-        """Return the same as it is known now, and for how long others may still come into sight."""
+        """Return the engines in sight now that are not registered, and for how many seconds others
+        may still appear."""
         if isinstance(self._reach, str):
             return Sighting((), 0.0)
         seen = await self._reach.sighting()
@@ -388,7 +398,7 @@ class Robots:
 
     @property
     def no_reach(self) -> str:
-        """Why no robot can be reached; "" when some can."""
+        """The reason why no robot can be reached; "" when some can."""
         return self._reach if isinstance(self._reach, str) else ""
 
     # --- the flight recorder ------------------------------------------------------------------
@@ -396,24 +406,24 @@ class Robots:
     def _note_state(self, engine: KnownEngine) -> None:
         name = engine.registration.name
         incarnation = engine.standing.incarnation
-        at = self._standing().clock_us()
+        at = self._open_context().clock_us()
         became = EngineBecame(at=at, state=engine.state, why=engine.why, incarnation=incarnation)
         self.robot_log.note(name, became, name)
 
     def _show(self, engine: KnownEngine, snapshots: tuple[Snapshot, ...]) -> None:
         self.foreign_stops.shows(engine, snapshots)
-        self._standing().shows(engine, snapshots)
+        self._open_context().shows(engine, snapshots)
 
     def _note_command(self, engine: KnownEngine, command: ForeignCommand) -> None:
         name = engine.registration.name
         if not command.targets or name in command.targets:
             self.foreign_stops.hear_of(name, command)
-            told = self._standing().foreign(engine, command)
-            self.robot_log.note(name, told, command.sender)
+            event = self._open_context().foreign(engine, command)
+            self.robot_log.note(name, event, command.sender)
 
     @property
     def robot_log(self) -> RobotLog:
-        """What others told the robots."""
+        """The log of what others told the robots."""
         if self._robot_log is None:
             raise RuntimeError("the registry is not open")
         return self._robot_log

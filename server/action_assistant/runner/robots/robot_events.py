@@ -1,7 +1,8 @@
-"""The log of a robot: commands of others, changes of its engine's state, files written for it.
+"""The log of a robot: commands of others, changes of its engine's state, Stops of foreign graphs,
+files written for it.
 
 One stream per robot, `robot/NAME`. Bodies are msgspec JSON; fields are only ever added, with a
-default. What our own runs sent stands in their streams.
+default. Commands of this runner's own runs stand in the streams of the runs.
 """
 
 from collections.abc import Iterable, Mapping
@@ -18,18 +19,19 @@ from action_assistant.runner.runs.history import RunnerJournal
 from action_assistant.runner.runs.recorder import StreamAppender
 from action_assistant.web.auth.caller import BackgroundTasks
 
-_PATIENCE_S: Final = 5.0  # until something that has to be stored is given up
+_STORE_S: Final = 5.0  # after which waiting for the journal ends
 
 
 def stream_of_robot(name: str) -> str:
-    """The stream of a robot."""
+    """Return the name of the stream of a robot."""
     return f"robot/{name}"
 
 
 class Commanded(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """Somebody else published a command to this robot, with this graph.
+    """A publisher other than this runner sent a command to this robot, with this graph.
 
-    `run` and `number`: the open run of ours that it concerns. `sender` tells publishers apart.
+    `run` and `number`: the open run of this runner that it concerns. `sender` tells publishers
+    apart.
     """
 
     kind: ClassVar[str] = "robot.commanded.v1"
@@ -45,7 +47,7 @@ class Commanded(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
 
 
 class EngineBecame(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """The engine is in another state than before."""
+    """The engine has changed its state."""
 
     kind: ClassVar[str] = "robot.engine_became.v1"
 
@@ -56,8 +58,8 @@ class EngineBecame(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True
 
 
 class StopAsked(msgspec.Struct, frozen=True, kw_only=True):
-    """Somebody here wants a graph stopped that was not started from here. `life`: the incarnation of
-    the engine that ran it, "" where that was not known."""
+    """A person wants a graph stopped that was not started from here. `life`: the incarnation of the
+    engine that ran it, "" where that was not known."""
 
     kind: ClassVar[str] = "robot.stop_asked.v1"
 
@@ -68,7 +70,7 @@ class StopAsked(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class StopWasProven(msgspec.Struct, frozen=True, kw_only=True):
-    """A get asked after that stop showed nothing of the graph moving."""
+    """An answer to a get that was sent after the Stop showed that no action of the graph moves."""
 
     kind: ClassVar[str] = "robot.stop_proven.v1"
 
@@ -78,7 +80,7 @@ class StopWasProven(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class StopUnproven(msgspec.Struct, frozen=True, kw_only=True):
-    """That stop was given up without a proof."""
+    """The Stop was given up without a proof."""
 
     kind: ClassVar[str] = "robot.stop_unproven.v1"
 
@@ -88,7 +90,8 @@ class StopUnproven(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class AskedGraph(msgspec.Struct, frozen=True, omit_defaults=True):
-    """A graph that shall be in a robot's index. `replaces`: the path of the file that was to go aside."""
+    """A graph to write into a robot's index folder. `replaces`: the path of the file that it
+    replaces."""
 
     name: str
     digest: str
@@ -96,7 +99,7 @@ class AskedGraph(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class IndexWriteAsked(msgspec.Struct, frozen=True, kw_only=True):
-    """Somebody wants graphs written into the folder that the robot's engine indexes. Stored before
+    """A person wants graphs written into the folder that the robot's engine indexes. Stored before
     anything is written."""
 
     kind: ClassVar[str] = "robot.index_write_asked.v1"
@@ -108,7 +111,8 @@ class IndexWriteAsked(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class GraphFile(msgspec.Struct, frozen=True, omit_defaults=True):
-    """A file that was written there. `kept`: where the one that it replaced is now."""
+    """A file that was written into an index folder. `kept`: the path to which the file that it
+    replaced was moved."""
 
     graph: str
     path: str
@@ -117,7 +121,7 @@ class GraphFile(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class IndexWritten(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """These files were written; `why` not all, "" if all were."""
+    """These files were written. `why` says why the others were not, "" if all were."""
 
     kind: ClassVar[str] = "robot.index_written.v1"
 
@@ -162,7 +166,8 @@ _ALARMS: Final[Mapping[Command, str]] = {
 
 
 def alarm_of(command: ForeignCommand, robot: str, graph: str) -> tuple[str, str] | None:
-    """What a command of somebody else means for a run of `graph` there: a code and a sentence."""
+    """Return code and text of the alarm that a foreign command raises for a run of `graph`; None
+    where it does not concern the run."""
     if command.graph == graph:
         text = _ALARMS[command.command].format(graph=graph, robot=robot)
         return f"foreign_{command.command}", text
@@ -175,21 +180,21 @@ def alarm_of(command: ForeignCommand, robot: str, graph: str) -> tuple[str, str]
 
 
 def draft_of(event: RobotEvent, author: str) -> Draft:
-    """An event as it is stored."""
+    """Encode an event for the journal."""
     return Draft(event.kind, author, msgspec.json.encode(event))
 
 
 def event_of(stored: Event) -> RobotEvent | None:
-    """What a stored event says; None for kinds that this version does not know."""
+    """Decode a stored event; None for a kind that this version does not know."""
     known = _KINDS.get(stored.kind)
     return None if known is None else msgspec.json.decode(stored.body, type=known)
 
 
-def left_unproven(told: Iterable[RobotEvent]) -> list[StopAsked]:
-    """The stops of which neither a proof nor that they were given up stands behind them, in events of
-    one robot, oldest first."""
+def left_unproven(events: Iterable[RobotEvent]) -> list[StopAsked]:
+    """Return the Stops that were neither proven nor given up, in events of one robot, oldest
+    first."""
     left: dict[str, StopAsked] = {}
-    for event in told:
+    for event in events:
         match event:
             case StopAsked(graph=graph):
                 left[graph] = event
@@ -206,35 +211,39 @@ class RobotLog:
     def __init__(self, journal: RunnerJournal, tasks: BackgroundTasks) -> None:
         self._journal = journal
         self._tasks = tasks
-        self._pens: dict[str, StreamAppender] = {}
+        self._appenders: dict[str, StreamAppender] = {}
 
     def note(self, robot: str, event: RobotEvent, author: str) -> None:
-        """Record soon. Never waits."""
+        """Queue an event for storing. Never waits."""
         self._appender(robot).add(draft_of(event, author))
 
     async def record(self, robot: str, event: RobotEvent, author: str) -> None:
-        """Record, and wait until it is stored. Raises Unavailable; then it may be stored later."""
+        """Store an event and wait until it is stored. Raises Unavailable after five seconds; it may
+        be stored later then."""
         self.note(robot, event, author)
         try:
-            with anyio.fail_after(_PATIENCE_S):
+            with anyio.fail_after(_STORE_S):
                 await self._appender(robot).flushed()
         except TimeoutError as late:
             raise Unavailable("The runner's journal does not take anything in now.") from late
 
     def _appender(self, robot: str) -> StreamAppender:
-        appender = self._pens.get(robot)
+        appender = self._appenders.get(robot)
         if appender is None:
-            appender = self._pens[robot] = StreamAppender(self._journal, stream_of_robot(robot), -1)
+            appender = self._appenders[robot] = StreamAppender(
+                self._journal, stream_of_robot(robot), -1
+            )
             self._tasks.start_soon(appender.run)
         return appender
 
     @property
     def waiting(self) -> int:
-        """How much is not stored."""
-        return sum(each.waiting for each in self._pens.values())
+        """The number of events that are not stored yet."""
+        return sum(each.waiting for each in self._appenders.values())
 
     async def newest(self, robot: str, most: int) -> list[tuple[int, RobotEvent]]:
-        """The newest events of a robot, oldest first, with their seqs. Raises Unavailable."""
+        """Return the newest events of a robot, at most `most`, oldest first, with their seqs.
+        Raises Unavailable."""
         stream = stream_of_robot(robot)
         end = await self._journal.newest(stream)
         stored = await self._journal.read(stream, after=max(0, end - most))
@@ -242,7 +251,7 @@ class RobotLog:
         return [(seq, event) for seq, event in read if event is not None]
 
     async def graph(self, robot: str, seq: int) -> str:
-        """The graph of a recorded command. Raises NotFound, Unavailable."""
+        """Return the graph of a recorded command. Raises NotFound, Unavailable."""
         stored = await self._journal.read(stream_of_robot(robot), after=seq - 1, limit=1)
         event = event_of(stored[0]) if stored and stored[0].seq == seq else None
         if not isinstance(event, Commanded) or not event.umrf:

@@ -16,7 +16,7 @@ from action_assistant.runner.runs.visits import MOMENT_US, Visit
 _EXACT_S: Final = 0.001
 
 
-class Took(msgspec.Struct, frozen=True, kw_only=True):
+class DurationBounds(msgspec.Struct, frozen=True, kw_only=True):
     """A duration in seconds: at least `least` and at most `most`; None: nothing bounds it from
     above."""
 
@@ -30,18 +30,18 @@ class Took(msgspec.Struct, frozen=True, kw_only=True):
         return self.most if known else None
 
 
-def took_us(least: int, most: int | None) -> Took:
+def duration_bounds(least: int, most: int | None) -> DurationBounds:
     """Convert bounds in microseconds, each rounded outwards to a millisecond."""
     above = None if most is None else max(0, math.ceil(most / 1000) / 1000)
-    return Took(least=max(0, math.floor(least / 1000) / 1000), most=above)
+    return DurationBounds(least=max(0, math.floor(least / 1000) / 1000), most=above)
 
 
-def of_visit(visit: Visit) -> Took | None:
+def of_visit(visit: Visit) -> DurationBounds | None:
     """Return how long a visit took; None while no end was seen."""
-    return None if visit.until is None else took_us(visit.least, visit.most)
+    return None if visit.until is None else duration_bounds(visit.least, visit.most)
 
 
-def of_run(run: Run) -> Took | None:
+def of_run(run: Run) -> DurationBounds | None:
     """Return the time from the start until nothing of the run moved any more, whenever that was
     proven; None for a run that was never started. It has no upper bound while the run is open or
     lost, or while an action may still go on."""
@@ -52,11 +52,11 @@ def of_run(run: Run) -> Took | None:
     least = max([run.going_at - MOMENT_US, run.started_at, *known]) - run.started_at
     open_end = run.end in {None, "lost"} or any(visit.not_after is None for visit in visits)
     if open_end or run.over_at is None:
-        return took_us(least, None)
-    return took_us(min(least, run.over_at - run.started_at), run.over_at - run.started_at)
+        return duration_bounds(least, None)
+    return duration_bounds(min(least, run.over_at - run.started_at), run.over_at - run.started_at)
 
 
-def at_rank(spans: Sequence[Took], share: float) -> Took | None:
+def at_rank(spans: Sequence[DurationBounds], share: float) -> DurationBounds | None:
     """Return the smallest duration that at least `share` of them do not exceed, each bound taken by
     itself; None without durations."""
     if not spans:
@@ -64,4 +64,4 @@ def at_rank(spans: Sequence[Took], share: float) -> Took | None:
     place = max(0, math.ceil(share * len(spans)) - 1)
     least = sorted(each.least for each in spans)[place]
     most = sorted(math.inf if each.most is None else each.most for each in spans)[place]
-    return Took(least=least, most=None if math.isinf(most) else most)
+    return DurationBounds(least=least, most=None if math.isinf(most) else most)

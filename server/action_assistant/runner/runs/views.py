@@ -9,7 +9,7 @@ from msgspec.structs import replace
 from sqlalchemy import Row
 
 from action_assistant.runner.runs.counts import VisitCount, visit_counts
-from action_assistant.runner.runs.durations import Took, of_run
+from action_assistant.runner.runs.durations import DurationBounds, of_run
 from action_assistant.runner.runs.events import AtRest, Author, Overridden, Override
 from action_assistant.runner.runs.run import Desired, Result, Run, State
 from action_assistant.runner.runs.sent_graphs import Sent, SubgraphShown, subgraphs_shown
@@ -120,7 +120,7 @@ class RunSummary(msgspec.Struct, frozen=True, kw_only=True):
     requested_at: datetime
     started_at: datetime | None
     ended_at: datetime | None
-    took: Took | None
+    took: DurationBounds | None
     stopped_by: Author | None
     detail: str
     alarms: list[AlarmShown]
@@ -270,7 +270,7 @@ def summary_of_row(row: Row[Any]) -> RunSummary:
         at_rest=_at_rest(msgspec.convert(at_rest, AtRest) if at_rest else None),
         moves_again_at=None,
         group=more.get("group"),
-        took=Took(least=took["least"], most=took["most"]) if took else None,
+        took=DurationBounds(least=took["least"], most=took["most"]) if took else None,
         stopped_by=Author(**stopped_by) if stopped_by else None,
         detail=more.get("detail", ""),
         alarms=[

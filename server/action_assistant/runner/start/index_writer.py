@@ -18,7 +18,7 @@ from action_assistant.runner.index_folders.comparison import (
     FileState,
     Hindered,
     Lacking,
-    There,
+    Present,
 )
 from action_assistant.runner.index_folders.scan import scanned, shown_path
 from action_assistant.runner.index_folders.writing import (
@@ -124,9 +124,9 @@ def planned(
             case Differing(file):
                 new.append(NewFile(name, text, file.path, sha(file.text)))
                 graphs_to_write.append(AskedGraph(name, digests[name], file.shown))
-            case There() | Hindered():
+            case Present() | Hindered():
                 continue
-    there = tuple(name for name, state in states.items() if isinstance(state, There))
+    there = tuple(name for name, state in states.items() if isinstance(state, Present))
     return WritePlan(tuple(new), tuple(graphs_to_write), there)
 
 

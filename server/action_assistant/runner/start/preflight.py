@@ -17,12 +17,12 @@ from action_assistant.runner.analysis.course_checks import CheckedCourses
 from action_assistant.runner.index_folders.comparison import (
     Differing,
     FileState,
-    FolderLook,
     Hindered,
+    IndexFolderState,
     Lacking,
-    There,
+    Present,
     WritableGraph,
-    held_against,
+    file_state,
     same_to_engine,
 )
 from action_assistant.runner.index_folders.scan import IndexedFiles, scanned, shown_path
@@ -62,7 +62,7 @@ class Item(msgspec.Struct, frozen=True, kw_only=True):
     codes: tuple[str, ...] = ()
     overridable: bool = False
     problems: tuple[Problem, ...] = ()
-    folder: FolderLook | None = None
+    folder: IndexFolderState | None = None
 
     def __post_init__(self) -> None:
         hold_names(self, "text")
@@ -492,7 +492,7 @@ def folder_state(
     graph: Graph, files: IndexedFiles, index: EngineIndex, facts: EngineFacts
 ) -> FileState:
     """Return the state of a graph's file in the folder of an engine with this index."""
-    return held_against(graph, files, facts, actions=index.actions, graphs=index.graphs)
+    return file_state(graph, files, facts, actions=index.actions, graphs=index.graphs)
 
 
 def _is_known(name: str, index: EngineIndex) -> bool:
@@ -548,7 +548,7 @@ def _with_folder(item: Item, view: EngineView, pinned: Mapping[str, Graph]) -> I
     hindered: dict[str, str] = {}
     for name in sorted(pinned):  # all of them are written or none
         match folder_state(pinned[name], files, view.index, view.facts):
-            case There():
+            case Present():
                 waiting += [name] if name in lacking or name in other else []
             case Lacking():
                 writable.append(WritableGraph(name))
@@ -560,7 +560,7 @@ def _with_folder(item: Item, view: EngineView, pinned: Mapping[str, Graph]) -> I
         why = f"The runner may not write into {shown_path(str(folder))}."
         hindered |= {each.graph: why for each in writable}
         writable = []
-    found = FolderLook(
+    found = IndexFolderState(
         path=shown_path(str(folder)),
         writable=tuple(writable),
         waiting=tuple(waiting),
