@@ -1,20 +1,25 @@
 /** Asks for what to say with a proposal. */
 import { Button, Modal, Textarea } from "@mantine/core";
-import { useState } from "react";
 import { type GraphDraft, proposeDraft } from "../api/documents/drafts";
-import { usePendingText } from "../ui/drafts/use-draft";
+import { usePerson } from "../api/use-person";
+import { textScope, useKeptText } from "../ui/drafts/kept-texts";
 import style from "./drafts.module.css";
 import { useDraftStep } from "./use-draft-step";
 
 export function ProposeDialog({ draft, onClose }: { draft: GraphDraft; onClose: () => void }) {
-  const [note, setNote] = useState("");
-  usePendingText(note, null);
+  const { person } = usePerson();
+  const [note, setNote] = useKeptText(`${textScope(draft.id, person.id)}proposal`);
   const { busy, wrong, step } = useDraftStep();
   const propose = () =>
     step(async () => {
       await proposeDraft(draft.id, note);
+      setNote("");
       onClose();
     });
+  const cancel = () => {
+    setNote("");
+    onClose();
+  };
   return (
     <Modal opened onClose={onClose} title={<bdi>Propose “{draft.name}”</bdi>}>
       <Textarea
@@ -29,7 +34,7 @@ export function ProposeDialog({ draft, onClose }: { draft: GraphDraft; onClose: 
         onChange={(event) => setNote(event.currentTarget.value)}
       />
       <div className={style.answers}>
-        <Button onClick={onClose}>Cancel</Button>
+        <Button onClick={cancel}>Cancel</Button>
         <Button variant="filled" loading={busy} onClick={() => void propose()}>
           Propose
         </Button>

@@ -16,6 +16,7 @@ import { useState } from "react";
 import { errorText, Refusal } from "../api/http";
 import { useLive } from "../api/live/use-live";
 import { changeRobot, type Registration, registerRobot } from "../api/robots";
+import { usePendingText } from "../ui/drafts/use-draft";
 import { isolated } from "../words/isolated";
 import type { EditedRobot } from "./robots-page";
 
@@ -117,6 +118,7 @@ export function RobotForm({ editing, onClose }: { editing: EditedRobot; onClose:
   const { runner } = useLive();
   const client = useQueryClient();
   const [robot, setRobot] = useState(editing.robot);
+  usePendingText(robot === editing.robot ? "" : JSON.stringify(robot), null);
   const [more, setMore] = useState(!editing.isNew);
   const [error, setError] = useState<unknown>(null);
   const [busy, setBusy] = useState(false);

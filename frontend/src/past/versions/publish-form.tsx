@@ -7,10 +7,11 @@ import { refreshHistory } from "../../api/documents/history";
 import { publishNamed } from "../../api/documents/versions";
 import { queryKeys } from "../../api/graphs";
 import { errorText } from "../../api/http";
+import { usePerson } from "../../api/use-person";
 import { CoursesAt } from "../../courses/courses-told";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import { useThrottledLink } from "../../sync/use-room";
-import { usePendingText } from "../../ui/drafts/use-draft";
+import { textScope, useKeptText } from "../../ui/drafts/kept-texts";
 import style from "./versions.module.css";
 
 const LABEL_LIMIT = 200; // letters
@@ -35,8 +36,8 @@ function Fields({ onPublished, onClose }: FieldsProps) {
   const link = useThrottledLink();
   const client = useQueryClient();
   const [label, setLabel] = useState("");
-  const [note, setNote] = useState("");
-  usePendingText(note, null);
+  const { person } = usePerson();
+  const [note, setNote] = useKeptText(`${textScope(id, person.id)}version`);
   const [busy, setBusy] = useState(false);
   const [refused, setRefused] = useState("");
   const obstacle = useObstacle();
@@ -50,11 +51,16 @@ function Fields({ onPublished, onClose }: FieldsProps) {
       await client.invalidateQueries({ queryKey: queryKeys.versions(id) });
       void refreshHistory(client, id);
       onPublished(seq);
+      setNote("");
       onClose();
     } catch (error) {
       setRefused(errorText(error));
       setBusy(false);
     }
+  };
+  const cancel = () => {
+    setNote("");
+    onClose();
   };
   return (
     <form className={style.form} onSubmit={(event) => void publish(event)}>
@@ -79,7 +85,7 @@ function Fields({ onPublished, onClose }: FieldsProps) {
       {obstacle === null && <CoursesAt graph={id} seq={seq} />}
       {(refused || obstacle) && <p role={refused ? "alert" : "status"}>{refused || obstacle}</p>}
       <div className={style.buttons}>
-        <Button size="compact-sm" variant="default" onClick={onClose}>
+        <Button size="compact-sm" variant="default" onClick={cancel}>
           Cancel
         </Button>
         <Button

@@ -11,9 +11,10 @@ import { errorText } from "../../api/http";
 import { useLive } from "../../api/live/use-live";
 import { type Preflight, type Robot, SIMULATOR } from "../../api/robots";
 import type { Run } from "../../api/runs";
-import { useMay } from "../../api/use-person";
+import { useMay, usePerson } from "../../api/use-person";
 import { EngineLabel } from "../../status/engine-label";
 import { HelpLink } from "../../status/help-link";
+import { textScope, useKeptText } from "../../ui/drafts/kept-texts";
 import { HoldButton } from "../../ui/floating/hold-button";
 import { colorOfName } from "../../ui/name-colors";
 import { isolated } from "../../words/isolated";
@@ -176,7 +177,10 @@ function obstacleOf(
 export function StartDialog(props: Props) {
   const { graph, name, seq, label, chosen, onChosen, onStarted, onClose } = props;
   const [engines, setEngines] = useState<readonly string[]>(chosen);
-  const [reason, setReason] = useState("");
+  const { person } = usePerson();
+  // A reason counts for this moment on these robots only.
+  const place = `${textScope(graph, person.id)}start/${seq}/${engines.join("/")}`;
+  const [reason, setReason] = useKeptText(place);
   const { now } = useLive();
   const { behaviours, choice } = useBehaviours(engines.includes(SIMULATOR));
   const { look, lookSoon, error } = useLook(graph, seq, engines, behaviours);
@@ -191,14 +195,15 @@ export function StartDialog(props: Props) {
         ? "Starting …"
         : obstacleOf(engines, looks, reason);
   const choose = (engine: string) => {
-    setEngines(toggled(engines, engine));
     setReason("");
+    setEngines(toggled(engines, engine));
   };
   const begin = () => {
     rememberEngines(graph, engines);
     onChosen([...engines]);
     const override = codes.length > 0 ? { override: { codes, reason: reason.trim() } } : {};
     const done = ({ runs }: { runs: readonly Run[] }) => {
+      setReason("");
       onClose();
       onStarted?.(runs);
     };

@@ -7,6 +7,7 @@ import { useState } from "react";
 import { errorText } from "../../api/http";
 import { useLive } from "../../api/live/use-live";
 import { confirmRest, type Run } from "../../api/runs";
+import { usePendingText } from "../../ui/drafts/use-draft";
 import { HoldButton } from "../../ui/floating/hold-button";
 import { isolated } from "../../words/isolated";
 import { notifyFailure } from "../start/use-start";
@@ -23,6 +24,8 @@ interface Props {
 export function ConfirmRestDialog({ run, opened, onClose }: Props) {
   const { runner } = useLive();
   const [how, setHow] = useState("");
+  // Never kept for later: these words are about what was seen a moment ago.
+  usePendingText(opened ? how : "", null);
   const confirm = useMutation({
     mutationFn: () => confirmRest(runner ?? "", run.id, how.trim()),
     onSuccess: onClose,
