@@ -98,6 +98,28 @@ test("persons, graphs and epochs are apart", async ({ page }) => {
   expect(await call(page, "read", ADA)).toMatchObject([{ epoch: "1", waiting: [{ id: "3" }] }]);
 });
 
+test("choices wait beside the edits, each tab changes only its own, and no copy with one is let go", async ({
+  page,
+}) => {
+  const choice = (id: string) => ({
+    ...{ id, root: "meta" as const, key: id, mine: "a", theirs: null, since: 1 },
+    cause: "return" as const,
+    writes: { mine: [], theirs: null },
+  });
+  const put = (...ids: string[]) => ({ choices: { put: ids.map(choice), gone: [] } });
+  await call(page, "write", ADA, "0", { ...NOTHING, ...put("x", "y"), client: 7 });
+  await call(page, "write", ADA, "0", { ...NOTHING, ...put("z"), client: 8 }); // another tab
+  await call(page, "write", ADA, "0", { ...NOTHING, choices: { put: [], gone: ["x"] }, client: 7 });
+  await call(page, "write", ADA, "0", NOTHING);
+  await call(page, "leave", "a");
+  await visit(page);
+  const kept = { choices: [choice("y"), choice("z")], clients: [7, 8] };
+  expect(await call(page, "read", ADA)).toMatchObject([kept]);
+  await call(page, "write", ADA, "0", { ...NOTHING, choices: { put: [], gone: ["y", "z"] } });
+  await call(page, "leave", "a");
+  expect(await call(page, "read", ADA)).toEqual([]);
+});
+
 test("of several epochs the one that was used last stands at the end", async ({ page }) => {
   await call(page, "write", ADA, "old", { ...NOTHING, waits: [edit("1")] });
   await page.waitForTimeout(5);

@@ -31,8 +31,8 @@ async function enter(page: Page, graph: string): Promise<void> {
 
 const description = (page: Page) => page.getByRole("textbox", { name: "Description" });
 
-async function put(page: Page, text: string): Promise<void> {
-  await card(page, "Look").click({ position: { x: 50, y: 30 } });
+async function put(page: Page, text: string, name = "Look"): Promise<void> {
+  await card(page, name).click({ position: { x: 50, y: 30 } });
   await description(page).fill(text);
   await page.keyboard.press("Tab");
 }
@@ -83,6 +83,135 @@ test("who was away is told both values, chooses by keys, and takes it back witho
   await saved(ada.page);
   await expect.poll(now).toBe("by Mari");
   await expect(card(mari.page, "Look")).toBeVisible();
+  expect([...ada.failures, ...mari.failures]).toEqual([]);
+  await ada.context.close();
+  await mari.context.close();
+});
+
+/** The client ids of this page's documents are all below or above those of everybody else: whose value stands. */
+async function clientIds(page: Page, from: number): Promise<void> {
+  await page.addInitScript((base) => {
+    const random = crypto.getRandomValues.bind(crypto);
+    crypto.getRandomValues = <T extends ArrayBufferView | null>(array: T): T => {
+      random(array as never);
+      if (array instanceof Uint32Array && array.length === 1)
+        array[0] = base + ((array[0] ?? 0) % 1_000_000);
+      return array;
+    };
+  }, from);
+}
+
+/** Opens the choices by keys, and picks the other value than the one that stands. */
+async function chooseOther(page: Page, field: string): Promise<void> {
+  const open = page.getByRole("button", { name: "Choose", exact: true });
+  await open.focus();
+  await page.keyboard.press("Enter");
+  const dialog = page.getByRole("dialog", { name: "Changed by you and by others" });
+  const values = dialog.getByRole("radiogroup", { name: field });
+  await expect(values.getByRole("radio", { disabled: true })).toHaveCount(0); // it has been read
+  await values.getByRole("radio", { checked: true }).focus();
+  await page.keyboard.press("ArrowDown");
+}
+
+test("who stayed is told what an edit from offline replaced, and both lists survive a reload and a closed tab", async ({
+  browser,
+}) => {
+  const ada = await product.person(browser, "Ada", { loadsAhead: true });
+  const mari = await product.person(browser, "Mari", { loadsAhead: true });
+  await clientIds(ada.page, 3_000_000_000);
+  await clientIds(mari.page, 1_000);
+  const graph = await newGraph("unseen-values");
+  await enter(ada.page, graph);
+  await add(ada.page, "Lift");
+  await put(ada.page, "before", "Lift");
+  await saved(ada.page);
+  await enter(mari.page, graph);
+  await ada.context.setOffline(true);
+  await put(ada.page, "by Ada", "Lift");
+  await expect(ada.page.getByText(/Offline with 1 change/i).first()).toBeVisible();
+  await put(mari.page, "by Mari", "Lift");
+  await saved(mari.page);
+  await mari.page.waitForTimeout(2_100); // what comes sooner may be an edit of the same moment
+  await ada.context.setOffline(false);
+  await saved(ada.page);
+
+  const now = async () => (await umrf(graph)).actions[0]?.description;
+  const unseen = mari.page.getByText(/replaced something that you had changed/);
+  await expect(unseen).toBeVisible();
+  expect(await now()).toBe("by Ada");
+  await mari.page.screenshot({ path: test.info().outputPath("unseen.png") });
+  await mari.page.reload();
+  await expect(unseen).toBeVisible();
+  await chooseOther(mari.page, "Lift: Description");
+  await mari.page.screenshot({ path: test.info().outputPath("unseen-choice.png") });
+  await expect.poll(now).toBe("by Mari");
+  await saved(mari.page);
+  await mari.page.reload();
+  await saved(mari.page);
+  await expect(card(mari.page, "Lift")).toBeVisible();
+  await expect(unseen).toHaveCount(0); // it was chosen
+
+  await expect(ada.page.getByText(/others changed something that you changed/)).toBeVisible();
+  await ada.page.close();
+  const again = await ada.context.newPage();
+  await again.goto(`${product.url}/graphs/${graph}`);
+  await expect(again.getByText(/others changed something that you changed/)).toBeVisible();
+  await chooseOther(again, "Lift: Description");
+  await expect.poll(now).toBe("by Ada");
+  await again.getByRole("button", { name: "Done" }).click();
+  await expect(again.getByRole("button", { name: "Choose", exact: true })).toHaveCount(0);
+  await again.reload();
+  await saved(again);
+  await expect(card(again, "Lift")).toBeVisible();
+  await expect(again.getByRole("button", { name: "Choose", exact: true })).toHaveCount(0);
+  expect([...ada.failures, ...mari.failures]).toEqual([]);
+  await ada.context.close();
+  await mari.context.close();
+});
+
+test("a value of others that the server had collected is read from the history", async ({
+  browser,
+}) => {
+  const ada = await product.person(browser, "Ada", { loadsAhead: true });
+  const mari = await product.person(browser, "Mari", { loadsAhead: true });
+  await clientIds(ada.page, 3_000_000_000);
+  await clientIds(mari.page, 1_000);
+  // The socket of Ada's page is dead for a while, and neither side has noticed. What she sends arrives later.
+  let isDead = false;
+  const held: (() => void)[] = [];
+  const sockets: (() => void)[] = [];
+  await ada.page.routeWebSocket(/\/room\?/, (socket) => {
+    const server = socket.connectToServer();
+    socket.onMessage((message) => {
+      if (isDead) held.push(() => server.send(message));
+      else server.send(message);
+    });
+    server.onMessage((message) => {
+      if (!isDead) socket.send(message);
+    });
+    sockets.push(() => void socket.close({ code: 1012 }));
+  });
+  const graph = await newGraph("collected-value");
+  await enter(ada.page, graph);
+  await add(ada.page, "Turn");
+  await put(ada.page, "before", "Turn");
+  await saved(ada.page);
+  await enter(mari.page, graph);
+  const now = async () => (await umrf(graph)).actions[0]?.description;
+  isDead = true;
+  await put(ada.page, "by Ada", "Turn");
+  await expect.poll(() => held.length).toBeGreaterThan(0);
+  await put(mari.page, "by Mari", "Turn");
+  await expect.poll(now).toBe("by Mari");
+  for (const send of held.splice(0)) send();
+  await expect.poll(now).toBe("by Ada");
+  for (const close of sockets.splice(0)) close();
+  isDead = false;
+  await saved(ada.page);
+  await expect(ada.page.getByText(/others changed something that you changed/)).toBeVisible();
+  await chooseOther(ada.page, "Turn: Description");
+  await expect.poll(now).toBe("by Mari");
+  await ada.page.screenshot({ path: test.info().outputPath("collected.png") });
   expect([...ada.failures, ...mari.failures]).toEqual([]);
   await ada.context.close();
   await mari.context.close();

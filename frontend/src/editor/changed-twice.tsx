@@ -1,11 +1,17 @@
-/** Fields that this person and others changed while this person was offline: a notice, and a dialog to choose a value. */
+/** A notice and a dialog about fields that this person and others changed without seeing each other's edit. */
 
 import { Button, Group, Modal, Radio, Stack, Text } from "@mantine/core";
 import { IconGitMerge } from "@tabler/icons-react";
+import { useQuery } from "@tanstack/react-query";
 import { useState } from "react";
+import { fetchChanges } from "../api/documents/history";
+import { errorText } from "../api/http";
+import { usePerson } from "../api/use-person";
+import { useEditorContext } from "../edit-actions/editor-context";
 import { changesOf, type ValuesByRoot } from "../graph/changes";
 import { type Maps, mapsFrom, mapsOf, type Root } from "../graph/document-keys";
-import type { ChangedTwice } from "../sync/changed-twice";
+import { asLogged } from "../sync/changed-twice";
+import type { ChangedTwice } from "../sync/indexed-db";
 import { useGraph, useRoom } from "../sync/use-room";
 import { Say } from "./room-notice";
 import style from "./stranded-edits-dialog.module.css";
@@ -18,8 +24,8 @@ interface ToldTwice {
   readonly theirs: string;
 }
 
-/** In words; null for what no person has changed, such as an order that follows from something else. */
-function toldOf(twice: ChangedTwice, here: Maps): ToldTwice | null {
+/** Describes a choice; null for what no person has changed, such as an order that follows from something else. */
+function toldOf(twice: ChangedTwice, here: Maps, unknown: string): ToldTwice | null {
   const { root, key, mine, theirs, writes } = twice;
   const [change] = changesOf(
     { difference: only(root, key, mine), before: only(root, key, theirs), here },
@@ -28,7 +34,6 @@ function toldOf(twice: ChangedTwice, here: Maps): ToldTwice | null {
   const [line] = change?.lines ?? [];
   if (change === undefined || line === undefined) return null;
   const isWhole = writes.mine.length > 1 || (writes.theirs?.length ?? 0) > 1;
-  const unknown = "another value, which the history has";
   const nothing = isWhole ? "Deleted" : "Nothing";
   return {
     twice,
@@ -38,17 +43,56 @@ function toldOf(twice: ChangedTwice, here: Maps): ToldTwice | null {
   };
 }
 
+/** The server gives the newest so many steps in one answer. */
+const MOST_STEPS = 5_000;
+
+/** Reads values of others that came as collected from the log, when somebody `looks`. */
+function useLogged(found: readonly ChangedTwice[], looks: boolean) {
+  const { id } = useEditorContext();
+  const { person } = usePerson();
+  const collected = found.filter(({ writes }) => writes.theirs === null);
+  const after = Math.min(...collected.map(({ since }) => since));
+  const log = useQuery({
+    enabled: looks && collected.length > 0,
+    queryKey: ["changed-twice", id, ...collected.map((each) => `${each.since} ${each.id}`)],
+    queryFn: ({ signal }) => fetchChanges(id, after, Number.MAX_SAFE_INTEGER, signal),
+    staleTime: Number.POSITIVE_INFINITY,
+    retry: false,
+  });
+  const { data, error } = log;
+  const isWhole = data !== undefined && data.length < MOST_STEPS;
+  const all = found.map((twice) =>
+    data === undefined || twice.writes.theirs !== null
+      ? twice
+      : (asLogged(twice, data, person.id) ?? twice),
+  );
+  return { all, unknown: unknownWords(data && isWhole, error) };
+}
+
+/** `isWhole`: whether all steps since then were read; undefined while none are. */
+function unknownWords(isWhole: boolean | undefined, error: Error | null): string {
+  if (isWhole) return "another value, which never stood, so the history does not show it";
+  if (isWhole === false)
+    return "another value; so much was changed since then that only the history can show it";
+  if (error === null) return "another value, which is being read from the history";
+  return `another value; the history could not be read: ${errorText(error)}`;
+}
+
 function only(root: Root, key: string, value: unknown): ValuesByRoot {
   return mapsFrom({ [root]: { [key]: value } });
 }
 
-/** What there is to choose from, in words. */
-function useChangedTwiceTold(all: readonly ChangedTwice[]): readonly ToldTwice[] {
+/**
+ * Describes the choices in words. Values of others that came as collected are read from the log when somebody
+ * `looks`.
+ */
+function useChangedTwiceTold(found: readonly ChangedTwice[], looks: boolean): readonly ToldTwice[] {
   const { doc } = useRoom();
   useGraph(); // the names in it
+  const { all, unknown } = useLogged(found, looks);
   if (all.length === 0) return [];
   const here = mapsOf(doc);
-  return all.flatMap((twice) => toldOf(twice, here) ?? []);
+  return all.flatMap((twice) => toldOf(twice, here, unknown) ?? []);
 }
 
 function Field({ told: { twice, title, mine, theirs } }: { told: ToldTwice }) {
@@ -93,9 +137,8 @@ function ChangedTwiceDialog({
       centered
     >
       <Text>
-        While you were away, you and others changed the same. What is marked stands now; choose
-        another value where it should. Each choice is an edit that you can undo, and the history has
-        both.
+        You and others changed the same, without seeing each other’s change. What is marked stands
+        now; choose another value where it should. Each choice is an edit that you can undo.
       </Text>
       <ul className={style.list} aria-label="Fields with two values">
         {told.map((each) => (
@@ -112,10 +155,14 @@ function ChangedTwiceDialog({
   );
 }
 
+const things = (count: number) => (count === 1 ? "something" : `${count} things`);
+
 export function ChangedTwiceNotice({ all }: { all: readonly ChangedTwice[] }) {
-  const told = useChangedTwiceTold(all);
   const [open, setOpen] = useState(false);
+  const told = useChangedTwiceTold(all, open);
   if (told.length === 0) return null;
+  const unseen = told.filter(({ twice }) => twice.cause === "unseen").length;
+  const away = told.length - unseen;
   return (
     <Say
       icon={<IconGitMerge size={16} />}
@@ -126,9 +173,18 @@ export function ChangedTwiceNotice({ all }: { all: readonly ChangedTwice[] }) {
         </Button>
       }
     >
-      While you were away, others changed{" "}
-      {told.length === 1 ? "something" : `${told.length} things`} that you changed, too. One of both
-      values stands.
+      {away > 0 && (
+        <>
+          While you were away, others changed {things(away)} that you changed, too. One of both
+          values stands.{" "}
+        </>
+      )}
+      {unseen > 0 && (
+        <>
+          Somebody who was offline, or on a slow network, replaced {things(unseen)} that you had
+          changed, without having seen your change.
+        </>
+      )}
       <ChangedTwiceDialog told={told} opened={open} onClose={() => setOpen(false)} />
     </Say>
   );

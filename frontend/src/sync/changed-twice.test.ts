@@ -13,8 +13,8 @@ import {
 } from "../graph/edit";
 import { actionIn, arrows, graphIn } from "../testing/edited-graph";
 import { FakeServer } from "../testing/fake-server";
-import { type ChangedTwice, ChangedTwiceStore } from "./changed-twice";
-import type { UnsavedEdit } from "./indexed-db";
+import { asLogged, ChangedTwiceStore } from "./changed-twice";
+import type { ChangedTwice, UnsavedEdit } from "./indexed-db";
 import { connectRoom, type Room } from "./room-connection";
 
 let server: FakeServer;
@@ -152,6 +152,191 @@ test("what waits for seconds on a socket that does not notice is told; what two 
   expect(told(room.changedTwice.now())).toEqual([["description", "mine", "theirs"]]);
 });
 
+test("a value of others that came as collected is the newest one of others that the log has since", () => {
+  open(true);
+  server.seq = 5;
+  server.ack(server.last);
+  server.last.end(1006);
+  let update: Uint8Array = new Uint8Array();
+  room.doc.once("update", (made: Uint8Array) => {
+    update = made;
+  });
+  room.doc.getMap("meta").set("description", "mine");
+  server.broadcast((doc) => doc.getMap("meta").set("description", "theirs"));
+  Y.applyUpdate(server.doc, update); // over a socket whose end nobody had noticed
+  vi.advanceTimersByTime(300);
+  server.accept();
+  const [twice] = room.changedTwice.now() as [ChangedTwice];
+  expect(twice).toMatchObject({ mine: "mine", since: 5, writes: { theirs: null } });
+  const step = (seq: number, author: string, after: unknown, key = "description") => ({
+    ...{ seq, author, root: "meta" as const, key, after },
+  });
+  const steps = [step(5, "mari", "old"), step(6, "mari", "theirs"), step(7, "ada", "mine")];
+  const known = asLogged(twice, [...steps, step(8, "mari", "other", "name")], "ada");
+  expect(known?.theirs).toBe("theirs");
+  expect(asLogged(twice, [step(5, "mari", "old"), step(7, "ada", "mine")], "ada")).toBeNull();
+  room.changedTwice.choose(known as ChangedTwice, "theirs");
+  expect(server.doc.getMap("meta").get("description")).toBe("theirs");
+});
+
+// -- who stayed ---------------------------------------------------------------------------------
+
+/** Somebody goes offline now, works by `work`, and comes back when the answer is called. */
+function away(work: (doc: Y.Doc) => void): () => void {
+  const doc = new Y.Doc();
+  Y.applyUpdate(doc, Y.encodeStateAsUpdate(server.doc));
+  doc.clientID = 3_000; // above this page's: their value stands
+  const at = Y.encodeStateVector(doc);
+  work(doc);
+  const update = Y.encodeStateAsUpdate(doc, at);
+  return () => server.broadcast((all) => Y.applyUpdate(all, update));
+}
+
+const later = () => vi.advanceTimersByTime(3_000);
+
+describe("a person who stayed on the page", () => {
+  let a: string;
+
+  beforeEach(() => {
+    open(true);
+    a = addAction(room.doc, { name: "A" });
+    setField(room.doc, a, "actor", "before");
+    later();
+  });
+
+  test("is told when an edit that had not seen their value replaces it, and can take it back", () => {
+    const comeBack = away((doc) => setField(doc, a, "actor", "theirs"));
+    setField(room.doc, a, "actor", "mine");
+    later();
+    comeBack();
+    expect(actionIn(room.doc, a)?.actor).toBe("theirs");
+    expect(told(room.changedTwice.now())).toEqual([["actor", "mine", "theirs"]]);
+    const [twice] = room.changedTwice.now() as [ChangedTwice];
+    expect([twice.cause, room.changedTwice.stands(twice)]).toEqual(["unseen", "theirs"]);
+    room.changedTwice.choose(twice, "mine");
+    expect(actionIn(server.doc, a)?.actor).toBe("mine");
+  });
+
+  test("is told also where the other erased or set it several times", () => {
+    const comeBack = away((doc) => {
+      setField(doc, a, "actor", "first");
+      setField(doc, a, "actor", "second");
+      setField(doc, a, "actor", "");
+    });
+    setField(room.doc, a, "actor", "mine");
+    later();
+    comeBack();
+    expect(told(room.changedTwice.now())).toEqual([["actor", "mine", ""]]);
+  });
+
+  test("is told when an action with their work is deleted by somebody who had not seen it", () => {
+    const b = addAction(room.doc, { name: "B" });
+    connect(room.doc, a, b);
+    later();
+    const comeBack = away((doc) => removeActions(doc, [a]));
+    setField(room.doc, a, "description", "mine");
+    later();
+    const before = graphIn(room.doc);
+    comeBack();
+    expect(told(room.changedTwice.now())).toEqual([["", "A", undefined]]);
+    const [twice] = room.changedTwice.now() as [ChangedTwice];
+    room.changedTwice.choose(twice, "mine");
+    expect(graphIn(server.doc)).toEqual(before);
+  });
+
+  test("hears nothing of edits that had seen their value, that come at once, or that lose", () => {
+    setField(room.doc, a, "actor", "mine");
+    away((doc) => setField(doc, a, "actor", "later"))();
+    setField(room.doc, a, "actor", "mine again");
+    later();
+    const comeBack = away((doc) => removeActions(doc, [a]));
+    later();
+    comeBack();
+    expect(room.changedTwice.now()).toEqual([]);
+
+    const b = addAction(room.doc, { name: "B" });
+    later();
+    const atOnce = away((doc) => setField(doc, b, "actor", "theirs"));
+    setField(room.doc, b, "actor", "mine");
+    vi.advanceTimersByTime(500);
+    atOnce();
+    expect(actionIn(room.doc, b)?.actor).toBe("theirs");
+    expect(room.changedTwice.now()).toEqual([]);
+  });
+
+  test("hears nothing where somebody else had replaced their value before", () => {
+    const comeBack = away((doc) => setField(doc, a, "actor", "offline"));
+    setField(room.doc, a, "actor", "mine");
+    later();
+    away((doc) => setField(doc, a, "actor", "a third"))();
+    later();
+    comeBack();
+    expect(room.changedTwice.now()).toEqual([]);
+  });
+});
+
+test("whatever two do, the one who stayed is told of each stored value that was replaced unseen, and of no other", () => {
+  const steps = fc.array(
+    fc.oneof(
+      fc.tuple(fc.constantFrom("ada", "bo"), fc.nat(2), fc.constantFrom("a", "b", "c", null)),
+      fc.constantFrom("to bo", "back"),
+    ),
+    { maxLength: 14, size: "max" },
+  );
+  fc.assert(
+    fc.property(steps, fc.boolean(), (script, wins) => {
+      const [ada, bo] = [new Y.Doc(), new Y.Doc()];
+      [ada.clientID, bo.clientID] = wins ? [1_000, 2_000] : [2_000, 1_000];
+      const store = new ChangedTwiceStore(ada);
+      const edits: UnsavedEdit[] = [];
+      ada.on("update", (update: Uint8Array, origin: unknown) => {
+        if (origin !== "bo") edits.push({ id: `${edits.length}`, update, at: 0 });
+      });
+      /** By key: how often Ada set it, how often by what Bo has received, and that number at each set of Bo's. */
+      const places = PLACES.slice(0, 3).map(() => ({ set: 0, received: 0, knew: [] as number[] }));
+      for (const step of script) {
+        if (step === "to bo") {
+          Y.applyUpdate(bo, Y.encodeStateAsUpdate(ada, Y.encodeStateVector(bo)));
+          for (const place of places) place.received = place.set;
+        } else if (step === "back") {
+          store.durable(edits.splice(0));
+          later();
+          store.dismiss();
+          const old = valuesIn(ada);
+          const shownBy = PLACES.map(([root, key]) => rootOf(ada, root)._map.get(key)?.id.client);
+          store.take([], 0, () =>
+            Y.applyUpdate(ada, Y.encodeStateAsUpdate(bo, Y.encodeStateVector(ada)), "bo"),
+          );
+          const now = valuesIn(ada);
+          places.forEach((place, n) => {
+            const [root, key] = PLACES[n] as readonly [Root, string];
+            const id = `${root} ${key}`;
+            const isReplaced =
+              old.has(id) && shownBy[n] === ada.clientID && old.get(id) !== now.get(id);
+            const twice = store.now().find((each) => each.id === id);
+            const unseen = place.knew.filter((count) => count < place.set);
+            if (twice !== undefined) {
+              expect(isReplaced && unseen.length > 0).toBe(true);
+              expect([twice.mine, twice.theirs]).toEqual([old.get(id), now.get(id)]);
+            } else if (unseen.length > 0 && unseen.length === place.knew.length) {
+              const isErasedOnly = rootOf(ada, root)._map.get(key)?.id.client === ada.clientID;
+              expect(isReplaced && !isErasedOnly).toBe(false);
+            }
+            place.knew = [];
+          });
+        } else {
+          const [who, n, value] = step;
+          const place = places[n] as (typeof places)[number];
+          play(who === "ada" ? ada : bo, [[n, value]]);
+          if (who === "ada") place.set += 1;
+          else if (value !== null) place.knew.push(place.received);
+        }
+      }
+    }),
+    { numRuns: 500 },
+  );
+});
+
 // -- whatever both do -------------------------------------------------------------------------
 
 const PLACES: readonly (readonly [Root, string])[] = [
@@ -204,7 +389,9 @@ test("whatever both set at the same time, each field with two values is told, an
       const [own, other] = [valuesIn(mine), valuesIn(theirs)];
       const store = new ChangedTwiceStore(mine);
       store.back(waiting);
-      store.take(waiting, () => Y.applyUpdate(mine, Y.encodeStateAsUpdate(theirs, at), "remote"));
+      store.take(waiting, 0, () =>
+        Y.applyUpdate(mine, Y.encodeStateAsUpdate(theirs, at), "remote"),
+      );
       const found = new Map(store.now().map((each) => [each.id, each]));
       const now = valuesIn(mine);
       for (const [root, key] of PLACES) {

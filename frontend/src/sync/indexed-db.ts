@@ -8,6 +8,7 @@
  */
 
 import { deviceNow } from "../clock/server-clock";
+import type { Root } from "../graph/document-keys";
 import type { ReplacedEntries } from "./replaced-history";
 
 /** Whose copy of which graph. */
@@ -34,7 +35,26 @@ export const madeNow = (update: Uint8Array, before: ReplacedEntries): UnsavedEdi
   before,
 });
 
-export const idOf = ({ id }: UnsavedEdit): string => id;
+/** A key that this person and somebody else set without knowing of each other. */
+export interface ChangedTwice {
+  readonly id: string;
+  readonly root: Root;
+  readonly key: string;
+  /** The value that this person set; `undefined` where they deleted it. */
+  readonly mine: unknown;
+  readonly theirs: unknown;
+  /** The entry of the log up to which the page knew what others did. */
+  readonly since: number;
+  /**
+   * `return`: this person was away, and others changed the same meanwhile. `unseen`: the value of this person was
+   * stored, and an edit replaced it whose author had not received it.
+   */
+  readonly cause: "return" | "unseen";
+  /** What to write for each choice; null where the value is not known any more. */
+  readonly writes: { readonly mine: ReplacedEntries; readonly theirs: ReplacedEntries | null };
+}
+
+export const idOf = ({ id }: { readonly id: string }): string => id;
 
 export interface StoredCopy {
   /** One history of the graph, see `epochName`. */
@@ -44,6 +64,10 @@ export interface StoredCopy {
   /** Updates that are durable; together they are the document. */
   readonly known: readonly Uint8Array[];
   readonly waiting: readonly UnsavedEdit[];
+  /** Values that the person has not chosen between yet. */
+  readonly choices?: readonly ChangedTwice[];
+  /** The client ids with which this person has edited the graph on this device. */
+  readonly clients?: readonly number[];
 }
 
 /** One write: all of it or nothing. */
@@ -55,6 +79,10 @@ export interface StoreWrite {
   /** The whole document, which replaces what was known. Only of durable edits. */
   readonly copy: Uint8Array | null;
   readonly seq: number;
+  /** Choices to keep from now on, and the ids of those that were made. */
+  readonly choices?: { readonly put: readonly ChangedTwice[]; readonly gone: readonly string[] };
+  /** The client id of the durable edits. */
+  readonly client?: number;
 }
 
 /** Somebody else whose edits wait here until they sign in again. */
@@ -81,7 +109,7 @@ export interface EditStore {
   forget(owner: CopyOwner, epoch: string, edits: readonly string[]): Promise<void>;
   /** The graphs of which this person has a copy here, the last used first. */
   graphs(person: string): Promise<readonly KeptGraph[]>;
-  /** Lets go of this person's copies in which nothing waits. */
+  /** Lets go of this person's copies in which no edit and no choice waits. */
   leave(person: string): Promise<void>;
   /** The others with edits of this graph that wait here. */
   others(owner: CopyOwner): Promise<readonly OtherPerson[]>;
@@ -116,7 +144,13 @@ interface Copy {
   name: string;
   seq: number;
   usedAt: number;
+  /** Absent in copies that an older page wrote. */
+  choices?: readonly ChangedTwice[];
+  clients?: readonly number[];
 }
+
+/** The client ids of so many visits are remembered. */
+const MOST_CLIENTS = 100;
 
 type CopyKey = readonly [graph: string, person: string, epoch: string];
 
@@ -175,7 +209,7 @@ export function indexedDbStore(factory: IDBFactory | undefined = globalThis.inde
       const done = finished(work);
       const copies = (await answer(work.objectStore("copies").getAll())) as Copy[];
       const keys = (await answer(work.objectStore("waiting").getAllKeys())) as unknown as CopyKey[];
-      const busy = busyPlaces(keys);
+      const busy = busyPlaces(copies, keys);
       for (const copy of copies) {
         const place: CopyKey = [copy.graph, copy.person, copy.epoch];
         if (copy.person === person && !busy.has(JSON.stringify(place))) remove(work, place);
@@ -239,14 +273,19 @@ async function readOne(work: IDBTransaction, copy: Copy): Promise<StoredCopy> {
     answer(work.objectStore("known").getAll(range)) as Promise<Uint8Array[]>,
     answer(work.objectStore("waiting").getAll(range)) as Promise<UnsavedEdit[]>,
   ]);
-  return { epoch: copy.epoch, seq: copy.seq, known, waiting };
+  const { epoch, seq, choices = [], clients = [] } = copy;
+  return {
+    ...{ epoch, seq, known, waiting },
+    ...(choices.length > 0 && { choices }),
+    ...(clients.length > 0 && { clients }),
+  };
 }
 
 async function writeBatch(
   database: IDBDatabase,
   { graph, person }: CopyOwner,
   epoch: string,
-  { waits, known, durable, copy, seq }: StoreWrite,
+  { waits, known, durable, copy, seq, choices, client }: StoreWrite,
 ): Promise<void> {
   const work = database.transaction(["copies", "known", "waiting"], "readwrite", {
     durability: "strict",
@@ -265,6 +304,12 @@ async function writeBatch(
     waiting.delete([...place, id]);
     if (copy === null) tail.put(update, [...place, freshId()]);
   }
+  const copies = work.objectStore("copies");
+  // Another tab writes to the same copy, so the two lists are changed and not replaced.
+  const old = (await answer(copies.get([...place]))) as Copy | undefined;
+  const changed = new Set([...(choices?.gone ?? []), ...(choices?.put ?? []).map(idOf)]);
+  const rest = (old?.choices ?? []).filter(({ id }) => !changed.has(id));
+  const clients = new Set([...(old?.clients ?? []), ...(client === undefined ? [] : [client])]);
   const entry: Copy = {
     graph,
     epoch,
@@ -272,19 +317,21 @@ async function writeBatch(
     name: person.name,
     seq,
     usedAt: deviceNow(),
+    choices: [...rest, ...(choices?.put ?? [])],
+    clients: [...clients].slice(-MOST_CLIENTS),
   };
-  work.objectStore("copies").put(entry, [...place]);
+  copies.put(entry, [...place]);
   work.commit();
   await done;
 }
 
-/** Lets go of copies in which nothing waits, except the newest and the one in use. */
+/** Lets go of copies in which no edit and no choice waits, except the newest and the one in use. */
 async function prune(database: IDBDatabase, owner: CopyOwner, most: number): Promise<void> {
   const work = database.transaction(["copies", "known", "waiting"], "readwrite");
   const done = finished(work);
   const copies = (await answer(work.objectStore("copies").getAll())) as Copy[];
   const keys = (await answer(work.objectStore("waiting").getAllKeys())) as unknown as CopyKey[];
-  const busy = busyPlaces(keys);
+  const busy = busyPlaces(copies, keys);
   const idle = copies
     .sort((a, b) => b.usedAt - a.usedAt)
     .filter(({ graph, person, epoch }) => {
@@ -295,9 +342,16 @@ async function prune(database: IDBDatabase, owner: CopyOwner, most: number): Pro
   await done;
 }
 
-/** The copies in which something waits. */
-function busyPlaces(waiting: readonly CopyKey[]): ReadonlySet<string> {
-  return new Set(waiting.map(([graph, person, epoch]) => JSON.stringify([graph, person, epoch])));
+/** The copies in which an edit or a choice waits. */
+function busyPlaces(copies: readonly Copy[], edits: readonly CopyKey[]): ReadonlySet<string> {
+  const undecided = copies
+    .filter(({ choices }) => (choices?.length ?? 0) > 0)
+    .map(({ graph, person, epoch }) => [graph, person, epoch] as const);
+  return new Set(
+    [...edits, ...undecided].map(([graph, person, epoch]) =>
+      JSON.stringify([graph, person, epoch]),
+    ),
+  );
 }
 
 /** Each graph once, whatever histories are kept of it. */

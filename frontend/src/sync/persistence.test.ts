@@ -106,6 +106,56 @@ test("an edit that builds on a colleague's is whole after closing the page", asy
   expect(second.doc.store.pendingStructs).toBeNull();
 });
 
+test("values to choose between survive a reload and a closed tab, until each was chosen or dismissed", async () => {
+  const first = await open();
+  server.accept();
+  server.last.end(1006);
+  const fields = ["a", "b", "c"];
+  for (const key of fields) write(first.doc, key, "mine");
+  server.broadcast((doc) => {
+    for (const key of fields) write(doc, key, "theirs");
+  });
+  await vi.advanceTimersByTimeAsync(300);
+  server.accept();
+  const ids = (room: Room) => room.changedTwice.now().map(({ key }) => key);
+  expect(ids(first)).toEqual(fields);
+  await vanish(first);
+  const second = await open();
+  expect(ids(second)).toEqual(fields);
+  const [a] = second.changedTwice.now();
+  if (a === undefined) throw new Error("nothing to choose");
+  server.accept();
+  second.changedTwice.choose(a, "mine");
+  second.changedTwice.choose(a, "theirs");
+  expect(server.doc.getMap("meta").get("a")).toBe("theirs");
+  expect(ids(second)).toEqual(fields); // until the list is closed
+  await vanish(second);
+  const third = await open();
+  expect(ids(third)).toEqual(["b", "c"]);
+  expect(ids(await open(MARI))).toEqual([]);
+  await device.leave(ADA.id);
+  expect(ids(await open())).toEqual(["b", "c"]);
+  third.changedTwice.dismiss();
+  await vanish(third);
+  expect(ids(await open())).toEqual([]);
+});
+
+test("a value of an earlier visit that was replaced unseen is told", async () => {
+  const first = await open();
+  server.accept();
+  write(first.doc, "a", "mine");
+  await vanish(first);
+  const second = await open();
+  server.accept();
+  const other = new Y.Doc();
+  other.clientID = 2 ** 32 - 1; // above any: this value stands
+  write(other, "a", "theirs");
+  server.broadcast((doc) => Y.applyUpdate(doc, Y.encodeStateAsUpdate(other)));
+  expect(second.changedTwice.now()).toMatchObject([
+    { key: "a", mine: "mine", theirs: "theirs", cause: "unseen" },
+  ]);
+});
+
 test("nobody's edits go under another name, and who they wait for is known", async () => {
   const ada = await open(ADA);
   write(ada.doc, "of ada");

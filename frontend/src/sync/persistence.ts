@@ -6,6 +6,7 @@
  */
 
 import {
+  type ChangedTwice,
   type CopyOwner,
   type EditStore,
   idOf,
@@ -32,6 +33,10 @@ export class Persistence {
   private waits: UnsavedEdit[] = [];
   private known: Uint8Array[] = [];
   private durable: UnsavedEdit[] = [];
+  /** Values that the person has not chosen between yet, by id, and the ids to write or to remove. */
+  private choices: ReadonlyMap<string, ChangedTwice> = new Map();
+  private unwritten = new Set<string>();
+  private readonly client: number;
   private seq = 0;
   private tail = 0;
   private copy: (() => Uint8Array | null) | null = null;
@@ -41,10 +46,17 @@ export class Persistence {
   private failed = false;
   private closed = false;
 
-  /** `only` this history, if it is given; else the one that was used last. */
-  constructor(device: EditStore, owner: CopyOwner, only: string | null, onChange: () => void) {
+  /** `only` this history, if it is given; else the one that was used last. `client` is the id of the edits. */
+  constructor(
+    device: EditStore,
+    owner: CopyOwner,
+    client: number,
+    only: string | null,
+    onChange: () => void,
+  ) {
     this.device = device;
     this.owner = owner;
+    this.client = client;
     this.only = only;
     this.epoch = only ?? UNNAMED_EPOCH;
     this.onChange = onChange;
@@ -65,6 +77,7 @@ export class Persistence {
     this.epoch = epoch;
     this.waits = [...waiting()];
     const moved = this.waits.map(idOf);
+    this.unwritten = new Set(this.choices.keys());
     this.tail = TAIL + 1; // the copy is written whole
     this.flush();
     while (this.writing !== null) await this.writing;
@@ -102,7 +115,7 @@ export class Persistence {
       this.epoch = kept?.epoch ?? this.epoch;
       this.seq = Math.max(this.seq, kept?.seq ?? 0);
       this.tail += kept?.known.length ?? 0;
-      if (this.waits.length > 0) this.flush();
+      if (this.waits.length > 0 || this.unwritten.size > 0) this.flush();
       return kept;
     } catch (error) {
       this.fail(error);
@@ -120,6 +133,16 @@ export class Persistence {
   learned(update: Uint8Array): void {
     this.known.push(update);
     this.soon();
+  }
+
+  /** Keeps the choices that the person still has to make; those of before that are missing were made. */
+  undecided(choices: readonly ChangedTwice[]): void {
+    const now = new Map(choices.map((choice) => [choice.id, choice]));
+    for (const id of new Set([...this.choices.keys(), ...now.keys()])) {
+      if (this.choices.get(id) !== now.get(id)) this.unwritten.add(id);
+    }
+    this.choices = now;
+    if (this.unwritten.size > 0) this.flush();
   }
 
   /** These edits are stored by the server. */
@@ -145,6 +168,7 @@ export class Persistence {
     this.waits = [];
     this.known = [];
     this.durable = [];
+    this.unwritten.clear();
     if (this.opened) await this.device.forget(this.owner, this.epoch, gone);
     this.opened = false;
   }
@@ -162,7 +186,8 @@ export class Persistence {
   close(): void {
     this.closed = true;
     clearTimeout(this.timer);
-    if (this.waits.length + this.known.length + this.durable.length > 0) this.flush();
+    const { waits, known, durable, unwritten } = this;
+    if (waits.length + known.length + durable.length + unwritten.size > 0) this.flush();
   }
 
   private soon(wait = KNOWN_LATER_MS): void {
@@ -180,13 +205,24 @@ export class Persistence {
   }
 
   private batch(): StoreWrite {
-    const { waits, known, durable, seq } = this;
+    const { waits, known, durable, seq, choices, client } = this;
     this.tail += known.length + durable.length;
     const copy = this.tail > TAIL ? (this.copy?.() ?? null) : null;
     if (copy !== null) this.tail = 1;
     this.known = [];
     this.durable = [];
-    return { waits: [...waits], known: copy === null ? known : [], durable, copy, seq };
+    const ids = [...this.unwritten];
+    this.unwritten.clear();
+    return {
+      waits: [...waits],
+      known: copy === null ? known : [],
+      ...{ durable, copy, seq },
+      choices: {
+        put: ids.flatMap((id) => choices.get(id) ?? []),
+        gone: ids.filter((id) => !choices.has(id)),
+      },
+      ...(durable.length > 0 && { client }),
+    };
   }
 
   private wrote(batch: StoreWrite): void {
@@ -194,7 +230,7 @@ export class Persistence {
     this.writing = null;
     this.failed = false;
     this.waits = this.waits.filter((edit) => !written.has(edit));
-    if (this.waits.length > 0 || this.durable.length > 0) this.flush();
+    if (this.waits.length + this.durable.length + this.unwritten.size > 0) this.flush();
     this.onChange();
   }
 
@@ -202,6 +238,9 @@ export class Persistence {
     this.writing = null;
     this.known.unshift(...batch.known);
     this.durable.unshift(...batch.durable);
+    for (const id of [...(batch.choices?.put ?? []).map(idOf), ...(batch.choices?.gone ?? [])]) {
+      this.unwritten.add(id);
+    }
     if (!this.closed) this.soon(AGAIN_MS);
     this.fail(error);
   }

@@ -197,7 +197,11 @@ class Connection implements Room, SocketHandler {
     person,
     epoch,
   }: PersistenceOptions): Persistence {
-    return new Persistence(device, { graph, person }, epoch ?? null, () => this.say({}));
+    const kept = new Persistence(device, { graph, person }, this.doc.clientID, epoch ?? null, () =>
+      this.say({}),
+    );
+    this.changedTwice.onChange(() => kept.undecided(this.changedTwice.undecided()));
+    return kept;
   }
 
   private async recall(persistence: Persistence): Promise<void> {
@@ -212,9 +216,10 @@ class Connection implements Room, SocketHandler {
     this.socket.dial();
   }
 
-  private adopt({ known, waiting, seq }: StoredCopy): void {
+  private adopt({ known, waiting, seq, choices = [], clients = [] }: StoredCopy): void {
     this.doc.transact(() => {
       for (const update of known) Y.applyUpdate(this.doc, update, this);
+      this.changedTwice.restore({ choices, clients });
       for (const { update } of waiting) Y.applyUpdate(this.doc, update, this);
     }, this);
     const recent = this.outbox.edits;
@@ -300,6 +305,7 @@ class Connection implements Room, SocketHandler {
       case messages.ACK: {
         const stored = this.outbox.durable(decoding.readVarUint(decoder));
         const seq = decoding.readVarUint(decoder);
+        this.changedTwice.durable(stored);
         if (stored.length > 0) this.persistence?.stored(stored);
         this.persistence?.shows(seq, this.copy);
         this.isAhead = false;
@@ -367,7 +373,8 @@ class Connection implements Room, SocketHandler {
   };
 
   private learn(update: Uint8Array): void {
-    this.changedTwice.take(this.outbox.edits, () => Y.applyUpdate(this.doc, update, this));
+    const { seq } = this.current; // the one that counts in what comes now is told after it
+    this.changedTwice.take(this.outbox.edits, seq, () => Y.applyUpdate(this.doc, update, this));
     this.persistence?.learned(update);
   }
 

@@ -15,14 +15,14 @@ import {
 import { type Colored, colorsOf, useKnownPeople } from "../api/people";
 import { isEqual } from "../graph/equal";
 import { EMPTY_GRAPH, type Graph } from "../graph/model";
-import type { ChangedTwice } from "./changed-twice";
+
 import {
   type ConnectionNotice,
   GraphConnection,
   type GraphConnectionState,
   wouldLose,
 } from "./graph-connection";
-import { browserStore, idOf, type OtherPerson } from "./indexed-db";
+import { browserStore, type ChangedTwice, idOf, type OtherPerson } from "./indexed-db";
 import type { OpenRoom } from "./open-room";
 import type { Participant } from "./presence/presence";
 import { type StrandedEdits, strandedEditsOf } from "./replaced-history";

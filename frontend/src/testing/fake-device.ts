@@ -1,6 +1,13 @@
 /** A device in memory for tests, which can refuse, hang, and lose what was not written yet. */
 
-import type { CopyOwner, EditStore, StoredCopy, StoreWrite, UnsavedEdit } from "../sync/indexed-db";
+import type {
+  ChangedTwice,
+  CopyOwner,
+  EditStore,
+  StoredCopy,
+  StoreWrite,
+  UnsavedEdit,
+} from "../sync/indexed-db";
 
 interface StoredGraph {
   graph: string;
@@ -9,6 +16,8 @@ interface StoredGraph {
   seq: number;
   known: Uint8Array[];
   waiting: Map<string, UnsavedEdit>;
+  choices: Map<string, ChangedTwice>;
+  clients: number[];
 }
 
 export class FakeEditStore implements EditStore {
@@ -24,9 +33,11 @@ export class FakeEditStore implements EditStore {
     this.check();
     return this.entries
       .filter((e) => e.graph === graph && e.person.id === person.id)
-      .map(({ epoch, seq, known, waiting }) => ({
+      .map(({ epoch, seq, known, waiting, choices, clients }) => ({
         epoch,
         seq,
+        choices: [...choices.values()],
+        clients: [...clients],
         known: [...known],
         waiting: [...waiting.values()],
       }));
@@ -43,6 +54,9 @@ export class FakeEditStore implements EditStore {
       entry.waiting.delete(id);
       if (batch.copy === null) entry.known.push(update);
     }
+    for (const choice of batch.choices?.put ?? []) entry.choices.set(choice.id, choice);
+    for (const id of batch.choices?.gone ?? []) entry.choices.delete(id);
+    if (batch.client !== undefined) entry.clients.push(batch.client);
     entry.seq = batch.seq;
   }
 
@@ -72,7 +86,9 @@ export class FakeEditStore implements EditStore {
 
   async leave(person: string): Promise<void> {
     this.check();
-    const stay = this.entries.filter((e) => e.person.id !== person || e.waiting.size > 0);
+    const stay = this.entries.filter(
+      (e) => e.person.id !== person || e.waiting.size + e.choices.size > 0,
+    );
     this.entries.splice(0, this.entries.length, ...stay);
   }
 
@@ -90,7 +106,8 @@ export class FakeEditStore implements EditStore {
       this.entries.push(old);
       return old;
     }
-    const fresh = { graph, person, epoch, seq: 0, known: [], waiting: new Map() };
+    const empty = { known: [], waiting: new Map(), choices: new Map(), clients: [] };
+    const fresh = { graph, person, epoch, seq: 0, ...empty };
     this.entries.push(fresh);
     return fresh;
   }
