@@ -22,6 +22,7 @@ from action_assistant.runner.runs.events import Answered, End, Proof, Published,
 from action_assistant.runner.runs.fold import is_news
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.stop.doubtful_errors import DoubtfulErrors
+from action_assistant.runner.stop.engine_threads import EngineThreads
 from action_assistant.runner.stop.loading import LoadingAction, LoadingWatch, in_words
 from action_assistant.runner.stop.proof import RestProof, hash_of
 from action_assistant.umrf.triggers import NEVER_BEGAN
@@ -74,6 +75,10 @@ class MonitoredRun(Protocol):
         """The engine's process was seen to end, and the code of all its actions with it."""
         ...
 
+    def threads_ended(self) -> None:
+        """No thread of the engine is left that could run code of this run."""
+        ...
+
     def alarm(self, code: str, text: str) -> None:
         """Tell people something now."""
         ...
@@ -117,6 +122,7 @@ class Monitor:
         self._beside: TaskGroup
         self._parts = SubGraphs()
         self._loading = LoadingWatch(it.run.graph_name, meddled=it.run.reshaped)
+        self._threads = EngineThreads()
         self._reads = False  # the arrows of graphs, for that
         self._loads_since: float | None = None
         self._answered = False  # by a get, since the last feedback
@@ -134,6 +140,7 @@ class Monitor:
     def starts(self, umrf: str) -> None:
         """This graph is being started, now: the engine's log may tell what becomes of it."""
         self._start.begins()
+        self._threads.starts(self._link.standing.process)
         self.sends(umrf)
 
     def sends(self, umrf: str, *, beside: bool = False) -> None:
@@ -356,6 +363,8 @@ class Monitor:
         if order < self._disturbed:
             return
         own, at_rest = shown[0], self._rest.seen(shown, asked)
+        if any(each.active for each in ours):
+            self._threads.see_moving()
         doubt = self._doubts.look(shown)
         if doubt and doubt != self._it.run.unconfirmed:
             self._it.doubt(doubt)
@@ -364,6 +373,8 @@ class Monitor:
             self.trouble = f"{going} has not stopped yet" if going else self._it.run.unconfirmed
             if self._exact and at_rest:
                 self._it.engine_ended()  # a simulated one is switched off, and nothing has moved
+            elif at_rest and self._threads.have_ended(self._it.run.process):
+                self._it.threads_ended()
             return
         if _never_began(own) and self.umrf is not None and self._lacking is None:
             self._lacking = ""
@@ -409,6 +420,8 @@ class Monitor:
             self._reads = True
             self._beside.start_soon(self._found_out, partial(self._read_arrows, unread, answer))
         found = self._loading.actions(ours)
+        if found and self._threads.have_ended(self._it.run.process):
+            found = ()
         if not found:
             self._loads_since = None
             self._it.load((), 0.0)

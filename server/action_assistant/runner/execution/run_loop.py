@@ -412,12 +412,22 @@ class OpenRun:
 
     def engine_ended(self) -> None:
         """The engine's process has ended, and the code of every action with it."""
-        process, run = self.run.process, self.run
+        process = self.run.process
         how = (
             "The simulated engine was switched off."
             if process is None
             else f"The engine's process, {process.pid} on this computer, has ended."
         )
+        self._rests_by_itself(how)
+
+    def threads_ended(self) -> None:
+        """No thread is left that the engine began for this run, and none of its code goes on."""
+        process = self.run.process
+        where = f"process {process.pid} on this computer" if process else "the engine's process"
+        self._rests_by_itself(f"No thread that the engine began for this run is left in {where}.")
+
+    def _rests_by_itself(self, how: str) -> None:
+        run = self.run
         state: End = "error" if run.doubt else "lost"
         self._rests(AtRest(None, self._clock_us(), how), state, run.doubt or run.lost or how)
 

@@ -13,9 +13,17 @@ from typing import Final
 import msgspec
 
 _PROC: Final = Path("/proc")
+_PROGRAM: Final = "action_engine_node"  # the engine's own, as ROS 2 starts it
 _FAST_DDS: Final = "010f"  # vendor id at the beginning of a GUID prefix
 _FIRST_PORT: Final = 7400  # of DDS; each domain has the next 250
 _PORTS: Final = 250
+
+
+class Thread(msgspec.Struct, frozen=True):
+    """One thread of a process. `began`: clock ticks after boot."""
+
+    number: int
+    began: int
 
 
 class EngineProcess(msgspec.Struct, frozen=True):
@@ -69,6 +77,25 @@ def engine_process(prefix: str, ours: str, domain: int, name: str) -> EngineProc
     return process(found[0]) if len(found) == 1 else None
 
 
+def threads(known: EngineProcess) -> frozenset[Thread] | None:
+    """Return the threads of a process; None when it has ended, when they cannot be seen, or when it is
+    not the engine's own node. Other engines may not begin a thread for each action."""
+    folder = _PROC / str(known.pid)
+    try:
+        program = (folder / "cmdline").read_bytes().partition(b"\0")[0].decode(errors="replace")
+        if _here() != (known.boot, known.namespace) or Path(program).name != _PROGRAM:
+            return None
+        numbers = [each.name for each in (folder / "task").iterdir()]
+        found = frozenset(
+            Thread(int(each), began)
+            for each in numbers
+            if (began := _began(folder / "task" / each))
+        )
+        return found if _started(known.pid) == known.started else None
+    except OSError:
+        return None
+
+
 def _here() -> tuple[str, str]:
     boot = (_PROC / "sys/kernel/random/boot_id").read_text().strip()
     return boot, str((_PROC / "self/ns/pid").readlink())
@@ -78,11 +105,24 @@ def _started(pid: int) -> int | None:
     """When a process began; None when it is over, also while its parent has not taken note of it."""
     folder = _PROC / str(pid)
     try:
-        fields = (folder / "stat").read_text().rpartition(")")[2].split()
+        fields = _fields(folder)
         is_dead = fields[0] in "ZX" and len(list((folder / "task").iterdir())) <= 1
     except (FileNotFoundError, ProcessLookupError):
         return None
     return None if is_dead else int(fields[19])
+
+
+def _began(folder: Path) -> int | None:
+    """Return when a thread began, in clock ticks after boot; None when it has ended."""
+    try:
+        return int(_fields(folder)[19])
+    except (FileNotFoundError, ProcessLookupError):
+        return None
+
+
+def _fields(folder: Path) -> list[str]:
+    """Return the fields of a `stat` file of /proc from the state on."""
+    return (folder / "stat").read_text().rpartition(")")[2].split()
 
 
 def _pids() -> Iterator[int]:

@@ -244,7 +244,8 @@ class Loading(msgspec.Struct, frozen=True, omit_defaults=True):
 
 class AtRest(msgspec.Struct, frozen=True):
     """The observation that ended a run where no answer of the engine proves rest: `by` a person who
-    looked, or by the runner itself (None), which saw the engine's process end."""
+    looked, or by the runner itself (None), which saw the engine's process, or its last
+    thread for the run, end."""
 
     by: Author | None
     at: int

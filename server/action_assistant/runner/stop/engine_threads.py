@@ -1,0 +1,54 @@
+"""The threads that an engine began since the start of one run, as this computer's kernel shows them.
+
+The engine's node loads and runs each action in a thread of its own, which the action before it or the
+start begins, and each thread of the engine ends by itself. So once none is left that began since the
+start was handed over, no code of the run goes on, and none of it can begin. The answers of an engine
+show neither an action that loads nor the thread of one that it has given up as ERROR.
+"""
+
+from collections.abc import Callable
+from typing import Final
+
+from action_assistant.runner.links.engine_process import EngineProcess, Thread, threads
+
+_SCANS: Final = 2  # a list of threads is no picture of one moment
+
+ThreadsOf = Callable[[EngineProcess], frozenset[Thread] | None]
+
+
+class EngineThreads:
+    """Compares the threads of an engine's process with those before the start of a run.
+
+    It concludes nothing of an engine whose process is not seen from here, or of which no thread of this
+    run was ever seen while an action of it moved.
+    """
+
+    def __init__(self, threads_of: ThreadsOf = threads) -> None:
+        self._threads_of = threads_of
+        self._process: EngineProcess | None = None
+        self._before: frozenset[Thread] | None = None
+        self._was_seen = False
+
+    def starts(self, process: EngineProcess | None) -> None:
+        """Remember the threads there are right before the start is handed over."""
+        self._process = process
+        self._before = None if process is None else self._threads_of(process)
+        self._was_seen = False
+
+    def see_moving(self) -> None:
+        """Look for a thread of the run while an answer shows an action of it moving."""
+        if not self._was_seen and self._before is not None:
+            self._was_seen = bool(self._since_the_start())
+
+    def have_ended(self, process: EngineProcess | None) -> bool:
+        """Return whether no thread is left that began since the start, in the process that the run was
+        sent to."""
+        if not self._was_seen or process is None or process != self._process:
+            return False
+        return all(self._since_the_start() == frozenset() for _ in range(_SCANS))
+
+    def _since_the_start(self) -> frozenset[Thread] | None:
+        if self._process is None or self._before is None:
+            return None
+        now = self._threads_of(self._process)
+        return None if now is None else now - self._before
