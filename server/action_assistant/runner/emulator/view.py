@@ -20,7 +20,7 @@ from action_assistant.umrf.semantics import (
     Trace,
 )
 from action_assistant.umrf.semantics.parts import Running, build
-from action_assistant.umrf.semantics.printing import Sheet
+from action_assistant.umrf.semantics.printing import GraphPrinter
 from action_assistant.umrf.semantics.script import DEFAULT
 
 ENDED: Final = frozenset({"FINISHED", "HALTED", "STOPPED", "ERROR"})
@@ -31,7 +31,7 @@ _MESSAGES: Final = 10  # of one action
 class _Held:
     """One graph that the engine holds."""
 
-    def __init__(self, running: Running, sheet: Sheet) -> None:
+    def __init__(self, running: Running, sheet: GraphPrinter) -> None:
         self.running = running
         self.sheet = sheet
         self.state = "UNINITIALIZED"
@@ -147,12 +147,12 @@ class PublishedGraphs:
             held = self._held[name] = _Held(running, self._sheet(running, again=again))
         return held
 
-    def _sheet(self, running: Running, *, again: bool = False) -> Sheet:
+    def _sheet(self, running: Running, *, again: bool = False) -> GraphPrinter:
         """A graph loses its description when it is matched; the text of one that is held already is
         not matched again."""
         plan = self.plans.get(running.own if running.home else running.name)
         whole = not self._quirks.drops_fields
-        return Sheet(
+        return GraphPrinter(
             running,
             plan.attributes if plan is not None else {},
             described=whole or again,
@@ -186,4 +186,4 @@ def _printed(plan: GraphPlan) -> str:
     """An indexed graph, which keeps its description."""
     running = Running(plan.graph.name, plan.graph, None, None)
     build(running, {action.key: (DEFAULT,) for action in plan.graph.actions})
-    return Sheet(running, plan.attributes, described=True).text("UNINITIALIZED", {}, {})
+    return GraphPrinter(running, plan.attributes, described=True).text("UNINITIALIZED", {}, {})

@@ -1,1 +1,1 @@
-"""The courses that a graph can take, followed without simulating each of them whole."""
+"""Courses that a graph can take, followed without simulating each of them completely."""

@@ -1,9 +1,10 @@
-"""How a graph comes to take an arrow: a search for the results of actions, and the order of their ends.
+"""Searches for the results of actions, and the order of their ends, under which a graph takes an
+arrow.
 
-Every state that can follow from another by one end of an action is looked at once, those first from
-which the fewest arrows lead to the parent. What is found is played by the simulator, which decides. A
-search that runs out of states proves that no results and no order of ends take the arrow, as long as
-actions give their outputs and stop when they are told to.
+Each state that can follow from another by one end of an action is examined once; states with the
+fewest arrows to the parent come first. The simulator then plays the script that was found, and
+decides. A search that runs out of states proves that no results and no order of ends take the
+arrow, provided that actions give their outputs and stop when they are told to.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -23,27 +24,27 @@ from action_assistant.umrf.semantics.simulate import DAY_MS, simulate
 from action_assistant.umrf.semantics.steps import MOST
 from action_assistant.umrf.semantics.transitions import GIVING_UP, IDLE, RUNS, STOPS
 
-#: Places of states that one search may look at: about two seconds.
+#: The states of single actions that one search may examine: about two seconds.
 BUDGET: Final = 2_000_000
-#: Between two ends; far less than what a stop may take.
+#: Seconds between two ends; far less than a stop may take.
 _GAP_S: Final = 0.1
 _FAR: Final = 1 << 30
 
 
 class ArrowReached(msgspec.Struct, frozen=True, tag_field="verdict", tag="reached"):
-    """Under this script the arrow is taken."""
+    """The arrow is taken under this script."""
 
     script: Script
 
 
 class ArrowUnreachable(msgspec.Struct, frozen=True, tag_field="verdict", tag="unreachable"):
-    """Nothing takes it: so many states are all that there are."""
+    """The arrow cannot be taken: this many states were examined, and there are no others."""
 
     states: int
 
 
 class ArrowUndecided(msgspec.Struct, frozen=True, tag_field="verdict", tag="undecided"):
-    """After so many states it is not known, and why."""
+    """It is not known after this many states, with the reason."""
 
     states: int
     why: str
@@ -56,14 +57,15 @@ ArrowSearch: TypeAlias = ArrowReached | ArrowUnreachable | ArrowUndecided
 
 
 class _End(NamedTuple):
-    """One action ends. `result` counts where it runs."""
+    """The end of one action. `result` is used if the action runs."""
 
     action: int
     result: Precondition
 
 
 class _GraphState(NamedTuple):
-    """A state of the whole graph: of each place, and how many run and are active."""
+    """The state of the whole graph: the state of each action and of the exit, and how many are
+    running and active."""
 
     states: tuple[State, ...]
     running: int
@@ -71,7 +73,7 @@ class _GraphState(NamedTuple):
 
 
 class _RecordingInstant(Instant):
-    """An instant that notes which edges were answered with anything but to ignore it."""
+    """An instant that records which edges were answered with anything but to ignore the result."""
 
     __slots__ = ("asked",)
 
@@ -85,10 +87,10 @@ class _RecordingInstant(Instant):
         return super()._ask(index, edge, result)
 
     def _only_ends(self) -> bool:
-        return False  # each edge shall be seen, also where it is known to lead to the exit
+        return False  # every edge is to be recorded, also one that is known to lead to the exit
 
     def after(self, before: _GraphState) -> _GraphState:
-        """The state that follows. Times do not matter: any order of ends is looked at."""
+        """Return the state that follows. Times are dropped, since any order of ends is searched."""
         states = list(before.states)
         for index, state in self.states.items():
             states[index] = state._replace(due=0.0)
@@ -101,8 +103,12 @@ def search_arrow(
     budget: int = BUDGET,
     inside: Mapping[str, Graph] | None = None,
 ) -> ArrowSearch:
-    """Search for a script under which an arrow is taken, with these graphs inside. What ends how inside
-    is not searched: it is taken as if any end were possible, and proven by the simulator."""
+    """Search for a script under which an arrow is taken, with the graphs of `inside` as sub-graphs.
+
+    The ends of a sub-graph are not searched: it is assumed to end with any result, and the
+    simulator proves whether the script works. `budget`: how many states of single actions to
+    examine.
+    """
     net = Network(graph)
     indices = {action.key: net.index.get(action.full_name, -2) for action in graph.actions}
     indices |= {ENTRY: -1, EXIT: net.exit}
@@ -132,7 +138,8 @@ def search_arrow(
 
 
 class _Search:
-    """The search for one arrow. `looked`: states; `spent`: places of them."""
+    """The search for one arrow. `looked`: how many graph states were found; `spent`: how much of
+    the budget was used."""
 
     def __init__(self, net: Network, wanted: tuple[int, int, Precondition], budget: int) -> None:
         self.looked = 0
@@ -144,7 +151,7 @@ class _Search:
         self._results = [self._telling(row) for row in net.edges]
 
     def found(self) -> tuple[_End, ...] | None:
-        """The ends after which the arrow is taken, in their order; None if they were not found."""
+        """Return the ends after which the arrow is taken, in order; None if none were found."""
         first = _first(self._net)
         instant = _RecordingInstant(self._net, first)
         instant.begin()
@@ -174,7 +181,7 @@ class _Search:
         self.looked += 1
         active = (n for n, state in enumerate(moment.states) if state.does in DUE)
         far = min((self._far[index] for index in active), default=_FAR)
-        if far < _FAR:  # else nothing that goes on leads there
+        if far < _FAR:  # otherwise no active action leads to the arrow
             heappush(open_, (2 * far + depth, depth, self.looked, moment))
 
     def _ends(self, moment: _GraphState) -> Iterator[_End]:
@@ -190,8 +197,11 @@ class _Search:
                     pass
 
     def _telling(self, row: Sequence[EdgeQuestion | None]) -> list[Precondition]:
-        """The results of an action that can make a difference: a failed one gives nothing and may
-        begin anew, and a bypass hands on the result itself."""
+        """Return the results of an action that can make a difference.
+
+        A failed action gives no outputs and may begin again, and a bypass passes the result itself
+        on.
+        """
         if any(edge is None or "bypass" in edge.responses.values() for edge in row):
             return list(OUTCOMES)
         found: dict[tuple[object, ...], Precondition] = {}
@@ -202,7 +212,7 @@ class _Search:
         return list(found.values())
 
     def script(self, ends: Sequence[_End]) -> Script:
-        """Behaviours that make actions end so, one after the other."""
+        """Return the behaviours under which actions end like this, one after the other."""
         visits: dict[int, list[_Visit]] = {}
         before = _first(self._net)
         for step, end in enumerate((None, *ends)):
@@ -231,7 +241,7 @@ class _Search:
 
 
 class _Visit(NamedTuple):
-    """From when to when an action goes on, in steps; -1 is never."""
+    """One run of an action, from step to step; -1 stands for never."""
 
     begun: int
     stopped: int = -1
@@ -240,7 +250,8 @@ class _Visit(NamedTuple):
 
 
 def _behaviours(visits: Sequence[_Visit], last: int) -> Iterator[Behaviour]:
-    """One for each visit; whoever is not asked to end otherwise ends true after all that."""
+    """Yield one behaviour for each run. A run that is not asked to end otherwise ends with on_true
+    after all the others."""
     for visit in visits:
         if visit.stopped >= 0:
             ended = visit.ended if visit.ended >= 0 else last + 1
@@ -270,7 +281,7 @@ def _way(
 
 
 def _distances(net: Network, to: int) -> list[int]:
-    """How many arrows lead at least from each place to this one."""
+    """Return for each action the least number of arrows from it to this one."""
     above: dict[int, list[int]] = {}
     for index, row in enumerate(net.edges):
         for edge in row:
@@ -279,7 +290,7 @@ def _distances(net: Network, to: int) -> list[int]:
                 above.setdefault(edge.child, []).append(index)
     far = [_FAR] * (len(net.nodes) + 1)
     if to < 0:
-        return far  # the entry is asked at the start, and never again
+        return far  # the entry reports at the start only
     far[to] = 0
     border = [to]
     while border:

@@ -1,4 +1,5 @@
-"""The course of a graph when every action ends with on_true, instant by instant, to compare others with."""
+"""The course of a graph in which every action ends with on_true, instant by instant. Other courses
+are compared with it."""
 
 from bisect import bisect_left
 from heapq import heappop, heappush
@@ -9,21 +10,24 @@ from action_assistant.umrf.courses.instants import DUE, Instant, State
 from action_assistant.umrf.courses.network import Network
 from action_assistant.umrf.semantics.transitions import RUNS
 
-#: `stuck`: RUNNING for ever with nothing that runs; `endless`: laps without end, or longer than was
-#: looked at; `never`: an entry action lacks a value, so it does not start.
+#: `stuck`: the graph stays RUNNING while no action runs. `endless`: it runs laps without end, or longer than it was
+#: followed. `never`: it does not start, since an entry action lacks a value.
 Kind: TypeAlias = Literal["finished", "halted", "crashed", "locked", "stuck", "endless", "never"]
 
-#: Ends of actions that are followed: this for each action, and some. Loops have no end.
+#: A course is followed for `LAPS` ends of each action and `MORE` in addition, since loops have no end.
 LAPS: Final = 4
 MORE: Final = 100
 
 
 class Outcome(NamedTuple):
-    """How a graph ends. `early`: FINISHED while something runs. Of one that is stuck: `waiting`, who
-    was asked and still waits (a bit for each place); `lacking`, the parents that the exit has not
-    heard of; `inputs`, whether it lacks outputs, which `last` (a place) did not give. `cut`: it was
-    not followed to an end, nor into a lap that is like another. `endless`: the spontaneous actions
-    that go on in a graph that is FINISHED."""
+    """How a graph ends. `early`: it is FINISHED while an action runs.
+
+    For a stuck graph: `waiting`, the actions that were asked and still wait (a mask by index);
+    `lacking`, the names of required parents that have not reported to the exit; `inputs`, whether
+    the exit lacks values, which the action `last` did not give. `cut`: the course was followed
+    neither to its end nor into a repeated lap. `endless`: the spontaneous actions that continue in
+    a FINISHED graph (a mask).
+    """
 
     kind: Kind
     early: bool = False
@@ -36,8 +40,12 @@ class Outcome(NamedTuple):
 
 
 class BaselineCourse:
-    """Histories by instant: `times`, `roots` (who ended), `touched`, and sums after each. Of each place
-    `instants` and `states`: when it was asked or ended, and its state then."""
+    """The history of the course. By instant: `times`, `roots` (the action that ended), `touched`,
+    and sums after each instant.
+
+    By action, `instants` and `states`: the instants at which it was asked or ended, and its state
+    after each.
+    """
 
     def __init__(self, net: Network) -> None:
         self.net = net
@@ -53,26 +61,27 @@ class BaselineCourse:
         self.last: list[int] = []
         self.instants: list[list[int]] = [[] for _ in range(count)]
         self.states: list[list[State]] = [[] for _ in range(count)]
-        #: Instants that would have halted the graph if so many fewer had run.
+        #: The instants that would have halted the graph if this many fewer actions had run.
         self.halting: dict[int, list[int]] = {}
         self._due: list[tuple[float, int]] = []
         self._waiting: Mask = 0
         self._came: Mask = 0
         self._last = -1
-        #: Whether it was seen to come to the same point twice.
+        #: True if the course came to the same point twice.
         self.laps = False
-        #: Whether two ended at one moment: only the engine knows in which order.
+        #: True if two actions ended at one moment: only the engine knows in which order.
         self.tied = False
         self.outcome = Outcome("never") if self._never_starts() else self._followed()
 
     def state(self, index: int, before: int) -> State:
-        """The state of a place before an instant, by its number."""
+        """Return the state of an action before the instant with the number `before`."""
         own = self.instants[index]
         found = len(own) if before > (own[-1] if own else -1) else bisect_left(own, before)
         return self.states[index][found - 1] if found else self.initial[index]
 
     def first_end(self, index: int) -> int | None:
-        """The instant at which an action ends for the first time, unless that is by a stop."""
+        """Return the number of the instant at which an action first ends by itself; None if it does
+        not."""
         for instant in self.instants[index]:
             if self.roots[instant] == index:
                 return instant if self.state(index, instant).does == RUNS else None
@@ -144,7 +153,8 @@ class BaselineCourse:
         self.last.append(self._last)
 
     def _seen(self, at: float) -> tuple[object, ...]:
-        """What is the same at the same point of two laps: who ended, and all states, by the round."""
+        """Return a value that is equal at the same point of two laps: who ended, and all states,
+        relative to the round."""
         start = at // self.net.round_ms * self.net.round_ms
         states = [
             state._replace(due=state.due - start) if state.does in DUE else state
@@ -156,7 +166,7 @@ class BaselineCourse:
 
 
 def stuck(net: Network, waiting: Mask, ended: State, last: int) -> Outcome:
-    """A graph in which nothing runs any more, though it has not ended."""
+    """Return the outcome of a graph in which nothing runs any more although it has not ended."""
     lacking = frozenset(
         name for bit, name in net.required[net.exit].items() if not ended.links & bit
     )

@@ -1,7 +1,7 @@
-"""Coverage: which arrows of a graph some courses took, and which actions they came to. Pure.
+"""Coverage: the arrows of a graph that some courses took, and the actions that ran in them. Pure.
 
-An arrow is taken when its parent ends with that outcome and the engine asks the child for anything but
-to ignore it, ready or not: the trace tells so (docs/contracts.md 5.1, `edge`).
+An arrow is taken when its parent ends with that outcome and the engine asks the child for a
+response other than to ignore it, whether or not the child is ready (docs/contracts.md 5.1, `edge`).
 """
 
 from collections.abc import Iterable, Iterator
@@ -21,7 +21,7 @@ from action_assistant.umrf.model import (
 from action_assistant.umrf.semantics.parts import ENTRY_NODE, EXIT_NODE
 from action_assistant.umrf.semantics.trace import EdgeEval, NodeStateEvent, Trace
 
-#: Arrows and actions of an answer.
+#: The most arrows and actions that an answer lists.
 SHOWN: Final = 2_000
 
 
@@ -34,15 +34,18 @@ class OutcomeArrow(msgspec.Struct, frozen=True, order=True):
 
 
 class TakenArrows(msgspec.Struct, frozen=True):
-    """What one course took."""
+    """The arrows that one course took, and the actions that ran in it."""
 
     arrows: frozenset[OutcomeArrow]
     actions: frozenset[Key]
 
 
 class ArrowCoverage(msgspec.Struct, frozen=True, kw_only=True):
-    """What some courses took together. `untaken` and `unvisited`: what none of them did, in the order
-    of the file, as many as are shown."""
+    """The coverage of some courses together.
+
+    `untaken` and `unvisited`: arrows that no course took and actions that ran in none, in file
+    order, at most `SHOWN` of each.
+    """
 
     arrows: int
     taken: int
@@ -53,7 +56,7 @@ class ArrowCoverage(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def arrows_of(graph: Graph) -> Iterator[OutcomeArrow]:
-    """Every outcome that a child answers with anything but to ignore it, each once."""
+    """Yield every outcome of an arrow that its child does not ignore, each once, in file order."""
     there = {action.key for action in graph.actions if not action.missing} | {ENTRY, EXIT}
     found: dict[OutcomeArrow, None] = {}
     for relation in graph.relations:
@@ -70,14 +73,15 @@ def arrows_of(graph: Graph) -> Iterator[OutcomeArrow]:
 
 
 def outcomes_of(relation: Relation) -> list[Precondition]:
-    """The outcomes of its parent that its child answers."""
+    """Return the outcomes of an arrow's parent that its child does not ignore."""
     if relation.parent == ENTRY:
-        return ["on_true"]  # an entry says nothing else, whatever its conditions
+        return ["on_true"]  # the entry reports no other outcome, whatever the conditions say
     return [o for o in PRECONDITIONS if relation.conditions.answer(o) != "ignore"]
 
 
 def arrows_taken(graph: Graph, traces: Iterable[Trace]) -> TakenArrows:
-    """What a course of this graph took. What happens in its sub-graphs is theirs."""
+    """Return the arrows and actions of this graph that a trace shows. Events of its sub-graphs are
+    not counted."""
     keys = {a.full_name: a.key for a in graph.actions if not a.missing}
     ends = keys | {ENTRY_NODE: ENTRY, EXIT_NODE: EXIT}
     labels = {f"{p} => {c}": (ends[p], ends[c]) for p, c in _pairs(graph, ends)}
@@ -106,7 +110,7 @@ def _pairs(graph: Graph, ends: dict[str, Key]) -> Iterator[tuple[str, str]]:
 
 
 def coverage(graph: Graph, courses: Iterable[TakenArrows]) -> ArrowCoverage:
-    """What of this graph these courses took together."""
+    """Return the coverage of a graph by these courses together."""
     took: set[OutcomeArrow] = set()
     came: set[Key] = set()
     for each in courses:

@@ -1,10 +1,12 @@
-"""What becomes of a graph when one action ends otherwise, followed only where it differs.
+"""The end of a graph when one action ends otherwise, followed only where the course differs from
+the baseline.
 
-An action's end reaches other actions by arrows only, and when an action ends depends on when it began
-only. So a course with one other end is the usual one apart from the states that differ from it, and
-those are few: they are kept by place, and only the instants that touch one of them are gone through
-again. When none is left, the rest is the usual course; when only one action runs and everything behind
-it is as at the start, the rest is as of anybody else who came there (decision 45).
+An action's end reaches other actions only along arrows, and the time of its end depends only on
+when it began. So a course with one other end equals the baseline course except for some states.
+These states are kept by index, and only the instants that touch one of them are followed. If no
+state differs any more, the rest is the baseline course. If a single action runs and everything
+reachable from it is as at the start, the rest is as in any other course that came to this point
+(decision 45).
 """
 
 from bisect import bisect_left
@@ -17,34 +19,35 @@ from action_assistant.umrf.courses.instants import DUE, Instant, State
 from action_assistant.umrf.model import Precondition
 from action_assistant.umrf.semantics.transitions import ACTIVE, IDLE, RUNS
 
-#: Differences that are remembered with what came of them.
+#: The most differing states of a situation whose outcome is remembered.
 _FEW: Final = 8
 
 
 class SimultaneousEnds(Exception):
-    """Two actions end at one moment, in an order that is known to the engine only."""
+    """Raised when two actions end at one moment: their order is known to the engine only."""
 
 
 _Key = tuple[int, frozenset[tuple[int, State]]]
 
 
 class DeviatingCourses:
-    """Courses beside the usual one. `work`: states that were looked at, the measure of what it took."""
+    """All courses in which one action ends otherwise. `work`: how many states were examined, as a
+    measure of the time taken."""
 
     def __init__(self, course: BaselineCourse) -> None:
         self.course = course
         self.net = course.net
         self.work = 0
-        #: How it goes on when only this action runs, and nothing behind it has been touched.
+        #: The outcome when only this action runs and nothing reachable from it has been touched.
         self.alone: dict[int, Outcome] = {}
-        #: How it goes on from these differences; and who had been left out of them till then.
+        #: The outcome from a situation, and the actions that had been dropped from it before.
         self.known: dict[_Key, tuple[Outcome, Mask]] = {}
-        for number, active in enumerate(course.active[:-1]):  # with the last it ended
+        for number, active in enumerate(course.active[:-1]):  # the last instant ended the graph
             if active == 1:
                 self._note_alone(number)
 
     def _note_alone(self, number: int) -> None:
-        """The usual course is one that came there, too."""
+        """Note the baseline course as one that came to a situation with a single running action."""
         course = self.course
         for index in course.touched[number]:
             if index == self.net.exit or course.state(index, number + 1).does != RUNS:
@@ -53,7 +56,8 @@ class DeviatingCourses:
                 self.alone[index] = course.outcome
 
     def outcome(self, index: int, result: Precondition) -> Outcome:
-        """How a graph ends in which the first run of an action ends with `result`."""
+        """Return how the graph ends if the first run of an action ends with `result`. Raises
+        `SimultaneousEnds`."""
         instant = self.course.first_end(index)
         if instant is None:
             return self.course.outcome
@@ -61,8 +65,12 @@ class DeviatingCourses:
 
 
 class _DeviatingCourse:
-    """One course that differs. `apart`: the states that do, by place; `forgotten`: who waits of those
-    that nothing can reach any more."""
+    """One course that differs from the baseline. `apart`: the states that differ, by index; `mask`:
+    their indices.
+
+    `dropped`: actions that were left out because nothing reaches them any more; `forgotten`: those
+    of them that wait.
+    """
 
     def __init__(self, all_: DeviatingCourses) -> None:
         self.all = all_
@@ -83,7 +91,7 @@ class _DeviatingCourse:
         self._steps = 0
         self._power = 1
         self._point: tuple[int, dict[int, State]] = (-1, {})
-        self._since = 0  # instants since it was last asked what can be left out
+        self._since = 0  # instants since states were last dropped
 
     def followed(self, instant: int, result: Precondition) -> Outcome:
         found = self._at(self.course.times[instant], self.course.roots[instant], result)
@@ -112,7 +120,8 @@ class _DeviatingCourse:
         return self._remembered(found)
 
     def _is_lap(self, at: float, root: int) -> bool:
-        """Whether it has come to a point where it was before, when the usual course is over."""
+        """Return whether the course has come to an earlier situation again after the end of the
+        baseline course."""
         self._steps += 1
         again = root == self._point[0] and self._differing(at) == self._point[1]
         if self._steps >= self._power:
@@ -137,7 +146,8 @@ class _DeviatingCourse:
     # One instant
 
     def _at(self, at: float, root: int, result: Precondition) -> Outcome | None:
-        """Goes through what happens at a moment, here and usually. None: it goes on."""
+        """Follow the events of one moment, here and in the baseline course. Return None if the
+        course continues."""
         course = self.course
         here = bisect_left(course.times, at)
         usual = here < len(course.times) and course.times[here] == at
@@ -177,7 +187,8 @@ class _DeviatingCourse:
         return None
 
     def _root(self, usually: int, root: int) -> int:
-        """What ends at a moment at which something usually does. Raises Tied if both do."""
+        """Return the action that ends at a moment of the baseline course. Raises `SimultaneousEnds`
+        if two do."""
         if usually in self.apart:
             return root
         if root not in (-1, usually):
@@ -189,7 +200,7 @@ class _DeviatingCourse:
         return own if own is not None else self.course.state(index, before)
 
     def _compare(self, index: int, state: State, after: int) -> None:
-        """Whether a state is the usual one now."""
+        """Note whether the state of an action differs from the baseline course now."""
         usual = self.course.state(index, after)
         running, active = self._sums.pop(index, (0, 0))
         self._running -= running
@@ -215,7 +226,8 @@ class _DeviatingCourse:
             self._push(instants[following])
 
     def _await_halt(self, after: int) -> None:
-        """The usual end that halts the graph here, where fewer run, is one to go through."""
+        """Queue the next instant of the baseline course that would halt the graph, if that fewer
+        actions run here."""
         if self._running < 0:
             halting = self.course.halting.get(-self._running, ())
             following = bisect_left(halting, after)
@@ -229,7 +241,8 @@ class _DeviatingCourse:
             heappush(self._queue, (state.due, index))
 
     def _beyond(self) -> Outcome | None:
-        """The usual course has ended, or was followed no further; this one has not ended."""
+        """Continue after the end of the baseline course, or after the point up to which it was
+        followed."""
         course = self.course
         end = len(course.times)
         if course.outcome.kind == "endless":
@@ -245,11 +258,11 @@ class _DeviatingCourse:
                     self._own(index, state)
         return self._as_before(end)
 
-    # What is left of the difference
+    # Situations that are known
 
     def _forget(self, after: int) -> Outcome | None:
-        """Leaves out what can make no difference any more. An outcome if nothing is left, or if
-        that is known."""
+        """Drop states that can make no difference any more. Return an outcome if none is left, or
+        if it is known."""
         course = self.course
         lively: Mask = 0
         idle: list[int] = []
@@ -280,7 +293,8 @@ class _DeviatingCourse:
             self.forgotten |= 1 << index
 
     def _as_before(self, after: int) -> Outcome | None:
-        """What another course came to from the same point."""
+        """Return the outcome of another course that came to the same situation; None if there was
+        none."""
         if self.course.active[after - 1] + self._active == 1:
             alone = [index for index, state in self.apart.items() if state.does == RUNS]
             if alone and self._is_fresh(alone[0], after):
@@ -297,7 +311,7 @@ class _DeviatingCourse:
         return None
 
     def _is_fresh(self, index: int, after: int) -> bool:
-        """Whether everything behind a running action is as at the start."""
+        """Return whether everything reachable from a running action is as at the start."""
         behind = self.net.reachable[index]
         if self.course.came[after - 1] & behind & ~self.mask:
             return False
@@ -314,13 +328,14 @@ class _DeviatingCourse:
     # The end
 
     def _quiet(self, after: int) -> Outcome:
-        """Nothing is left to happen."""
+        """Return the outcome when nothing is left to happen."""
         return stuck(
             self.net, self._waiting(after), self._state(self.net.exit, after), self._last()
         )
 
     def _came_alone(self, index: int, known: Outcome, after: int) -> Outcome:
-        """What is not behind the one that runs stays as it is."""
+        """Return the known outcome of a single running action. Actions that it cannot reach stay as
+        they are."""
         behind = self.net.reachable[index]
         waiting = self._waiting(after) | known.waiting & behind
         if known.kind == "stuck" and not behind >> self.net.exit & 1:
@@ -328,12 +343,13 @@ class _DeviatingCourse:
         return self._joined(known, waiting)
 
     def _met_again(self, known: Outcome, dropped: Mask, after: int) -> Outcome:
-        """`dropped`: who was left out of what was followed, and here may be as usual."""
+        """Return the known outcome of a situation. `dropped`: the actions that the earlier course
+        had left out of it, which may be as in the baseline course here."""
         usual = self.course.waiting[after - 1] & dropped & ~(self.dropped | self.mask)
         return self._joined(known, self.forgotten | known.waiting & ~self.dropped | usual)
 
     def _joined(self, known: Outcome, waiting: Mask) -> Outcome:
-        """An outcome that is known from here on, with who waits in the end."""
+        """Return an outcome that is known from here on, with the actions that wait in the end."""
         if known.kind != "stuck":
             return known
         last = known.last if known.last >= 0 else self._last()

@@ -1,5 +1,5 @@
-"""An expected course against another version of its graph: actions are known by their keys, so that one
-that was renamed still does what it did. Pure."""
+"""Compares an expected course with another version of its graph. Actions are matched by key, so
+that a renamed action still counts as the same. Pure."""
 
 from collections.abc import Mapping, Sequence
 
@@ -24,15 +24,15 @@ from action_assistant.umrf.semantics.steps import (
 
 
 class CourseCheck(msgspec.Struct, frozen=True):
-    """How a graph goes under the script of an expected course: where it parts from that, if it does,
-    and what it took on its way."""
+    """The first step in which a graph departs from an expected course, None if it does not, and the
+    arrows that it took."""
 
     apart: Departure | None
     taken: TakenArrows
 
     @property
     def why(self) -> str:
-        """Where they part, in words; empty if they do not."""
+        """The first difference in words; empty if there is none."""
         if self.apart is None:
             return ""
         expected, found = said(self.apart.expected), said(self.apart.found)
@@ -46,8 +46,11 @@ def check_expected(
     now: Graph,
     inside: Mapping[str, Graph] | None = None,
 ) -> CourseCheck:
-    """Simulate a graph as it is now, with these graphs inside, under the script of a course that an
-    earlier one took."""
+    """Simulate a graph as it is now under the script of a course that an earlier version took, and
+    compare.
+
+    `was`: the earlier graph; `inside`: the graphs that are sub-graphs of `now`.
+    """
     old = {action.full_name: action.key for action in was.actions}
     new = _identities(was, now)
     names = {key: name for name, key in new.items()}
@@ -69,8 +72,10 @@ def check_expected(
 
 
 def _identities(was: Graph, now: Graph) -> dict[str, Key]:
-    """Which action of the earlier graph each full name stands for. A file without identities tells
-    actions by their names alone."""
+    """Return the action of the earlier graph that each full name stands for.
+
+    In a file without identities actions are matched by name alone.
+    """
     keys = {action.key for action in was.actions if AID.fullmatch(action.key)}
     names = {action.full_name: action.key for action in was.actions}
     found: dict[str, Key] = {}
@@ -81,14 +86,14 @@ def _identities(was: Graph, now: Graph) -> dict[str, Key]:
 
 
 def keyed(steps: Sequence[ExpectedStep], keys: Mapping[str, Key]) -> list[ExpectedStep]:
-    """Steps of the top graph with the keys of actions in place of their names."""
+    """Return steps in which actions of the top graph have their keys as names."""
     return [
         step if step.graph else replace(step, node=keys.get(step.node, step.node)) for step in steps
     ]
 
 
 def scripted_by_key(script: Script, graph: Graph) -> Script:
-    """The script with actions by their keys, which stay when they are called otherwise."""
+    """Return the script with its actions under their keys, which survive a renaming."""
     found = dict(script.behaviours)
     for action in graph.actions:
         for name in (action.full_name, action.name, f"{graph.name}/{action.full_name}"):
@@ -101,7 +106,7 @@ def scripted_by_key(script: Script, graph: Graph) -> Script:
 
 
 def scripted_by_name(script: Script, graph: Graph) -> Script:
-    """The same with the names that actions have in this graph."""
+    """Return a script whose actions are under keys with the full names of this graph instead."""
     names = {action.key: action.full_name for action in graph.actions}
     return Script({names.get(key, key): calls for key, calls in script.behaviours.items()})
 

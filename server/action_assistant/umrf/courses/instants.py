@@ -26,13 +26,17 @@ from action_assistant.umrf.semantics.transitions import (
 
 #: Activities that end by themselves, at `State.due`.
 DUE: Final = frozenset({RUNS, STOPS, GIVING_UP})
-#: After so long the engine gives up on a paused action that it stops.
+#: The time after which the engine gives up on a paused action that it stops.
 GIVING_UP_MS: Final = 5_000.0
 
 
 class State(NamedTuple):
-    """One action at one moment. `got`: inputs whose value came from a parent, gone after the run;
-    `waiting`: it was asked and was not ready."""
+    """The state of one action at one moment. `due`: when its activity ends, if it is one of `DUE`.
+
+    `links`: the required parents that have reported. `has`: the inputs that hold a value. `got`:
+    those of them whose value came from a parent and is cleared after the run. `filled`: its outputs
+    have values. `waiting`: it was asked and was not ready.
+    """
 
     does: int = IDLE
     due: float = 0.0
@@ -43,17 +47,19 @@ class State(NamedTuple):
     waiting: bool = False
 
 
-#: How a graph ends: `locked`: a bypass goes round in circles.
+#: How a graph ends. `locked`: a bypass goes round in a circle.
 End: TypeAlias = Literal["finished", "halted", "crashed", "locked"]
 Reader: TypeAlias = Callable[[int], State]
 
 
 class Instant:
-    """Everything that happens at one moment, and its sums. `states`: of what was asked or ended.
+    """Follows everything that happens at one moment. `states`: the new states of actions that were
+    asked or ended, by index.
 
-    `end`: how the graph ended, if it did; `early`: it is FINISHED while something runs; `last`: who
-    asked the exit last without ending the graph, by place; -1 nobody; `others`: how many others ran
-    when all children of one that ended ignored it, which halts the graph if there are none.
+    `running` and `active`: how many actions run and are active, kept up to date. `end`: how the
+    graph ended; None if it did not. `early`: it is FINISHED while an action runs. `last`: the index
+    of the last action that asked the exit without ending the graph; -1 if none did. `others`: for
+    each end that all children ignored, how many other actions ran; the graph is halted if none did.
     """
 
     __slots__ = ("_bypassed", "_net", "_now", "_read", "_returning", "_tasks", "active", "early", "end",
@@ -75,12 +81,13 @@ class Instant:
         self.others: list[int] = []
 
     def begin(self) -> None:
-        """The graph starts."""
+        """Start the graph: its entry asks its children."""
         self._inform(-1, "on_true", self._net.entry)
         self._settle()
 
     def ends(self, index: int, result: Precondition) -> None:
-        """The action that runs, stops or is given up here ends; `result`: of one that runs."""
+        """End the action at this index, which runs, stops or is given up. `result` is used if it
+        runs."""
         state = self._state(index)
         match state.does:
             case 1:
@@ -131,13 +138,14 @@ class Instant:
                 self.end = "locked"
 
     def _only_ends(self) -> bool:
-        """Whether these bypasses do nothing but lead to the exit, however far."""
+        """Return whether the pending bypasses lead to the exit and do nothing else, however far
+        they go."""
         plain, ends = self._net.plain, self._net.ends
         if not any(ends[result] >> index & 1 for index, result in self._tasks):
             return False
         if any(not plain[result] >> index & 1 for index, result in self._tasks):
             return False
-        # Whoever leads to the exit may run itself, and would not be one of the others then.
+        # An action with an arrow to the exit may be running itself, and is not one of the others then.
         return not self.active or not any(
             self._state(index).does in ACTIVE for index in self._net.last
         )
@@ -158,7 +166,7 @@ class Instant:
                 self.end = "halted"
 
     def _ask(self, index: int, edge: EdgeQuestion, result: Precondition) -> bool:
-        """One edge; whether the child ignores it."""
+        """Ask one child for its response. Return whether it ignores the result."""
         child, net = edge.child, self._net
         before = state = self._state(child)
         if edge.link & ~state.links:
@@ -189,8 +197,7 @@ class Instant:
         return False
 
     def _bypass(self, index: int, child: int, result: Precondition) -> None:
-        """What a bypass of one action with one result does is done once: that it comes by several
-        ways changes nothing."""
+        """Bypass a child, once for each result: further paths to the same bypass change nothing."""
         if child == self._net.exit:
             self._finish(index)
         elif (child, result) not in self._bypassed:
@@ -199,7 +206,7 @@ class Instant:
 
     def _finish(self, index: int) -> None:
         self.end = "finished"
-        # One that was bypassed while it runs goes on.
+        # An action that was bypassed while it runs continues to run.
         own = index == self._returning >= 0 and self._state(index).does in ACTIVE
         self.early = self.active > own
 

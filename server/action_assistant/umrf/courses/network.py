@@ -1,8 +1,8 @@
-"""A graph as numbers and bit masks, for following what changes when one action ends otherwise.
+"""A graph as numbers and bit masks, for the fast rules of the checks.
 
-Built from the same nodes and edges as the engine's (`parts.build`), so that both mean one graph. Places
-are those of the actions in it; `Network.exit` is one more. Times are milliseconds, all of them exact in
-a double: sums are compared.
+It is built from the same nodes and edges as the engine's graph (`parts.build`), so that both mean
+one graph. Each action has an index, and `Network.exit` is one more. Times are milliseconds, all of
+them exact in a double, since sums are compared.
 """
 
 from collections.abc import Sequence
@@ -21,17 +21,21 @@ from action_assistant.umrf.semantics.values import (
     renamed,
 )
 
-#: How long an action takes about, and by how much places differ: nobody ends at the same time as
-#: another, so that what reports first is always the same.
+#: The length of a round, which is about the time that an action takes, and the step by which ends of different
+#: actions differ within it. No two actions end at the same time, so the order of their reports is always the same.
 ROUND_MS: Final = 1_000.0
 STEP_MS: Final = 1 / 16
 STOP_MS: Final = 50.0
 
 
 class EdgeQuestion(NamedTuple):
-    """One edge as an end of its parent asks it. `link`: its bit among the child's required parents.
-    `given`: the child's inputs that it fills from outputs before and after the parent filled them;
-    None where the renaming kills the engine."""
+    """One edge, as the end of its parent asks it. `responses`: the child's response to each
+    outcome.
+
+    `link`: the parent's bit among the child's required parents. `given`: the child's inputs that
+    the parent's outputs fill, before and after the parent has run; None where the renaming kills
+    the engine.
+    """
 
     child: int
     responses: dict[Precondition, Response]
@@ -40,9 +44,13 @@ class EdgeQuestion(NamedTuple):
 
 
 class Network:
-    """`needs`: required parents,
-    `wants`: required inputs, `has`: inputs that have a value from the start. `able`: whether the
-    engine runs it at all. `late`: its place in a round; `rounds_ms`: how long one is."""
+    """Holds a graph as numbers. Masks have a bit for each parent or input of one action.
+
+    `names`: full names by index; `index`: the reverse. `needs`: the required parents, `wants`: the
+    required inputs, `has`: the inputs that hold a value from the start. `able`: False for names
+    that the engine never runs. `late`: the time at which an action ends within a round of
+    `round_ms`. `edges`: the questions of each action's end; None where the engine aborts.
+    """
 
     def __init__(self, graph: Graph, *, slower_first: bool = False) -> None:
         running = Running(graph.name, graph, None, None)
@@ -84,22 +92,23 @@ class Network:
             self.edges.append(row)
 
     def due(self, index: int, now_ms: float) -> float:
-        """When an action that begins now ends: each at its own time of the next round."""
+        """Return the time at which an action that begins now ends: at its own time within the next
+        round."""
         return (now_ms // self.round_ms + 1) * self.round_ms + self.late[index]
 
     @cached_property
     def reachable(self) -> list[Mask]:
-        """Return for each place all places to which a path of arrows leads from there."""
+        """For each action the actions, and the exit, to which a path of arrows leads from it."""
         return reachable([[e.child for e in row if e is not None] for row in self.edges])
 
     @cached_property
     def circling(self) -> dict[str, Mask]:
-        """For each outcome the actions that a bypass of it leads back to."""
+        """For each outcome the actions that a bypass with it leads back to."""
         return {outcome: self._circling(outcome) for outcome in PRECONDITIONS}
 
     @cached_property
     def plain(self) -> dict[str, Mask]:
-        """For each outcome the actions whose bypass sets nothing in motion but further bypasses."""
+        """For each outcome the actions whose bypass causes nothing but further bypasses."""
         return {outcome: self._plain(outcome) for outcome in PRECONDITIONS}
 
     @cached_property
@@ -125,7 +134,7 @@ class Network:
         return every & ~self._leading(outcome, other)
 
     def _leading(self, outcome: Precondition, to: set[int]) -> Mask:
-        """Who leads to one of these by bypasses, and they themselves."""
+        """Return the set `to` together with all actions that lead into it by bypasses."""
         found, stack = set(to), list(to)
         while stack:
             for index in self._bypassing(outcome).get(stack.pop(), ()):
@@ -135,7 +144,7 @@ class Network:
         return sum(1 << index for index in found)
 
     def _bypassing(self, outcome: Precondition) -> dict[int, list[int]]:
-        """Who bypasses whom, by the one that is bypassed."""
+        """Return for each bypassed action the actions that bypass it."""
         if outcome not in self._bypasses:
             found: dict[int, list[int]] = {}
             for index, row in enumerate(self.edges):
@@ -168,7 +177,8 @@ def _asked(
     bits: Sequence[dict[str, Mask]],
     slots: Sequence[dict[str, Mask]],
 ) -> EdgeQuestion | None:
-    """None where the engine aborts: no such child, or one that does not list its parent."""
+    """Return an edge as a question. None where the engine aborts: the child is missing or does not
+    list this parent."""
     link = edge.child.links.get(parent.full_name) if edge.child is not None else None
     if edge.child is None or link is None:
         return None
@@ -189,7 +199,7 @@ def _asked(
 
 
 def _takes(target: Slot, source: Slot) -> bool:
-    """Whether an input takes what this output holds once its action has run."""
+    """Return whether an input accepts the value that this output holds once its action has run."""
     filled = {source.name: _copy(source)}
     fill_outputs(filled, None)
     probe = _copy(target)

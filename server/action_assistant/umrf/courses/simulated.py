@@ -1,7 +1,7 @@
-"""One course of a graph as the engine goes through it, from its start to its end.
+"""The outcome of one course of a graph, found by the simulated engine from start to end.
 
-What `deviations` finds by differences is found here the plain way: for graphs with spontaneous actions,
-which stop others as they please, and to hold the two together.
+Used for graphs with spontaneous actions, which stop others at any time, and in tests as the
+reference for `deviations`.
 """
 
 from action_assistant.umrf.components import Mask
@@ -25,8 +25,8 @@ from action_assistant.umrf.semantics.trace import (
 
 
 class _Timed(Engine):
-    """An engine whose actions end when those of a network do, and that does a bypass of one action
-    with one result once in an instant."""
+    """An engine whose actions end at the times of a network, and that bypasses an action once for
+    each result in an instant."""
 
     def __init__(self, net: Network, script: Script) -> None:
         super().__init__(script=script, serial=False)
@@ -55,8 +55,11 @@ class _Timed(Engine):
 def simulated_outcome(
     net: Network, graph: Graph, full_name: str, result: str
 ) -> tuple[Outcome, int]:
-    """How a graph ends in which the first run of an action ends with `result`, and how many events
-    that took. "" is nobody."""
+    """Return how a graph ends if the first run of one action ends with `result`, and how many trace
+    events that took.
+
+    With `full_name` empty all actions end with on_true.
+    """
     calls: dict[str, tuple[Behaviour, ...]] = {}
     if full_name:
         calls[full_name] = (Behaviour(result=result), Behaviour())
@@ -94,7 +97,7 @@ def simulated_outcome(
 
 
 def _going_on(net: Network, engine: Engine, name: str) -> Mask:
-    """The spontaneous actions that run in a graph of this engine, and that nobody has told to stop."""
+    """Return the spontaneous actions that still run in a graph of this engine, as a mask."""
     return sum(
         1 << net.index[node.full_name]
         for node in engine.graphs[name].nodes.values()
@@ -103,7 +106,7 @@ def _going_on(net: Network, engine: Engine, name: str) -> Mask:
 
 
 class _TraceReader:
-    """What a trace told of who waits, and of the end."""
+    """Reads from a trace which actions wait, and how the graph ends."""
 
     def __init__(self, net: Network) -> None:
         self.net = net
@@ -113,7 +116,7 @@ class _TraceReader:
         self._asked = -1
 
     def take(self, traces: list[Trace]) -> Kind | None:
-        """The end, if it is among these."""
+        """Read trace events, and return the end of the graph if it is among them."""
         kind: Kind | None = None
         for trace in traces:
             match trace:

@@ -1,4 +1,4 @@
-"""Virtual time, states and hazards: what every rule of the engine stands on."""
+"""Virtual time, states and hazards: the base on which the rules of the simulated engine stand."""
 
 from collections import deque
 from collections.abc import Callable
@@ -19,15 +19,15 @@ Task: TypeAlias = Callable[[], None]
 
 
 class Clock:
-    """Events in the order of their time, states with their sums, and what was seen."""
+    """Runs events in the order of their time, keeps counts of states, and collects the trace."""
 
     def __init__(self, facts: EngineFacts) -> None:
         self.facts = facts
         self.graphs: dict[str, Running] = {}
         self.now = 0.0
-        #: Code of the hazard that ended the process, if one did.
+        #: The code of the hazard that ended the process; None while it lives.
         self.crashed: str | None = None
-        #: Whether the engine's lock is held for ever: no command is answered any more.
+        #: True once the engine's lock is held without end: no command is answered any more.
         self.locked = False
         self._heap: list[tuple[float, int, Task]] = []
         self._order = 0
@@ -54,7 +54,7 @@ class Clock:
         self.now = max(self.now, to_ms) if to_ms != inf else self.now
 
     def _settle(self) -> None:
-        """Carries out everything that happens at this instant."""
+        """Run everything that happens at this instant."""
         while self._tasks:
             self._tasks.popleft()()
         for graph in self._touched:
@@ -86,7 +86,7 @@ class Clock:
         self._out.append(HazardEvent(self._t(), graph.name, code, effect, name, message))
 
     def _crash(self, graph: Running, code: str, message: str, node: Node | None = None) -> None:
-        """The engine's process ends here, with every graph in it."""
+        """End the engine's process with all of its graphs."""
         self._hazard(graph, code, "crash", message, node)
         self.crashed = code
         self._halt_time()

@@ -1,6 +1,6 @@
-"""The core of the engine's semantics: what the end of one action sets in motion.
+"""Simulates the core of the engine: what the end of one action causes, and the life of one action.
 
-See docs/umrf-and-the-engine.md 2.3, 2.4, 2.9.
+See docs/umrf-and-the-engine.md 2.3, 2.4 and 2.9.
 """
 
 from collections.abc import Callable, Mapping
@@ -40,16 +40,19 @@ from action_assistant.umrf.semantics.trace import (
 from action_assistant.umrf.semantics.transitions import EFFECTS
 from action_assistant.umrf.semantics.values import RemapUnknown, fill_outputs, hand_over
 
-#: A node that starts so often at one instant runs in a loop without time.
+#: An action that starts this many times at one instant runs in a loop that takes no time.
 INSTANT_LAPS = 3
-#: So many bypasses at one instant, and ten for each action, are a circle.
+#: More bypasses than this at one instant, plus ten for each action, mean that they go round in a circle.
 BYPASSES = 1_000
 
 _OUTCOMES: dict[str, Outcome] = {outcome: outcome for outcome in OUTCOMES}
 
 
 class Core(Clock):
-    """The propagation of results and the life of actions. `Engine` adds the commands."""
+    """Propagates results along the relations and runs the life of actions.
+
+    `Graphs` adds the life of graphs and sub-graphs, and `Engine` the commands.
+    """
 
     def __init__(
         self,
@@ -64,23 +67,30 @@ class Core(Clock):
         self.script = script
         self.library = library
         self.actor = actor
-        #: Whether commands wait for each other.
+        #: True if each command waits until the one before it is done.
         self.serial = True
-        #: How long an action takes at least from its trigger to RUNNING the first time (dlopen, onInit);
-        #: a behaviour may say more. Meanwhile nothing counts it as active: a stop passes it by
-        #: (recording engine_frozen.2).
+        #: The least time from the trigger of an action to its first RUNNING (dlopen, onInit); a behaviour may
+        #: say more. An action that loads does not count as active, and a stop does not reach it (recording
+        #: engine_frozen.2).
         self.loading_ms = 0.0
         self._executions: list[Execution] = []
 
     def executing(self, at_ms: float) -> list[Execution]:
-        """The calls of actions' own code that have not returned by then: the truth of what moves,
-        apart from the states that the engine shows. None when its process has ended."""
+        """Return the calls of actions' own code that have not returned by this time, in ms.
+
+        This is what really moves, apart from the states that the engine shows. Empty once the
+        process has ended.
+        """
         return [] if self.crashed else [e for e in self._executions if e.ends_ms > at_ms]
 
     # Results
 
     def _inform(self, graph: Running, node: Node, result: Outcome) -> None:
-        """`startChildNodes`: asks every child what it does now that `node` ended."""
+        """Ask every child what it does now that `node` has ended with `result` (the engine's
+        `startChildNodes`).
+
+        The graph is HALTED if every child ignores the result and no other action runs.
+        """
         if graph.state != "RUNNING":
             return
         if graph.deadly:
@@ -109,7 +119,11 @@ class Core(Clock):
     def _ask(
         self, graph: Running, node: Node, edge: Edge, child: Node, link: NodeLink, result: Outcome
     ) -> str:
-        """One relation. `done` ends the round, `ignored` counts for HALTED, `` neither."""
+        """Ask one child for its response to a result and carry the response out.
+
+        Return `done` if no further child is to be asked, `ignored` if the child ignores the result,
+        else an empty text.
+        """
         child.receive(link)
         response = link.conditions.answer(result)
         self._out.append(EdgeEval(self._t(), graph.name, edge.label, f"{result} -> {response}"))
@@ -185,7 +199,7 @@ class Core(Clock):
         self._soon(partial(self._sub_ended, graph, result))
 
     def _left_loading(self, graph: Running, state: str) -> None:
-        """Tell that actions which still load will run in a graph that counts as ended."""
+        """Report that actions which still load will run although their graph counts as ended."""
         for node in graph.nodes.values():
             if node.loading:
                 message = (
@@ -197,7 +211,8 @@ class Core(Clock):
 
     @staticmethod
     def _begins_again(node: Node) -> bool:
-        """Whether an action that has returned runs once more by itself: also after it threw."""
+        """Return whether an action that has returned starts again by itself: a spontaneous one
+        does, also after an error."""
         return node.type == "spontaneous" and node.state in ("RUNNING", "ERROR")
 
     def _run(self, graph: Running, node: Node) -> None:
@@ -235,7 +250,7 @@ class Core(Clock):
             self._begin(graph, node)
 
     def _loaded(self, graph: Running, node: Node) -> None:
-        """The action is there now, and runs, whatever has become of its graph."""
+        """Begin an action that has finished loading, whatever has become of its graph meanwhile."""
         node.loading = False
         graph.loading -= 1
         if self.graphs.get(graph.name) is graph and not node.loaded and self._load(graph, node):
@@ -276,11 +291,11 @@ class Core(Clock):
         self._let_run(graph, node, inf if node.call.never else duration)
 
     def _takes_ms(self, node: Node) -> float:
-        """How long this call of an action takes."""
+        """Return how long the current call of an action takes."""
         return node.call.after_s * 1000
 
     def _stops_ms(self, node: Node) -> float:
-        """How long its code goes on after a stop."""
+        """Return how long the action's code continues after a stop."""
         return node.call.stop_s * 1000
 
     def _let_run(self, graph: Running, node: Node, duration_ms: float) -> None:
@@ -295,7 +310,7 @@ class Core(Clock):
             self._ended(graph, node, _OUTCOMES[node.call.result])
 
     def _performed_returns(self, returned: Returned) -> None:
-        """Nothing of a call goes on any more that somebody has performed."""
+        """End a call of a performer: none of its code runs any more."""
         found = self._performed.take(returned.number)
         if found is None:
             return
@@ -304,7 +319,7 @@ class Core(Clock):
         if node.execution is not execution or self.graphs.get(graph.name) is not graph:
             return
         if node.rest_ms is not None and node.state not in HELD and not self.facts.pauses_safely:
-            return  # it was paused when it was stopped: the engine waits for its thread for ever
+            return  # it was paused when it was stopped: the engine waits for its thread without end
         if node.busy_until == inf:
             node.busy_until = self.now
         if node.active:
@@ -317,7 +332,7 @@ class Core(Clock):
             self._ended(graph, node, _OUTCOMES[returned.result])
 
     def _ended(self, graph: Running, node: Node, result: Outcome) -> None:
-        """`onRun` returned, or threw (`on_error`)."""
+        """Handle the return of `onRun`, or the exception that it threw (`on_error`)."""
         if node.state in HELD:
             node.pending = result
             return
@@ -326,7 +341,7 @@ class Core(Clock):
         node.token += 1
         node.returning = True
         node.due_ms = None
-        if node.subgraph is None and result != "on_error":  # also of one that was stopped
+        if node.subgraph is None and result != "on_error":  # also after a stop
             fill_outputs(node.outputs, node.call.outputs)
         self._result(graph, node, result)
         failed = result == "on_error" and node.subgraph is None
@@ -394,7 +409,8 @@ class Core(Clock):
             self._soon(partial(self._stop_failed, graph, node, node.token))
 
     def _stop_code(self, node: Node, held: bool) -> float:
-        """`onStop`: when the action's own code returns now."""
+        """Call `onStop`, and return the time at which the action's own code returns; inf if it does
+        not."""
         self._performed.stop(node)
         ends = self.now + node.rest_ms if held and node.rest_ms is not None else node.due_ms
         if ends is None:
@@ -410,8 +426,11 @@ class Core(Clock):
             self._ended(graph, node, "on_stopped")
 
     def _stop_failed(self, graph: Running, node: Node, token: int) -> None:
-        """`onStop` threw, or the engine has waited for five seconds: it says ERROR, while the code of
-        the action goes on. When that returns, its children hear of it as of any other result."""
+        """Show ERROR after `onStop` threw or the stop timeout passed, while the code of the action
+        continues.
+
+        When that code returns, the children are informed as of any other result.
+        """
         if node.token != token or node.state != "STOPPING":
             return
         node.token += 1
@@ -429,7 +448,8 @@ class Core(Clock):
             self._after(graph, node, _OUTCOMES[node.call.result], failed=True)
 
     def _stop_downstream(self, graph: Running, node: Node, then: Task) -> None:
-        """What a spontaneous action does to everything that it leads to before it informs."""
+        """Stop every active action downstream of a spontaneous one, as the engine does before it
+        informs the children."""
         if graph.state != "RUNNING":
             then()
             return
@@ -447,7 +467,7 @@ class Core(Clock):
         self._wait(lambda: any(n.active for n in linked), self.facts.stop_poll_ms, then)
 
     def _wait(self, going: Callable[[], bool], poll_ms: int, then: Task) -> None:
-        """Asks every `poll_ms` whether it still goes on."""
+        """Call `then` once `going` returns False; it is asked every `poll_ms`."""
 
         def look() -> None:
             if going():
@@ -463,7 +483,8 @@ class Core(Clock):
             self._hazard(graph, "H5", "goes on", message, node)
 
     def _pause_node(self, graph: Running, node: Node) -> bool:
-        """Whether the action is paused, or was not running."""
+        """Pause an action. Return True if it is paused now or was not running, False if it handles
+        no pause."""
         if EFFECTS["pause"][node.activity(self.now)] == "nothing":
             return True
         self._state(graph, node, "PAUSE_REQUESTED")

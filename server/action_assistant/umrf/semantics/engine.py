@@ -1,4 +1,4 @@
-"""A TeMoto Action Engine without I/O or clock: its commands and what it knows.
+"""A TeMoto Action Engine without I/O or clock: its commands, and the states that it knows.
 
 See docs/umrf-and-the-engine.md 2.
 """
@@ -24,7 +24,8 @@ _BUSY: Final = frozenset({"RUNNING", "PAUSED", "STOPPING", "CLEARING"})
 
 
 class GraphNow(msgspec.Struct, frozen=True):
-    """What an engine knows of one graph: states by full name; the result once it ended."""
+    """The state of one graph in an engine. `nodes`: states by full name. `result`: None until the
+    graph ended."""
 
     state: str
     result: str | None
@@ -32,14 +33,15 @@ class GraphNow(msgspec.Struct, frozen=True):
 
 
 class Engine(Graphs):
-    """One engine with its graphs and sub-graphs. Deterministic: same calls, same trace.
+    """Simulates one engine with its graphs and sub-graphs. Deterministic: the same calls give the
+    same trace.
 
     `library`: graphs that can be sub-graphs, by name. `actor`: the engine's name; without one it
     plays the only actor that a graph names. `signatures`: the actions that it has; without them it
-    has every action with any parameters. `performer`: carries out the actions that it says are its
-    own; the script says what the others do. `serial`: commands wait for each other as they do over
-    ROS; otherwise a second stop during a stop reaches the engine and kills it. `loading_ms`: see
-    `Core`.
+    has every action with any parameters. `performer`: carries out the actions that it names as its
+    own; the script says how the others behave. `serial`: commands wait for each other as they do
+    over ROS; otherwise a second stop during a stop reaches the engine and kills it. `loading_ms`:
+    see `Core`. All times are ms on the caller's clock.
     """
 
     def __init__(
@@ -58,27 +60,27 @@ class Engine(Graphs):
         self.loading_ms = loading_ms
         self.serial = serial
 
-    # What callers ask
+    # Commands and questions
 
     @property
     def due(self) -> float | None:
-        """When something happens next by itself, in ms; None if nothing will."""
+        """The time in ms at which something happens next by itself; None if nothing will."""
         if self._out or self._tasks:
             return self.now
         return self._heap[0][0] if self._heap else None
 
     @property
     def busy(self) -> bool:
-        """Whether a command is still being carried out, so that the next one waits."""
+        """True while a command is being carried out, so that the next one waits."""
         return self._busy
 
     def advance(self, to_ms: float) -> list[Trace]:
-        """Everything due up to and including `to_ms`, in order."""
+        """Run the engine up to and including `to_ms`, and return the trace in order."""
         self._run_until(to_ms)
         return self._taken()
 
     def states(self) -> dict[str, GraphNow]:
-        """All graphs by the name they run under, ended ones too."""
+        """Return the state of every graph, ended ones too, by the name under which it runs."""
         return {
             name: GraphNow(g.state, g.result, {n.full_name: n.state for n in g.nodes.values()})
             for name, g in self.graphs.items()
@@ -92,8 +94,11 @@ class Engine(Graphs):
         *,
         by_name: bool = False,
     ) -> list[Trace]:
-        """Starts a graph. `states`: run states that its file carries. `by_name`: the engine takes
-        it from its own index, and matches it each time. Raises `GraphRefused`."""
+        """Start a graph. Raises `GraphRefused`.
+
+        `states`: run states that the file carries, by key of the action. `by_name`: the engine
+        takes the graph from its own index, and matches it each time.
+        """
         self._run_until(at_ms)
         old = self.graphs.get(graph.name)
         if self.crashed or self.locked:
@@ -128,28 +133,30 @@ class Engine(Graphs):
         return self._taken()
 
     def asked(self) -> list[Trace]:
-        """Somebody asks for all graphs (`umrf_graph_get`): one that was built in part kills the
-        engine."""
+        """Handle a get of all graphs (`umrf_graph_get`): a graph that was built in part only kills
+        the engine."""
         deadly = next((graph for graph in self.graphs.values() if graph.deadly), None)
         if deadly is not None and not self.crashed:
             self._crash(deadly, "H6", "A broken graph is asked for: the engine aborts.")
         return self._taken()
 
     def stop(self, graph_name: str, at_ms: float) -> list[Trace]:
-        """Stops a graph; nothing happens to one that does not run."""
+        """Stop a graph. A graph that does not run stays as it is."""
         return self._on(graph_name, at_ms, self._stop_graph)
 
     def pause(self, graph_name: str, at_ms: float) -> list[Trace]:
-        """Pauses a RUNNING graph."""
+        """Pause a RUNNING graph."""
         return self._on(graph_name, at_ms, self._pause_graph)
 
     def resume(self, graph_name: str, at_ms: float, continue_from: str = "") -> list[Trace]:
-        """Resumes a PAUSED or HALTED graph; `continue_from` is the full name of a node to run."""
+        """Resume a PAUSED or HALTED graph. `continue_from` is the full name of a node to run."""
         return self._on(graph_name, at_ms, partial(self._resume_graph, continue_from=continue_from))
 
     def modify(self, graph: Graph, at_ms: float, continue_from: str = "") -> list[Trace]:
-        """Gives a running, paused or halted graph of this name a new structure and lets it go on.
-        Raises `GraphRefused`; a graph that was paused for it then stays PAUSED."""
+        """Give a running, paused or halted graph of this name a new structure and let it continue.
+
+        Raises `GraphRefused`; a graph that was paused for the modify then stays PAUSED.
+        """
         self._run_until(at_ms)
         old = self.graphs.get(graph.name)
         if old is not None and not self.crashed and not self.locked:
@@ -157,13 +164,14 @@ class Engine(Graphs):
         return self._taken()
 
     def returned(self, returned: Returned, at_ms: float) -> list[Trace]:
-        """A call that the performer was given has ended, all of it."""
+        """Take the result of a call that the performer carried out and that has ended
+        completely."""
         self._run_until(at_ms)
         if not self.crashed:
             self._performed_returns(returned)
         return self._taken()
 
-    # How commands come in
+    # Helpers of the commands
 
     def _taken(self) -> list[Trace]:
         self._settle()

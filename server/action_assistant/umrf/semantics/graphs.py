@@ -1,4 +1,4 @@
-"""How graphs live in an engine: built, begun, stopped, paused, resumed, modified.
+"""Simulates the life of graphs in an engine: build, start, stop, pause, resume and modify.
 
 See docs/umrf-and-the-engine.md 2.
 """
@@ -28,7 +28,10 @@ from action_assistant.umrf.semantics.trace import HazardEvent, NodeStateEvent
 
 
 class GraphRefused(Exception):
-    """The engine throws instead of starting. What happened before comes with the next call."""
+    """Raised where the engine throws instead of starting or modifying a graph.
+
+    The trace up to then is returned by the next call of the engine.
+    """
 
     def __init__(self, message: str) -> None:
         super().__init__(message)
@@ -36,7 +39,7 @@ class GraphRefused(Exception):
 
 
 class Graphs(Core):
-    """The life of graphs and sub-graphs, one command after the other. `Engine` says when."""
+    """Runs the commands on graphs and sub-graphs one after the other. `Engine` decides when."""
 
     def __init__(
         self,
@@ -52,7 +55,7 @@ class Graphs(Core):
         self._busy = False
         self._waiting: deque[Task] = deque()
 
-    # Commands, one after the other
+    # The command queue
 
     def _command(self, command: Task) -> None:
         if self._busy:
@@ -61,7 +64,7 @@ class Graphs(Core):
             command()
 
     def _free(self) -> None:
-        """The command that held the engine is done; the next ones may go."""
+        """Run the waiting commands, now that the command which held the engine is done."""
         self._busy = False
         while self._waiting and not self._busy and not self.crashed and not self.locked:
             try:
@@ -94,7 +97,7 @@ class Graphs(Core):
         return running
 
     def _resolves(self, graph: Running) -> bool:
-        """Whether the engine has every action that it shall run itself."""
+        """Return whether the engine has every action that it has to run itself."""
         own = {"", self.actor} if self.actor else {node.actor for node in graph.nodes.values()}
         known = self.signatures or {}
 
@@ -115,9 +118,12 @@ class Graphs(Core):
         )
 
     def _not_built(self, graph: Running, *, matched: bool) -> tuple[Node, bool] | None:
-        """The first action that the engine cannot build, and whether it is the first of all. It
-        goes by full name through a graph that it has matched, else as the file does, and takes what
-        it has not matched for actions with a library of their own."""
+        """Return the first action that the engine cannot build, and whether it is the first of all;
+        None if there is none.
+
+        The engine goes through a matched graph by full name and through others in file order. It
+        takes an action that it has not matched for one with a library of its own.
+        """
         nodes = list(graph.nodes.values())
         if matched:
             nodes.sort(key=lambda node: node.full_name.encode())
@@ -130,8 +136,11 @@ class Graphs(Core):
         return None
 
     def _refuse_broken(self, graph: Running, *, matched: bool) -> None:
-        """A graph with an action that cannot be built stays in the engine, without that one and
-        those after it; when there are others before it, whoever asks for it kills the engine."""
+        """Refuse a graph with an action that cannot be built. Raises `GraphRefused`.
+
+        The graph stays in the engine without that action and those after it. If there are others
+        before it, a get kills the engine.
+        """
         found = self._not_built(graph, matched=matched)
         if found is None:
             return
@@ -151,14 +160,14 @@ class Graphs(Core):
     def _clear(self, old: Running) -> None:
         if old.broken:
             return
-        if old.state == "HALTED":  # it is stopped first, as what runs is
+        if old.state == "HALTED":  # it is stopped first, like a running graph
             self._graph_state(old, "STOPPING")
             self._graph_state(old, "STOPPED")
         self._graph_state(old, "CLEARING")
         self._graph_state(old, "UNINITIALIZED")
 
     def _again(self, old: Running, new: Running, *, matched: bool) -> None:
-        """Starts a graph whose name the engine holds."""
+        """Start a graph whose name the engine already holds."""
         if any(node.holds_thread(self.now) for node in old.nodes.values()):
             self._command(partial(self._replace, old, new, matched))
             return
@@ -167,7 +176,8 @@ class Graphs(Core):
         self._begin_graph(new)
 
     def _replace(self, old: Running, new: Running, matched: bool) -> None:
-        """Starts a graph again although actions of the finished one still run."""
+        """Start a graph again although actions of the finished one still run: they are stopped
+        first."""
         self._graph_state(old, "CLEARING")
         left_over = [node for node in old.nodes.values() if node.holds_thread(self.now)]
         self._busy = True
@@ -214,7 +224,8 @@ class Graphs(Core):
         self._inform(graph, graph.entry, "on_true")
 
     def _lacks_inputs(self, graph: Running) -> bool:
-        """The silent refusal: an entry action without a required value."""
+        """Return whether an entry action lacks a required value, in which case the engine silently
+        does not start the graph."""
         from_outside = {name: slot.value for name, slot in graph.entry.outputs.items()}
         for edge in graph.entry.children:
             if edge.child is None:
@@ -342,8 +353,8 @@ class Graphs(Core):
             )
 
     def _built_names(self, changed: Running) -> set[str] | None:
-        """The actions of a modified graph that the engine can build, up to the first that it cannot;
-        None if it can build all."""
+        """Return the actions of a modified graph up to the first that the engine cannot build; None
+        if it can build all."""
         if self.facts.restart_matches:
             return None
         found = self._not_built(changed, matched=False)

@@ -1,4 +1,4 @@
-"""Which indexed action or graph a node stands for (docs/umrf-and-the-engine.md 2.1)."""
+"""Finds the indexed action or graph that a node stands for (docs/umrf-and-the-engine.md 2.1)."""
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import Final, Literal
@@ -11,15 +11,18 @@ from action_assistant.umrf.parameters import flat_name
 from action_assistant.umrf.semantics.parts import Node
 from action_assistant.umrf.semantics.values import slots_of
 
-#: Actions that are looked at while sub-graphs of sub-graphs are resolved; their number can double
-#: with each level, in the engine too.
+#: The most actions that are examined while sub-graphs of sub-graphs are resolved. Their number can double with each
+#: level, in the engine too.
 BUDGET: Final = 20_000
 
 
 class Unresolved(msgspec.Struct, frozen=True):
-    """A sub-graph that the engine does not look for. `action`: of the top graph, through which it
-    comes; `name`: the sub-graph. `recursion`: it is one of those around it; `again`: the engine has
-    used it up, beside this place or beside one around it."""
+    """A sub-graph that the engine does not look for. `name`: the sub-graph; `action`: the action of
+    the top graph that leads to it.
+
+    `recursion`: it is one of the graphs around it. `again`: the engine has used it already, in the
+    same graph or in one around it.
+    """
 
     why: Literal["recursion", "again"]
     action: Action
@@ -27,15 +30,18 @@ class Unresolved(msgspec.Struct, frozen=True):
 
 
 class IndexedGraphs:
-    """The indexed graphs that actions can stand for. What each takes and gives is found once,
-    however many actions ask: a small file has room for ten thousand that do."""
+    """Finds the indexed graphs that actions can stand for.
+
+    The inputs and outputs of each graph are computed once, however many actions ask: a small file
+    has room for ten thousand that do.
+    """
 
     def __init__(self, library: Mapping[str, Graph]) -> None:
         self._library = library
         self._known: dict[str, tuple[set[str], set[str]]] = {}
 
     def fitting(self, name: str, inputs: Collection[str], outputs: Collection[str]) -> Graph | None:
-        """The graph of that name, if it takes and gives exactly these."""
+        """Return the graph of that name if it has exactly these inputs and outputs, else None."""
         sub = self._library.get(name)
         if sub is None:
             return None
@@ -45,8 +51,8 @@ class IndexedGraphs:
 
 
 class _Level:
-    """One graph while its actions are resolved. `above`: the graphs around it and itself; `used`:
-    what the engine does not look for here any more, of this graph and of those around it."""
+    """One graph while its actions are resolved. `above`: the names of the graphs around it and its
+    own; `used`: names that the engine does not look for any more here."""
 
     def __init__(self, graph: Graph, above: frozenset[str], used: frozenset[str]) -> None:
         self.above = above | {graph.name}
@@ -58,13 +64,13 @@ class _Level:
 def unresolved(
     graph: Graph, library: Mapping[str, Graph], is_other: Callable[[Action], bool]
 ) -> Iterator[Unresolved]:
-    """The sub-graphs that an engine refuses a graph for although it has them.
+    """Yield the sub-graphs for which an engine refuses a graph although it has indexed them.
 
-    It goes through the actions by full name, and takes a graph off its list when it has used it:
-    for what comes later in the same graph and for whatever is inside that, not for what is beside.
-    So one sub-graph twice in one graph is refused, and one beside a later one that contains it; the
-    same inside two different sub-graphs is not (measured). `is_other`: what is no sub-graph: an
-    action, or somebody else's.
+    The engine goes through the actions by full name. It takes a graph off its list once it has used
+    it, for the later actions of the same graph and for everything inside, but not for graphs beside
+    it. So one sub-graph twice in one graph is refused, and so is one beside a later one that
+    contains it; the same sub-graph inside two different ones is not (measured). `is_other` returns
+    True for what is no sub-graph of this engine: a plain action, or one of another actor.
     """
     indexed = IndexedGraphs(library)
     levels = [_Level(graph, frozenset(), frozenset())]
@@ -92,7 +98,7 @@ def unresolved(
 
 
 def has_action(node: Node, known: Signature | None) -> bool:
-    """Whether an indexed action has exactly the parameters of a node."""
+    """Return whether an indexed action has exactly the parameters of a node."""
     return (
         known is not None
         and set(node.inputs) == set(known.inputs)
@@ -101,7 +107,7 @@ def has_action(node: Node, known: Signature | None) -> bool:
 
 
 def _expected(sub: Graph) -> tuple[set[str], set[str]]:
-    """Names of the inputs that a graph takes and of the outputs that it gives."""
+    """Return the names of the inputs that a graph takes and of the outputs that it gives."""
     entries = {r.child for r in sub.relations if r.parent == ENTRY}
     exits = sorted((r.child_order, r.parent) for r in sub.relations if r.child == EXIT)
     ends = {key for _, key in exits}

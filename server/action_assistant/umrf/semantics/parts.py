@@ -1,4 +1,4 @@
-"""Graphs in motion: nodes, edges and their run state, built from a graph value."""
+"""The parts of a running graph: nodes, edges and their run state, built from a graph value."""
 
 from collections.abc import Mapping, Sequence
 from math import inf
@@ -23,7 +23,7 @@ from action_assistant.umrf.semantics.values import Slot, slots_of
 
 ENTRY_NODE = "graph_entry_0"
 EXIT_NODE = "graph_exit_0"
-#: Names of actions that the engine takes for ends whatever their number: it never runs them.
+#: Names of actions that the engine takes for the ends of a graph, whatever their number: it never runs them.
 RESERVED = frozenset({"graph_entry", "graph_exit"})
 
 #: How a call of an action can end.
@@ -35,7 +35,7 @@ HELD = frozenset({"PAUSE_REQUESTED", "PAUSED"})
 
 
 class NodeLink:
-    """What a child knows of one parent."""
+    """Holds what a child knows of one of its parents."""
 
     __slots__ = ("conditions", "received", "required")
 
@@ -46,7 +46,7 @@ class NodeLink:
 
 
 class Edge:
-    """One item of a parent's `children`. `child` is None where no such action exists."""
+    """Holds one item of a parent's `children`. `child` is None where no such action exists."""
 
     __slots__ = ("child", "label", "remap")
 
@@ -57,11 +57,13 @@ class Edge:
 
 
 class Execution:
-    """One call of an action's own code, whatever the engine says of the action meanwhile: after five
-    seconds an engine calls one that ignores stop ERROR, and its code goes on.
+    """Holds one call of an action's own code, independent of the state that the engine shows for
+    the action.
 
-    `ends_ms`: when the code returns; inf while nothing will end it, also while it is held. `number`:
-    of a call that somebody performs; 0 where the script says what is done.
+    An engine calls an action that ignores a stop ERROR after five seconds, while its code
+    continues. `ends_ms`: when the code returns; inf while nothing will end it, also while it is
+    paused. `number`: the number of a call that a performer carries out; 0 where the script says how
+    the action behaves.
     """
 
     __slots__ = ("began_ms", "ends_ms", "graph", "node", "number")
@@ -75,13 +77,13 @@ class Execution:
 
 
 class Node:
-    """An action while its graph runs.
+    """Holds one action while its graph runs.
 
-    `token` counts what makes scheduled events void. `loaded`: the plugin instance lives. `due_ms`:
-    when the call returns by itself, `rest_ms`: what was left of it when it was paused. `pending`: the
-    result of a call that returned while paused. `returning`: it returned, its children wait.
-    `execution`: the newest call of its code. `loading`: it was triggered and will run once it has
-    loaded, which no state shows.
+    `token` is increased to make scheduled events void. `loaded`: the plugin instance exists.
+    `due_ms`: when the call returns by itself; `rest_ms`: the time that was left of it when it was
+    paused. `pending`: the result of a call that returned while paused. `returning`: the call has
+    returned and the children are being informed. `execution`: the newest call of the action's code.
+    `loading`: it was triggered and will run once it has loaded; no state shows this.
     """
 
     __slots__ = (
@@ -145,27 +147,29 @@ class Node:
         return self.activity(at_ms) != IDLE
 
     def link(self, parent: str, link: NodeLink) -> None:
-        """Adds a parent, unless an earlier listing has it."""
+        """Add a parent, unless an earlier listing has it."""
         if parent not in self.links:
             self.links[parent] = link
             self.waiting_links += link.required
 
     def receive(self, link: NodeLink) -> None:
-        """Marks a parent as reported, for ever."""
+        """Mark a parent as reported; it stays so for the rest of the run."""
         if not link.received:
             link.received = True
             self.waiting_links -= link.required
 
     def has_inputs(self) -> bool:
-        """Whether every required input holds a value."""
+        """Return whether every required input holds a value."""
         return all(slot.has_value() or not slot.required for slot in self.inputs.values())
 
 
 class Running:
-    """A graph in an engine. `name` is the one it runs under, `own` the one it calls itself.
+    """Holds one graph in an engine. `name` is the name it runs under, `own` the one it calls
+    itself.
 
-    `running`: nodes in state RUNNING; `active`: nodes that hold a thread; `held`: paused ones;
-    `loading`: nodes that are about to run.
+    `above` and `home`: the action that this sub-graph stands for and the graph of that action; None
+    for a top graph. `running`: nodes in state RUNNING; `active`: nodes that are active; `held`:
+    paused ones; `loading`: nodes that load and will run.
     """
 
     def __init__(self, name: str, graph: Graph, above: "Node | None", home: "Running | None"):
@@ -189,14 +193,15 @@ class Running:
         self.bypassed_ms = -1.0
         self.stop_failed = False
         self.has_ghost_ends = False
-        #: It was built in part only; `deadly`: a get of it kills the engine.
+        #: `broken`: it was built in part only. `deadly`: a get of it kills the engine.
         self.broken = False
         self.deadly = False
-        self.blocked: Node | None = None  # its thread hangs while it ends the graph
+        self.blocked: Node | None = None  # the node whose thread hangs while it ends the graph
         self.linked: dict[Node, list[Node] | None] = {}
 
     def own_names(self) -> set[str]:
-        """What this graph and those it runs inside call themselves, and are called."""
+        """Return the names of this graph and of all graphs around it, and of the actions that stand
+        for them."""
         found, graph = set[str](), self
         while True:
             found.add(graph.own)
@@ -206,14 +211,15 @@ class Running:
             graph = graph.home
 
     def count(self, state: str, by: int) -> None:
-        """Keeps the sums of states."""
+        """Add `by` to the counters of a node state."""
         self.running += by * (state == "RUNNING")
         self.active += by * (state in ACTIVE)
         self.held += by * (state in HELD)
 
 
 def build(running: Running, behaviours: Mapping[Key, tuple[Behaviour, ...]]) -> None:
-    """Fills a graph with nodes and edges. Of two actions with one full name the later is lost."""
+    """Fill a graph with nodes and edges. If two actions have one full name, the later one is
+    lost."""
     graph = running.graph
     nodes = {a.key: Node(a, a.full_name, behaviours[a.key]) for a in graph.actions if not a.missing}
     for node in nodes.values():
@@ -280,8 +286,11 @@ def _link_children(running: Running, nodes: Mapping[Key, Node], ghosts: Mapping[
 
 
 def restructure(running: Running, new: Running) -> None:
-    """What a modify does: nodes that stay get the relations and values of the new graph, an empty
-    list of relations changes nothing, and every parent's report is forgotten."""
+    """Give a running graph the structure of `new`, as a modify does.
+
+    Nodes that stay get the relations and values of the new graph. An empty list of relations
+    changes nothing, and the reports of all parents are forgotten.
+    """
     merged = {name: running.nodes.get(name, node) for name, node in new.nodes.items()}
     for node in (*new.nodes.values(), new.entry):
         for edge in node.children:
@@ -294,7 +303,7 @@ def restructure(running: Running, new: Running) -> None:
             continue
         node.inputs = fresh.inputs
         for slot in node.inputs.values():
-            slot.received = slot.has_value()  # gone after the run, like what a parent gave
+            slot.received = slot.has_value()  # cleared after the run, like a value from a parent
         node.children = fresh.children or node.children
         node.links = fresh.links or node.links
         for link in node.links.values():
@@ -306,7 +315,8 @@ def restructure(running: Running, new: Running) -> None:
 
 
 def exit_owner(graph: Graph) -> Action | None:
-    """The action whose outputs the exit takes in: the last of `graph_exit` that has any."""
+    """Return the action whose outputs the exit takes in: the last one of `graph_exit` that has any
+    outputs."""
     by_key = {action.key: action for action in graph.actions if not action.missing}
     ends = [r for r in graph.relations if r.child == EXIT and r.only != "children"]
     ends.sort(key=lambda r: (r.child_order, name_order(r)), reverse=True)
@@ -315,15 +325,19 @@ def exit_owner(graph: Graph) -> Action | None:
 
 
 def exit_inputs(graph: Graph) -> dict[str, Slot]:
-    """What the exit takes in, and as a sub-graph gives out: the engine makes the outputs of each
-    action of `graph_exit` its inputs, and those of the last one that has any stay, required like
-    any input. Whoever leads to the exit has to hand them over, or the graph does not end."""
+    """Return the inputs of the exit, which are also the outputs of the graph as a sub-graph, by
+    flat name.
+
+    The engine makes the outputs of each action of `graph_exit` inputs of the exit; those of the
+    last one that has any remain. They are required like any input: unless an action that leads to
+    the exit hands them over, the graph does not end.
+    """
     owner = exit_owner(graph)
     return slots_of(owner.outputs) if owner is not None else {}
 
 
 def linked_nodes(running: Running, node: Node) -> list[Node] | None:
-    """Every action downstream of a node, or None if the way leads into a loop."""
+    """Return every action downstream of a node, or None if a path from it leads into a loop."""
     if node not in running.linked:
         running.linked[node] = _downstream(running, node)
     return running.linked[node]

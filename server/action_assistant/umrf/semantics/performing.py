@@ -1,6 +1,7 @@
-"""What carries actions out where no script does: a port. What stands behind it is nobody's business here.
+"""The port through which actions are carried out outside of the simulator, where no script says how
+they behave.
 
-A performed action never ends by itself: whoever performs it says when (`Engine.returned`).
+A performed action never ends by itself: the performer reports its end (`Engine.returned`).
 """
 
 from typing import Any, Final, Protocol
@@ -11,14 +12,17 @@ from action_assistant.umrf.semantics.parts import Execution, Node, Running
 from action_assistant.umrf.semantics.script import Behaviour
 from action_assistant.umrf.semantics.values import Opaque
 
-#: What the engine makes of a call that somebody performs.
+#: The behaviour of a call that a performer carries out.
 PERFORMED: Final = Behaviour(never=True, ignores_stop=True)
 
 
 class Call(msgspec.Struct, frozen=True, kw_only=True):
-    """One call of an action's code; `number` is its own in this engine. `graph` is a running name,
-    `node` a full name. `inputs`: values by flat name (`pose::x`), numbers as doubles, without those
-    of which only actions know the type. `outputs`: the type of each by flat name."""
+    """One call of an action's code. `number` is unique in its engine, `graph` a running name and
+    `node` a full name.
+
+    `inputs`: values by flat name (`pose::x`), numbers as doubles, without values whose type only
+    actions know. `outputs`: the type of each output by flat name.
+    """
 
     number: int
     graph: str
@@ -29,8 +33,11 @@ class Call(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Returned(msgspec.Struct, frozen=True, kw_only=True):
-    """A call of which nothing goes on any more. `result`: one of `OUTCOMES`. `outputs`: values of
-    the type that the call named, by flat name. `message`: what it had to say."""
+    """The end of a call of which no code runs any more. `result`: one of `OUTCOMES`.
+
+    `outputs`: values of the types that the call named, by flat name. `message`: a text about the
+    end for people.
+    """
 
     number: int
     result: str
@@ -42,28 +49,32 @@ class Performer(Protocol):
     """Carries out calls beside the engine. No method waits."""
 
     def performs(self, name: str) -> bool:
-        """Whether actions of this name are its own, rather than the script's."""
+        """Return whether this performer carries out actions of this name, rather than the
+        script."""
 
     def begin(self, call: Call) -> None:
-        """A call begins."""
+        """Begin a call."""
 
     def stop(self, number: int) -> None:
-        """It shall end soon."""
+        """Ask a call to end soon."""
 
     def pause(self, number: int) -> None:
-        """It shall hold."""
+        """Ask a call to pause."""
 
     def resume(self, number: int) -> None:
-        """It may go on."""
+        """Let a paused call continue."""
 
     def give_up(self, number: int) -> str | None:
-        """The engine has waited for long enough: the call is ended by force, which is told as a
-        return like any other. What it had to say."""
+        """End a call by force, since the engine's stop timeout has passed, and return a message
+        about it.
+
+        The end is reported as a return like any other.
+        """
 
 
 class PerformedCalls:
-    """The calls of one engine that somebody performs, as long as anything of them goes on. Without a
-    performer there are none, and nothing happens."""
+    """Tracks the performed calls of one engine until all of their code has ended. Without a
+    performer there are none."""
 
     def __init__(self, performer: Performer | None) -> None:
         self._performer = performer
@@ -71,11 +82,11 @@ class PerformedCalls:
         self._newest = 0
 
     def performs(self, name: str) -> bool:
-        """Whether actions of this name are performed."""
+        """Return whether actions of this name are performed."""
         return self._performer is not None and self._performer.performs(name)
 
     def begin(self, graph: Running, node: Node) -> None:
-        """The action's code is called."""
+        """Begin a call of the action's code with its current inputs."""
         if self._performer is None or node.execution is None:
             return
         self._newest += 1
@@ -98,31 +109,33 @@ class PerformedCalls:
         self._performer.begin(call)
 
     def stop(self, node: Node) -> None:
-        """The action is told to stop."""
+        """Ask the action's call to end."""
         if self._performer is not None and (number := self._number(node)):
             self._performer.stop(number)
 
     def pause(self, node: Node) -> None:
-        """The action is told to hold."""
+        """Ask the action's call to pause."""
         if self._performer is not None and (number := self._number(node)):
             self._performer.pause(number)
 
     def resume(self, node: Node) -> None:
-        """The action is told to go on."""
+        """Let the action's paused call continue."""
         if self._performer is not None and (number := self._number(node)):
             self._performer.resume(number)
 
     def give_up(self, node: Node) -> str | None:
-        """The engine waits no longer for the action; what there is to say of it."""
+        """End the action's call by force, and return the performer's message; None if the action
+        has no open call."""
         if self._performer is not None and (number := self._number(node)):
             return self._performer.give_up(number)
         return None
 
     def take(self, number: int) -> tuple[Running, Node, Execution] | None:
-        """A call that goes on no more: whose it was."""
+        """Remove a call that has ended, and return its graph, node and execution; None if it is not
+        known."""
         return self._going.pop(number, None)
 
     def _number(self, node: Node) -> int:
-        """Of the call that goes on; 0 if there is none."""
+        """Return the number of the node's open call; 0 if there is none."""
         number = node.execution.number if node.execution is not None else 0
         return number if number in self._going else 0

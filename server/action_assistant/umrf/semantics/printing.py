@@ -1,6 +1,6 @@
-"""A graph in motion as the engine prints it in feedback and in answers of get.
+"""Prints a running graph as the engine prints it in feedback and in answers to a get.
 
-See docs/umrf-and-the-engine.md 1, 4.
+See docs/umrf-and-the-engine.md 1 and 4.
 """
 
 import json
@@ -14,13 +14,15 @@ from action_assistant.umrf.semantics.values import Slot
 
 #: The order in which the engine lists conditions.
 _LISTED: Final = ("on_true", "on_false", "on_stopped", "on_error")
-_MARGIN: Final = "\n" + 8 * " "  # of an action inside its graph
+_MARGIN: Final = "\n" + 8 * " "  # before each line of an action inside its graph
 
 
-class Sheet:
-    """One running graph, ready to be printed after every change; what has not changed is not
-    printed anew. `attributes`: the `gui_attributes` of actions by full name, which the engine gives
-    back verbatim. The engine drops the description of running graphs (unless `described`), and the
+class GraphPrinter:
+    """Prints one running graph after every change; the text of an action that did not change is
+    reused.
+
+    `attributes`: the `gui_attributes` of actions by full name, which the engine gives back
+    verbatim. The engine drops the description of running graphs (unless `described`), and the
     conditions of exits and the renamings of entries (unless `conditioned`).
 
     See docs/umrf-and-the-engine.md 1.4.
@@ -55,7 +57,8 @@ class Sheet:
         states: Mapping[str, str],
         messages: Mapping[str, Sequence[tuple[int, str]]],
     ) -> str:
-        """The graph with these states, and what its actions had to say: (ms since 1970, text)."""
+        """Return the text of the graph with these states. `messages`: texts of each action as (ms
+        since 1970, text)."""
         actions = ",".join(
             self._action(
                 node, states.get(node.full_name, "UNINITIALIZED"), messages.get(node.full_name, ())
@@ -95,7 +98,7 @@ class Sheet:
 
 
 def printed_action(action: Action) -> str:
-    """An action of the index, as the engine lists it."""
+    """Return the text of an indexed action as the engine lists it."""
     node = Node(action, action.full_name, (DEFAULT,))
     return _text(_own_fields(node, action.description, "UNINITIALIZED"), "\n")
 
@@ -144,7 +147,8 @@ def _child(label: str, remap: list[dict[str, str]]) -> dict[str, Any]:
 
 
 def _parameters(slots: Mapping[str, Slot], *, values: bool) -> dict[str, Any]:
-    """Leaves nested by `::`; values only of inputs, and only while they are held."""
+    """Return leaves nested by the `::` of their names. Only inputs have values, and only while they
+    hold one."""
     root: dict[str, Any] = {}
     for flat, slot in slots.items():
         leaf: dict[str, Any] = {"pvf_type": slot.type}

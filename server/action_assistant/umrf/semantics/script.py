@@ -1,4 +1,4 @@
-"""Scripts: what actions do in a simulation (docs/contracts.md 5.2)."""
+"""Scripts: how actions behave in a simulation (docs/contracts.md 5.2)."""
 
 from collections.abc import Iterable
 from typing import Annotated, Any, Final
@@ -8,18 +8,20 @@ import msgspec
 from action_assistant.umrf.model import OUTCOMES
 
 _OUTCOME: Final = msgspec.Meta(extra_json_schema={"enum": list(OUTCOMES)})
-#: Describes a field that `script_from` reads; the route names `Script` beside its body.
+#: The schema of a field that `script_from` reads; the route names `Script` beside its body.
 SCRIPT: Final = msgspec.Meta(extra_json_schema={"$ref": "#/components/schemas/Script"})
 
 
 class Behaviour(msgspec.Struct, frozen=True, kw_only=True):
-    """One call of an action. Times are seconds.
+    """The behaviour of one call of an action. Times are seconds.
 
-    `never`: does not end by itself. `ignores_stop`: goes on until its own end. `stop_error`: throws
-    in onStop, which the engine calls ERROR at once, whatever its code does. `pauses`: has an onPause.
-    `load_s`: how long it loads (library and `onInit`) when it is triggered for the first time, which this
-    engine does not count as running. `init_error`: throws when it is loaded. `no_library`: indexed, but its library is not there, so
-    that no graph with it can be built (said of its first call). `outputs`: values by flat name.
+    `after_s`: how long it runs. `never`: it does not end by itself. `ignores_stop`: it continues
+    until its own end. `stop_error`: it throws in onStop; the engine shows ERROR at once, whatever
+    its code does. `pauses`: it has an onPause. `load_s`: how long it loads (library and `onInit`)
+    when it is triggered for the first time, which the engine does not count as running.
+    `init_error`: it throws when it is loaded. `no_library`: it is indexed and its library is
+    missing, so that no graph with it can be built (read from its first call). `outputs`: values by
+    flat name.
     """
 
     after_s: float = 1.0
@@ -40,13 +42,17 @@ DEFAULT: Final = Behaviour()
 
 
 class Script(msgspec.Struct, frozen=True):
-    """Behaviours by key: one entry per call, the last repeats."""
+    """Behaviours by key: one entry for each call, and the last one repeats."""
 
     behaviours: dict[str, tuple[Behaviour, ...]] = {}
 
     def calls_of(self, running: str, own: str, full_name: str, name: str) -> tuple[Behaviour, ...]:
-        """What an action of the graph that runs as `running` and calls itself `own` does; the
-        closest key wins."""
+        """Return the behaviours of an action in the graph that runs as `running` and calls itself
+        `own`.
+
+        The most specific key wins: `running/full_name`, `own/full_name`, the full name, the name,
+        `*`.
+        """
         keys = (f"{running}/{full_name}", f"{own}/{full_name}", full_name, name, "*")
         for key in keys:
             if found := self.behaviours.get(key):
@@ -55,7 +61,8 @@ class Script(msgspec.Struct, frozen=True):
 
 
 def script_json(script: Script) -> dict[str, Any]:
-    """A script as JSON values, as `script_from` reads them, without what is so by default."""
+    """Return a script as JSON values that `script_from` reads, without members that have their
+    default."""
     usual = msgspec.to_builtins(DEFAULT)
     return {
         "behaviours": {
@@ -73,7 +80,7 @@ def script_json(script: Script) -> dict[str, Any]:
 
 
 def script_from(value: object) -> Script:
-    """A script from JSON values. Raises `ValueError` naming the place."""
+    """Read a script from JSON values. Raises `ValueError` that names the place."""
     if not isinstance(value, dict) or not isinstance(value.get("behaviours", {}), dict):
         raise ValueError("A script is an object with “behaviours”, an object.")
     unknown = sorted(map(str, value.keys() - {"behaviours"}))

@@ -1,4 +1,4 @@
-"""A whole simulation in one call, for the command line and for tests."""
+"""Runs a whole simulation in one call, for the command line, courses and tests."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Final
@@ -28,11 +28,14 @@ def simulate(
     actor: str = "",
     signatures: Mapping[str, Signature] | None = None,
 ) -> Iterator[Trace]:
-    """Everything that happens from the start at 0 ms until nothing is left to happen, `until_ms`
-    or `max_events`. `commands`: (ms, `stop` | `pause` | `resume`, running name or None for the top
-    graph). `signatures`: the actions that the engine has; without them it has every one. Commands reach the engine as calls, so that two stops at once kill it. A start that the
-    engine refuses ends in a hazard `refused`; a trace that is cut off after `max_events` in one more
-    event, the hazard `events`."""
+    """Simulate a graph from its start at 0 ms, and yield the trace.
+
+    The trace ends when nothing more will happen, at `until_ms`, or after `max_events`; a trace that
+    is cut off ends with one more event, the hazard `events`. A start that the engine refuses ends
+    in the hazard `refused`. `commands`: (ms, `stop` | `pause` | `resume`, running name or None for
+    the top graph); they reach the engine as direct calls, so that two stops at once kill it.
+    `signatures`: the actions that the engine has; without them it has every action.
+    """
     engine = Engine(
         facts=facts,
         script=script,
@@ -65,7 +68,7 @@ def simulate(
 
 
 def cut_off(engine: Engine, graph: Graph, max_events: int) -> Trace:
-    """The last event of a trace that has more events than were asked for."""
+    """Return the last event of a trace that has more events than were asked for."""
     message = (
         f"The simulation ends here, after {max_events:,} events; the graph does not. How it goes on is "
         "not known."
@@ -74,7 +77,7 @@ def cut_off(engine: Engine, graph: Graph, max_events: int) -> Trace:
 
 
 def started(engine: Engine, graph: Graph, states: Mapping[Key, str] | None) -> list[Trace]:
-    """The start at 0 ms; one that the engine refuses ends in a hazard."""
+    """Start a graph at 0 ms. A start that the engine refuses ends in a hazard."""
     try:
         return engine.start(graph, 0.0, states)
     except GraphRefused as e:
@@ -83,7 +86,8 @@ def started(engine: Engine, graph: Graph, states: Mapping[Key, str] | None) -> l
 
 
 def commanded(engine: Engine, at_ms: float, verb: str, name: str) -> list[Trace]:
-    """`stop`, `pause` or `resume` at this moment, of the graph that runs as `name`."""
+    """Carry out `stop`, `pause` or `resume` at this time for the graph that runs as `name`. Raises
+    `ValueError`."""
     match verb:
         case "stop":
             return engine.stop(name, at_ms)

@@ -1,4 +1,5 @@
-"""The course of a run as steps without times, and where two courses part. Pure."""
+"""The course of a run as steps without times, and the first step in which two courses differ.
+Pure."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Final, Literal
@@ -18,11 +19,11 @@ from action_assistant.umrf.semantics.trace import (
     Trace,
 )
 
-MOST: Final = 20_000  # events of a course
+MOST: Final = 20_000  # the most events of one course
 
 
 class ExpectedStep(msgspec.Struct, frozen=True):
-    """One step of a course: what happened to an action (empty: to the graph), and how."""
+    """One step of a course: an event of an action, or of the graph if `node` is empty."""
 
     graph: str
     node: str
@@ -31,7 +32,8 @@ class ExpectedStep(msgspec.Struct, frozen=True):
 
 
 class Departure(msgspec.Struct, frozen=True):
-    """The first step in which a course is another one. None where a course has ended."""
+    """The first step in which a course differs from the expected one. A step is None where that
+    course has ended."""
 
     place: int
     expected: ExpectedStep | None
@@ -44,8 +46,11 @@ def course(
     most: int = MOST,
     inside: Mapping[str, Graph] | None = None,
 ) -> tuple[ExpectedStep, ...]:
-    """What happens when this graph, with these graphs inside, runs under this script, without times, as
-    far as `most` events go. Deterministic."""
+    """Return the steps of this graph under this script, with the graphs of `inside` as sub-graphs,
+    up to `most` trace events.
+
+    Deterministic; times are left out.
+    """
     traces = simulate(
         graph, script=script, library=inside, facts=SIMULATED, until_ms=DAY_MS, max_events=most
     )
@@ -53,7 +58,7 @@ def course(
 
 
 def steps_of(traces: Iterable[Trace]) -> tuple[ExpectedStep, ...]:
-    """What a trace tells, as steps."""
+    """Return the steps of a trace."""
     return tuple(step for trace in traces if (step := _step(trace)) is not None)
 
 
@@ -67,7 +72,7 @@ def _step(trace: Trace) -> ExpectedStep | None:
             return ExpectedStep(trace.graph, "", "ends", trace.value)
         case GraphStateEvent():
             return ExpectedStep(trace.graph, "", "state", trace.state)
-        case HazardEvent(code=code):  # that it was cut off is no part of what was expected before
+        case HazardEvent(code=code):  # a cut-off is no step: earlier versions did not record it
             is_cut = code == CUT_OFF
             return None if is_cut else ExpectedStep(trace.graph, trace.node or "", "hazard", code)
         case _:
@@ -75,7 +80,8 @@ def _step(trace: Trace) -> ExpectedStep | None:
 
 
 def departure(expected: Sequence[ExpectedStep], found: Sequence[ExpectedStep]) -> Departure | None:
-    """Where the second course first differs from the first; None when they are the same."""
+    """Return the first step in which the second course differs from the first; None if they are
+    equal."""
     for place in range(max(len(expected), len(found))):
         one = expected[place] if place < len(expected) else None
         other = found[place] if place < len(found) else None
@@ -85,7 +91,8 @@ def departure(expected: Sequence[ExpectedStep], found: Sequence[ExpectedStep]) -
 
 
 def unnamed(steps: Sequence[ExpectedStep]) -> list[ExpectedStep]:
-    """Without the name of the top graph: a graph may be renamed and still do the same."""
+    """Return the steps without the name of the top graph, so that a renamed graph compares
+    equal."""
     top = steps[0].graph if steps else ""
     return [
         msgspec.structs.replace(step, graph=step.graph.removeprefix(top).lstrip("_"))
@@ -97,7 +104,7 @@ _WORDS: Final = {"result": "ends", "runs": "is told to", "state": "is", "hazard"
 
 
 def said(step: ExpectedStep | None) -> str:
-    """A step in words."""
+    """Return a step in words."""
     if step is None:
         return "the end"
     if step.what == "ends":

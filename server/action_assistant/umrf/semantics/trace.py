@@ -1,4 +1,4 @@
-"""What a running engine does, event by event, as `simulate --trace` prints it.
+"""Trace events of a running engine, as `simulate --trace` prints them.
 
 See docs/contracts.md 5.1.
 """
@@ -11,7 +11,7 @@ from action_assistant.safe_text import hold_names
 
 
 class NodeStateEvent(msgspec.Struct, frozen=True, tag_field="kind", tag="node_state"):
-    """An action changed its state. Times are milliseconds as the caller counts them."""
+    """An action changed its state. Times are milliseconds on the caller's clock."""
 
     t_ms: float
     graph: str
@@ -28,7 +28,8 @@ class GraphStateEvent(msgspec.Struct, frozen=True, tag_field="kind", tag="graph_
 
 
 class EdgeEval(msgspec.Struct, frozen=True, tag_field="kind", tag="edge"):
-    """One relation was asked: `parent => child`, and what came of it: `result -> response`."""
+    """A child was asked for its response. `edge` is `parent => child`, `eval` is `result ->
+    response`."""
 
     t_ms: float
     graph: str
@@ -37,7 +38,7 @@ class EdgeEval(msgspec.Struct, frozen=True, tag_field="kind", tag="edge"):
 
 
 class Dispatch(msgspec.Struct, frozen=True, tag_field="kind", tag="dispatch"):
-    """A child was ready and the response was carried out."""
+    """A child was ready, and its response was carried out."""
 
     t_ms: float
     graph: str
@@ -58,7 +59,7 @@ class NotReady(msgspec.Struct, frozen=True, tag_field="kind", tag="not_ready"):
 
 
 class GraphResultEvent(msgspec.Struct, frozen=True, tag_field="kind", tag="graph_result"):
-    """The exit of a graph was satisfied with this result."""
+    """The exit of a graph was reached with this result."""
 
     t_ms: float
     graph: str
@@ -66,12 +67,10 @@ class GraphResultEvent(msgspec.Struct, frozen=True, tag_field="kind", tag="graph
 
 
 class HazardEvent(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="kind", tag="hazard"):
-    """Here the real engine crashes, hangs or does something that nobody wants.
+    """The real engine crashes, hangs or does something unwanted here.
 
-    See docs/umrf-and-the-engine.md 3.
-
-    `effect`: `crash` ends the trace; after `hang` no command is answered; `goes on` warns; `cut off`
-    says that it was not simulated any further.
+    See docs/umrf-and-the-engine.md 3. `effect`: `crash` ends the trace; after `hang` no command is
+    answered; `goes on` warns; `cut off` says that the simulation was not continued.
     """
 
     t_ms: float
@@ -88,7 +87,7 @@ class HazardEvent(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="ki
 class NodeResultEvent(
     msgspec.Struct, frozen=True, omit_defaults=True, tag_field="kind", tag="node_result"
 ):
-    """How a visit of an action ended; the real engine tells nobody."""
+    """A visit of an action ended with this result; the real engine reports it to no client."""
 
     t_ms: float
     graph: str

@@ -1,4 +1,5 @@
-"""Parameters at run time: who holds which value, and what reaches a child.
+"""Parameters at run time: the values that actions hold, and the values that a parent hands to a
+child.
 
 See docs/umrf-and-the-engine.md 2.7.
 """
@@ -26,7 +27,7 @@ class Opaque(msgspec.Struct, frozen=True):
 
 
 class Missing:
-    """No value."""
+    """The value of a parameter that has none."""
 
     def __repr__(self) -> str:
         return "no value"
@@ -53,18 +54,21 @@ class Slot:
         self.received = False
 
     def has_value(self) -> bool:
-        """Whether there is something to work with."""
+        """Return whether the parameter holds a value."""
         return self.value is not MISSING
 
     def default(self) -> Any:
-        """What an action that says nothing leaves here: the value of the file, else the first allowed
-        one, else the neutral one of its type. Generated packages begin with the same."""
+        """Return the value that an action leaves here if it gives none.
+
+        This is the value of the file, else the first allowed value, else the neutral value of the
+        type. Generated packages begin with the same.
+        """
         if self.has_value():
             return self.value
         return self.allowed[0] if self.allowed else NEUTRAL.get(self.type, Opaque(self.type))
 
     def receive(self, kind: str, value: Any) -> None:
-        """Takes what a parent hands over, unless type, lock or allowed values forbid it."""
+        """Take a value from a parent, unless its type, a lock or the allowed values forbid it."""
         if value is MISSING or kind != self.type or not self.updatable:
             return
         if self.allowed and kind in _CHECKED and value not in self.allowed:
@@ -73,18 +77,19 @@ class Slot:
         self.received = True
 
     def end_of_run(self) -> None:
-        """A value that came from a parent is gone after the run; the static one does not return."""
+        """Clear a value that came from a parent. The value of the file does not return."""
         if self.received:
             self.value = MISSING
             self.received = False
 
 
 class RemapUnknown(Exception):
-    """A renaming starts from an output that the parent does not have: the engine aborts."""
+    """Raised for a renaming of an output that the parent does not have: the engine aborts."""
 
 
 def slots_of(parameters: Iterable[Parameter]) -> dict[str, Slot]:
-    """The parameters of one side by flat name, as an engine sorts them."""
+    """Return the parameters of one side by flat name, in the order in which an engine sorts
+    them."""
     found: dict[str, Slot] = {}
     for parameter in parameters:
         leaf = parse_small(parameter.text)
@@ -95,7 +100,8 @@ def slots_of(parameters: Iterable[Parameter]) -> dict[str, Slot]:
 
 
 def fill_outputs(outputs: dict[str, Slot], given: dict[str, Any] | None) -> None:
-    """Fill what an action leaves behind: the script's value, else the default of the output."""
+    """Fill the outputs of an action that has run: the value that the script gives, else the default
+    of the output."""
     for name, slot in outputs.items():
         value = (given or {}).get(name)
         if value is None:
@@ -104,7 +110,7 @@ def fill_outputs(outputs: dict[str, Slot], given: dict[str, Any] | None) -> None
 
 
 def hand_over(outputs: dict[str, Slot], remap: Sequence[Remap], inputs: dict[str, Slot]) -> None:
-    """Moves a parent's outputs into the child's inputs of the same name after renaming.
+    """Copy a parent's outputs into the child's inputs of the same name, after renaming.
 
     Raises `RemapUnknown`.
     """
@@ -116,10 +122,10 @@ def hand_over(outputs: dict[str, Slot], remap: Sequence[Remap], inputs: dict[str
 def renamed(
     outputs: Collection[str], remap: Sequence[Remap], inputs: Collection[str]
 ) -> dict[str, str]:
-    """Which output reaches which input: input name → output name. Raises `RemapUnknown`.
+    """Return the output that reaches each input: input name → output name. Raises `RemapUnknown`.
 
-    The engine renames inside a sorted tree whose order is not restored, so that other outputs may
-    not be found any more.
+    The engine renames inside a sorted tree and does not restore its order, so that other outputs
+    may not be found any more.
     """
     if not remap:
         fewer, more = sorted((inputs, outputs), key=len)
@@ -136,7 +142,7 @@ def renamed(
 
 
 def plain(value: Json) -> Any:
-    """A JSON value with numbers as doubles."""
+    """Return a JSON value with its numbers as doubles."""
     match value:
         case Number():
             return value.value
@@ -149,8 +155,11 @@ def plain(value: Json) -> Any:
 
 
 class _Tree:
-    """A red-black tree into which sorted names were inserted one by one, like `std::set`: its shape,
-    which depends on their number only."""
+    """The shape of a red-black tree into which sorted names were inserted one by one, like
+    `std::set`.
+
+    The shape depends only on how many names there are.
+    """
 
     def __init__(self, count: int) -> None:
         self.left: list[int | None] = [None] * count
@@ -162,7 +171,8 @@ class _Tree:
             self._insert_greatest(index)
 
     def find(self, names: Sequence[str], name: str) -> int | None:
-        """The place of a name among `names` by the comparisons that the tree's order promises."""
+        """Search the tree for a name by the comparisons that its order promises, and return its
+        index among `names` or None."""
         place, best = self.root, None
         while place is not None:
             if names[place] < name:
