@@ -1,4 +1,4 @@
-"""What is wrong with a graph, in words that say what would happen.
+"""Checks a graph and returns its problems, in words that say what would happen.
 
 See docs/umrf-and-the-engine.md 3.
 """
@@ -42,11 +42,11 @@ def check(
     graphs: Mapping[str, Graph] | None = None,
     resolution: Resolution = CERTAIN,
 ) -> list[Problem]:
-    """Every problem of a graph, errors first, then what is worst. Never raises.
+    """Return every problem of a graph: errors first, then by rank. Never raises.
 
-    `library`: the actions that the engine has, by name; `graphs`: the graphs that it has indexed and
-    so can run as sub-graphs, found by this `resolution`. What is None is not known, and nothing is said
-    of it.
+    `library`: the actions that the engine has, by name. `graphs`: the graphs that it has indexed
+    and can run as sub-graphs, found by this `resolution`. None means unknown, and no problem is
+    reported about it.
     """
     subject = Subject(graph, facts)
     check_structure(subject)
@@ -64,8 +64,8 @@ def check_reading(
     facts: EngineFacts = PINNED,
     graphs: Mapping[str, Graph] | None = None,
 ) -> list[Problem]:
-    """Every problem of a file as it stands, with its place there: of its text, and of the graph in
-    it."""
+    """Return every problem of a file with its place there: problems of the text, and of the graph
+    in it."""
     found = check(reading.graph, library, facts, graphs)
     problems = [*reading.problems, *reading.placed(found)]
     return sorted(problems, key=rank)
@@ -76,14 +76,14 @@ def check_written(
     graphs: Mapping[str, Graph] | None = None,
     resolution: Resolution = CERTAIN,
 ) -> list[Problem]:
-    """Every problem of a graph, with its place in the graph's canonical text. `graphs`, `resolution`: as
-    in `check`."""
+    """Return every problem of a graph with its place in the graph's canonical text. `graphs` and
+    `resolution`: as in `check`."""
     found = check(graph, graphs=graphs, resolution=resolution)
     return placed(found, write(graph)) if found else []
 
 
 def check_action(reading: ActionReading) -> list[Problem]:
-    """Every problem of the file of one action, with places in that file, errors first."""
+    """Return every problem of the file of one action with its place there, errors first."""
     graph = Graph(name=reading.action.name or "action", actions=(reading.action,))
     subject = Subject(graph, PINNED)
     check_structure(subject)
@@ -93,7 +93,8 @@ def check_action(reading: ActionReading) -> list[Problem]:
 
 
 def refused_by_parser(reading: Reading) -> list[Problem]:
-    """Why the engine's parser refuses a file as it stands; nothing of such a file can run."""
+    """Return the reasons for which the engine's parser refuses a file. Nothing of such a file can
+    run."""
     subject = Subject(reading.graph, PINNED)
     check_structure(subject)
     ends = {ENTRY, EXIT}
@@ -112,7 +113,8 @@ def refused_by_parser(reading: Reading) -> list[Problem]:
 
 
 def blocking(problems: Collection[Problem], *, overridden: Collection[str] = ()) -> list[Problem]:
-    """The errors that forbid a start; those that are final whatever is overridden."""
+    """Return the errors that forbid a start. Errors that are final are among them even if they are
+    `overridden`."""
     return [
         problem
         for problem in problems
@@ -121,7 +123,8 @@ def blocking(problems: Collection[Problem], *, overridden: Collection[str] = ())
 
 
 def is_final(problem: Problem) -> bool:
-    """Whether nobody can override this error: its code is final, or that of what it is about inside."""
+    """Return whether nobody can override this error: its code is final, or the code of the problem
+    inside that it is about."""
     inner = problem.inside.code if problem.inside is not None else problem.code
     return problem.severity == "error" and not FINAL.isdisjoint({problem.code, inner})
 

@@ -1,4 +1,5 @@
-"""What is true of one engine build; kept with a robot's profile, taken by check, simulator and link."""
+"""Facts about one engine build. They are kept with a robot's profile and used by checks, simulator
+and link."""
 
 from collections.abc import Mapping
 from typing import Final
@@ -11,13 +12,13 @@ ALL_HAZARDS: Final = frozenset(
 
 
 class EngineFacts(msgspec.Struct, frozen=True, kw_only=True):
-    """Hazards, names and abilities of an engine built from one commit.
+    """Hazards, names and abilities of an engine built from one commit. Times are in milliseconds.
 
-    `hazards`: those of docs/umrf-and-the-engine.md 3 that this build has. `bypass_fixed`: it captures
-    the result of a bypass by value, so that H3 is no crash. `synchronises`: graphs with several actors
-    run. `pauses_safely`: a stop of a paused graph works. `restart_matches`: starting a graph's JSON again
-    finds its sub-graphs again. Times in milliseconds. `longest_loading_ms`: what a person says that an
-    action of this robot takes to load at most; 0 where nobody has said.
+    `hazards`: those of docs/umrf-and-the-engine.md 3 that this build has. `bypass_fixed`: it
+    captures the result of a bypass by value, so that H3 is no crash. `synchronises`: graphs with
+    several actors run. `pauses_safely`: a stop of a paused graph works. `restart_matches`: starting
+    a graph's JSON again finds its sub-graphs again. `longest_loading_ms`: the longest time that an
+    action of this robot takes to load, as a person has declared it; 0 if nobody has.
     """
 
     commit: str
@@ -50,8 +51,10 @@ _KNOWN: Final = {facts.commit: facts for facts in (PINNED, SIMULATED)}
 
 
 def facts_for(commit: str | None) -> EngineFacts:
-    """The facts of a commit (seven digits or more); those of the pinned engine for one that nobody
-    has measured, under its own name."""
+    """Return the facts of a commit (seven digits or more).
+
+    A commit that was not measured gets the facts of the pinned engine under its own name.
+    """
     if not commit:
         return PINNED
     for known, facts in _KNOWN.items():
@@ -61,7 +64,7 @@ def facts_for(commit: str | None) -> EngineFacts:
 
 
 class BadProfile(ValueError):
-    """A profile that says something about an engine that cannot be said; `path` is a JSON pointer."""
+    """Raised for a profile with a wrong statement about an engine; `path` is a JSON pointer."""
 
     def __init__(self, message: str, path: str) -> None:
         super().__init__(message)
@@ -69,14 +72,14 @@ class BadProfile(ValueError):
         self.path = path
 
 
-#: What a profile may demand of people besides what it says of an engine: that somebody else than the
-#: starter has said yes to a graph.
+#: The one field of a profile that is a demand on people: that a second person has approved a graph before its start.
 SECOND_PERSON: Final = "second_person"
 
 
 def facts_of(profile: Mapping[str, object]) -> EngineFacts:
-    """The facts of a robot's engine: those of its `commit` (without one, of the pinned engine), and
-    whatever else the profile says of it, by the names of `EngineFacts`. Raises BadProfile."""
+    """Return the facts of a robot's engine: those of its `commit` (without one, of the pinned
+    engine), with the other fields of the profile, named as in `EngineFacts`. Raises `BadProfile`.
+    """
     if not isinstance(profile.get(SECOND_PERSON, False), bool):
         raise BadProfile(f"{SECOND_PERSON} is true or false.", f"/{SECOND_PERSON}")
     profile = {key: value for key, value in profile.items() if key != SECOND_PERSON}
@@ -93,7 +96,7 @@ def facts_of(profile: Mapping[str, object]) -> EngineFacts:
 
 
 def _said(key: str, value: object) -> object:
-    """One value of a profile, of the type that its field has."""
+    """Return one value of a profile with the type of its field. Raises `BadProfile`."""
     try:
         fitting: EngineFacts = msgspec.convert({"commit": "", key: value}, EngineFacts)
     except msgspec.ValidationError as wrong:

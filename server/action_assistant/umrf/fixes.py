@@ -1,4 +1,4 @@
-"""Fixes of problems: each one call, idempotent, without inventing meaning."""
+"""Fixes of problems. Each is one call, idempotent, and invents no meaning."""
 
 from collections.abc import Callable, Iterable, Mapping
 from typing import Final
@@ -12,13 +12,14 @@ from action_assistant.umrf.relations import MAX_REFERRED_ID
 
 
 def fix(graph: Graph, problem: Problem) -> Graph:
-    """The graph after the problem's fix; the graph itself where there is nothing to do."""
+    """Return the graph after the problem's fix; the graph itself if there is nothing to fix."""
     mend = _FIXES.get(problem.fix or "")
     return mend(graph, problem) if mend else graph
 
 
 def _mend_relation(change: Callable[[Relation], Relation | None]) -> "_Fix":
-    """A fix that changes the relation of the problem, or removes it (None)."""
+    """Return a fix that changes the relation of the problem, or removes it if `change` returns
+    None."""
 
     def mend(graph: Graph, problem: Problem) -> Graph:
         relations = (
@@ -52,7 +53,7 @@ def _without_lonely_ghosts(graph: Graph) -> Graph:
 
 
 def _renumbered(graph: Graph, problem: Problem) -> Graph:
-    """Gives the action the lowest number that is free for its name."""
+    """Give the action the lowest number that is free for its name."""
     used: Mapping[Key, Action] = {action.key: action for action in graph.actions}
     action = used.get(problem.where.aid or "")
     if action is None:
@@ -83,13 +84,14 @@ def _optional_outputs(graph: Graph, problem: Problem) -> Graph:
 
 
 def with_optional_outputs(action: Action) -> Action:
-    """The action with outputs that nobody waits for; those with a value are there anyway."""
+    """Return the action with outputs that are not required, except those that have a value
+    anyway."""
     outputs = tuple(_optional(parameter) for parameter in action.outputs)
     return msgspec.structs.replace(action, outputs=outputs)
 
 
 def _optional(parameter: Parameter) -> Parameter:
-    """Every leaf of it that has no value."""
+    """Make a parameter without a value optional."""
     value = parse_small(parameter.text)
     if not isinstance(value, dict) or "pvf_type" not in value or "pvf_value" in value:
         return parameter
@@ -99,7 +101,7 @@ def _optional(parameter: Parameter) -> Parameter:
 
 
 def _with_example(graph: Graph, problem: Problem) -> Graph:
-    """Takes the example of the input that the problem is about as its value."""
+    """Take the example of the input that the problem is about as its value."""
     _, found, path = problem.where.path.partition("/input_parameters/")
     for action in graph.actions:
         if found and action.key == problem.where.aid:
@@ -109,7 +111,7 @@ def _with_example(graph: Graph, problem: Problem) -> Graph:
 
 
 def with_examples(graph: Graph, problems: Iterable[Problem]) -> Graph:
-    """Takes the examples of all inputs without a value that the problems are about."""
+    """Take the examples of all inputs without a value that the problems are about."""
     for problem in problems:
         if problem.fix == "take-example":
             graph = _with_example(graph, problem)

@@ -1,10 +1,12 @@
-"""What a UMRF graph is: frozen values for graphs, actions, relations and problems.
+"""The values of a UMRF graph: frozen structs for graphs, actions, relations and problems.
 
 Shapes follow the file format (docs/umrf-and-the-engine.md 1), with two differences that make values
-easy to edit and to merge: relations stand beside the actions instead of being written twice, and both
-refer to actions by `key`, never by name. `ENTRY` and `EXIT` are the keys of the graph's two ends.
+easy to edit and to merge: relations stand beside the actions instead of being written twice, and
+both refer to actions by `key`, never by name. `ENTRY` and `EXIT` are the keys of the graph's two
+ends.
 
-Raw JSON text is kept wherever spelling matters (`5` against `5.0`, order of members, unknown fields).
+Raw JSON text is kept wherever its spelling matters (`5` against `5.0`, order of members, unknown
+fields).
 """
 
 from typing import Final, Literal, TypeAlias
@@ -31,7 +33,7 @@ RESPONSES: Final[tuple[Response, ...]] = ("run", "pause", "restart", "stop", "by
 
 
 class Conditions(msgspec.Struct, frozen=True):
-    """What a child does for each outcome of its parent. A missing answer is `ignore`."""
+    """The child's response to each outcome of its parent. A missing answer is `ignore`."""
 
     on_true: Response = "ignore"
     on_false: Response = "ignore"
@@ -39,14 +41,14 @@ class Conditions(msgspec.Struct, frozen=True):
     on_stopped: Response = "ignore"
 
     def answer(self, outcome: Precondition) -> Response:
-        """The response to one outcome."""
+        """Return the response to one outcome."""
         answer: Response = getattr(self, outcome)
         return answer
 
 
-#: What the engine assumes for a condition that a file leaves out (docs/umrf-and-the-engine.md 1.4).
+#: The responses that the engine assumes for conditions that a file leaves out (docs/umrf-and-the-engine.md 1.4).
 ENGINE_DEFAULTS: Final = Conditions("run", "run", "bypass", "ignore")
-#: The only thing an entry relation can say.
+#: The only conditions that a relation of the entry can have.
 ENTRY_CONDITIONS: Final = Conditions("run")
 
 
@@ -64,10 +66,10 @@ class Parameter(msgspec.Struct, frozen=True):
 class Action(msgspec.Struct, frozen=True, kw_only=True):
     """A node of the graph. Its full name on the wire is `name_instance_id`.
 
-    `missing`: only named by relations, no action of the file (drawn as a ghost, never written).
-    `twin`: has the full name of an earlier action of its file, and keeps it.
-    `extra`: fields that this model does not know, or known ones whose value does not fit; the
-    latter win over the field when written.
+    `missing`: relations name it and the file has no such action (it is drawn as a ghost and never
+    written). `twin`: it has the full name of an earlier action of its file, and keeps it. `extra`:
+    fields that this model does not know, and known ones whose value does not fit; the latter
+    replace the field when the graph is written.
     """
 
     key: Key
@@ -97,13 +99,14 @@ class Remap(msgspec.Struct, frozen=True):
 
 
 class Relation(msgspec.Struct, frozen=True, kw_only=True):
-    """An arrow: what `child` does when `parent` ends.
+    """An arrow: the responses of `child` when `parent` ends.
 
-    `parent` may be `ENTRY`, `child` may be `EXIT`. `listing` counts the pairs that a file lists more
-    than once, from 0. `only` names the one array that has it when a file lists one side only.
-    `parent_order` is the place in the parent's `children`, `child_order` in the child's `parents`
-    (for the ends: in `graph_entry` and `graph_exit`); ties go by key. `waypoints`: by response, in the
-    order of `RESPONSES`, the JSON text of the places through which people have led its line.
+    `parent` may be `ENTRY`, `child` may be `EXIT`. `listing` numbers the pairs that a file lists
+    more than once, from 0. `only` names the one array that has it when a file lists one side only.
+    `parent_order` is its position in the parent's `children`, `child_order` in the child's
+    `parents` (for the ends: in `graph_entry` and `graph_exit`); ties are ordered by key.
+    `waypoints`: by response, in the order of `RESPONSES`, the JSON text of the points through which
+    people have led its line.
     """
 
     parent: Key
@@ -121,9 +124,9 @@ class Relation(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Graph(msgspec.Struct, frozen=True, kw_only=True):
-    """A whole task. `actions` are in file order; `relations` in no order that means anything.
+    """A whole task. `actions` are in file order; the order of `relations` has no meaning.
 
-    `direction`: where what follows is drawn; graphs that do not say are drawn top down.
+    `direction`: the side on which later actions are drawn; a graph without one is drawn top down.
     `notes`: (id, JSON text) of notes and frames on the canvas.
     """
 
@@ -139,9 +142,11 @@ class Graph(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Where(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """The place of a problem. `path` is a JSON pointer into the text that was given, or, of a graph
-    that was not read from one, into its canonical text. `line` and `column` (characters, both from
-    1) are there where that text is known: where the value begins, with its key if it has one.
+    """The place of a problem or note. `path` is a JSON pointer into the text that was given, or
+    into the canonical text of a graph that was not read from a text.
+
+    `line` and `column` (in characters, both from 1) are present if that text is known: the value
+    begins there, with its key if it has one.
     """
 
     path: str = ""
@@ -152,9 +157,12 @@ class Where(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
 
 
 class PlaceInside(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """Where in a sub-graph a problem is. `levels` are the full names of the actions that lead there, `aids`
-    their ids: from that of the graph around it, down to the one that stands for `graph`. `where` is in the
-    text of that graph, whose own problem has this `code` and `message`."""
+    """The place of a problem within a sub-graph.
+
+    `levels` are the full names of the actions that lead there and `aids` their ids: from the action
+    of the graph around it, down to the one that stands for `graph`. `where` is in the text of that
+    graph, whose own problem has this `code` and `message`.
+    """
 
     levels: tuple[str, ...]
     aids: tuple[Key, ...]
@@ -168,8 +176,11 @@ class PlaceInside(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True)
 
 
 class Problem(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """Something about a graph that a person should know. Checks return these, never raise. `also`: the
-    other places of the same thing, which is told once. `inside`: where below the place it is."""
+    """A fact about a graph that a person should know. Checks return problems and never raise.
+
+    `also`: the other places of the same problem, which is reported once. `inside`: its place within
+    a sub-graph.
+    """
 
     code: str
     severity: Severity
@@ -184,10 +195,10 @@ class Problem(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
 
 
 class Note(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """What was done with something of a text that was read: translated, or left out.
+    """A remark on something in a text that was translated or left out when it was read.
 
-    `times` counts how often it was, `where` is the first place and `also` are the others (the first
-    thousand of them).
+    `times` counts how often that was, `where` is the first place and `also` are the others (the
+    first thousand of them).
     """
 
     message: str
@@ -200,12 +211,13 @@ class Note(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
 
     @property
     def sentence(self) -> str:
-        """The message, with how often it is true."""
+        """The message, with the number of times if there are several."""
         return f"{self.message} ({self.times} times)" if self.times > 1 else self.message
 
 
 class Signature(msgspec.Struct, frozen=True, kw_only=True):
-    """What a library says of one action. Keys are flat parameter names (`pose::x`), values types.
+    """The parameters of one action in a library. Keys are flat parameter names (`pose::x`), values
+    are types.
 
     `optional`: inputs that the action can do without.
     """

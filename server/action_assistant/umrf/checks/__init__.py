@@ -1,1 +1,1 @@
-"""The rules of `check`, by what they look at."""
+"""The single checks of a graph."""

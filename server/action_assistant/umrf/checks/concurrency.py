@@ -1,9 +1,8 @@
-"""What may go on at the same time, as far as arrows and possible outcomes tell.
+"""Finds the actions that may run at the same time, as far as arrows and possible outcomes tell.
 
-See docs/umrf-and-the-engine.md 2.3.
-
-Too much rather than too little: how long actions take is not known, and which outcomes come together is
-not looked at. But an action that a join waits for is over when the join begins.
+See docs/umrf-and-the-engine.md 2.3. It reports too many pairs rather than too few: durations are
+not known, and combinations of outcomes are not examined. But an action that a join waits for is
+over when the join begins.
 """
 
 from collections import deque
@@ -15,16 +14,19 @@ from action_assistant.umrf.checks.places import Subject
 from action_assistant.umrf.components import Mask, nodes_in, reachable
 from action_assistant.umrf.model import ENTRY, EXIT, PRECONDITIONS, Key, Precondition, Relation
 
-#: Pairs that are looked at; where there are more the rest is not followed: any two may meet, then.
+#: The most pairs that are examined. If there are more, any two actions are taken to run at once.
 PAIRS: Final = 400_000
-#: Above so many actions nothing is followed.
+#: Graphs with more actions are not followed.
 MOST: Final = 20_000
 
 
 class Concurrency:
-    """`runs`: the actions that can run; `reports`: with which outcomes each (or the entry) can report
-    an end, its own or one that it passes on when it is bypassed. `known`: whether it was followed; if
-    not, anything that can run may run at any time."""
+    """Answers which actions can run at the same time.
+
+    `runs`: the actions that can run. `reports`: the outcomes that each action, or the entry, can
+    report, its own or those that it passes on when it is bypassed. `known`: True if the graph was
+    followed; if not, any action that can run may run at any time.
+    """
 
     def __init__(
         self, subject: Subject, runs: set[Key], reports: Mapping[Key, set[Precondition]]
@@ -36,8 +38,8 @@ class Concurrency:
         self._reports = reports
         self._pairs = 0 if len(self.keys) <= MOST else PAIRS + 1
         count = len(self.keys)
-        self._with: list[Mask] = [0] * count  # while it runs
-        #: When it passes on an outcome because it is bypassed, which is none of its own ends.
+        self._with: list[Mask] = [0] * count  # the actions that may run while it runs
+        #: The actions that may run when an action is bypassed and passes an outcome on, without an end of its own.
         self._passing: dict[tuple[Key, Precondition], Mask] = {}
         self._behind_kept: dict[Mask, Mask] = {}
         self._lively = {a.key for a in subject.real if a.type == "spontaneous"}
@@ -60,11 +62,11 @@ class Concurrency:
 
     @property
     def known(self) -> bool:
-        """See the class."""
+        """True if the graph was followed completely."""
         return self._pairs <= PAIRS
 
     def may_run(self, key: Key, other: Key) -> bool:
-        """Whether `key` can run at a moment at which `other` runs."""
+        """Return whether `key` can run at a moment at which `other` runs."""
         if key not in self._runs or other not in self._runs:
             return False
         return not self.known or bool(self._with[self.index[other]] >> self.index[key] & 1)
@@ -72,8 +74,12 @@ class Concurrency:
     def running_after(
         self, key: Key, outcome: Precondition, waited: Iterable[Key] = ()
     ) -> set[Key]:
-        """Which actions may run just after `key` reported this outcome, those that it starts included,
-        when the ones that were `waited` for have reported, too. Of a large graph, any."""
+        """Return the actions that may run just after `key` reported this outcome, including those
+        that it starts.
+
+        `waited`: actions that have reported, too. For a graph that was not followed, this is any
+        action that can run.
+        """
         if outcome not in self._reports.get(key, ()):
             return set()
         if not self.known:
@@ -84,14 +90,16 @@ class Concurrency:
         return {self.keys[index] for index in nodes_in(mask)} - {key}
 
     def may_run_at(self, key: Key, other: Key, outcome: Precondition) -> bool:
-        """Whether `key` can be running when `other` reports this outcome."""
+        """Return whether `key` can be running when `other` reports this outcome."""
         if key not in self._runs or outcome not in self._reports.get(other, ()):
             return False
         return not self.known or bool(self._when(other, outcome) >> self.index[key] & 1)
 
     def may_outlast(self, key: Key, outcome: Precondition) -> bool:
-        """Whether `key` itself may go on when it reports this outcome: a spontaneous action begins again,
-        and one that is bypassed may be running."""
+        """Return whether `key` itself may continue when it reports this outcome.
+
+        A spontaneous action begins again, and a bypassed action may be running.
+        """
         if key not in self._runs or outcome not in self._reports.get(key, ()):
             return False
         if not self.known or (key in self._lively and outcome != "on_stopped"):
@@ -110,25 +118,28 @@ class Concurrency:
 
     @cached_property
     def _first(self) -> Mask:
-        """What the graph begins with."""
+        """The actions with which the graph begins."""
         indices = {index for index in self._children(ENTRY) if self.keys[index] in self._runs}
         return sum(1 << index for index in indices)
 
     @cached_property
     def _needs(self) -> list[Mask]:
-        """What each action waits for."""
+        """For each action the actions that it waits for."""
         listed = (self._required.get(key, ()) for key in self.keys)
         return [sum(1 << self.index[each] for each in set(own)) for own in listed]
 
     @cached_property
     def _after(self) -> list[Mask]:
-        """What comes after each action, by arrows."""
+        """For each action the actions to which a path of arrows leads."""
         return reachable([self._children(key) for key in self.keys])
 
     @cached_property
     def _repeated(self) -> Mask:
-        """Actions that may have reported and go on again although nothing leads from them to themselves:
-        they are started in several ways, or by what goes round."""
+        """The actions that may have reported and run again although no path leads from them to
+        themselves.
+
+        They are started by several parents, or by a loop.
+        """
         found = 0
         for index, after in enumerate(self._after):
             if after >> index & 1:
@@ -144,16 +155,17 @@ class Concurrency:
         return found
 
     def _beside(self, required: Key) -> Mask:
-        """What may go on once this one has reported, as what waits for it begins."""
+        """Return the actions that may run when this one has reported and an action that waits for
+        it begins."""
         index = self.index[required]
         found = self._whenever(required) | self._after[index] | self._repeated & 1 << index
-        # To be bypassed takes no time: what follows on what goes on then comes after it has reported.
+        # A bypass takes no time: successors of the actions that run then come after it has reported.
         for outcome in PRECONDITIONS:
             found |= self._behind(self._passing.get((required, outcome), 0))
         return found
 
     def _behind(self, mask: Mask) -> Mask:
-        """What comes after any of these, by arrows."""
+        """Return the actions that come after any of these, along arrows."""
         found = self._behind_kept.get(mask)
         if found is None:
             found = 0
@@ -173,7 +185,7 @@ class Concurrency:
                 yield relation, "run" if run else relation.conditions.answer(outcome)
 
     def _started(self, key: Key, outcome: Precondition) -> Mask:
-        """What an end starts at its instant, also by way of bypasses."""
+        """Return the actions that an end starts at its instant, also by way of bypasses."""
         if key == ENTRY:
             return self._first
         if outcome not in self._starts:
@@ -181,8 +193,11 @@ class Concurrency:
         return self._starts[outcome][self.index[key]]
 
     def _all_started(self, outcome: Precondition) -> list[Mask]:
-        """Of each action: bypasses are ways, what they start lies at their ends, counted from behind
-        the last action."""
+        """Return the actions that the end of each action starts with this outcome.
+
+        Bypasses are the edges of the searched graph; started actions are its ends, numbered after
+        the last action.
+        """
         count = len(self.keys)
         ways: list[list[int]] = []
         for key in self.keys:
@@ -212,12 +227,14 @@ class Concurrency:
                     self._joins.add(child)
 
     def _around(self, key: Key, outcome: Precondition) -> Mask:
-        """What goes on already when it reports; a spontaneous one goes on itself."""
+        """Return the actions that already run when an action reports; a spontaneous one continues
+        itself."""
         own = 1 << self.index[key] if key in self._lively else 0
         return own | self._when(key, outcome)
 
     def _join(self, child: Key) -> None:
-        """What it waits for has more around it than was known when its parents were followed."""
+        """Follow the parents of an action again, since more may run beside it than was known when
+        they were followed."""
         for relation in self._subject.incoming.get(child, []):
             for outcome in self._reports.get(relation.parent, ()):
                 run = relation.parent == ENTRY or relation.conditions.answer(outcome) == "run"
@@ -260,8 +277,11 @@ class Concurrency:
         self._pairs += looked_at
 
     def _is_ready(self, key: Key, parent: Key, beside: int) -> bool:
-        """Whether what the same end would start can begin while the other (a place) goes on: what it
-        waits for besides has to have reported by then."""
+        """Return whether an action that the same end would start can begin while the action
+        `beside` (an index) runs.
+
+        All other actions that it waits for have to have reported by then.
+        """
         listed = self._required.get(key, ())
         again = self._after[beside] | self._repeated
         if self._needs[self.index[key]] >> beside & ~again >> beside & 1:
@@ -272,7 +292,7 @@ class Concurrency:
         )
 
     def _again(self, key: Key) -> None:
-        """More goes on with it than was known: its ends have more around them."""
+        """Follow an action again, since more runs beside it than was known."""
         if key not in self._waiting and key in self._reports:
             self._waiting.add(key)
             self._open.append(key)

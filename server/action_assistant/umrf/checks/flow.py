@@ -30,7 +30,7 @@ from action_assistant.umrf.model import (
 
 
 def check_spontaneous(subject: Subject) -> None:
-    """Spontaneous actions from which a loop can be reached."""
+    """Report spontaneous actions from which a loop can be reached (H9)."""
     spontaneous = [action for action in subject.real if action.type == "spontaneous"]
     if not spontaneous:
         return
@@ -47,8 +47,10 @@ def check_spontaneous(subject: Subject) -> None:
 def check_instant_loops(
     subject: Subject, runs: Collection[Key], reports: Mapping[Key, Collection[Precondition]]
 ) -> None:
-    """Loops that would block the engine if they took no time. `runs`: actions that can run;
-    `reports`: with which outcomes they can end."""
+    """Report loops that would block the engine if they took no time (H5).
+
+    `runs`: the actions that can run; `reports`: the outcomes with which they can end.
+    """
     if "H5" not in subject.facts.hazards:
         return
 
@@ -71,13 +73,14 @@ def check_instant_loops(
 
 
 def _takes_time(action: Action) -> bool:
-    """Whether somebody has said so: `"takes_time": true` in its `gui_attributes` (decision 56)."""
+    """Return whether a person has declared `"takes_time": true` in the action's `gui_attributes`
+    (decision 56)."""
     attributes = parse_small(dict(action.extra).get("gui_attributes", "null"))
     return isinstance(attributes, dict) and attributes.get("takes_time") is True
 
 
 def _leading_to(subject: Subject, keys: set[Key]) -> set[Key]:
-    """Everything from which there is a way to one of these, themselves included."""
+    """Return all actions from which a path leads to one of these, and these themselves."""
     found = set(keys)
     stack = list(keys)
     while stack:
@@ -106,7 +109,8 @@ def loops(
 
 
 def check_flow(subject: Subject, nested: Container[str] = frozenset()) -> None:
-    """Reports all of it. `nested`: the names of actions that are graphs themselves."""
+    """Report all problems of the flow. `nested`: the names of actions that are graphs
+    themselves."""
     _check_sides(subject)
     if not subject.real:
         subject.report(
@@ -152,7 +156,7 @@ def _check_sides(subject: Subject) -> None:
 
 
 def _check_bypasses(subject: Subject, reachability: "Reachability") -> None:
-    """H3: bypasses that can happen, told once."""
+    """Report the bypasses that can happen (H3), as one problem."""
     if "H3" not in subject.facts.hazards or subject.facts.bypass_fixed:
         return
     found: list[tuple[Relation, list[Precondition]]] = []
@@ -178,9 +182,11 @@ def _check_bypasses(subject: Subject, reachability: "Reachability") -> None:
 
 
 class Reachability:
-    """What can happen at all: which actions can run, and which can report an end.
+    """Finds the actions that can run and the outcomes that each can report, as far as arrows and
+    outcomes tell.
 
-    `stages` tell in which order: a parent that reports before its child ran is none of a loop.
+    `runs`: actions that can run; `reports`: outcomes that each of them, or the entry, can report;
+    `asked`: actions that can be asked at all.
     """
 
     def __init__(self, subject: Subject) -> None:
@@ -249,7 +255,7 @@ def _first(relations: list[Relation]) -> list[Relation]:
 
 
 def _check_waiting(subject: Subject, reachability: Reachability) -> None:
-    """Actions that never run, and why."""
+    """Report actions that never run, with the reason."""
     net: dict[Key, int] = {}
     for number, members in enumerate(loops(subject)):
         net.update(dict.fromkeys(members, number))
@@ -274,7 +280,8 @@ def _check_waiting(subject: Subject, reachability: Reachability) -> None:
 def _report_missed_join(
     subject: Subject, key: Key, missing: list[Relation], net: dict[Key, int]
 ) -> None:
-    """`net`: the number of the net of loops in which an action lies."""
+    """Report required parents that never report. `net`: the number of the group of loops in which
+    an action lies."""
     action = subject.actions[key]
     for relation in missing:
         parent = subject.name(relation.parent)
@@ -303,7 +310,7 @@ def _check_exit(subject: Subject, reachability: Reachability) -> None:
         subject.report("no-exit", "warning", message, member="/graph_exit")
         return
     if any(problem.code == "H8" for problem in subject.problems):
-        return  # why no parent of the exit ends is said already
+        return  # the reason for which no parent of the exit ends is reported already
     for relation in exits:
         if relation.required and not reachability.reports.get(relation.parent):
             message = (

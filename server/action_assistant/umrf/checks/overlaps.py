@@ -1,7 +1,7 @@
-"""What goes wrong where two things go on at once: responses that come at the wrong moment, and ends that
-leave something running. Only what can happen is told.
+"""Checks for problems of two things that happen at once: a response that comes at the wrong moment,
+and an end that leaves an action running. Only what can happen is reported.
 
-See docs/umrf-and-the-engine.md 2.3, 2.5; H4, H5, H12.
+See docs/umrf-and-the-engine.md 2.3 and 2.5; H4, H5, H12, H14.
 """
 
 from collections.abc import Collection, Container, Mapping
@@ -26,7 +26,7 @@ from action_assistant.umrf.model import (
     Severity,
 )
 
-#: Ways to the exit that are looked at one by one; of more, those count that say the same as the first.
+#: The most arrows to the exit that are examined one by one; the others count if they equal the first one reported.
 _ENDS: Final = 200
 _Reports = Mapping[Key, Collection[Precondition]]
 
@@ -37,8 +37,10 @@ def check_responses(
     concurrency: Concurrency,
     nested: Container[str] = frozenset(),
 ) -> None:
-    """What a response does to a child that is in the wrong state. `nested`: names of actions that are
-    graphs themselves, which run as soon as they are told to."""
+    """Report responses that reach a child in the wrong state (H4, H5).
+
+    `nested`: names of actions that are graphs themselves, which run as soon as they are told to.
+    """
     killed: set[Key] = set()
     for key, relations in subject.incoming.items():
         if key == EXIT:
@@ -47,7 +49,7 @@ def check_responses(
         runs = {k for k, _ in asking.get("run", ())} - {ENTRY}
         met: dict[str, set[Key]] = {}
         for answer in ("pause", "stop"):
-            # Only what runs can be paused or stopped, and only then does `run` kill.
+            # Only a running action can be paused or stopped, and only after that does `run` end the engine.
             others = {k for k, o in asking.get(answer, ()) if concurrency.may_run_at(key, k, o)}
             late = {k for k in runs - others if concurrency.may_run(k, key)}
             met[answer] = others
@@ -78,7 +80,7 @@ def check_responses(
 def _asking(
     relations: list[Relation], reports: _Reports
 ) -> dict[str, set[tuple[Key, Precondition]]]:
-    """Who can ask for what, and with which outcome."""
+    """Return for each response the parents that can ask for it, with the outcome."""
     found: dict[str, set[tuple[Key, Precondition]]] = {}
     for relation in relations:
         reported = reports.get(relation.parent, ())
@@ -124,9 +126,12 @@ def check_loading(
     concurrency: Concurrency,
     nested: Container[str] = frozenset(),
 ) -> None:
-    """H14: ends that halt the graph beside an action that may still load, told once. `nested` as in
-    `check_responses`. Not told of ends with on_error: whatever ignores the errors of one branch would have
-    it, and its action would have to fail while another one loads."""
+    """Report ends that halt the graph beside an action that may still load (H14), as one problem.
+
+    `nested` as in `check_responses`. Ends with on_error are not reported: every graph that ignores
+    the errors of one branch would have them, and an action would have to fail while another one
+    loads.
+    """
     if "H14" not in subject.facts.hazards:
         return
     runs_at_once = {action.key for action in subject.real if action.name in nested}
@@ -155,8 +160,11 @@ def check_loading(
 
 
 def check_endless(subject: Subject, reports: _Reports, concurrency: Concurrency) -> None:
-    """H12 of spontaneous actions, told once: when the graph is FINISHED they begin again and again, and no
-    stop reaches them. An error if that comes when all goes well."""
+    """Report spontaneous actions that continue when the graph is FINISHED (H12), as one problem.
+
+    They begin again and again, and no stop reaches them. It is an error if this happens when all
+    actions end with on_true.
+    """
     lively = {action.key for action in subject.real if action.type == "spontaneous"}
     if "H12" not in subject.facts.hazards or not lively:
         return
@@ -196,7 +204,8 @@ def _going_on(
     lively: Collection[Key],
     concurrency: Concurrency,
 ) -> set[Key]:
-    """The spontaneous actions that may go on when this way has led to the exit with this outcome."""
+    """Return the spontaneous actions that may continue after this arrow has led to the exit with
+    this outcome."""
     parent = relation.parent
     if relation.conditions.answer(outcome) == "ignore":
         return set()
@@ -214,8 +223,11 @@ def _full_names(subject: Subject, keys: Collection[Key]) -> set[str]:
 
 
 def _endless_when_well(graph: Graph) -> set[str]:
-    """The spontaneous actions that go on when all ends with on_true and the graph is FINISHED: those that
-    do whichever of what runs side by side is quicker, as far as the graph ends at all."""
+    """Return the spontaneous actions that continue after all actions have ended with on_true and
+    the graph is FINISHED.
+
+    Only those count that do so whichever of two concurrent actions is quicker.
+    """
     found: list[set[str]] = []
     for slower_first in (False, True):
         net = Network(graph, slower_first=slower_first)
@@ -226,8 +238,11 @@ def _endless_when_well(graph: Graph) -> set[str]:
 
 
 class _EarlyExit(msgspec.Struct, frozen=True):
-    """A way to the exit that does not wait for what may still run. `bypassed`: with which outcomes it
-    does not wait for anybody."""
+    """An arrow to the exit that does not wait for actions which may still run.
+
+    `left`: those actions. `bypassed`: the outcomes for which the arrow waits for nobody. `started`:
+    the parent starts them itself when it ends.
+    """
 
     relation: Relation
     left: frozenset[Key]
@@ -236,7 +251,8 @@ class _EarlyExit(msgspec.Struct, frozen=True):
 
 
 def check_stragglers(subject: Subject, reports: _Reports, concurrency: Concurrency) -> None:
-    """H12: ways to the exit on which something else may still run, told once."""
+    """Report arrows to the exit by which a graph is FINISHED while other actions may still run
+    (H12), as one problem."""
     if "H12" not in subject.facts.hazards:
         return
     incoming = [r for r in subject.incoming.get(EXIT, []) if not r.listing]
@@ -300,7 +316,7 @@ def _early(
                 left |= around
             continue
         if not concurrency.known and not begun and (relation.required or len(incoming) == 1):
-            continue  # it waits for others, and for which is not known
+            continue  # the exit waits for others, and it is not known for which
         if not around or _comes_after(subject, relation.parent, others):
             continue
         started = started or bool(begun)
@@ -319,7 +335,7 @@ def _begun(subject: Subject, key: Key, outcome: Precondition) -> set[Key]:
 
 
 def _comes_after(subject: Subject, key: Key, others: list[Key]) -> bool:
-    """Whether one of the others that the exit waits for can only come after this one."""
+    """Return whether one of the others that the exit waits for can only come after this action."""
     if not others:
         return False
     seen, stack = {ENTRY}, [ENTRY]

@@ -1,4 +1,5 @@
-"""Where things of a graph stand in its canonical file, and how problems name them."""
+"""Indexes a graph for its checks, with the place of everything in its canonical file, and collects
+the problems."""
 
 from collections.abc import Iterable
 from itertools import islice
@@ -24,7 +25,11 @@ from action_assistant.umrf.reports import MAX_EACH, ProblemList
 
 
 class Subject:
-    """A graph under examination, indexed, with the problems found so far."""
+    """A graph under examination, indexed, with the problems found so far.
+
+    `paths`: JSON pointers of actions. `parents` and `children`: relations as the file lists them,
+    by child and by parent. `incoming` and `outgoing`: those of them that the engine follows.
+    """
 
     def __init__(self, graph: Graph, facts: EngineFacts) -> None:
         self.graph = graph
@@ -51,7 +56,7 @@ class Subject:
         for r in by_parent:
             if r.only != "parents" and r.child != EXIT:
                 self._place(r, self.children.setdefault(r.parent, []), r.parent, self.child_paths)
-        #: Relations that the engine follows: both sides list each other, both ends exist.
+        #: The relations that the engine follows: both sides list each other, and both ends exist.
         self.sound = [r for r in by_parent if self._is_sound(r)]
         self.incoming: dict[Key, list[Relation]] = {}
         self.outgoing: dict[Key, list[Relation]] = {}
@@ -65,7 +70,8 @@ class Subject:
         return self._problems.found
 
     def place(self, relation: Relation) -> tuple[int, int]:
-        """Where a relation stands in the file: with which action, and there as which."""
+        """Return the position of a relation in the file: the number of the child, and the number
+        within its `parents`."""
         path = self.parent_paths.get(id(relation), "")
         numbers = [int(part) for part in path.split("/") if part.isdigit()]
         return (numbers[0], numbers[-1]) if numbers else (0, 0)
@@ -85,14 +91,15 @@ class Subject:
         listed.append(relation)
 
     def fix_of_input(self, action: Action, name: str) -> str | None:
-        """What mends an input that has no value: its example, where that can be one."""
+        """Return the fix for an input that has no value: to take its example, if that fits; else
+        None."""
         if action.key not in self._texts:
             self._texts[action.key] = {p.path: p.text for p in action.inputs}
         text = self._texts[action.key].get(self.path_of(action, name), "null")
         return "take-example" if example_of(text) is not None else None
 
     def path_of(self, action: Action, name: str) -> str:
-        """The path of a parameter by its flat name."""
+        """Return the path of a parameter by its flat name."""
         if action.key not in self._flat:
             every = (*action.inputs, *action.outputs)
             self._flat[action.key] = {flat_name(p.path): p.path for p in reversed(every)}
@@ -103,7 +110,7 @@ class Subject:
         return relation.only is None and not any(end and end.missing for end in ends)
 
     def name(self, key: Key) -> str:
-        """How people call one end of a relation."""
+        """Return the name of one end of a relation for a message."""
         match key:
             case "entry":
                 return "the entry"
@@ -126,11 +133,13 @@ class Subject:
         also: Iterable[Relation] = (),
         inside: PlaceInside | None = None,
     ) -> None:
-        """Adds a problem of the graph, of an action or of a relation; `member` goes below it, `side`
-        says in which of the lists that have the relation it is. `also`: other relations of which the
-        same is to be said; `inside`: where in the sub-graph of the action it is.
+        """Add a problem of the graph, of an action or of a relation.
 
-        Only the first `MAX_EACH` of one code and severity: more help nobody and fill the memory.
+        `member` is a pointer below that place, `side` names the list in which a relation is meant.
+        `also`: other relations with the same problem. `inside`: the place in the sub-graph for
+        which the action stands.
+
+        Only the first `MAX_EACH` of one code and severity are kept.
         """
         if not self._problems.has_room(severity, code):
             return
@@ -164,15 +173,17 @@ class Subject:
 
 
 def joined(names: set[str]) -> str:
-    """Names for a sentence. Without quotes: those say what stands at the place of a problem."""
+    """Return names for a sentence, without quotes: a name in quotes stands at the place of the
+    problem."""
     return ", ".join(sorted(names))
 
 
 def quoted(names: set[str]) -> str:
-    """Names for a sentence that stand at the place of its problem."""
+    """Return names for a sentence in quotes, which stand at the place of its problem."""
     return ", ".join(f"“{name}”" for name in sorted(names))
 
 
 def more(count: int, one: str, many: str) -> str:
-    """The end of a message that is told for several places at once."""
+    """Return the end of a message that is reported for several places at once; empty if `count` is
+    0."""
     return f" {count:,} more {one if count == 1 else many} of this kind." if count > 0 else ""

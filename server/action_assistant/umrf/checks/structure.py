@@ -1,6 +1,7 @@
-"""What the engine's parser refuses, and names that lead nowhere.
+"""Checks the structure of a graph: fields that the engine's parser refuses, and names that lead
+nowhere.
 
-See docs/umrf-and-the-engine.md 1, H6.
+See docs/umrf-and-the-engine.md 1; H6.
 """
 
 import re
@@ -17,15 +18,15 @@ _LISTS: Final = {"parents", "children", "graph_entry", "graph_exit", "actions"}
 _OBJECTS: Final = {"input_parameters", "output_parameters"}
 _CLASS: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _CONTROL: Final = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]")
-#: Characters of a name of a graph or an action.
+#: The most characters in the name of a graph or an action.
 MAX_NAME: Final = 200
-#: Characters of a wrong text that are quoted.
+#: How many characters of a wrong text are quoted.
 _SHOWN: Final = 80
 TYPES: Final = ("sync", "async", "spontaneous")
 
 
 def check_structure(subject: Subject) -> None:
-    """Reports all of it."""
+    """Report all problems of the structure."""
     graph = subject.graph
     for field, text in graph.extra:
         _check_known(subject, field, parse_small(text), f"/{field}", None)
@@ -45,7 +46,7 @@ def check_structure(subject: Subject) -> None:
 def _check_known(
     subject: Subject, field: str, value: Json, member: str, action: Action | None
 ) -> None:
-    """A known field whose value is kept aside because it does not fit."""
+    """Report a known field whose value was kept in `extra` because it does not fit."""
     wanted = None
     if field in _TEXTS and not isinstance(value, str):
         wanted = "a text"
@@ -61,7 +62,7 @@ def _check_known(
 
 
 def _check_number(value: Json) -> tuple[str, Severity, str] | None:
-    """Code, severity and message for an `instance_id` that is none."""
+    """Return code, severity and message for an `instance_id` that is not valid, else None."""
     if whole_of(value)[1]:
         return None
     if isinstance(value, Number):
@@ -122,8 +123,11 @@ def _check_action(subject: Subject, action: Action) -> None:
 
 
 def _unsendable(name: str) -> str | None:
-    """Why no robot is sent this name, as the end of a sentence. Blanks, letters of any script and other
-    characters are sent as they are: the engine takes them."""
+    """Return the reason for which no robot is sent this name, as the end of a sentence; None if it
+    can be sent.
+
+    Blanks, letters of any script and other characters are sent as they are: the engine takes them.
+    """
     if _CONTROL.search(name):
         return "contains a control character, which no log or file can carry."
     if "%" in name:
@@ -197,7 +201,7 @@ def _check_parent_field(subject: Subject, relation: Relation, field: str, value:
 
 
 def _check_conditions(subject: Subject, relation: Relation, value: Json) -> None:
-    """Conditions that the engine refuses, each at its own place."""
+    """Report conditions that the engine refuses, each at its own place."""
     if not isinstance(value, list):
         message = "“conditions” must be a list of texts; the engine refuses the graph."
         subject.report(
@@ -260,7 +264,8 @@ def _check_parameters(
 
 
 def refusal_of(value: Json) -> str | None:
-    """Why the engine's parser refuses one parameter, or None."""
+    """Return the reason for which the engine's parser refuses one parameter, as the end of a
+    sentence; None if it takes it."""
     if not isinstance(value, dict):
         return "must be an object"
     if "pvf_type" not in value:
@@ -280,7 +285,8 @@ def refusal_of(value: Json) -> str | None:
 
 
 def _misfit(what: str, none: str, kind: str) -> str:
-    """Why a value does not go with its type: the engine reads none of types that it does not know."""
+    """Return the reason for which a value does not fit its type. The engine reads no value of a
+    type that it does not know."""
     if kind in NATIVE:
         return f"{what} {none} {kind}"
     if not kind:

@@ -1,4 +1,4 @@
-"""Actions that are graphs themselves: what the graph inside does to the one around it.
+"""Checks actions that are graphs themselves: how a sub-graph affects the graph around it.
 
 See docs/umrf-and-the-engine.md 2.6.
 """
@@ -32,16 +32,16 @@ from action_assistant.umrf.semantics.matching import unresolved
 from action_assistant.umrf.semantics.values import slots_of
 from action_assistant.umrf.signatures import signature_of_graph, with_inputs
 
-#: Errors of one sub-graph, with all that is inside of it, that are told at each action that stands for it.
+#: The most errors of one sub-graph, with the graphs inside it, that are reported at each action that stands for it.
 _ERRORS: Final = 20
-#: What of a sub-graph may go wrong for the graph around it: it takes the engine with it, or never ends, or
-#: is not reached by a stop.
+#: Problems of a sub-graph that affect the graph around it: the engine ends, the graph never ends, or a stop does not
+#: reach it.
 _REACHES_OUT: Final = frozenset({"H4", "H5", "H8", "H12", "H14"})
 
 
 @dataclass(frozen=True)
 class _Finding:
-    """A problem of a sub-graph, or of one inside of it: `place` leads there from the sub-graph."""
+    """A problem of a sub-graph or of one inside it. `place` leads there from the sub-graph."""
 
     severity: Severity
     place: PlaceInside
@@ -49,8 +49,10 @@ class _Finding:
 
 @dataclass(frozen=True)
 class _Inner:
-    """What is the same wherever a sub-graph stands: found once, not once per action. `halted`: when it ends
-    HALTED, and whether it does so in any case."""
+    """The findings about one sub-graph, computed once for all actions that stand for it.
+
+    `halted`: in which case the graph ends HALTED, and whether it always does.
+    """
 
     signature: Signature
     findings: tuple[_Finding, ...]
@@ -59,22 +61,26 @@ class _Inner:
 
 @dataclass(frozen=True)
 class Resolution:
-    """How names were resolved to graphs. `several`: names of more than one graph, of which the oldest
-    was taken; `cut`: there are more graphs inside than were looked at; `hidden`: names of a graph that an
-    action of the library has, too."""
+    """The way in which names were resolved to graphs.
+
+    `several`: names of more than one graph, of which the oldest was taken. `cut`: there are more
+    graphs inside than were examined. `hidden`: names of a graph that an action of the library has,
+    too.
+    """
 
     several: Container[str] = frozenset()
     cut: bool = False
     hidden: Container[str] = frozenset()
 
 
-#: Each name is that of one graph, and all were looked at.
+#: Each name belongs to one graph, and all graphs were examined.
 CERTAIN: Final = Resolution()
 
 
 @dataclass(frozen=True)
 class _Graphs:
-    """The graphs by name, of which actions come before them, and what was found in each."""
+    """The graphs by name, the names of actions that take precedence over them, and the findings
+    about each graph."""
 
     by_name: Mapping[str, Graph]
     known: Container[str]
@@ -83,15 +89,19 @@ class _Graphs:
     _recurring: dict[tuple[str, str], bool] = field(default_factory=dict)
 
     def of(self, name: str) -> Graph | None:
+        """Return the graph that an action of this name stands for, or None."""
         return None if name in self.known else self.by_name.get(name)
 
     def is_hidden(self, name: str) -> bool:
-        """Whether an action comes before a graph of that name."""
+        """Return whether an action takes precedence over a graph of that name."""
         return name in self.resolution.hidden or (name in self.known and name in self.by_name)
 
     def recurs(self, name: str, within: str) -> bool:
-        """Whether the graph of an action of that name contains itself, or the graph that it is in.
-        Told by the names that actions use: the name in a graph's own text decides nothing."""
+        """Return whether the graph of an action of that name contains itself, or the graph `within`
+        which the action is.
+
+        Only the names that actions use count; the name in a graph's own text decides nothing.
+        """
         if (name, within) not in self._recurring:
             self._recurring[name, within] = name == within or self._reaches(name, {name, within})
         return self._recurring[name, within]
@@ -113,8 +123,11 @@ class _Graphs:
         return (name for name in real if self.of(name) is not None)
 
     def inmost_first(self, top: Graph) -> Iterator[str]:
-        """Every graph inside that does not recur, after all that is inside of it. No call of itself: a
-        hierarchy may be deeper than Python's stack."""
+        """Yield the name of every graph inside that does not recur, after those of all graphs
+        inside it.
+
+        Iterative, since a hierarchy may be deeper than Python's stack.
+        """
         seen: set[str] = set()
         levels = [(top.name, self._inside(top))]
         while levels:
@@ -135,7 +148,8 @@ def check_subgraphs(
     known: Container[str] = frozenset(),
     resolution: Resolution = CERTAIN,
 ) -> None:
-    """Reports all of it. `known`: names of actions, which come before graphs of the same name."""
+    """Report all problems of sub-graphs. `known`: names of actions, which take precedence over
+    graphs of the same name."""
     if resolution.cut:
         message = (
             "There are more graphs inside this one than are looked at. What lies deeper was not checked, "
@@ -150,7 +164,8 @@ def check_subgraphs(
 
 
 def _check_each(subject: Subject, within: str, graphs: _Graphs) -> None:
-    """Reports what the sub-graphs of one graph do to it. `within`: the name by which it is called."""
+    """Report how the sub-graphs of one graph affect it. `within`: the name by which that graph is
+    called."""
     for action in subject.real:
         graph = graphs.of(action.name)
         if graph is None:
@@ -179,7 +194,7 @@ def _check_each(subject: Subject, within: str, graphs: _Graphs) -> None:
 
 
 def _report(subject: Subject, action: Action, graph: Graph, found: _Inner) -> None:
-    """What a sub-graph does to the graph around it, at the action that stands for it."""
+    """Report the findings about a sub-graph at the action that stands for it."""
     own = slots_of(action.inputs), slots_of(action.outputs)
     check_signature(subject, action, found.signature, *own)
     for each in found.findings:
@@ -210,7 +225,8 @@ def _sentence(severity: Severity, place: PlaceInside) -> str:
 
 
 def _check_again(subject: Subject, graphs: Mapping[str, Graph], known: Container[str]) -> None:
-    """Sub-graphs that an engine has used up when it comes to them. Each engine resolves its own."""
+    """Report sub-graphs that an engine has used up when it comes to them. Each engine resolves its
+    own actions."""
     told: set[tuple[Key, str]] = set()
     for actor in sorted({action.actor for action in subject.real} - {""}) or [""]:
 
@@ -232,7 +248,7 @@ def _check_again(subject: Subject, graphs: Mapping[str, Graph], known: Container
 
 
 def _inner(name: str, facts: EngineFacts, graphs: _Graphs) -> _Inner:
-    """What a sub-graph does wrong, with all that is inside of it, which was looked at before."""
+    """Check a sub-graph; the graphs inside it were checked before."""
     graph = graphs.by_name[name]
     inside = Subject(with_inputs(graph), facts)
     check_structure(inside)
@@ -247,15 +263,16 @@ def _inner(name: str, facts: EngineFacts, graphs: _Graphs) -> _Inner:
 
 
 def _stays(finding: _Finding) -> bool:
-    """Whether it is known already that the sub-graph may not end."""
+    """Return whether a finding already says that the sub-graph may not end."""
     return finding.severity == "error" or finding.place.code == "H8"
 
 
 def _findings(inside: Subject) -> tuple[_Finding, ...]:
-    """The worst of it: errors, else of each kind of what reaches out the first."""
+    """Return the worst problems of a sub-graph: its errors, else the first of each kind that
+    affects the graph around it."""
     problems = sorted(inside.problems, key=rank)
     errors = [each for each in problems if each.severity == "error"]
-    errors.sort(key=lambda each: each.code not in FINAL)  # what nobody can override is always told
+    errors.sort(key=lambda each: each.code not in FINAL)  # final errors are always among them
     if errors:
         told, left = errors[:_ERRORS], len(errors) - _ERRORS
         return (
@@ -270,7 +287,10 @@ def _findings(inside: Subject) -> tuple[_Finding, ...]:
 
 
 def _finding(inside: Subject, problem: Problem, left: int = 0) -> _Finding:
-    """As it is told further out, for `left` others too; what was deeper keeps its place."""
+    """Return a problem as a finding for the graph around it, which stands for `left` further ones.
+
+    A problem from deeper inside keeps its place.
+    """
     place = problem.inside or PlaceInside(
         levels=(),
         aids=(),

@@ -18,17 +18,18 @@ from action_assistant.umrf.model import EXIT, Action, Graph, Key, Precondition, 
 from action_assistant.umrf.semantics.parts import exit_inputs, exit_owner
 from action_assistant.umrf.semantics.values import slots_of
 
-#: States that all trials of one graph may look at, so that checking takes seconds: about 2 µs each.
+#: The most states that all trials of one graph may examine, so that a check takes seconds: about 2 µs each.
 BUDGET: Final = 5_000_000
-#: What an event of the engine counts, where a trial is gone through as a whole.
+#: The cost of one trace event in a trial that is simulated completely.
 _EVENT: Final = 20
-#: Above so many actions only the usual way is tried: what lies behind each takes their square in bits.
+#: With more actions only the baseline course is tried: the sets of reachable actions take the square of them in bits.
 MAX_ACTIONS: Final = 20_000
 _OTHERWISE: Final[tuple[Precondition, ...]] = ("on_false", "on_error")
 
 
 class Trial(msgspec.Struct, frozen=True):
-    """One way. `action`: who ends with `outcome` the first time; None: nobody ends otherwise."""
+    """One course that was tried. `action`: the action that ends with `outcome` the first time; None
+    in the baseline course."""
 
     action: Action | None
     outcome: str
@@ -36,15 +37,18 @@ class Trial(msgspec.Struct, frozen=True):
 
     @property
     def when(self) -> str:
-        """In words, for the beginning of a sentence."""
+        """The condition of the trial in words, for the beginning of a sentence."""
         if self.action is None:
             return "If all goes well"
         return f"If {self.action.full_name} ends with {self.outcome}"
 
 
 class Coverage(msgspec.Struct, frozen=True, kw_only=True):
-    """What was looked at. `tried` ways of `ways`; `cut`: so many of the tried were followed for four
-    laps only; `first_left`: the first that was not tried."""
+    """How much was tried: `tried` courses of `ways`.
+
+    `cut`: how many of them were followed for four laps only. `first_left`: the first course that
+    was not tried.
+    """
 
     ways: int = 0
     tried: int = 0
@@ -53,7 +57,8 @@ class Coverage(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Trials:
-    """All ways of one graph. `slower_first`: of what runs side by side the later is quicker."""
+    """All trial courses of one graph. `slower_first`: of two concurrent actions, the later one in
+    the file ends first."""
 
     def __init__(self, graph: Graph, *, slower_first: bool = False) -> None:
         self.graph = graph
@@ -84,7 +89,7 @@ class Trials:
             yield self._noted(Trial(self.actions[self.net.names[index]], outcome, end))
 
     def coverage(self) -> Coverage:
-        """What has been looked at, once all was asked for."""
+        """Return how much was tried, once the iteration is over."""
         ways = 1 + len(self._others)
         return Coverage(ways=ways, tried=self._tried, cut=self._cut, first_left=self._left)
 
@@ -100,7 +105,7 @@ class Trials:
             try:
                 return deviations.outcome(index, outcome)
             except SimultaneousEnds:
-                pass  # the engine knows the order
+                pass  # only the simulated engine knows the order
         return self._whole(self.net.names[index], outcome)
 
     def _whole(self, full_name: str, outcome: Precondition) -> Outcome:
@@ -109,8 +114,11 @@ class Trials:
         return end
 
     def _meant(self) -> list[tuple[int, Precondition]]:
-        """What can make a difference: children that answer otherwise, or are bypassed and pass the
-        outcome on, or outputs that are missed."""
+        """Return the deviations that can make a difference.
+
+        These are outcomes that a child answers otherwise, that a bypass passes on, or whose missing
+        outputs matter.
+        """
         found: list[tuple[int, Precondition]] = []
         for index, row in enumerate(self.net.edges):
             edges = [edge for edge in row if edge is not None]
@@ -127,8 +135,10 @@ _BLOCKED: Final = {"H2", "H6", "H7", "H8", "H9", "no-entry", "ghost", "actors"}
 
 
 def check_scenarios(subject: Subject) -> Coverage:
-    """Tries every action with on_true, then one that ends otherwise at a time. What was looked at;
-    nothing where another error keeps the graph from running anyway."""
+    """Run all trials of a graph, report those that end stuck (H8), and return how much was tried.
+
+    The coverage is empty if another error keeps the graph from running.
+    """
     if not subject.real or any(
         p.code in _BLOCKED and p.severity == "error" for p in subject.problems
     ):
@@ -159,17 +169,18 @@ def _report_left(subject: Subject, coverage: Coverage) -> None:
 
 
 class _Waiting:
-    """Who waits for ever inside the graph, each told once, with the first way that leads there."""
+    """Reports the actions that wait without end inside the graph, each once, with the first trial
+    that leads there."""
 
     def __init__(self, subject: Subject, net: Network) -> None:
         self.subject = subject
         self.net = net
         self.actions = {action.full_name: action for action in subject.real}
         self._told: set[int] = set()
-        self._firsts: dict[int, int] = {}  # many ways leave the same ones waiting
+        self._firsts: dict[int, int] = {}  # many trials leave the same actions waiting
 
     def report(self, trial: Trial) -> bool:
-        """Whether it is told, or was: False for what only the exit waits for."""
+        """Report a stuck trial, and return True; return False if only the exit waits."""
         inside = trial.end.waiting & ~(1 << self.net.exit)
         if not inside and trial.end.waiting:
             return False
@@ -185,7 +196,7 @@ class _Waiting:
         return True
 
     def _first(self, waiting: int) -> int:
-        """The first that waits for no other that waits."""
+        """Return the first waiting action that waits for no other waiting action."""
         if waiting not in self._firsts:
             for_others, rest = 0, waiting
             while rest:
@@ -203,17 +214,17 @@ class _Waiting:
         if not self.net.wants[index] & ~self.net.has[index]:
             return f"{name} still waits for parents that are required and did not run"
         if any("pvf_allowed_values" in p.text for a in self.subject.real for p in a.inputs):
-            return None  # which values actions give is not known
+            return None  # the values that actions give are not known
         if not self.net.needs[index]:
             return f"{name} still waits for inputs"
         return f"{name} still waits for parents that are required, or for inputs"
 
 
-# What the exit waits for
+# Parents and outputs for which the exit waits
 
 
 def _report_at_exit(subject: Subject, net: Network, found: list[Trial]) -> None:
-    """Each parent that is missed and each action whose outputs are missed, once."""
+    """Report each parent that the exit misses and each action whose outputs it misses, once."""
     mended = _mended(subject.graph, {name for trial in found for name in trial.end.lacking})
     is_mend = bool(found) and _never_stuck(mended)
     told: set[str] = set()
@@ -242,8 +253,11 @@ def _report_at_exit(subject: Subject, net: Network, found: list[Trial]) -> None:
 
 
 def _may_fit(subject: Subject, last: str) -> bool:
-    """Whether another value than the default could be what the exit takes in: only actions know what they
-    give. Those of the action whose outputs the exit takes in count if it was the `last` to end."""
+    """Return whether an output other than the default could be a value that the exit takes.
+
+    Only actions know the values that they give. Those of the action whose outputs the exit takes
+    count if it was the `last` to end.
+    """
     owner = exit_owner(subject.graph)
     limited = {
         name: slot.type
@@ -292,8 +306,8 @@ def _mended(graph: Graph, lacking: set[str]) -> Graph:
 
 
 def _never_stuck(mended: Graph) -> bool:
-    """Whether a graph then ends in every trial, and never while something runs, whichever of what
-    runs side by side is quicker."""
+    """Return whether a graph ends in every trial and never while an action runs, whichever of two
+    concurrent actions is quicker."""
     for slower_first in (False, True):
         trials = Trials(mended, slower_first=slower_first)
         if any(trial.end.kind == "stuck" or trial.end.early for trial in trials):
@@ -304,7 +318,7 @@ def _never_stuck(mended: Graph) -> bool:
 
 
 def halted(subject: Subject) -> str | None:
-    """In which case a graph ends HALTED, in words; None if no trial does."""
+    """Return in which case a graph ends HALTED, in words; None if no trial does."""
     for trial in Trials(subject.graph):
         if trial.end.kind == "halted":
             return f"if {trial.when[3:]}" if trial.action else "in any case"

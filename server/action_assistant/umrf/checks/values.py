@@ -1,4 +1,4 @@
-"""Parameters: who provides them, what renamings break, what a library says.
+"""Checks parameters: their sources, the effect of renamings, and the signatures of a library.
 
 See docs/umrf-and-the-engine.md 2.7; H2, H7, H8.
 """
@@ -15,7 +15,8 @@ def check_values(
     library: Mapping[str, Signature] | None,
     graphs: Container[str] = frozenset(),
 ) -> None:
-    """Reports all of it. `graphs`: names of sub-graphs, which no library needs to know."""
+    """Report all problems of parameters. `graphs`: names of sub-graphs, which a library need not
+    know."""
     inputs = {action.key: slots_of(action.inputs) for action in subject.real}
     outputs = {action.key: slots_of(action.outputs) for action in subject.real}
     for relation in subject.sound:
@@ -58,7 +59,7 @@ def _check_remap(
 
 
 def _check_order(subject: Subject, relation: Relation, own: _Slots, targets: _Slots) -> None:
-    """Renaming changes the order in which the engine looks for outputs."""
+    """Report a renaming that changes the order in which the engine looks for outputs."""
     parent, child = subject.name(relation.parent), subject.name(relation.child)
     meant = {name: name for name in own} | {r.source: r.target for r in relation.remap}
     try:
@@ -88,7 +89,7 @@ def _check_inputs(
     outputs: Mapping[Key, _Slots],
     library: Mapping[str, Signature] | None,
 ) -> None:
-    """Required inputs for which there is no value."""
+    """Report required inputs for which there is no value."""
     known = (library or {}).get(action.name)
     incoming = subject.incoming.get(action.key, [])
     needed = {
@@ -121,7 +122,7 @@ def _check_inputs(
 def _given_kinds(
     incoming: list[Relation], outputs: Mapping[Key, _Slots], needed: _Slots
 ) -> dict[str, set[str]]:
-    """The types of what parents hand over to inputs that are not locked, by input."""
+    """Return for each unlocked input the types of the outputs that parents hand over to it."""
     open_ = {name: slot for name, slot in needed.items() if slot.updatable}
     kinds: dict[str, set[str]] = {}
     for relation in incoming if open_ else []:
@@ -136,7 +137,7 @@ def _given_kinds(
 
 
 def check_static(subject: Subject) -> None:
-    """Values that are none of the allowed ones."""
+    """Report values that are none of the allowed ones."""
     for action in subject.real:
         _check_static(subject, action, slots_of(action.inputs))
 
@@ -170,7 +171,8 @@ def _check_known(
 def check_signature(
     subject: Subject, action: Action, known: Signature, inputs: _Slots, outputs: _Slots
 ) -> None:
-    """Whether an action has exactly the parameters of what it is resolved to."""
+    """Report parameters of an action that differ from those of the action or graph to which it is
+    resolved."""
     for side, ours, theirs in (("input", inputs, known.inputs), ("output", outputs, known.outputs)):
         surplus, lacking = set(ours) - set(theirs), set(theirs) - set(ours)
         if surplus or lacking:
