@@ -14,9 +14,9 @@ from action_assistant.umrf.model import Problem, Severity, Where
 from action_assistant.umrf.problem_kinds import (
     MISTAKES,
     UNWRITTEN,
-    ToldCounts,
+    ProblemCounts,
     kind_of,
-    told_counts,
+    problem_counts,
 )
 
 VECTORS: Final = json.loads(
@@ -44,7 +44,7 @@ def test_a_graph_has_as_many_of_each_as_the_vectors_say(vector: dict[str, Any]) 
     problems = check_written(graph)
     wanted = msgspec.convert(vector["problems"], list[Problem])
     assert list(map(_said, problems)) == list(map(_said, wanted))
-    assert told_counts(problems, graph) == ToldCounts(vector["wrong"], vector["to_fill_in"])
+    assert problem_counts(problems, graph) == ProblemCounts(vector["wrong"], vector["to_fill_in"])
 
 
 def _said(problem: Problem) -> tuple[str | None, ...]:

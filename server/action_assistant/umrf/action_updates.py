@@ -1,8 +1,8 @@
-"""What becomes of a graph when the library says something new of an action that it uses.
+"""Updates the uses of a library action in a graph after the library has changed it.
 
-A use keeps its values, its unknown fields and what it is called; its parameters become those of the
-library. What flowed along an arrow goes on flowing after a renaming. Nothing is guessed: a parameter
-that went and one that came are the same only if the caller says so.
+A use keeps its values, its unknown fields and its name; its parameters become those of the library.
+Values that an arrow handed over are still handed over after a renaming. Nothing is guessed: a
+removed and an added parameter are the same only if the caller says so.
 """
 
 from collections.abc import Iterable, Mapping
@@ -15,7 +15,7 @@ from action_assistant.umrf.json.text import Json, dump, parse_small
 from action_assistant.umrf.model import Action, Graph, Key, Parameter, Relation, Remap
 from action_assistant.umrf.parameters import NATIVE, fits, flat_name
 
-#: What a library says of a parameter so that it counts; absent ones have these values.
+#: The members of a library's parameter that matter to an engine, with the values that absent ones have.
 _CONTRACT: Final[dict[str, Json]] = {
     "pvf_type": None,
     "pvf_required": True,
@@ -23,12 +23,12 @@ _CONTRACT: Final[dict[str, Json]] = {
     "pvf_locked": None,
     "pvf_allowed_values": None,
 }
-#: What it says for people, too. All other members of a use are its own.
+#: The members that a library defines, including those for people. All other members of a use are its own.
 _DEFINED: Final = frozenset({*_CONTRACT, "pvf_example", "pvf_unit", "pvf_description"})
 
 
 class Renames(msgspec.Struct, frozen=True):
-    """Parameters that are called otherwise now: pairs of old and new path."""
+    """Renamed parameters: pairs of old and new path."""
 
     inputs: tuple[tuple[str, str], ...]
     outputs: tuple[tuple[str, str], ...]
@@ -38,20 +38,20 @@ NO_RENAMES: Final = Renames((), ())
 
 
 def uses_of(graph: Graph, name: str) -> tuple[Action, ...]:
-    """The actions of a graph that are uses of a library's action."""
+    """Return the actions of a graph that are uses of a library's action."""
     return tuple(a for a in graph.actions if a.name == name and not a.missing)
 
 
 def is_like(use: Action, known: Action) -> bool:
-    """Whether a use has the parameters that the library says, in whatever order and with whatever
-    values."""
+    """Return whether a use has the parameters of the library, in any order and with any values."""
     return _shape(use.inputs) == _shape(known.inputs) and _shape(use.outputs) == _shape(
         known.outputs
     )
 
 
 def suggested(graph: Graph, known: Action) -> Renames:
-    """Likely renames: of all uses together, one parameter of a type went and one of that type came."""
+    """Return likely renames: over all uses, exactly one parameter of a type was removed and one of
+    that type added."""
     uses = uses_of(graph, known.name)
     return Renames(
         _swapped([use.inputs for use in uses], known.inputs),
@@ -60,7 +60,7 @@ def suggested(graph: Graph, known: Action) -> Renames:
 
 
 def updated(graph: Graph, known: Action, renames: Renames = NO_RENAMES) -> Graph:
-    """The graph with the uses of `known` as the library has it."""
+    """Return the graph with the uses of `known` as the library has it."""
     inputs, outputs = dict(renames.inputs), dict(renames.outputs)
     paths: dict[Key, _Moves] = {}
     after: dict[Key, Action] = {}
@@ -87,14 +87,15 @@ def updated(graph: Graph, known: Action, renames: Renames = NO_RENAMES) -> Graph
 
 
 class _Moves(msgspec.Struct, frozen=True):
-    """Where the parameters of a use are afterwards, by flat name; None for those that went."""
+    """The new names of a use's parameters by their old flat name; None for those that were
+    removed."""
 
     inputs: dict[str, str | None] = {}
     outputs: dict[str, str | None] = {}
 
 
 class _Names(msgspec.Struct, frozen=True):
-    """Flat names of what an action takes and gives."""
+    """The flat names of an action's inputs and outputs."""
 
     inputs: frozenset[str] = frozenset()
     outputs: frozenset[str] = frozenset()
@@ -143,7 +144,7 @@ def _swapped(
 def _sources(
     use: tuple[Parameter, ...], known: tuple[Parameter, ...], renames: Mapping[str, str]
 ) -> dict[str, Parameter]:
-    """Which parameter of the use each of the library's was, by its path."""
+    """Return the use's parameter that each of the library's parameters was before, by its path."""
     had = {parameter.path: parameter for parameter in use}
     said = {parameter.path for parameter in known}
     found = {path: parameter for path, parameter in had.items() if path in said}
@@ -161,11 +162,11 @@ def _parameters(
         p if (old := sources.get(p.path)) is None else Parameter(p.path, _text(old.text, p.text))
         for p in known
     )
-    return use if set(new) == set(use) else new  # another order alone is no change
+    return use if set(new) == set(use) else new  # a different order is no change
 
 
 def _text(use: str, known: str) -> str:
-    """A parameter as the library has it, with what is the use's own."""
+    """Return a parameter as the library has it, with the use's own members."""
     mine, new = parse_small(use), parse_small(known)
     if not isinstance(mine, dict) or not isinstance(new, dict):
         return known if _defined(mine) != _defined(new) else use
@@ -174,7 +175,7 @@ def _text(use: str, known: str) -> str:
     own = {name: value for name, value in mine.items() if name not in _DEFINED}
     kind = new.get("pvf_type")
     if kind != mine.get("pvf_type") and kind in NATIVE and not _fits(kind, own.get("pvf_value")):
-        # A value that no engine would take: the preview shows that it goes.
+        # No engine would take this value: the preview shows that it is removed.
         own.pop("pvf_value", None)
     return dump({**{name: value for name, value in new.items() if name in _DEFINED}, **own})
 
@@ -193,7 +194,7 @@ def _moved(
 def _led_on(
     relation: Relation, names: Mapping[Key, _Names], moves: Mapping[Key, _Moves]
 ) -> Relation:
-    """The relation with renamings that let flow what flowed before."""
+    """Return the relation with renamings that hand the same values over as before."""
     outputs = moves.get(relation.parent, _Moves()).outputs
     inputs = moves.get(relation.child, _Moves()).inputs
     remap: list[Remap] = []

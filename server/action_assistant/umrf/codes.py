@@ -1,4 +1,4 @@
-"""The codes of problems: what each means, how sure it is, what happens, what mends it.
+"""The codes of problems: meaning, severity, consequence and fixes of each.
 
 Checks may report only these; the table in the documentation is made from them.
 """
@@ -9,14 +9,13 @@ import msgspec
 
 from action_assistant.umrf.model import Problem, Severity
 
-#: `unreadable`: no graph at all; `refused`: the engine's parser refuses the text; `structural`: its
-#: parser takes it, its start does not; `unsendable`: no robot is sent it; `hazard`: of docs/umrf-and-the-engine.md 3; `other`: the
-#: rest.
+#: `unreadable`: there is no graph. `refused`: the engine's parser refuses the text. `structural`: the parser takes it and
+#: the start does not. `unsendable`: it is sent to no robot. `hazard`: one of docs/umrf-and-the-engine.md 3.
 Kind: TypeAlias = Literal["unreadable", "refused", "structural", "unsendable", "hazard", "other"]
 
 
 class Code(msgspec.Struct, frozen=True):
-    """One kind of problem. `fixes`: names of what `fixes.fix` does about it."""
+    """One kind of problem. `fixes`: the names of its fixes in `fixes.fix`."""
 
     kind: Kind
     severities: tuple[Severity, ...]
@@ -50,7 +49,7 @@ CODES: Final[dict[str, Code]] = {
     "number-too-big": _unreadable("a number that no double can hold"),
     "too-deep": _unreadable("more than 64 levels"),
     "too-large": _unreadable("more than 10 MB, or more than a million values"),
-    # What the engine's parser refuses
+    # Refused by the engine's parser
     "dialect-old": _refused("the form of an earlier engine, or of the designer"),
     "graph-name-missing": _refused("no `graph_name`"),
     "entry-exit-missing": _refused("several actions without `graph_entry` or `graph_exit`"),
@@ -65,7 +64,7 @@ CODES: Final[dict[str, Code]] = {
     "condition-illegal": _refused("a condition that is not `precondition -> response`"),
     "remap-illegal": _refused("a renaming that repeats a `from` or lacks an end"),
     "parameter-illegal": _refused("a parameter whose members do not fit its `pvf_type`"),
-    # What it cannot start
+    # Refused by the engine's start
     "ghost": Code(
         "structural", _ERROR, "a relation with an action that does not exist",
         "at the entry or exit the engine refuses the graph, elsewhere it aborts or never starts it",
@@ -79,7 +78,7 @@ CODES: Final[dict[str, Code]] = {
         "structural", _ERROR, "two actions with one full name, or one called like an end",
         "the start throws, and a broken graph stays in the engine", ("renumber",),
     ),
-    # What is sent to no robot
+    # Sent to no robot
     "graph-name": Code(
         "unsendable", _ERROR, "control characters, `%`, or more than 200 characters in the graph's name",
         "nothing is sent: no log or file can carry the name, and the engine dies of `%` when it logs an error about it",
@@ -186,27 +185,26 @@ CODES: Final[dict[str, Code]] = {
     "parameter-type": Code("other", _ERROR, "another type than in the action's own file", "the action ends in ERROR"),
 }  # fmt: skip
 
-#: Codes of what makes the engine's parser refuse a text.
+#: Codes for which the engine's parser refuses a text.
 REFUSED: Final = frozenset(name for name, code in CODES.items() if code.kind == "refused")
 #: Codes that block every engine and cannot be overridden.
 STRUCTURAL: Final[frozenset[str]] = REFUSED | {
     name for name, code in CODES.items() if code.kind == "structural"
 }
-#: Codes of errors that nobody can override: those, and what no robot is sent.
+#: Codes of errors that nobody can override: structural ones, and those that are sent to no robot.
 FINAL: Final[frozenset[str]] = STRUCTURAL | {
     name for name, code in CODES.items() if code.kind == "unsendable"
 }
 
-#: Of what is possible, what comes first: it kills or blocks the engine, it cannot be stopped, it never
-#: ends.
+#: The order of possible hazards: the engine dies or blocks, the graph cannot be stopped, it never ends.
 _WORST: Final = ("H4", "H5", "H12", "H8", "H14")
-#: Warnings that are true of nearly every graph, since they come with the engine's own defaults: told once,
-#: after all others, and not counted among them, so that warnings are read.
+#: Warnings that apply to nearly every graph, since they come with the engine's own defaults. They are reported once, after
+#: all others, and not counted, so that people read the other warnings.
 QUIET: Final = frozenset({"H3"})
 
 
 def rank(problem: Problem) -> tuple[Severity, int]:
-    """The order in which problems are told."""
+    """Return the sort key of a problem."""
     code = problem.code
     if code in QUIET:
         return problem.severity, len(_WORST) + 1
@@ -214,7 +212,7 @@ def rank(problem: Problem) -> tuple[Severity, int]:
 
 
 def table() -> str:
-    """All codes as a Markdown table."""
+    """Return all codes as a Markdown table."""
     lines = [
         "| code | severity | what it is | what happens | fix |",
         "|---|---|---|---|---|",

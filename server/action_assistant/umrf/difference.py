@@ -1,4 +1,4 @@
-"""What differs between two graphs, action by action and arrow by arrow."""
+"""Computes the difference of two graphs, action by action and arrow by arrow."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any, Final, Literal, TypeAlias
@@ -11,12 +11,12 @@ from action_assistant.umrf.model import ENTRY, EXIT, Action, Graph, JsonText, Ke
 Change: TypeAlias = Literal["added", "removed", "changed"]
 
 
-#: Where a note lies, and how large it is.
+#: The members of a note for its position and size.
 _NOTE_PLACE: Final = {"at", "size"}
 
 
 class Field(msgspec.Struct, frozen=True):
-    """A field that says something else now. None where it said nothing."""
+    """A field with another value. None stands for no value."""
 
     field: str
     before: Any
@@ -24,7 +24,7 @@ class Field(msgspec.Struct, frozen=True):
 
 
 class ActionChange(msgspec.Struct, frozen=True):
-    """An action that came, went or changed. `name` is its full name, the newer one."""
+    """An action that was added, removed or changed. `name` is its full name, the newer one."""
 
     change: Change
     aid: str
@@ -33,9 +33,12 @@ class ActionChange(msgspec.Struct, frozen=True):
 
 
 class RelationChange(msgspec.Struct, frozen=True):
-    """An arrow that came, went or changed, between actions by full name, or `entry` and `exit`. `ends`:
-    the same by their keys. `when`: of one that came or went what its child does: pairs of outcome
-    and response."""
+    """An arrow that was added, removed or changed, between actions by full name, or `entry` and
+    `exit`.
+
+    `ends`: the same by their keys. `when`: pairs of outcome and response of an arrow that was added
+    or removed.
+    """
 
     change: Change
     parent: str
@@ -46,8 +49,10 @@ class RelationChange(msgspec.Struct, frozen=True):
 
 
 class NoteChange(msgspec.Struct, frozen=True):
-    """A note or frame that came, went or changed. `text` is what it says, the newer one. `moved`: it only
-    lies elsewhere, or is larger or smaller."""
+    """A note or frame that was added, removed or changed. `text` is its text, the newer one.
+
+    `moved`: only its position or size has changed.
+    """
 
     change: Change
     id: str
@@ -56,7 +61,8 @@ class NoteChange(msgspec.Struct, frozen=True):
 
 
 class Difference(msgspec.Struct, frozen=True):
-    """From `before` to `after`, both changes of the same graph's document."""
+    """The difference from the moment `before` to the moment `after`, both numbers of changes of one
+    graph's document."""
 
     before: int
     after: int
@@ -67,7 +73,7 @@ class Difference(msgspec.Struct, frozen=True):
 
 
 def difference(before: tuple[int, Graph], after: tuple[int, Graph]) -> Difference:
-    """Compare two moments of a graph."""
+    """Compare a graph at two moments."""
     (old_seq, old), (new_seq, new) = before, after
     return Difference(
         old_seq,
@@ -109,7 +115,8 @@ def _relations(old: Graph, new: Graph) -> Iterable[RelationChange]:
 
 
 def _when(relation: Relation | None) -> tuple[tuple[str, str], ...]:
-    """What the child does, by outcome; of the entry there is nothing to say."""
+    """Return the responses of the child by outcome, without those that ignore it. Empty for an
+    arrow from the entry."""
     if relation is None or relation.parent == ENTRY:
         return ()
     says: dict[str, str] = msgspec.structs.asdict(relation.conditions)
@@ -126,14 +133,14 @@ def _notes(old: Graph, new: Graph) -> Iterable[NoteChange]:
 
 
 def _said(note: JsonText) -> str:
-    """What a note or frame says; anything else may stand in its place."""
+    """Return the text of a note or frame; empty if it has none."""
     found = parse_small(note)
     said = found.get("text") if isinstance(found, dict) else None
     return said if isinstance(said, str) else ""
 
 
 def _but_place(note: JsonText) -> dict[str, Any] | JsonText:
-    """What a note is, wherever it lies."""
+    """Return a note without its position and size."""
     found = parse_small(note)
     if not isinstance(found, dict):
         return note

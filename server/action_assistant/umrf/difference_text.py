@@ -1,4 +1,4 @@
-"""A difference as text, line by line, and graphs of different origins made comparable. Pure."""
+"""Prints a difference as lines of text, and makes graphs of different origins comparable. Pure."""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
@@ -22,8 +22,11 @@ _LOOKS: Final = ("position", "direction", "waypoints/", "gui_attributes")
 
 
 def by_name(graph: Graph) -> Graph:
-    """The graph with the full name of each action as its key, so that it can be compared with one that
-    was read elsewhere. Of several with one name the further ones are numbered."""
+    """Return the graph with the full name of each action as its key, so that it can be compared
+    with a graph read elsewhere.
+
+    If several actions have one name, the later ones are numbered.
+    """
     seen: Counter[str] = Counter()
     keys: dict[Key, Key] = {}
     for action in graph.actions:
@@ -45,7 +48,8 @@ def by_name(graph: Graph) -> Graph:
 
 
 def without_looks(found: Difference) -> Difference:
-    """What means something to a robot: nothing of where things stand, of notes, of how lines are led."""
+    """Return the part of a difference that matters to a robot: without positions, notes and
+    waypoints."""
     actions = (replace(a, fields=_meant(a.fields)) for a in found.actions)
     relations = (replace(r, fields=_meant(r.fields)) for r in found.relations)
     return replace(
@@ -58,12 +62,13 @@ def without_looks(found: Difference) -> Difference:
 
 
 def is_same(found: Difference) -> bool:
-    """Whether nothing differs."""
+    """Return whether there is no difference."""
     return not (found.fields or found.actions or found.relations or found.notes)
 
 
 def lines(found: Difference) -> Iterator[str]:
-    """The difference for people: what a robot notices first, then what only looks otherwise."""
+    """Yield the lines of a difference: first what a robot notices, then what only changes the
+    drawing."""
     meant = without_looks(found)
     if meant.fields:
         yield "~ graph"
@@ -92,7 +97,7 @@ def _indented(fields: Iterable[Field]) -> Iterator[str]:
 
 
 def _members(field: Field) -> Iterator[tuple[str, Any, Any]]:
-    """A parameter by those members that differ; everything else as a whole."""
+    """Yield the members of a parameter that differ, or any other field as one."""
     name = _words(field.field)
     was, now = _parsed(field, field.before), _parsed(field, field.after)
     if not (isinstance(was, dict) and isinstance(now, dict)):
@@ -106,22 +111,21 @@ def _members(field: Field) -> Iterator[tuple[str, Any, Any]]:
 
 
 def _parsed(field: Field, value: Any) -> Any:
-    """What stands in the text of a parameter or of a field that is kept as text."""
+    """Return the JSON value of a field that is kept as text, and any other value as it is."""
     kept = field.field.startswith(("in/", "out/", "x/"))
     return parse_small(value) if kept and isinstance(value, str) else value
 
 
 def _plain(value: Any) -> Any:
-    """A parameter that came or went: its value alone, if it has one."""
+    """Return the value of a parameter that was added or removed, if it has one, else the
+    parameter."""
     return value.get("pvf_value", value) if isinstance(value, dict) else value
 
 
 def _said(value: Any) -> str:
     if value is None:
         return "(nothing)"
-    if isinstance(
-        value, tuple | float | int
-    ):  # of a place; what was read of a text is none of these
+    if isinstance(value, tuple | float | int):  # a position; parsed texts are none of these types
         return msgspec.json.encode(value).decode()
     return dump(value)
 

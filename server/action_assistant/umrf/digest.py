@@ -1,4 +1,4 @@
-"""The digest of a graph: what it means, whatever its layout, spelling of numbers and run state."""
+"""The digest of a graph's meaning, independent of layout, spelling of numbers and run state."""
 
 import hashlib
 from collections.abc import Iterable
@@ -12,7 +12,8 @@ from action_assistant.umrf.model import Graph
 
 
 def digest(graph: Graph) -> str:
-    """Lower-case hex SHA-256 of the canonical graph (RFC 8785) without `gui_attributes`."""
+    """Return the lower-case hex SHA-256 of the canonical graph (RFC 8785) without
+    `gui_attributes`."""
     tree = tree_of(graph)
     tree.pop("gui_attributes", None)
     actions = tree["actions"]
@@ -23,8 +24,11 @@ def digest(graph: Graph) -> str:
 
 
 def tree_digest(own: str, subgraphs: Iterable[tuple[str, str]]) -> str:
-    """Of a graph with this digest together with its sub-graphs, by name and digest, in any order: SHA-256
-    of `[own, [[name, digest], …]]` (RFC 8785) by name. Without sub-graphs it is the graph's own digest."""
+    """Return the digest of a graph with the digest `own` together with its sub-graphs.
+
+    `subgraphs`: their names and digests in any order. It is the SHA-256 of `[own, [[name, digest],
+    …]]` (RFC 8785) sorted by name. Without sub-graphs it is the graph's own digest.
+    """
     parts = sorted(subgraphs)
     if not parts:
         return own
@@ -33,7 +37,7 @@ def tree_digest(own: str, subgraphs: Iterable[tuple[str, str]]) -> str:
 
 
 def _plain(value: Json) -> Any:
-    """Numbers as the doubles that the engine reads."""
+    """Return a value with its numbers as the doubles that the engine reads."""
     match value:
         case dict():
             return {key: _plain(member) for key, member in value.items()}

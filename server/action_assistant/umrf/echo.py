@@ -1,4 +1,5 @@
-"""A graph as an engine gives it back, for comparing what was sent with what is seen.
+"""Computes the graph that an engine gives back, so that the sent graph can be compared with the one
+that is seen.
 
 See docs/umrf-and-the-engine.md 1.4.
 """
@@ -23,13 +24,14 @@ from action_assistant.umrf.parameters import escape, flat_name
 
 
 def echo(graph: Graph, facts: EngineFacts) -> Graph:
-    """What is left of a graph in feedback and get answers, so that `digest` of both can be compared.
+    """Return a graph as it appears in feedback and get answers, so that the `digest` of both can be
+    compared.
 
-    Gone are the graph's description, unknown fields, exit conditions, renamings of the entry,
-    `pvf_required`, the order of actions, values of outputs, and values of inputs that a parent may
-    hand over. The same for every build that was measured.
+    Missing in it are the graph's description, unknown fields, exit conditions, renamings of the
+    entry, `pvf_required`, the order of actions, values of outputs, and values of inputs that a
+    parent may hand over. This is the same for every build that was measured.
     """
-    del facts  # all builds that were measured give back the same
+    del facts  # all measured builds give the same back
     real = sorted((a for a in graph.actions if not a.missing), key=lambda a: a.full_name)
     reached = _reached(graph, {action.key: action for action in real})
     return Graph(
@@ -40,7 +42,7 @@ def echo(graph: Graph, facts: EngineFacts) -> Graph:
 
 
 def _reached(graph: Graph, actions: Mapping[Key, Action]) -> dict[Key, set[str]]:
-    """Flat names of the inputs that some parent's output may get to."""
+    """Return the flat names of the inputs that an output of some parent may reach."""
     found: dict[Key, set[str]] = {}
     for relation in graph.relations:
         parent = actions.get(relation.parent)
@@ -68,7 +70,8 @@ def _action(action: Action, reached: set[str]) -> Action:
 def _parameters(
     parameters: tuple[Parameter, ...], reached: set[str] | None
 ) -> tuple[Parameter, ...]:
-    """Leaves as the engine prints them; `reached` inputs (None: all) without their value."""
+    """Return parameters as the engine prints them. `reached` inputs (None: all) lose their
+    value."""
     found: dict[str, Parameter] = {}
     for parameter in parameters:
         leaf = parse_small(parameter.text)

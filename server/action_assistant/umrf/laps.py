@@ -1,9 +1,7 @@
-"""Which actions of a graph can run more than once, as far as its arrows tell.
+"""Finds the actions of a graph that can run more than once, as far as its arrows tell.
 
-See docs/umrf-and-the-engine.md 2.3, 2.9, 2.10.
-
-Two sights of a running action are sights of the same run of it only where it cannot have begun anew in
-between; an engine counts nothing.
+See docs/umrf-and-the-engine.md 2.3, 2.9 and 2.10. Two observations of a running action belong to
+the same run of it only if it cannot have begun again in between; an engine counts nothing.
 """
 
 from collections import Counter
@@ -15,12 +13,15 @@ from action_assistant.umrf.model import ENTRY, PRECONDITIONS, Graph, Key, Precon
 
 
 class Laps(msgspec.Struct, frozen=True, omit_defaults=True):
-    """`once`: full names of actions that run at most once. `barring_errors`: of those, the ones of
-    which that is true only until an action fails, since a failure is passed on past a join. `stops`:
-    the graph itself stops or pauses actions, or runs them over and over; then nothing is `once`.
-    `needs`: of actions that may run again, those that only one other one sets going (action, the other
-    one, how many times the entry does so besides); of a graph inside, which may be begun again as a
-    whole, of all actions."""
+    """The actions that can run once or again.
+
+    `once`: full names of actions that run at most once. `barring_errors`: those of them for which
+    this holds only until an action fails, since a failure is passed on past a join. `stops`: the
+    graph itself stops or pauses actions, or runs them over and over; then nothing is `once`.
+    `needs`: for an action that may run again and is set going by only one other one: (action, the
+    other one, how many times the entry sets it going in addition); for a graph inside, which may be
+    begun again as a whole, of all actions.
+    """
 
     once: tuple[str, ...] = ()
     barring_errors: tuple[str, ...] = ()
@@ -29,7 +30,10 @@ class Laps(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 def laps(graph: Graph, *, inside: bool = False) -> Laps:
-    """What the arrows of a graph rule out. `inside`: it runs inside of another one. Total."""
+    """Return the actions that the arrows of a graph allow to run once or again.
+
+    `inside`: the graph runs inside another one. Total.
+    """
     if _stops(graph):
         return Laps(stops=True)
     known = _walked(graph)
@@ -46,8 +50,12 @@ def laps(graph: Graph, *, inside: bool = False) -> Laps:
 def _needs(
     graph: Graph, once: Collection[str], names: Mapping[str, int]
 ) -> Iterator[tuple[str, str, int]]:
-    """Each run of such an action was set going by a run of its one parent, or by the entry. An outcome
-    that is passed on past the parent sets it going without that, so there must be none."""
+    """Yield the actions for which each run was started by a run of their one parent, or by the
+    entry.
+
+    An outcome that is passed on past the parent would start it without a run of the parent, so
+    there must be none.
+    """
     called = {each.key: each.full_name for each in graph.actions if names[each.full_name] == 1}
     arriving: dict[Key, list[Relation]] = {}
     for arrow in graph.relations:
@@ -70,7 +78,7 @@ def _needs(
 
 
 def _runs(arrow: Relation) -> list[Precondition]:
-    """The outcomes for which an arrow runs its child."""
+    """Return the outcomes for which an arrow runs its child."""
     if arrow.parent == ENTRY:
         return ["on_true"]
     return [each for each in PRECONDITIONS if arrow.conditions.answer(each) == "run"]
@@ -85,8 +93,10 @@ def _stops(graph: Graph) -> bool:
 
 
 def _walked(graph: Graph) -> dict[Key, bool]:
-    """The actions that end at most once, each with whether that needs that none fails. Whatever lies
-    in or behind a loop is never come to."""
+    """Return the actions that end at most once, each with whether this needs that no action fails.
+
+    Actions in a loop or after one are never reached by this walk.
+    """
     arriving: dict[Key, list[Relation]] = {each.key: [] for each in graph.actions}
     leaving: dict[Key, list[Key]] = {}
     for arrow in graph.relations:
@@ -109,7 +119,8 @@ def _walked(graph: Graph) -> dict[Key, bool]:
 
 
 def _joined(arrows: Sequence[Relation]) -> bool | None:
-    """Whether several parents are waited for; None when more than one of them can set it going."""
+    """Return whether an action waits for several parents; None if more than one of them can start
+    it."""
     live = [each for each in arrows if any(_live(each, outcome) for outcome in PRECONDITIONS)]
     if len(live) <= 1:
         return False

@@ -64,7 +64,7 @@ class Parameter(msgspec.Struct, frozen=True):
 
 
 class Action(msgspec.Struct, frozen=True, kw_only=True):
-    """A node of the graph. Its full name on the wire is `name_instance_id`.
+    """An action of the graph. Its full name on the wire is `name_instance_id`.
 
     `missing`: relations name it and the file has no such action (it is drawn as a ghost and never
     written). `twin`: it has the full name of an earlier action of its file, and keeps it. `extra`:

@@ -1,4 +1,5 @@
-"""Parameters between their nested form in files and their paths."""
+"""Converts parameters between their nested form in files and their paths, and handles their values
+and examples."""
 
 from collections.abc import Iterable, Iterator
 from typing import Final
@@ -6,20 +7,24 @@ from typing import Final
 from action_assistant.umrf.json.text import Json, Number, dump, parse_small
 from action_assistant.umrf.model import JsonText, Parameter
 
-#: The engine has no limit; a file of ours could not be read again beyond it.
+#: The most keys of a path. The engine has no limit; a file of ours could not be read again beyond this one.
 MAX_PATH: Final = 60
 
 
 def flatten(group: dict[str, Json]) -> tuple[Parameter, ...]:
-    """Every value below `group` that is not a non-empty object without `pvf_type`, in order."""
+    """Return every value below `group` that is not a non-empty object without `pvf_type`, in
+    order."""
     return tuple(
         Parameter("/".join(map(escape, keys)), dump(value)) for keys, value in _leaves(group, ())
     )
 
 
 def nest(parameters: Iterable[Parameter]) -> dict[str, Json]:
-    """The inverse of `flatten`. Of two paths one of which lies inside the other the shorter wins;
-    paths longer than `MAX_PATH` are left out."""
+    """Return the nested form, the inverse of `flatten`.
+
+    If one path lies inside another, the shorter one is kept; paths longer than `MAX_PATH` are left
+    out.
+    """
     root: dict[str, Json] = {}
     listed = [(keys_of(p.path), p.text) for p in parameters]
     listed = [(keys, text) for keys, text in listed if len(keys) <= MAX_PATH]
@@ -37,24 +42,24 @@ def nest(parameters: Iterable[Parameter]) -> dict[str, Json]:
 
 
 def keys_of(path: str) -> tuple[str, ...]:
-    """The keys that a path joins."""
+    """Return the keys that a path joins."""
     return tuple(part.replace("~1", "/").replace("~0", "~") for part in path.split("/"))
 
 
 def escape(key: str) -> str:
-    """A key as one part of a path."""
+    """Return a key as one part of a path."""
     return key.replace("~", "~0").replace("/", "~1")
 
 
 def flat_name(path: str) -> str:
-    """The name by which the engine knows a parameter: `pose::position::x`."""
+    """Return the name by which the engine knows a parameter: `pose::position::x`."""
     return "::".join(keys_of(path))
 
 
 def example_of(text: JsonText) -> Json:
-    """What the `pvf_example` of a parameter without a value would be as its value, or None.
+    """Return the `pvf_example` of a parameter without a value as a value of its type, or None.
 
-    Old files spell examples as texts; one that is no value of the type is not made into one. Twin of
+    Old files spell examples as texts; a text that is no value of the type is not converted. Twin of
     `frontend/src/graph/edit/examples.ts`.
     """
     leaf = parse_small(text)
@@ -70,7 +75,7 @@ def example_of(text: JsonText) -> Json:
 
 
 def with_example(parameter: Parameter) -> Parameter:
-    """The parameter with its example as value, if it has one that can be."""
+    """Return the parameter with its example as value, if the example fits."""
     leaf, value = parse_small(parameter.text), example_of(parameter.text)
     if value is None or not isinstance(leaf, dict):
         return parameter
@@ -78,7 +83,8 @@ def with_example(parameter: Parameter) -> Parameter:
 
 
 def without_value(parameter: Parameter) -> Parameter:
-    """The parameter as an action's file describes it, which gives no value to nodes of graphs."""
+    """Return the parameter as an action's file describes it, without the value that an action of a
+    graph gives it."""
     leaf = parse_small(parameter.text)
     if not isinstance(leaf, dict) or "pvf_value" not in leaf:
         return parameter
@@ -86,12 +92,13 @@ def without_value(parameter: Parameter) -> Parameter:
     return Parameter(parameter.path, dump(rest))
 
 
-#: Types of which the engine reads values.
+#: The types whose values the engine reads.
 NATIVE: Final = ("string", "number", "bool", "strings", "numbers", "bools")
 
 
 def fits(kind: str, value: Json) -> bool:
-    """Whether the engine can read a value of a native type; of other types it reads none."""
+    """Return whether the engine can read a value of a native type. It reads no value of other
+    types."""
     match kind:
         case "string":
             return isinstance(value, str)

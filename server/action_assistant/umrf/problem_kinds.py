@@ -1,7 +1,7 @@
-"""Problems as people are told them: what is wrong, and what is only not written yet.
+"""Sorts problems as the page shows them: errors to mend, and values that are not written yet.
 
-Twin of `frontend/src/graph/problems`, which tells them one by one; lists of graphs have the same two
-numbers. `tests/vectors/problem-kinds.json` holds both to it.
+Twin of `frontend/src/graph/problems`, which shows them one by one; lists of graphs have the same
+two numbers. `tests/vectors/problem-kinds.json` holds both to it.
 """
 
 import re
@@ -26,11 +26,11 @@ from action_assistant.umrf.model import (
 from action_assistant.umrf.parameters import flat_name, keys_of
 from action_assistant.umrf.semantics.values import RemapUnknown, renamed
 
-#: `wrong`: certain harm, or a mistake. `fill-in`: still to be written. `warning`: may go wrong. `note`:
-#: what is so with nearly every graph on this engine.
+#: `wrong`: certain harm, or a mistake. `fill-in`: still to be written. `warning`: may go wrong. `note`: applies to
+#: nearly every graph on this engine.
 ProblemKind: TypeAlias = Literal["wrong", "fill-in", "warning", "note"]
 
-#: Codes that say that something has not been written or connected so far.
+#: Codes of things that have not been written or connected so far.
 UNWRITTEN: Final = frozenset(
     {
         "empty",
@@ -44,7 +44,7 @@ UNWRITTEN: Final = frozenset(
         "unreachable",
     }
 )
-#: Mistakes whose harm no engine notices, so that checks call them warnings.
+#: Mistakes that no engine notices, so that checks call them warnings.
 MISTAKES: Final = frozenset({"parameter-allowed", "parameter-inside", "remap-target", "wrong-side"})
 
 _INPUT: Final = re.compile(r"/actions/[0-9]+/input_parameters/(.+)", re.DOTALL)
@@ -55,15 +55,16 @@ _POSE_PARTS: Final = frozenset(
 _MOST_IN_ROW: Final = 4
 
 
-class ToldCounts(msgspec.Struct, frozen=True):
-    """How many things people are told to mend, and to fill in."""
+class ProblemCounts(msgspec.Struct, frozen=True):
+    """The number of things in a graph to mend, and the number to fill in."""
 
     wrong: int
     to_fill_in: int
 
 
-def told_counts(problems: Iterable[Problem], graph: Graph) -> ToldCounts:
-    """What is told of the problems of a graph, one thing once, however many fields it has."""
+def problem_counts(problems: Iterable[Problem], graph: Graph) -> ProblemCounts:
+    """Count the problems of a graph as the page shows them: one thing once, however many fields it
+    has."""
     actions = {action.key: action for action in graph.actions}
     arrows: dict[Key, list[Relation]] = {}
     for relation in filter(_hands_over, graph.relations):
@@ -86,17 +87,18 @@ def told_counts(problems: Iterable[Problem], graph: Graph) -> ToldCounts:
             what = "in/" + next((row[:-1] for row in starts if path.startswith(row)), path)
         place = problem.where.relation or problem.where.aid or ""
         told[kind].add((problem.code, place, what))
-    return ToldCounts(len(told["wrong"]), len(told["fill-in"]))
+    return ProblemCounts(len(told["wrong"]), len(told["fill-in"]))
 
 
 def input_of(problem: Problem) -> str | None:
-    """The path of an input to which the check asks for a value; None for any other problem."""
+    """Return the path of an input for which the check asks a value; None for any other problem."""
     found = _INPUT.fullmatch(problem.where.path) if problem.code in {"H7", "H8"} else None
     return None if found is None else found[1]
 
 
 def kind_of(problem: Problem, *, misfit: bool = False) -> ProblemKind:
-    """`misfit`: whether arrows bring the input something that it cannot take, which is a mistake."""
+    """Return the kind of a problem. `misfit`: arrows bring the input a value that it cannot take,
+    which is a mistake."""
     if input_of(problem) is not None:
         return "wrong" if misfit else "fill-in"
     if problem.code in UNWRITTEN:
@@ -109,7 +111,7 @@ def kind_of(problem: Problem, *, misfit: bool = False) -> ProblemKind:
 def _misfits(
     action: Action, arrows: Iterable[Relation], actions: Mapping[Key, Action]
 ) -> frozenset[str]:
-    """The paths of inputs of which every giver brings what they cannot take."""
+    """Return the paths of inputs that cannot take the value of any parent that hands one over."""
     inputs = {flat_name(each.path): each for each in action.inputs}
     taken: dict[str, bool] = {}
     for relation in arrows:
@@ -128,21 +130,25 @@ def _misfits(
 
 
 def _hands_over(relation: Relation) -> bool:
-    """Whether outputs go along an arrow: unless it ignores or bypasses every end."""
+    """Return whether outputs are handed over along an arrow: unless it ignores or bypasses every
+    outcome."""
     if relation.only is not None or relation.listing or relation.parent == ENTRY:
         return False
     return any(relation.conditions.answer(o) not in {"ignore", "bypass"} for o in PRECONDITIONS)
 
 
 def _takes(target: Parameter, source: Parameter) -> bool:
-    """Whether an input takes an output that reaches it."""
+    """Return whether an input takes an output that reaches it."""
     to, given = _leaf(target), _leaf(source)
     return _type(to) == _type(given) and to.get("pvf_updatable") is not False
 
 
 def _rows(inputs: Iterable[Parameter]) -> Iterable[str]:
-    """What paths of points, vectors and poses begin with, with the slash at its end: each of them is
-    one thing for people, as `grip/` of `grip/position/x`."""
+    """Yield the prefixes of paths of points, vectors and poses, each of which is one thing for
+    people.
+
+    For example `grip/` of `grip/position/x`.
+    """
     for prefix, neighbours in groupby(inputs, key=lambda each: _above(each.path)):
         members = list(neighbours)
         if not prefix or not 2 <= len(members) <= _MOST_IN_ROW or not all(map(_axis, members)):
@@ -157,7 +163,7 @@ def _above(path: str) -> str:
 
 
 def _axis(parameter: Parameter) -> bool:
-    """Whether it is a free number with the name of an axis."""
+    """Return whether a parameter is an unrestricted number with the name of an axis."""
     leaf = _leaf(parameter)
     free = not isinstance(allowed := leaf.get("pvf_allowed_values"), list) or not allowed
     return keys_of(parameter.path)[-1] in _LETTERS and _type(leaf) == "number" and free

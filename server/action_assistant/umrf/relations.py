@@ -1,4 +1,4 @@
-"""Conditions, renamings and numbers of relations, read as the engine's parser reads them."""
+"""Reads conditions, renamings and numbers of relations as the engine's parser reads them."""
 
 import re
 from typing import Final, get_args
@@ -16,7 +16,7 @@ from action_assistant.umrf.model import (
     Response,
 )
 
-#: The greatest `instance_id` that a relation can refer to (16 bits in the engine).
+#: The largest `instance_id` that a relation can refer to (16 bits in the engine).
 MAX_REFERRED_ID: Final = 65_535
 MAX_ID: Final = 2**32 - 1
 
@@ -28,9 +28,9 @@ assert set(_RESPONSES) == set(get_args(Response))
 
 
 def condition_of(text: Json) -> tuple[Precondition, Response] | None:
-    """`"on_true -> run"` in parts, or None where the engine refuses it.
+    """Return the parts of `"on_true -> run"`, or None if the engine refuses it.
 
-    Blanks count for nothing, tabs do, and what follows a second arrow is ignored.
+    Blanks are ignored, tabs are not, and everything after a second arrow is ignored.
     """
     if not isinstance(text, str):
         return None
@@ -43,7 +43,8 @@ def condition_of(text: Json) -> tuple[Precondition, Response] | None:
 
 
 def conditions_of(value: Json) -> tuple[Conditions, bool]:
-    """The conditions of a list over the engine's defaults, and whether all of it could be read."""
+    """Return the conditions of a list over the engine's defaults, and whether all of it could be
+    read."""
     conditions = ENGINE_DEFAULTS
     if not isinstance(value, list):
         return conditions, False
@@ -58,12 +59,13 @@ def conditions_of(value: Json) -> tuple[Conditions, bool]:
 
 
 def conditions_text(conditions: Conditions) -> list[Json]:
-    """All four conditions as a file has them."""
+    """Return all four conditions as a file has them."""
     return [f"{outcome} -> {conditions.answer(outcome)}" for outcome in PRECONDITIONS]
 
 
 def remap_of(value: Json) -> tuple[tuple[Remap, ...], bool, bool]:
-    """The renamings of a list; whether the engine takes them; whether the list says nothing else."""
+    """Return the renamings of a list, whether the engine takes them, and whether the list has no
+    other members."""
     if not isinstance(value, list):
         return (), False, False
     found: dict[str, Remap] = {}
@@ -80,7 +82,8 @@ def remap_of(value: Json) -> tuple[tuple[Remap, ...], bool, bool]:
 
 
 def whole_of(value: Json) -> tuple[int, bool]:
-    """An `instance_id` as the engine takes it, and whether it is one (whole, not negative)."""
+    """Return an `instance_id` as the engine reads it, and whether it is valid (whole, not
+    negative)."""
     match value:
         case Number(text=text):
             exact = text.lstrip("-").isdigit()

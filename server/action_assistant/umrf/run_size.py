@@ -1,14 +1,15 @@
-"""How large a graph may be that is run: one limit, told by the editor while publishing and by the runner at a start."""
+"""The largest graph that can be run: one limit, for publishing in the editor and for a start in the
+runner."""
 
 from typing import Final
 
 import msgspec
 
-#: Bytes of the UMRF texts of a graph and of all graphs inside of it.
+#: The most bytes of the UMRF texts of a graph and of all graphs inside it.
 MOST_BYTES: Final = 2_000_000
-#: Graphs inside of one.
+#: The most graphs inside one.
 MOST_INSIDE: Final = 200
-#: Actions of all of them together.
+#: The most actions of all of them together.
 MOST_ACTIONS: Final = 5_000
 
 
@@ -32,7 +33,7 @@ def excess(size: RunSize) -> str | None:
         counted = f"{_begun(whole)} {has} {size.actions:,} actions"
         return f"{counted}; at most {MOST_ACTIONS:,} are run."
     if size.bytes > MOST_BYTES:
-        # Rounded up, so that what is too large is never shown as the limit.
+        # Rounded up, so that a text which is too large never shows the limit itself.
         megabytes = -(-size.bytes // 10_000) / 100
         text = "texts" if size.inside else "text"
         return (

@@ -1,4 +1,4 @@
-"""What action files and graphs say about their parameters, for libraries.
+"""Derives signatures from action files and graphs, for libraries.
 
 See docs/umrf-and-the-engine.md 2.1.
 """
@@ -11,15 +11,18 @@ from action_assistant.umrf.parameters import flat_name, without_value
 
 
 def signature_of(action: Action) -> Signature:
-    """The signature of an action as its own file describes it."""
+    """Return the signature of an action as its own file describes it."""
     inputs, optional = _types(action.inputs)
     outputs, _ = _types(action.outputs)
     return Signature(inputs=inputs, outputs=outputs, optional=optional)
 
 
 def signature_of_graph(graph: Graph) -> Signature:
-    """The signature of a graph as a sub-graph: the inputs of its entry actions that have no value,
-    and the outputs of the last exit action that has any."""
+    """Return the signature of a graph as a sub-graph.
+
+    It has the inputs of its entry actions that have no value, and the outputs of the last exit
+    action that has any.
+    """
     by_key = {action.key: action for action in graph.actions if not action.missing}
     inputs: dict[str, str] = {}
     optional: frozenset[str] = frozenset()
@@ -36,8 +39,11 @@ def signature_of_graph(graph: Graph) -> Signature:
 
 
 def action_of_graph(graph: Graph) -> Action:
-    """The action that stands for a graph in another, with the parameters of `signature_of_graph`. An
-    input that two entry actions take is required where one of them requires it."""
+    """Return the action that stands for a graph in another one, with the parameters of
+    `signature_of_graph`.
+
+    An input that two entry actions take is required if one of them requires it.
+    """
     by_key = {action.key: action for action in graph.actions if not action.missing}
     inputs: dict[str, Parameter] = {}
     outputs: tuple[Parameter, ...] = ()
@@ -61,7 +67,7 @@ def action_of_graph(graph: Graph) -> Action:
 
 
 def with_inputs(graph: Graph) -> Graph:
-    """The graph as if its parent had given its entry actions what they lack."""
+    """Return the graph as if its parent had given its entry actions the values that they lack."""
     entries = {relation.child for relation in graph.relations if relation.parent == ENTRY}
     actions = tuple(
         msgspec.structs.replace(action, inputs=tuple(map(_not_required, action.inputs)))

@@ -1,10 +1,9 @@
-"""Which actions of a graph an engine may have triggered, by what it shows of all of them.
+"""Finds the actions of a graph that an engine may have triggered, from the states that it shows.
 
-See docs/umrf-and-the-engine.md 2.3, 2.4, 2.9, 2.10.
-
-An action is triggered when a parent reports its end while the graph is RUNNING. Until it has loaded, the
-engine shows it as one that nobody has triggered. What is decided here is who may have reported what;
-whatever the arrows leave open counts as triggered. Pure.
+See docs/umrf-and-the-engine.md 2.3, 2.4, 2.9 and 2.10. An action is triggered when a parent reports
+its end while the graph is RUNNING. Until it has loaded, the engine shows it as one that was never
+triggered. This module decides which actions may have reported which outcome; whatever the arrows
+leave open counts as triggered. Pure.
 """
 
 from collections.abc import Collection, Iterator, Mapping
@@ -25,9 +24,9 @@ from action_assistant.umrf.model import (
 )
 from action_assistant.umrf.semantics.values import RemapUnknown, renamed, slots_of
 
-#: States in which an engine keeps a graph or an action that nothing has begun.
+#: The states of a graph or an action that has not begun.
 NEVER_BEGAN: Final = frozenset({"UNINITIALIZED", "INITIALIZED"})
-#: States of a graph in which the end of an action triggers nothing any more.
+#: The states of a graph in which the end of an action triggers nothing any more.
 LEFT: Final = frozenset({"STOPPING", "STOPPED", "FINISHED", "HALTED", "ERROR"})
 
 _ALL: Final = frozenset[Precondition](PRECONDITIONS)
@@ -37,8 +36,8 @@ _Outcomes: TypeAlias = frozenset[Precondition]
 
 
 class TriggerArrow(msgspec.Struct, frozen=True, array_like=True):
-    """One arrow by full names (`parent` may be ENTRY, `child` EXIT), with its responses in the order
-    of PRECONDITIONS."""
+    """One arrow by full names (`parent` may be ENTRY, `child` EXIT), with its responses in the
+    order of PRECONDITIONS."""
 
     parent: str
     child: str
@@ -51,9 +50,9 @@ class TriggerArrow(msgspec.Struct, frozen=True, array_like=True):
 
 
 class Triggers(msgspec.Struct, frozen=True):
-    """The arrows of one graph, as far as triggering goes.
+    """The arrows of one graph, as far as triggering is concerned.
 
-    `once`: actions that run at most once; `barring_errors`: those of them of which that holds only
+    `once`: actions that run at most once; `barring_errors`: those of them for which this holds only
     until an action fails. `in_turn`: at each moment at most one action is loading, runs or reports,
     since no outcome has two consequences.
     """
@@ -65,9 +64,11 @@ class Triggers(msgspec.Struct, frozen=True):
 
 
 class SeenAfter(msgspec.Struct, frozen=True):
-    """What was seen of a graph after it had left RUNNING. `active`: actions that moved then, and
-    `idle`: those that had never begun, so that neither had reported an end before. `drained`: the graph
-    had ended by itself."""
+    """Observations of a graph after it had left RUNNING.
+
+    `active`: actions that moved then, and `idle`: those that had never begun; neither had reported
+    an end before. `drained`: the graph had ended by itself.
+    """
 
     active: frozenset[str] = frozenset()
     idle: frozenset[str] = frozenset()
@@ -75,8 +76,11 @@ class SeenAfter(msgspec.Struct, frozen=True):
 
 
 def triggers_of(graph: Graph, *, exits_known: bool) -> Triggers:
-    """Return the arrows of a graph. `exits_known`: the text it was read from says how the end of the
-    graph answers; an engine's own text does not."""
+    """Return the arrows of a graph.
+
+    `exits_known`: the text it was read from has the responses of the graph's exit; an engine's own
+    text has not.
+    """
     names = {each.key: each.full_name for each in graph.actions if not each.missing}
     names |= {ENTRY: ENTRY, EXIT: EXIT}
     arrows = tuple(
@@ -91,7 +95,7 @@ def triggers_of(graph: Graph, *, exits_known: bool) -> Triggers:
         for each in graph.relations
         if each.parent in names and each.child in names
     )
-    if exits_known:  # else whether an input is required is not said either
+    if exits_known:  # otherwise the text does not say either whether an input is required
         lacking = frozenset(_lacking(graph))
         arrows = tuple(each for each in arrows if each.child not in lacking)
     known = laps(graph)
@@ -101,8 +105,10 @@ def triggers_of(graph: Graph, *, exits_known: bool) -> Triggers:
 
 
 def _lacking(graph: Graph) -> Iterator[str]:
-    """The actions that never run, since nothing gives them a required input. Those of the entry may
-    get theirs from the graph around it."""
+    """Yield the actions that never run, since nothing gives them a required input.
+
+    Entry actions may get theirs from the graph around it.
+    """
     actions = {each.key: each for each in graph.actions if not each.missing}
     arriving: dict[str, list[Relation]] = {}
     for arrow in graph.relations:
@@ -134,7 +140,7 @@ def _given(parent: Action, arrow: Relation, child: Action) -> set[str]:
 
 
 def _has_one_consequence(arrows: tuple[TriggerArrow, ...]) -> bool:
-    """Whether each outcome of each action starts, passes by or ends at most one thing."""
+    """Return whether each outcome of each action starts, bypasses or ends at most one thing."""
     found: set[tuple[str, Precondition]] = set()
     for arrow in arrows:
         outcomes = PRECONDITIONS[:1] if arrow.parent == ENTRY else PRECONDITIONS
@@ -155,10 +161,10 @@ def may_be_loading(
     *,
     parts: Collection[str] = (),
 ) -> tuple[str, ...]:
-    """Return the full names of actions that may have been triggered and have not begun, in a graph of
-    which no action moves.
+    """Return the full names of actions that may have been triggered and have not begun, in a graph
+    of which no action moves.
 
-    `states`: of all actions, by full name. `parts`: those that are sub-graphs.
+    `states`: the states of all actions, by full name. `parts`: the actions that are sub-graphs.
     """
     idle = {name for name, state in states.items() if state in NEVER_BEGAN}
     if not idle or graph_state in NEVER_BEGAN:
@@ -171,7 +177,8 @@ def may_be_loading(
 
 
 class _Reports:
-    """Who may have reported which end while the graph was RUNNING, passing by included."""
+    """Finds the outcomes that each action may have reported while the graph was RUNNING, including
+    passed-on ones."""
 
     def __init__(
         self,
@@ -213,7 +220,7 @@ class _Reports:
                 yield name, outcome
 
     def _outcomes(self, name: str, state: str) -> _Outcomes:
-        """Return all that an action that has begun may have ended with."""
+        """Return all outcomes with which an action that has begun may have ended."""
         if name not in self._once or name in self._parts:
             return _ALL
         possible = frozenset[Precondition](

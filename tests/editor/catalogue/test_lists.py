@@ -17,7 +17,7 @@ from action_assistant.editor.documents.contents import labels_of
 from action_assistant.editor.log.graph_events import graph_stream
 from action_assistant.settings import EditorSettings
 from action_assistant.umrf.model import Graph
-from action_assistant.umrf.problem_kinds import ToldCounts
+from action_assistant.umrf.problem_kinds import ProblemCounts
 from action_assistant.web.workers.lanes import GaveUp
 from editor.api.test_api import NAV
 from editor.client import Client
@@ -73,7 +73,7 @@ async def test_a_graph_that_did_not_change_is_not_checked_again(tmp_path: Path) 
         checks = GraphChecks(services.journal, services.rooms, reader)
         summaries = [await checks.summary(made.id, made.seq) for _ in range(3)]
     assert asked.count("info") == 1
-    assert {summary.told for summary in summaries} == {ToldCounts(made.wrong, made.to_fill_in)}
+    assert {summary.told for summary in summaries} == {ProblemCounts(made.wrong, made.to_fill_in)}
 
 
 @given(st.one_of(st.lists(texts), texts, st.dictionaries(st.text(max_size=3), texts)))

@@ -13,7 +13,7 @@ export interface EditorApi {
     };
     /**
      * ActionChange
-     * @description An action that came, went or changed. `name` is its full name, the newer one.
+     * @description An action that was added, removed or changed. `name` is its full name, the newer one.
      */
     ActionChange: {
         /** @enum {string} */
@@ -119,13 +119,15 @@ export interface EditorApi {
     };
     /**
      * Behaviour
-     * @description One call of an action. Times are seconds.
+     * @description The behaviour of one call of an action. Times are seconds.
      *
-     *     `never`: does not end by itself. `ignores_stop`: goes on until its own end. `stop_error`: throws
-     *     in onStop, which the engine calls ERROR at once, whatever its code does. `pauses`: has an onPause.
-     *     `load_s`: how long it loads (library and `onInit`) when it is triggered for the first time, which this
-     *     engine does not count as running. `init_error`: throws when it is loaded. `no_library`: indexed, but its library is not there, so
-     *     that no graph with it can be built (said of its first call). `outputs`: values by flat name.
+     *     `after_s`: how long it runs. `never`: it does not end by itself. `ignores_stop`: it continues
+     *     until its own end. `stop_error`: it throws in onStop; the engine shows ERROR at once, whatever
+     *     its code does. `pauses`: it has an onPause. `load_s`: how long it loads (library and `onInit`)
+     *     when it is triggered for the first time, which the engine does not count as running.
+     *     `init_error`: it throws when it is loaded. `no_library`: it is indexed and its library is
+     *     missing, so that no graph with it can be built (read from its first call). `outputs`: values by
+     *     flat name.
      */
     Behaviour: {
         /** @default 1 */
@@ -283,7 +285,8 @@ export interface EditorApi {
     };
     /**
      * Difference
-     * @description From `before` to `after`, both changes of the same graph's document.
+     * @description The difference from the moment `before` to the moment `after`, both numbers of changes of one
+     *     graph's document.
      */
     Difference: {
         before: number;
@@ -295,7 +298,7 @@ export interface EditorApi {
     };
     /**
      * Dispatch
-     * @description A child was ready and the response was carried out.
+     * @description A child was ready, and its response was carried out.
      */
     Dispatch: {
         /** @enum {string} */
@@ -401,7 +404,8 @@ export interface EditorApi {
     };
     /**
      * EdgeEval
-     * @description One relation was asked: `parent => child`, and what came of it: `result -> response`.
+     * @description A child was asked for its response: `parent => child` was evaluated to `result ->
+     *     response`.
      */
     EdgeEval: {
         /** @enum {string} */
@@ -467,7 +471,7 @@ export interface EditorApi {
     };
     /**
      * Field
-     * @description A field that says something else now. null where it said nothing.
+     * @description A field with another value. null stands for no value.
      */
     Field: {
         field: string;
@@ -529,7 +533,8 @@ export interface EditorApi {
     };
     /**
      * FlatOrigin
-     * @description Where an action of the flat graph comes from: from the top graph down to the action itself.
+     * @description The origin of an action of the flat graph: the levels from the top graph down to the action
+     *     itself.
      */
     FlatOrigin: {
         key: string;
@@ -538,7 +543,8 @@ export interface EditorApi {
     };
     /**
      * FlatteningReason
-     * @description One reason why one graph would not do what the hierarchy does. `at`: the action it is about.
+     * @description One reason for which one graph would not do the same as the hierarchy. `at`: the action that
+     *     it concerns.
      */
     FlatteningReason: {
         /** @enum {string} */
@@ -577,7 +583,7 @@ export interface EditorApi {
     };
     /**
      * GraphResultEvent
-     * @description The exit of a graph was satisfied with this result.
+     * @description The exit of a graph was reached with this result.
      */
     GraphResultEvent: {
         /** @enum {string} */
@@ -648,12 +654,10 @@ export interface EditorApi {
     };
     /**
      * HazardEvent
-     * @description Here the real engine crashes, hangs or does something that nobody wants.
+     * @description The real engine crashes, hangs or does something unwanted here.
      *
-     *     See docs/umrf-and-the-engine.md 3.
-     *
-     *     `effect`: `crash` ends the trace; after `hang` no command is answered; `goes on` warns; `cut off`
-     *     says that it was not simulated any further.
+     *     See docs/umrf-and-the-engine.md 3. `effect`: `crash` ends the trace; after `hang` no command is
+     *     answered; `goes on` warns; `cut off` says that the simulation was not continued.
      */
     HazardEvent: {
         /** @enum {string} */
@@ -677,7 +681,7 @@ export interface EditorApi {
     };
     /**
      * HierarchyLevel
-     * @description One step of the way down to an action: a graph, and an action of it by key and full name.
+     * @description One step on the way down to an action: a graph, and an action of it by key and full name.
      */
     HierarchyLevel: {
         graph: string;
@@ -852,8 +856,8 @@ export interface EditorApi {
     };
     /**
      * LeftOut
-     * @description The description and unknown fields of an action that was a sub-graph, or of the sub-graph:
-     *     nothing has them now.
+     * @description The description and unknown fields of an action that was a sub-graph, or of that graph, which
+     *     nothing in the flat graph has.
      */
     LeftOut: {
         levels: EditorApi["HierarchyLevel"][];
@@ -1028,7 +1032,7 @@ export interface EditorApi {
     };
     /**
      * NodeResultEvent
-     * @description How a visit of an action ended; the real engine tells nobody.
+     * @description A visit of an action ended with this result; the real engine reports it to no client.
      */
     NodeResultEvent: {
         /** @enum {string} */
@@ -1041,7 +1045,7 @@ export interface EditorApi {
     };
     /**
      * NodeStateEvent
-     * @description An action changed its state. Times are milliseconds as the caller counts them.
+     * @description An action changed its state. Times are milliseconds on the caller's clock.
      */
     NodeStateEvent: {
         /** @enum {string} */
@@ -1065,10 +1069,10 @@ export interface EditorApi {
     };
     /**
      * Note
-     * @description What was done with something of a text that was read: translated, or left out.
+     * @description A remark on something in a text that was translated or left out when it was read.
      *
-     *     `times` counts how often it was, `where` is the first place and `also` are the others (the first
-     *     thousand of them).
+     *     `times` counts how often that was, `where` is the first place and `also` are the others (the
+     *     first thousand of them).
      */
     Note: {
         message: string;
@@ -1080,8 +1084,9 @@ export interface EditorApi {
     };
     /**
      * NoteChange
-     * @description A note or frame that came, went or changed. `text` is what it says, the newer one. `moved`: it only
-     *     lies elsewhere, or is larger or smaller.
+     * @description A note or frame that was added, removed or changed. `text` is its text, the newer one.
+     *
+     *     `moved`: only its position or size has changed.
      */
     NoteChange: {
         /** @enum {string} */
@@ -1220,9 +1225,11 @@ export interface EditorApi {
     };
     /**
      * PlaceInside
-     * @description Where in a sub-graph a problem is. `levels` are the full names of the actions that lead there, `aids`
-     *     their ids: from that of the graph around it, down to the one that stands for `graph`. `where` is in the
-     *     text of that graph, whose own problem has this `code` and `message`.
+     * @description The place of a problem within a sub-graph.
+     *
+     *     `levels` are the full names of the actions that lead there and `aids` their ids: from the action
+     *     of the graph around it, down to the one that stands for `graph`. `where` is in the text of that
+     *     graph, whose own problem has this `code` and `message`.
      */
     PlaceInside: {
         levels: string[];
@@ -1248,8 +1255,10 @@ export interface EditorApi {
     };
     /**
      * Problem
-     * @description Something about a graph that a person should know. Checks return these, never raise. `also`: the
-     *     other places of the same thing, which is told once. `inside`: where below the place it is.
+     * @description A fact about a graph that a person should know. Checks return problems and never raise.
+     *
+     *     `also`: the other places of the same problem, which is reported once. `inside`: its place within
+     *     a sub-graph.
      */
     Problem: {
         code: string;
@@ -1376,9 +1385,11 @@ export interface EditorApi {
     };
     /**
      * RelationChange
-     * @description An arrow that came, went or changed, between actions by full name, or `entry` and `exit`. `ends`:
-     *     the same by their keys. `when`: of one that came or went what its child does: pairs of outcome
-     *     and response.
+     * @description An arrow that was added, removed or changed, between actions by full name, or `entry` and
+     *     `exit`.
+     *
+     *     `ends`: the same by their keys. `when`: pairs of outcome and response of an arrow that was added
+     *     or removed.
      */
     RelationChange: {
         /** @enum {string} */
@@ -1397,7 +1408,7 @@ export interface EditorApi {
     };
     /**
      * Renames
-     * @description Parameters that are called otherwise now: pairs of old and new path.
+     * @description Renamed parameters: pairs of old and new path.
      */
     Renames: {
         inputs: [
@@ -1440,7 +1451,7 @@ export interface EditorApi {
     };
     /**
      * Script
-     * @description Behaviours by key: one entry per call, the last repeats.
+     * @description Behaviours by key: one entry for each call, and the last one repeats.
      */
     Script: {
         /** @default {} */
@@ -1661,9 +1672,11 @@ export interface EditorApi {
     };
     /**
      * Where
-     * @description The place of a problem. `path` is a JSON pointer into the text that was given, or, of a graph
-     *     that was not read from one, into its canonical text. `line` and `column` (characters, both from
-     *     1) are there where that text is known: where the value begins, with its key if it has one.
+     * @description The place of a problem or note. `path` is a JSON pointer into the text that was given, or
+     *     into the canonical text of a graph that was not read from a text.
+     *
+     *     `line` and `column` (in characters, both from 1) are present if that text is known: the value
+     *     begins there, with its key if it has one.
      */
     Where: {
         /** @default  */

@@ -2,7 +2,7 @@
 export interface RunnerApi {
     /**
      * ActionChange
-     * @description An action that came, went or changed. `name` is its full name, the newer one.
+     * @description An action that was added, removed or changed. `name` is its full name, the newer one.
      */
     ActionChange: {
         /** @enum {string} */
@@ -138,8 +138,10 @@ export interface RunnerApi {
     };
     /**
      * ArrowCoverage
-     * @description What some courses took together. `untaken` and `unvisited`: what none of them did, in the order
-     *     of the file, as many as are shown.
+     * @description The coverage of some courses together.
+     *
+     *     `untaken` and `unvisited`: arrows that no course took and actions that ran in none, in file
+     *     order, at most `SHOWN` of each.
      */
     ArrowCoverage: {
         arrows: number;
@@ -210,13 +212,15 @@ export interface RunnerApi {
     };
     /**
      * Behaviour
-     * @description One call of an action. Times are seconds.
+     * @description The behaviour of one call of an action. Times are seconds.
      *
-     *     `never`: does not end by itself. `ignores_stop`: goes on until its own end. `stop_error`: throws
-     *     in onStop, which the engine calls ERROR at once, whatever its code does. `pauses`: has an onPause.
-     *     `load_s`: how long it loads (library and `onInit`) when it is triggered for the first time, which this
-     *     engine does not count as running. `init_error`: throws when it is loaded. `no_library`: indexed, but its library is not there, so
-     *     that no graph with it can be built (said of its first call). `outputs`: values by flat name.
+     *     `after_s`: how long it runs. `never`: it does not end by itself. `ignores_stop`: it continues
+     *     until its own end. `stop_error`: it throws in onStop; the engine shows ERROR at once, whatever
+     *     its code does. `pauses`: it has an onPause. `load_s`: how long it loads (library and `onInit`)
+     *     when it is triggered for the first time, which the engine does not count as running.
+     *     `init_error`: it throws when it is loaded. `no_library`: it is indexed and its library is
+     *     missing, so that no graph with it can be built (read from its first call). `outputs`: values by
+     *     flat name.
      */
     Behaviour: {
         /** @default 1 */
@@ -358,7 +362,8 @@ export interface RunnerApi {
     };
     /**
      * Difference
-     * @description From `before` to `after`, both changes of the same graph's document.
+     * @description The difference from the moment `before` to the moment `after`, both numbers of changes of one
+     *     graph's document.
      */
     Difference: {
         before: number;
@@ -434,7 +439,7 @@ export interface RunnerApi {
     };
     /**
      * ExpectedStep
-     * @description One step of a course: what happened to an action (empty: to the graph), and how.
+     * @description One step of a course: an event of an action, or of the graph if no action is named.
      */
     ExpectedStep: {
         graph: string;
@@ -445,7 +450,7 @@ export interface RunnerApi {
     };
     /**
      * Field
-     * @description A field that says something else now. null where it said nothing.
+     * @description A field with another value. null stands for no value.
      */
     Field: {
         field: string;
@@ -771,8 +776,9 @@ export interface RunnerApi {
     };
     /**
      * NoteChange
-     * @description A note or frame that came, went or changed. `text` is what it says, the newer one. `moved`: it only
-     *     lies elsewhere, or is larger or smaller.
+     * @description A note or frame that was added, removed or changed. `text` is its text, the newer one.
+     *
+     *     `moved`: only its position or size has changed.
      */
     NoteChange: {
         /** @enum {string} */
@@ -834,9 +840,11 @@ export interface RunnerApi {
     };
     /**
      * PlaceInside
-     * @description Where in a sub-graph a problem is. `levels` are the full names of the actions that lead there, `aids`
-     *     their ids: from that of the graph around it, down to the one that stands for `graph`. `where` is in the
-     *     text of that graph, whose own problem has this `code` and `message`.
+     * @description The place of a problem within a sub-graph.
+     *
+     *     `levels` are the full names of the actions that lead there and `aids` their ids: from the action
+     *     of the graph around it, down to the one that stands for `graph`. `where` is in the text of that
+     *     graph, whose own problem has this `code` and `message`.
      */
     PlaceInside: {
         levels: string[];
@@ -863,8 +871,10 @@ export interface RunnerApi {
     };
     /**
      * Problem
-     * @description Something about a graph that a person should know. Checks return these, never raise. `also`: the
-     *     other places of the same thing, which is told once. `inside`: where below the place it is.
+     * @description A fact about a graph that a person should know. Checks return problems and never raise.
+     *
+     *     `also`: the other places of the same problem, which is reported once. `inside`: its place within
+     *     a sub-graph.
      */
     Problem: {
         code: string;
@@ -1029,9 +1039,11 @@ export interface RunnerApi {
     };
     /**
      * RelationChange
-     * @description An arrow that came, went or changed, between actions by full name, or `entry` and `exit`. `ends`:
-     *     the same by their keys. `when`: of one that came or went what its child does: pairs of outcome
-     *     and response.
+     * @description An arrow that was added, removed or changed, between actions by full name, or `entry` and
+     *     `exit`.
+     *
+     *     `ends`: the same by their keys. `when`: pairs of outcome and response of an arrow that was added
+     *     or removed.
      */
     RelationChange: {
         /** @enum {string} */
@@ -1394,7 +1406,7 @@ export interface RunnerApi {
     RunnerMessage: RunnerApi["Hello"] | RunnerApi["RunMessage"] | RunnerApi["EnginesMessage"] | RunnerApi["Heartbeat"] | RunnerApi["Stopping"] | RunnerApi["RefusedMessage"];
     /**
      * Script
-     * @description Behaviours by key: one entry per call, the last repeats.
+     * @description Behaviours by key: one entry for each call, and the last one repeats.
      */
     Script: {
         /** @default {} */
@@ -1623,9 +1635,11 @@ export interface RunnerApi {
     };
     /**
      * Where
-     * @description The place of a problem. `path` is a JSON pointer into the text that was given, or, of a graph
-     *     that was not read from one, into its canonical text. `line` and `column` (characters, both from
-     *     1) are there where that text is known: where the value begins, with its key if it has one.
+     * @description The place of a problem or note. `path` is a JSON pointer into the text that was given, or
+     *     into the canonical text of a graph that was not read from a text.
+     *
+     *     `line` and `column` (in characters, both from 1) are present if that text is known: the value
+     *     begins there, with its key if it has one.
      */
     Where: {
         /** @default  */

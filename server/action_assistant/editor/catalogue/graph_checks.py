@@ -17,7 +17,7 @@ from action_assistant.editor.log.graph_events import DocumentKind, graph_stream
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import NotFound, Refused
 from action_assistant.journal.journal import Journal
-from action_assistant.umrf.problem_kinds import ToldCounts
+from action_assistant.umrf.problem_kinds import ProblemCounts
 from action_assistant.umrf.semantics.matching import BUDGET
 from action_assistant.web.workers.lanes import HOPELESS, Crashed
 
@@ -40,7 +40,7 @@ class GraphSummary(msgspec.Struct, frozen=True):
     description: str | None = None
     actions: int | None = None
     problems: Counts | None = None
-    told: ToldCounts | None = None
+    told: ProblemCounts | None = None
     robots: tuple[str, ...] = ()
     labels: tuple[str, ...] = ()
     damaged: int | None = None
@@ -95,7 +95,7 @@ class GraphChecks:
         self.names: Final = GraphNames(journal, self._name)
         self._abouts = Recent[str, _About](_COUNTED, _NAMES)
         self._hopeless = Recent[str, tuple[int, Refused]](_COUNTED)
-        self._counts = Recent[str, tuple[int, bytes, Counts, ToldCounts]](_COUNTED)
+        self._counts = Recent[str, tuple[int, bytes, Counts, ProblemCounts]](_COUNTED)
         self._problems = Recent[tuple[str, int, bytes], bytes](_REMEMBERED)
         self._digests = Recent[tuple[str, int], str](_COUNTED)
         self._uses = Recent[tuple[str, int], tuple[str, tuple[str, ...]]](_REMEMBERED)
@@ -169,7 +169,9 @@ class GraphChecks:
             info.first,
         )
 
-    async def _counted(self, graph: str, seq: int, named: NamedInside) -> tuple[Counts, ToldCounts]:
+    async def _counted(
+        self, graph: str, seq: int, named: NamedInside
+    ) -> tuple[Counts, ProblemCounts]:
         key, known = named.key(), self._counts.get(graph)
         if known is None or known[:2] != (seq, key):
             sight, inside = await self._sight(graph, seq), await self._seen(named)

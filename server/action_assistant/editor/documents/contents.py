@@ -19,7 +19,7 @@ from action_assistant.umrf.digest import digest, tree_digest
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.json.text import parse_small
 from action_assistant.umrf.model import Action, Graph, Problem
-from action_assistant.umrf.problem_kinds import ToldCounts, told_counts
+from action_assistant.umrf.problem_kinds import ProblemCounts, problem_counts
 from action_assistant.umrf.run_size import RunSize
 
 _REMEMBERED: Final = 32  # moments of graphs
@@ -85,7 +85,7 @@ class GraphInfo(msgspec.Struct, frozen=True):
     description: str
     actions: int
     problems: Counts
-    told: ToldCounts
+    told: ProblemCounts
     robots: tuple[str, ...]
     labels: tuple[str, ...]
     first: tuple[str, str] | None = None
@@ -149,11 +149,11 @@ def info(sight: GraphAtSeq) -> GraphInfo:
     return info_of(found.moment.graph, found.problems())
 
 
-def counted(sight: GraphAtSeq, inside: Inside) -> tuple[Counts, ToldCounts]:
+def counted(sight: GraphAtSeq, inside: Inside) -> tuple[Counts, ProblemCounts]:
     """What a list counts, with the graphs inside."""
     found = read(sight)
     problems = found.problems(inside)
-    return _counts(problems), told_counts(problems, found.moment.graph)
+    return _counts(problems), problem_counts(problems, found.moment.graph)
 
 
 def names(sight: GraphAtSeq) -> tuple[str, tuple[str, ...]]:
@@ -174,7 +174,7 @@ def info_of(graph: Graph, problems: list[Problem]) -> GraphInfo:
         graph.description,
         sum(not action.missing for action in graph.actions),
         _counts(problems),
-        told_counts(problems, graph),
+        problem_counts(problems, graph),
         tuple(sorted({action.actor for action in graph.actions} - {""})),
         labels_of(graph),
         None if (action := first_action(graph)) is None else (action.name, action.description),

@@ -44,7 +44,7 @@ class Trial(msgspec.Struct, frozen=True):
 
 
 class Coverage(msgspec.Struct, frozen=True, kw_only=True):
-    """How much was tried: `tried` courses of `ways`.
+    """The extent of the trials: `tried` courses of `ways`.
 
     `cut`: how many of them were followed for four laps only. `first_left`: the first course that
     was not tried.

@@ -44,7 +44,7 @@ class ArrowUnreachable(msgspec.Struct, frozen=True, tag_field="verdict", tag="un
 
 
 class ArrowUndecided(msgspec.Struct, frozen=True, tag_field="verdict", tag="undecided"):
-    """It is not known after this many states, with the reason."""
+    """The search ended after this many states without a result; `why` is the reason."""
 
     states: int
     why: str

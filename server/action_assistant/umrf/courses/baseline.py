@@ -20,7 +20,7 @@ MORE: Final = 100
 
 
 class Outcome(NamedTuple):
-    """How a graph ends. `early`: it is FINISHED while an action runs.
+    """The end of a graph. `early`: it is FINISHED while an action runs.
 
     For a stuck graph: `waiting`, the actions that were asked and still wait (a mask by index);
     `lacking`, the names of required parents that have not reported to the exit; `inputs`, whether

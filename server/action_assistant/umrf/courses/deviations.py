@@ -94,6 +94,8 @@ class _DeviatingCourse:
         self._since = 0  # instants since states were last dropped
 
     def followed(self, instant: int, result: Precondition) -> Outcome:
+        """Follow the course from the instant at which its action ends with `result`, and return how
+        the graph ends."""
         found = self._at(self.course.times[instant], self.course.roots[instant], result)
         if instant < len(self.course.times) - 1:
             self._push(len(self.course.times) - 1)

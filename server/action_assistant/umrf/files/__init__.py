@@ -1,1 +1,1 @@
-"""UMRF files of every dialect, read and written."""
+"""UMRF files: reading of every dialect, and writing."""

@@ -1,4 +1,4 @@
-"""Files that describe one action (docs/umrf-and-the-engine.md 5), read and written."""
+"""Reads and writes files that describe one action (docs/umrf-and-the-engine.md 5)."""
 
 from collections.abc import Iterable
 from typing import Final
@@ -32,17 +32,20 @@ class ActionReading(msgspec.Struct, frozen=True):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """The remarks as sentences."""
+        """The remarks as sentences, in the order of their messages."""
         return tuple(note.sentence for note in self.remarks)
 
     def placed(self, problems: Iterable[Problem]) -> list[Problem]:
-        """Problems of the graph that has only this action, with their places in its file."""
+        """Return problems of the graph that has only this action, with their places in its file."""
         return placed(problems, self.text, self.steps)
 
 
 def read_action(text: str | bytes) -> ActionReading:
-    """Reads what is known to be the file of one action (`codec.read` tells it from others). Raises
-    `Unreadable` for what is none or beyond the limits."""
+    """Read a text that is known to be the file of one action (`codec.read` recognises it among
+    others).
+
+    Raises `Unreadable` for any other text, or one beyond the limits.
+    """
     text = decoded(text)
     value = parse(text)
     dialect = action_dialect(value) if isinstance(value, dict) else None
@@ -76,7 +79,8 @@ def read_action(text: str | bytes) -> ActionReading:
 
 
 def write_action(action: Action) -> str:
-    """The canonical file of an action: no run state, number only if it is not 0."""
+    """Return the canonical file of an action, without run state, and with its number only if it is
+    not 0."""
     actions = tree_of(Graph(name=action.name, actions=(action,)))["actions"]
     assert isinstance(actions, list)
     (file,) = actions

@@ -1,4 +1,4 @@
-"""UMRF files: every dialect read into one graph, canonical D3 written (docs/contracts.md 2)."""
+"""Reads UMRF files of every dialect into graphs, and writes canonical D3 (docs/contracts.md 2)."""
 
 from collections.abc import Iterable
 
@@ -24,13 +24,13 @@ __all__ = [
 
 
 class Reading(msgspec.Struct, frozen=True):
-    """A graph, and what is to be said about the text it came from.
+    """A graph, and the remarks and problems about the text from which it was read.
 
-    `remarks`: what was translated, left out, or has no place in D3. `problems`: what is wrong in the
-    text as it stands and cannot be seen in the graph any more (H1 among it); `check` finds the rest.
-    Both have their places in the text. `states`, `graph_state`: run states that the text carries
-    (other than UNINITIALIZED). `steps` lead from the canonical text of the graph to `text`
-    (`places.Steps`).
+    `remarks`: notes on everything that was translated, left out, or has no place in D3. `problems`:
+    errors in the text that cannot be seen in the graph any more (H1 among them); `check` finds the
+    others. Both have their places in the text. `states`, `graph_state`: run states that the text
+    carries, other than UNINITIALIZED. `steps` lead from the canonical text of the graph to `text`
+    (`origins.Steps`).
     """
 
     graph: Graph
@@ -44,17 +44,19 @@ class Reading(msgspec.Struct, frozen=True):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """The remarks as sentences."""
+        """The remarks as sentences, in the order of their messages."""
         return tuple(note.sentence for note in self.remarks)
 
     def placed(self, problems: Iterable[Problem]) -> list[Problem]:
-        """Problems of the graph with their places in the text that was read."""
+        """Return problems of the graph with their places in the text that was read."""
         return placed(problems, self.text, self.steps)
 
 
 def read(text: str | bytes) -> Reading:
-    """Reads a graph. Raises `Unreadable` for what is no UMRF or beyond the limits; everything else
-    is read, and reported where it is wrong."""
+    """Read a graph. Raises `Unreadable` for a text that is no UMRF or beyond the limits.
+
+    Everything else is read, and reported if it is wrong.
+    """
     text = decoded(text)
     value = parse(text)
     if not isinstance(value, dict):
@@ -88,7 +90,8 @@ def read(text: str | bytes) -> Reading:
 
 
 def _no_object(value: Json) -> str:
-    """Why a text that is no object is no graph."""
+    """Return the reason for which a text that is no object is not a graph, with what it holds
+    instead."""
     items = [item for item in value if isinstance(item, dict)] if isinstance(value, list) else []
     dialects = [found for found in map(dialect_of, items) if found is not None]
     if not dialects:
@@ -106,7 +109,8 @@ def _no_object(value: Json) -> str:
 
 
 def _carried_states(tree: Tree) -> list[Problem]:
-    """H1: an engine that is given a node's state takes the action for loaded."""
+    """Return a problem H1 for each run state: an engine that is given one takes the action for
+    loaded."""
     return [
         Problem(
             code="H1",
@@ -122,7 +126,7 @@ def _carried_states(tree: Tree) -> list[Problem]:
 
 
 def stamp_of(text: str | bytes) -> Stamp:
-    """The stamp that a file carries; empty where there is none. Raises `Unreadable`."""
+    """Return the stamp of a file; an empty one if it has none. Raises `Unreadable`."""
     value = parse(text)
     attributes = value.get("gui_attributes") if isinstance(value, dict) else None
     ours = attributes.get("action_assistant") if isinstance(attributes, dict) else None

@@ -1,4 +1,4 @@
-"""Which dialect a file is written in, and older ones translated into D3.
+"""Recognises the dialect of a file, and translates older dialects into D3.
 
 See docs/umrf-and-the-engine.md 1.5.
 """
@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 
 from action_assistant.umrf.files.older_dialects import (
     EFFECTS,
-    Old,
+    OldFile,
     from_action,
     from_actions,
     from_umrf_actions,
@@ -19,8 +19,8 @@ from action_assistant.umrf.relations import MAX_REFERRED_ID, whole_of
 
 
 class Translation(NamedTuple):
-    """A file in D3. Notes and problems name places of the given file, to which `origins` lead
-    from the translated one (`places.Origins`)."""
+    """A file in D3. Notes and problems name places of the given file, to which `origins` lead from
+    the translated one (`origins.Origins`)."""
 
     file: dict[str, Json]
     notes: tuple[Note, ...] = ()
@@ -36,15 +36,16 @@ _ACTION_FIELDS: Final = {
     "output_parameters", "parents", "children", "gui_attributes", "effect", "id", "suffix",
     "package_name", "library_path", "notation",
 }  # fmt: skip
-#: Of packages of JavaScript, which have a name and a type as well.
+#: The types of JavaScript packages, which have a name and a type as well.
 _FOREIGN_TYPES: Final = ("module", "commonjs")
 
 
 def dialect_of(file: dict[str, Json]) -> str | None:
-    """The name of the dialect, or None for what is no UMRF.
+    """Return the name of the dialect, or None if the file is no UMRF.
 
-    `D3` current graphs, `D3-designer` with entry and exit as objects, `D2` of 2023, `D1` with
-    `umrf_actions`, `D1'` the same from a language model, `D3-action` and `D0` single actions.
+    `D3`: current graphs. `D3-designer`: with entry and exit as objects. `D2`: of 2023. `D1`: with
+    `umrf_actions`; `D1'`: the same written by a language model. `D3-action` and `D0`: single
+    actions.
     """
     if not any(mark in file for mark in _MARKS):
         return action_dialect(file) if _is_action(file) else None
@@ -61,8 +62,8 @@ def dialect_of(file: dict[str, Json]) -> str | None:
 
 
 def _is_action(file: dict[str, Json]) -> bool:
-    """Whether a file says what only actions say: the name and type that the engine asks for many
-    other files have too."""
+    """Return whether a file has members that only actions have. Many other files have the required
+    name and type, too."""
     if any(isinstance(file.get(side), dict) for side in _PARAMETERS):
         return bool(file.keys() & {"name", "type", "effect"})
     if (effect := file.get("effect")) and isinstance(effect, str) and effect in EFFECTS:
@@ -74,8 +75,11 @@ def _is_action(file: dict[str, Json]) -> bool:
 
 
 def action_dialect(file: dict[str, Json]) -> str | None:
-    """The dialect of a file that is known to be that of an action: with the engine's eyes, which
-    wants a name and a type. None for a graph, and for what says nothing of an action."""
+    """Return the dialect of a file that is known to be that of an action, as the engine sees it:
+    with a name and a type.
+
+    None for a graph, and for a file without members of an action.
+    """
     if any(mark in file for mark in _MARKS):
         return None
     told = file.keys() & {"name", "type", "effect", "suffix", "package_name", *_PARAMETERS}
@@ -92,7 +96,8 @@ def _is_d2(action: dict[str, Json]) -> bool:
 
 
 def translated(file: dict[str, Json], dialect: str) -> Translation:
-    """The file in D3, what was translated, and why the engine refuses it as it stands."""
+    """Translate a file into D3, with notes on what was translated and the reasons for which the
+    engine refuses the original."""
     match dialect:
         case "D3-designer":
             old = _from_designer(file)
@@ -108,14 +113,14 @@ def translated(file: dict[str, Json], dialect: str) -> Translation:
     return Translation(old.file, old.notes.all(), tuple(old.problems), old.origins)
 
 
-def _from_designer(file: dict[str, Json]) -> Old:
-    old = Old(file)
+def _from_designer(file: dict[str, Json]) -> OldFile:
+    old = OldFile(file)
     positions: dict[str, Json] = {}
     for end in ("entry", "exit"):
         field = f"graph_{end}"
         value = file.get(field)
         if not isinstance(value, dict) or not isinstance(value.get("actions", []), list):
-            continue  # what is no object of the designer's stays as it is, with what is in it
+            continue  # an end that is not in the designer's form stays as it is
         path = pointer(field)
         old.file[field] = value.get("actions", [])
         old.origins[path] = pointer(field, "actions")
@@ -146,8 +151,8 @@ def _add_attributes(file: dict[str, Json], ours: dict[str, Json]) -> None:
     file["gui_attributes"] = joined
 
 
-def renumber(old: Old) -> None:
-    """Gives actions whose `instance_id` no relation can refer to the lowest free one."""
+def renumber(old: OldFile) -> None:
+    """Give each action whose `instance_id` no relation can refer to the lowest free one."""
     file = old.file
     actions = file.get("actions")
     if not isinstance(actions, list):

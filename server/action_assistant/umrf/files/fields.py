@@ -1,4 +1,4 @@
-"""Single fields of files, read without losing what does not fit."""
+"""Reads single fields of files without losing values that do not fit."""
 
 import re
 from typing import Final, TypeAlias
@@ -11,12 +11,12 @@ from action_assistant.umrf.relations import whole_of
 AID: Final = re.compile(r"[A-Za-z0-9]{12}")
 ZERO: Final = Number("0")
 
-#: Unknown fields and known ones whose value does not fit, as text.
+#: Unknown fields, and known ones whose value does not fit, with the text of their value.
 Extra: TypeAlias = list[tuple[str, str]]
 
 
 def text_of(item: dict[str, Json], field: str, extra: Extra, default: str = "") -> str:
-    """A text; anything else goes to `extra`."""
+    """Return a text; any other value goes to `extra`."""
     value = item.get(field, default)
     if isinstance(value, str):
         return value
@@ -25,7 +25,7 @@ def text_of(item: dict[str, Json], field: str, extra: Extra, default: str = "") 
 
 
 def number_of(item: dict[str, Json], extra: Extra) -> int:
-    """The `instance_id`; one that is none also goes to `extra`."""
+    """Return the `instance_id`; a value that is not valid also goes to `extra`."""
     value = item.get("instance_id", ZERO)
     number, fits = whole_of(value)
     if not fits:
@@ -34,7 +34,7 @@ def number_of(item: dict[str, Json], extra: Extra) -> int:
 
 
 def parameters_of(item: dict[str, Json], field: str, extra: Extra) -> tuple[Parameter, ...]:
-    """One side's parameters; what is no object goes to `extra`."""
+    """Return the parameters of one side; a value that is no object goes to `extra`."""
     value = item.get(field, {})
     if isinstance(value, dict):
         return flatten(value)
@@ -43,7 +43,7 @@ def parameters_of(item: dict[str, Json], field: str, extra: Extra) -> tuple[Para
 
 
 def is_runtime(value: Json) -> bool:
-    """Whether the engine can read a run log."""
+    """Return whether the engine can read a run log."""
     messages = value.get("messages") if isinstance(value, dict) else None
     return isinstance(messages, list) and all(
         isinstance(message, dict)
@@ -54,7 +54,7 @@ def is_runtime(value: Json) -> bool:
 
 
 def graph_attributes(file: dict[str, Json]) -> tuple[dict[str, Json], str | None]:
-    """Our part of a graph's `gui_attributes`, and the text of the rest."""
+    """Return our part of a graph's `gui_attributes`, and the text of the rest."""
     if "gui_attributes" not in file:
         return {}, None
     value = file["gui_attributes"]
@@ -68,7 +68,7 @@ def graph_attributes(file: dict[str, Json]) -> tuple[dict[str, Json], str | None
 def action_attributes(
     item: dict[str, Json],
 ) -> tuple[Position | None, str | None, str | None]:
-    """Position and identity out of an action's `gui_attributes`, and the text of the rest."""
+    """Return position and identity from an action's `gui_attributes`, and the text of the rest."""
     if "gui_attributes" not in item:
         return None, None, None
     value = item["gui_attributes"]
@@ -89,12 +89,13 @@ def action_attributes(
 
 
 def direction_of(value: Json) -> Direction:
-    """Where what follows is drawn; down where a file says nothing or something unknown."""
+    """Return the side on which later actions are drawn; down if the file says nothing or something
+    unknown."""
     return "right" if value == "right" else "down"
 
 
 def position_of(value: Json) -> Position | None:
-    """A place on the canvas."""
+    """Return a position on the canvas; None if the value is none."""
     if not isinstance(value, dict):
         return None
     x, y = value.get("x"), value.get("y")

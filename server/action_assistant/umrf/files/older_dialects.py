@@ -1,4 +1,5 @@
-"""Files of earlier engines (D0, D1, D1', D2) as D3 values, with a note on each translation.
+"""Translates files of earlier engines (D0, D1, D1', D2) into D3 values, with a note on each
+translation.
 
 See docs/umrf-and-the-engine.md 1.5.
 """
@@ -12,7 +13,7 @@ from action_assistant.umrf.model import Problem, Severity, Where
 from action_assistant.umrf.reports import Notes
 
 EFFECTS: Final = {"synchronous": "sync", "asynchronous": "async", "sync": "sync", "async": "async"}
-#: What says how an action stands among others; by itself it has no place.
+#: The fields of an action that name its neighbours; an action by itself has none.
 RELATIONS: Final = ("parents", "children")
 _OUTCOMES: Final[dict[str, tuple[str, ...]]] = {
     "always": ("on_true", "on_false", "on_error"),
@@ -20,7 +21,8 @@ _OUTCOMES: Final[dict[str, tuple[str, ...]]] = {
     "on_failure": ("on_false", "on_error"),
 }
 _FLAGS: Final = ("pvf_required", "pvf_updatable")
-#: A parent that stops: only one that ended well did so, and one that was stopped told nobody.
+#: The conditions of a parent that stops its child: only one that ended without error did so, and a stopped one
+#: informed no child.
 _STOPS: Final = (
     "on_true -> stop",
     "on_false -> stop",
@@ -29,10 +31,10 @@ _STOPS: Final = (
 )
 
 
-class Old:
-    """One file under translation. Values that were parsed are not changed; copies are.
+class OldFile:
+    """One file under translation. Parsed values are never changed; copies are.
 
-    `origins` lead from the translated file to the given one (`places.Origins`); notes and problems
+    `origins` lead from the translated file to the given one (`origins.Origins`); notes and problems
     name places of the given one.
     """
 
@@ -43,28 +45,29 @@ class Old:
         self.origins: dict[str, str] = {}
 
     def at(self, path: str, member: str = "") -> str:
-        """The place in the given file of what stands at `path` in the translated one, or of what
-        was its `member`."""
+        """Return the place in the given file of the value at `path` in the translated one, or of
+        its former `member`."""
         return origin(self.origins, path) + (pointer(member) if member else "")
 
     def note(self, text: str, path: str) -> None:
-        """Says that something was translated that stood at a place of the given file."""
+        """Note that a value at a place of the given file was translated."""
         self.notes.add(text, path)
 
     def renamed(self, path: str, was: str, now: str) -> None:
-        """Says that the member `was` of what stands at `path` is called `now`."""
+        """Record that the member `was` of the value at `path` is called `now`."""
         self.origins[path + pointer(now)] = self.at(path, was)
 
     def refuse(self, path: str, message: str, code: str = "dialect-old") -> None:
-        """Says why the current engine refuses the file as it stands, or runs another graph."""
+        """Report the reason for which the current engine refuses the file, or runs another
+        graph."""
         where = Where(path=path)
         severity: Severity = "error" if code == "dialect-old" else "warning"
         self.problems.append(Problem(code=code, severity=severity, where=where, message=message))
 
 
-def from_umrf_actions(file: dict[str, Json], shallow: bool) -> Old:
-    """D1 and D1': `umrf_actions` without entry and exit."""
-    old = Old(file)
+def from_umrf_actions(file: dict[str, Json], shallow: bool) -> OldFile:
+    """Translate D1 and D1': `umrf_actions` without entry and exit."""
+    old = OldFile(file)
     actions = old.file.pop("umrf_actions")
     old.file["actions"] = actions
     old.renamed("", "umrf_actions", "actions")
@@ -76,9 +79,10 @@ def from_umrf_actions(file: dict[str, Json], shallow: bool) -> Old:
     return old
 
 
-def from_actions(file: dict[str, Json]) -> Old:
-    """D2: `actions` with `condition`, numbers as states, and perhaps no entry and exit."""
-    old = Old(file)
+def from_actions(file: dict[str, Json]) -> OldFile:
+    """Translate D2: `actions` with `condition`, numbers as states, and perhaps no entry and
+    exit."""
+    old = OldFile(file)
     old.refuse(
         "", "The file has the form of an engine of 2023; the current one refuses or misreads it."
     )
@@ -86,13 +90,15 @@ def from_actions(file: dict[str, Json]) -> Old:
     return old
 
 
-def from_action(file: dict[str, Json]) -> Old:
-    """D0, and a current action file: one action becomes a graph of its own, without the neighbours
-    that it names: they stand in other files."""
+def from_action(file: dict[str, Json]) -> OldFile:
+    """Translate D0, and a current action file: the action becomes a graph of its own.
+
+    The neighbours that it names are left out, since they are in other files.
+    """
     name = file.get("name")
     graph: dict[str, Json] = {"graph_name": name if isinstance(name, str) else ""}
     graph["actions"] = [{key: value for key, value in file.items() if key not in RELATIONS}]
-    old = Old(graph)
+    old = OldFile(graph)
     old.origins.update({"/actions": "", "/actions/0": "", "/graph_name": "/name"})
     old.note("The file describes one action; it became a graph of this action alone.", "")
     for field in RELATIONS:
@@ -106,7 +112,7 @@ def from_action(file: dict[str, Json]) -> Old:
     return old
 
 
-def _translate(old: Old, shallow: bool) -> None:
+def _translate(old: OldFile, shallow: bool) -> None:
     if "graph_state" in old.file and not isinstance(old.file["graph_state"], str):
         del old.file["graph_state"]
         text = "A number as “graph_state” was left out; it says how a past run stood."
@@ -116,8 +122,8 @@ def _translate(old: Old, shallow: bool) -> None:
         _ends(old, actions, first)
 
 
-def _actions(old: Old, shallow: bool) -> set[int]:
-    """Translates the actions. Returns which are marked to be first."""
+def _actions(old: OldFile, shallow: bool) -> set[int]:
+    """Translate the actions, and return the indices of those that are marked to be first."""
     actions = old.file.get("actions")
     first: set[int] = set()
     if not isinstance(actions, list):
@@ -136,7 +142,7 @@ def _actions(old: Old, shallow: bool) -> set[int]:
     return first
 
 
-def _action(old: Old, item: dict[str, Json], path: str, shallow: bool) -> None:
+def _action(old: OldFile, item: dict[str, Json], path: str, shallow: bool) -> None:
     _number(old, item, path)
     if "type" not in item:
         _type(old, item, path, shallow)
@@ -161,7 +167,7 @@ def _action(old: Old, item: dict[str, Json], path: str, shallow: bool) -> None:
             ]
 
 
-def _type(old: Old, item: dict[str, Json], path: str, shallow: bool) -> None:
+def _type(old: OldFile, item: dict[str, Json], path: str, shallow: bool) -> None:
     effect = item.get("effect")
     kind = EFFECTS.get(effect) if isinstance(effect, str) else None
     item["type"] = kind or "sync"
@@ -177,8 +183,8 @@ def _type(old: Old, item: dict[str, Json], path: str, shallow: bool) -> None:
         old.note("An action without a type got the type sync.", old.at(path))
 
 
-def _number(old: Old, item: dict[str, Json], path: str) -> None:
-    """`id` and `suffix` were what `instance_id` is."""
+def _number(old: OldFile, item: dict[str, Json], path: str) -> None:
+    """Rename `id` or `suffix`, the former names of `instance_id`."""
     if "instance_id" in item:
         return
     for field in ("id", "suffix"):
@@ -193,7 +199,7 @@ def _number(old: Old, item: dict[str, Json], path: str) -> None:
             return
 
 
-def _relation(old: Old, relation: Json, path: str, side: str) -> Json:
+def _relation(old: OldFile, relation: Json, path: str, side: str) -> Json:
     if isinstance(relation, str):
         old.note("A relation that was only a name became one with number 0.", old.at(path))
         return {"name": relation}
@@ -224,9 +230,12 @@ def _relation(old: Old, relation: Json, path: str, side: str) -> Json:
     return relation
 
 
-def _stop(old: Old, relation: dict[str, Json], path: str) -> None:
-    """A parent whose end stopped the child. The older engine never counted it among those for which
-    the child waits, so one that is required kept the child from ever running."""
+def _stop(old: OldFile, relation: dict[str, Json], path: str) -> None:
+    """Translate a parent whose end stopped the child.
+
+    The older engine never counted it among the parents for which the child waits, so a required one
+    kept the child from ever running.
+    """
     relation["conditions"] = list[Json](_STOPS)
     old.renamed(path, "stop_when_received", "conditions")
     place = old.at(path, "stop_when_received")
@@ -258,7 +267,7 @@ def _conditions(text: str) -> list[Json] | None:
     return [f"{outcome} -> {response if outcome in outcomes else 'ignore'}" for outcome in every]
 
 
-def _parameters(old: Old, group: dict[str, Json], path: str) -> dict[str, Json]:
+def _parameters(old: OldFile, group: dict[str, Json], path: str) -> dict[str, Json]:
     changed: dict[str, Json] = {}
     for key, value in group.items():
         inner = path + pointer(key)
@@ -280,8 +289,9 @@ def _is_flag(value: Json) -> bool:
     return isinstance(value, bool) or value in ("true", "false")
 
 
-def _ends(old: Old, actions: list[Json], first: set[int]) -> None:
-    """Entry: actions without parents, or marked to be first; exit: actions without children."""
+def _ends(old: OldFile, actions: list[Json], first: set[int]) -> None:
+    """Derive the ends: actions without parents, or marked to be first, are the entry, and actions
+    without children the exit."""
     if "graph_entry" in old.file or "graph_exit" in old.file:
         return
     listed = [(i, item) for i, item in enumerate(actions) if isinstance(item, dict)]
@@ -314,7 +324,7 @@ def _ends(old: Old, actions: list[Json], first: set[int]) -> None:
     _say_missing(old, bool(listed), entries, exits)
 
 
-def _say_missing(old: Old, any_action: bool, entries: list[int], exits: list[int]) -> None:
+def _say_missing(old: OldFile, any_action: bool, entries: list[int], exits: list[int]) -> None:
     for field, found, which, what in (
         ("graph_entry", entries, "a parent", "nothing would be started"),
         ("graph_exit", exits, "a child", "it never ends by itself as FINISHED"),
@@ -340,7 +350,7 @@ def _name(item: dict[str, Json]) -> tuple[str, str]:
 
 
 def items_of(file: dict[str, Json], field: str) -> Iterator[dict[str, Json]]:
-    """The objects in one of a file's lists."""
+    """Yield the objects in one of a file's lists."""
     value = file.get(field)
     for item in value if isinstance(value, list) else []:
         if isinstance(item, dict):

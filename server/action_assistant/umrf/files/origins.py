@@ -12,17 +12,17 @@ from msgspec.structs import replace
 from action_assistant.umrf.json.places import places_of
 from action_assistant.umrf.model import Note, Problem, Where
 
-#: Where values came from, in one step: a pointer → the pointer before it. What is not named stands
-#: where what is around it came from.
+#: One step of a translation: a pointer after it → the pointer before it. A value that is not named came with the value
+#: around it.
 Origins: TypeAlias = Mapping[str, str]
-#: Steps that lead to the given text, one after the other.
+#: The steps that lead back to the given text, one after the other.
 Steps: TypeAlias = Sequence[Origins]
 
 Told = TypeVar("Told", Problem, Note)
 
 
 def origin(origins: Origins, path: str) -> str:
-    """The pointer from which what stands at `path` came, by one step."""
+    """Return the pointer before one step of the value that is at `path` after it."""
     head = path
     while head not in origins:
         cut = head.rfind("/")
@@ -33,12 +33,12 @@ def origin(origins: Origins, path: str) -> str:
 
 
 def placed(problems: Iterable[Problem], text: str, steps: Steps = ()) -> list[Problem]:
-    """The problems with their places in the given text, to which `steps` lead."""
+    """Return the problems with their places in the given text, to which `steps` lead."""
     return located(text, [moved(problem, steps) for problem in problems])[0]
 
 
 def moved(told: Told, steps: Steps) -> Told:
-    """A problem or note with the pointers of the given text, to which `steps` lead."""
+    """Return a problem or note with pointers into the given text, to which `steps` lead."""
 
     def lead(where: Where) -> Where:
         path = where.path
@@ -53,8 +53,11 @@ def moved(told: Told, steps: Steps) -> Told:
 def located(
     text: str, problems: Sequence[Problem], notes: Sequence[Note] = ()
 ) -> tuple[list[Problem], tuple[Note, ...]]:
-    """Problems and notes that have pointers of this text, with lines and columns; of what is not
-    there the place is what it would be in. Without a text they stay as they are."""
+    """Return problems and notes whose pointers are into this text with lines and columns.
+
+    A value that is missing has the place of the value in which it would be. Without a text they
+    stay as they are.
+    """
     every = [where for problem in problems for where in (problem.where, *problem.also)]
     every += [where for note in notes for where in (note.where, *note.also)]
     if not text or not every:

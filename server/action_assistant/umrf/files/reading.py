@@ -1,4 +1,5 @@
-"""Graphs from the nested values of a D3 file, losing nothing (docs/contracts.md 1, 2)."""
+"""Reads graphs from the nested values of a D3 file without losing anything (docs/contracts.md 1 and
+2)."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -60,8 +61,8 @@ _Name: TypeAlias = tuple[str, int]
 
 
 class Tree(msgspec.Struct, frozen=True):
-    """What `read_tree` found. Problems and notes name places of the file that was read; `origins`
-    lead there from the canonical text of the graph (`places.Origins`)."""
+    """The result of `read_tree`. Problems and notes name places of the file that was read;
+    `origins` lead there from the canonical text of the graph (`origins.Origins`)."""
 
     graph: Graph
     problems: tuple[Problem, ...]
@@ -72,7 +73,8 @@ class Tree(msgspec.Struct, frozen=True):
 
 
 def read_tree(file: dict[str, Json]) -> Tree:
-    """The graph of a D3 file. Never fails: what does not fit is kept in `extra` or reported."""
+    """Read the graph of a D3 file. Never fails: values that do not fit are kept in `extra` or
+    reported."""
     return _Reader().read(file)
 
 
@@ -115,6 +117,7 @@ class _Reader:
     # The graph
 
     def read(self, file: dict[str, Json]) -> Tree:
+        """Read the file, and return the graph with all that was noted about it."""
         extra: Extra = []
         if "graph_name" not in file:
             self.report("graph-name-missing", "", "The graph has no name; the engine refuses it.")
@@ -151,7 +154,8 @@ class _Reader:
         )
 
     def _state(self, item: dict[str, Json], field: str, path: str) -> str | None:
-        """A run state that says something, or None; a wrong one makes the engine refuse the file."""
+        """Return a run state, or None if it says nothing. The engine refuses a file with a wrong
+        state."""
         if field not in item:
             return None
         value = item[field]
@@ -182,7 +186,7 @@ class _Reader:
         return self.origins.get(path, path)
 
     def _came_from(self, canonical: str, path: str) -> None:
-        """Says where something stands in the file that stands elsewhere in the canonical text."""
+        """Record that a value of the canonical text is at another place in the file."""
         if canonical != path:
             self.origins[canonical] = path
 
@@ -264,7 +268,8 @@ class _Reader:
     def _items(
         self, owner: int, items: list[Json], path: str, place: str, kind: _Kind
     ) -> list[_Item]:
-        """`path`: of the list in the file; `place`: in the canonical text."""
+        """Read a list of relations. `path`: its pointer in the file; `place`: its pointer in the
+        canonical text."""
         found: list[_Item] = []
         for index, item in enumerate(items):
             if not isinstance(item, dict) or not isinstance(item.get("name"), str):
@@ -320,7 +325,7 @@ class _Reader:
         return relations
 
     def _who_lists(self, sides: list[list[_Item]]) -> dict[tuple[_Name, _Name], int]:
-        """(name, name listed) → the first action of that name that lists it."""
+        """Return for (name, name listed) the first action of that name that lists it."""
         found: dict[tuple[_Name, _Name], int] = {}
         for item in chain.from_iterable(sides):
             owner = self.actions[item.owner]
@@ -379,8 +384,11 @@ class _Reader:
         return relations
 
     def _find(self, item: _Item, back: dict[tuple[_Name, _Name], int]) -> int:
-        """The action that an item names: of twins the one that lists the owner back, else the
-        first; a ghost where there is none."""
+        """Return the index of the action that an item names: of twins the one that lists the owner
+        back, else the first.
+
+        If there is none, a ghost is added.
+        """
         name = item.name, item.instance_id
         found = self.by_name.get(name)
         if found is None:

@@ -1,8 +1,8 @@
-"""Waypoints of arrows in files: by the names of the actions, since a file need not have their keys.
+"""Waypoints of arrows in files, by the names of the actions, since a file need not have their keys.
 
-`gui_attributes.action_assistant.waypoints` of the graph is a list of `{parent, child, response, points}`
-(docs/decisions/052-waypoints.md). `parent` and `child` are full names, or `entry` and `exit`. `listing`
-counts the relations of the same two names from 0, and is there when it is not 0.
+`gui_attributes.action_assistant.waypoints` of the graph is a list of `{parent, child, response,
+points}` (docs/decisions/052-waypoints.md). `parent` and `child` are full names, or `entry` and
+`exit`. `listing` numbers the relations of the same two names from 0, and is present if it is not 0.
 """
 
 from collections import defaultdict
@@ -14,12 +14,12 @@ from msgspec.structs import replace
 from action_assistant.umrf.json.text import Json, Number, dump, parse_small
 from action_assistant.umrf.model import ENTRY, EXIT, RESPONSES, Graph, JsonText, Relation, Response
 
-#: The full names of both ends, and which of the relations between them.
+#: The full names of both ends, and the number of the relation between them.
 _Name: TypeAlias = tuple[str, str, int]
 
 
 def waypoints_json(graph: Graph) -> list[Json]:
-    """The waypoints of a graph as they stand in its file, in the order of its actions."""
+    """Return the waypoints of a graph as its file has them, in the order of its actions."""
     if not any(relation.waypoints for relation in graph.relations):
         return []
     items: list[Json] = []
@@ -33,7 +33,7 @@ def waypoints_json(graph: Graph) -> list[Json]:
 
 
 def with_waypoints(graph: Graph, items: Json) -> Graph:
-    """The graph with what a file says of waypoints. What fits no relation is left out."""
+    """Return the graph with the waypoints of a file. Those that fit no relation are left out."""
     if not isinstance(items, list):
         return graph
     told: dict[_Name, dict[str, JsonText]] = defaultdict(dict)
@@ -64,7 +64,7 @@ def _name_in(item: dict[str, Json]) -> _Name:
 
 
 def _named(graph: Graph) -> Iterable[tuple[_Name, Relation]]:
-    """Relations by the names of their ends, in the order of the actions."""
+    """Yield relations with the names of their ends, in the order of the actions."""
     names = {ENTRY: ENTRY, EXIT: EXIT} | {a.key: a.full_name for a in graph.actions}
     order = {key: place for place, key in enumerate(names)}
     there = [r for r in graph.relations if r.parent in names and r.child in names]

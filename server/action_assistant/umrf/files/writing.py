@@ -1,4 +1,4 @@
-"""Graphs as canonical D3 files (docs/contracts.md 2)."""
+"""Writes graphs as canonical D3 files (docs/contracts.md 2)."""
 
 from collections.abc import Iterable
 from operator import attrgetter
@@ -13,7 +13,7 @@ from action_assistant.umrf.relations import conditions_text
 
 
 class Stamp(msgspec.Struct, frozen=True):
-    """Which graph, version and run a file belongs to."""
+    """The ids of the graph, version and run to which a file belongs."""
 
     graph: str | None = None
     version: str | None = None
@@ -21,17 +21,17 @@ class Stamp(msgspec.Struct, frozen=True):
 
 
 def write(graph: Graph, stamp: Stamp | None = None) -> str:
-    """The canonical file of a graph. Never fails, whatever the graph says."""
+    """Return the canonical file of a graph. Never fails, whatever the graph says."""
     return dump_indented(tree_of(graph, stamp)) + "\n"
 
 
 def tree_of(graph: Graph, stamp: Stamp | None = None) -> dict[str, Json]:
-    """The canonical file as nested values."""
+    """Return the canonical file as nested values."""
     return _Writer(graph, stamp).graph()
 
 
 def name_order(relation: Relation) -> tuple[str, int]:
-    """What decides between relations with equal order."""
+    """Return the sort key of relations with equal order."""
     return f"{relation.parent}>{relation.child}", relation.listing
 
 
@@ -51,7 +51,7 @@ class _Writer:
                 self.children.setdefault(relation.parent, []).append(relation)
 
     def _exists(self, key: Key) -> bool:
-        """Whether a relation's other end can be named in a file."""
+        """Return whether a file can name this end of a relation."""
         return key in self.actions
 
     def graph(self) -> dict[str, Json]:
@@ -136,7 +136,8 @@ def _point(position: Position) -> dict[str, Json]:
 def _with_extra(
     fields: dict[str, Json], extra: Iterable[tuple[str, str]], attributes: dict[str, Json]
 ) -> dict[str, Json]:
-    """Adds what the model does not know, which wins, and our part of `gui_attributes`."""
+    """Add the fields that the model does not know, which take precedence, and our part of
+    `gui_attributes`."""
     for field, text in extra:
         fields[field] = parse_small(text)
     if attributes:

@@ -1,1 +1,2 @@
-"""Hierarchical tasks: graphs with sub-graphs, made into one (docs/umrf.md, Flattening)."""
+"""Hierarchical tasks: graphs with sub-graphs, flattened, extracted and unpacked (docs/umrf.md,
+Flattening)."""

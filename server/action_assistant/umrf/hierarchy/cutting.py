@@ -1,8 +1,9 @@
 """Cuts some actions of a graph out into a graph of their own, with one action left in their place.
 
-`border_of` sorts the arrows by where they stand to the chosen actions; entry, exit, inputs and outputs of the new
-graph follow from those that cross the border. Whether the two graphs do what the one did is checked by
-`extraction`. See docs/umrf-and-the-engine.md 2.3 and 2.6.
+`selection_of` sorts the arrows by their relation to the chosen actions. Entry, exit, inputs and
+outputs of the new graph follow from the arrows that cross the selection's border. Whether the two
+graphs do the same as the one is checked by `extraction`. See docs/umrf-and-the-engine.md 2.3 and
+2.6.
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -37,9 +38,12 @@ from action_assistant.umrf.signatures import action_of_graph
 
 
 class Selection(NamedTuple):
-    """Arrows of a graph by where they stand to the chosen actions; `leading` those that come from each of
-    them. `entries`: the chosen actions to which others lead, or that nothing leads to where no arrow comes in
-    at all."""
+    """The chosen actions of a graph, and its arrows sorted by their relation to them.
+
+    `into`, `within` and `out`: arrows that come in, stay inside and go out. `leading`: the arrows
+    that come from each chosen action. `entries`: the chosen actions to which arrows from outside
+    lead, or, if none comes in, those to which no arrow leads.
+    """
 
     graph: Graph
     chosen: Mapping[Key, Action]
@@ -50,29 +54,30 @@ class Selection(NamedTuple):
     leading: Mapping[Key, Sequence[Relation]]
 
     def at(self, key: Key) -> tuple[HierarchyLevel, ...]:
-        """The place of a chosen action."""
+        """Return the place of a chosen action for a reason."""
         return (HierarchyLevel(self.graph.name, key, self.chosen[key].full_name),)
 
     def named(self, key: Key) -> str:
-        """What an action or an end of the graph is called."""
+        """Return the name of an action or of an end of the graph for a message."""
         if key in (ENTRY, EXIT):
             return f"the {key}"
         return next((a.full_name for a in self.graph.actions if a.key == key), key)
 
     def answers(self, key: Key, outcome: Precondition) -> dict[Key, Response]:
-        """What the actions outside that a chosen one leads to answer to an end of it."""
+        """Return the responses of actions outside to this outcome of a chosen action, without those
+        that ignore it."""
         ways = (r for r in self.leading.get(key, ()) if r.child not in self.chosen)
         found = ((r.child, r.conditions.answer(outcome)) for r in ways)
         return {child: answer for child, answer in found if answer != "ignore"}
 
     def goes_on(self, key: Key, outcome: Precondition) -> bool:
-        """Whether another chosen action answers to an end."""
+        """Return whether another chosen action responds to this outcome."""
         ways = (r for r in self.leading.get(key, ()) if r.child in self.chosen)
         return any(r.conditions.answer(outcome) != "ignore" for r in ways)
 
 
 def selection_of(graph: Graph, chosen: Collection[Key]) -> Selection:
-    """The border around these actions."""
+    """Return the selection of these actions in a graph."""
     actions = {action.key: action for action in graph.actions if action.key in chosen}
     inside, ordered = actions.keys(), in_order(graph.relations, by_parent=False)
     into = tuple(r for r in ordered if r.child in inside and r.parent not in inside)
@@ -91,7 +96,8 @@ def selection_of(graph: Graph, chosen: Collection[Key]) -> Selection:
 
 
 def between(selection: Selection) -> Iterator[FlatteningReason]:
-    """What was not chosen though ways lead over it from chosen actions to others."""
+    """Yield a reason for each action that lies on a path from chosen actions to chosen actions and
+    is not chosen."""
     ahead, back = dict[Key, list[Key]](), dict[Key, list[Key]]()
     for relation in selection.graph.relations:
         ahead.setdefault(relation.parent, []).append(relation.child)
@@ -115,7 +121,10 @@ def _reached(selection: Selection, ways: Mapping[Key, Sequence[Key]]) -> set[Key
 
 
 def ways_in_differ(selection: Selection) -> Iterator[FlatteningReason]:
-    """Why these entries cannot be one: each has to be told the same by the same."""
+    """Yield the reasons for which the entries cannot be entries of one sub-graph.
+
+    The same actions have to lead to each of them, with the same conditions.
+    """
     if not selection.entries:
         message = "Each of these actions follows another of them, so none would begin."
         yield FlatteningReason("ways-in", message)
@@ -140,6 +149,8 @@ def ways_in_differ(selection: Selection) -> Iterator[FlatteningReason]:
 
 
 def _told(selection: Selection, key: Key) -> dict[Key, tuple[Conditions | None, bool]]:
+    """Return the conditions, and whether it is required, of each arrow from outside to a chosen
+    action."""
     ways = (r for r in selection.into if r.child == key)
     return {
         r.parent: (None, True) if r.parent == ENTRY else (r.conditions, r.required) for r in ways
@@ -147,7 +158,8 @@ def _told(selection: Selection, key: Key) -> dict[Key, tuple[Conditions | None, 
 
 
 def ways_out_differ(selection: Selection) -> Iterator[FlatteningReason]:
-    """Why these ends cannot be one: outside only the outcome is seen, and not who ended."""
+    """Yield the reasons for which ends cannot be ends of one sub-graph: actions outside see the
+    outcome only, not who ended."""
     differing: dict[tuple[Key, Key], list[Precondition]] = {}
     for outcome in PRECONDITIONS:
         known: tuple[Key, dict[Key, Response]] | None = None
@@ -169,7 +181,8 @@ def ways_out_differ(selection: Selection) -> Iterator[FlatteningReason]:
 
 
 def answers_of(selection: Selection, child: Key) -> Conditions:
-    """What an action outside answers to the ends of what stands for the chosen actions."""
+    """Return the responses of an action outside to the ends of the action that stands for the
+    selection."""
     found: dict[str, Response] = {}
     for outcome in PRECONDITIONS:
         for key in selection.chosen:
@@ -180,9 +193,13 @@ def answers_of(selection: Selection, child: Key) -> Conditions:
 
 
 def ends_within(selection: Selection, *, closing: bool, gives: bool) -> dict[Key, Conditions]:
-    """The chosen actions that end the sub-graph, and with what. `closing`: also those after which nothing
-    follows, which one graph would notice and a sub-graph would not; not with an outcome after which
-    something follows elsewhere. `gives`: the exit waits for values."""
+    """Return the chosen actions that end the sub-graph, with the conditions of their arrows to its
+    exit.
+
+    `closing`: also actions end it after which nothing follows, since a graph would be HALTED there
+    and nobody would notice in a sub-graph; not for an outcome after which something follows
+    elsewhere. `gives`: the exit waits for values.
+    """
     free = [o for o in OUTCOMES if not any(selection.answers(key, o) for key in selection.chosen)]
     found: dict[Key, Conditions] = {}
     for key in selection.chosen:
@@ -199,15 +216,16 @@ def ends_within(selection: Selection, *, closing: bool, gives: bool) -> dict[Key
 
 
 class CutPlan(NamedTuple):
-    """One way to cut. `closing`: ends after which nothing follows end the sub-graph, too; `all_ends`: its
-    exit waits for all ends."""
+    """One way to cut. `closing`: ends after which nothing follows end the sub-graph, too.
+    `all_ends`: its exit waits for all ends."""
 
     closing: bool
     all_ends: bool
 
 
 class CutGraphs(NamedTuple):
-    """The graph inside, the graph around it, and the action that stands for the former in the latter."""
+    """The graph inside, the graph around it, and the action in the latter that stands for the
+    former."""
 
     inner: Graph
     outer: Graph
@@ -217,7 +235,8 @@ class CutGraphs(NamedTuple):
 def cut(
     selection: Selection, name: str, key: Key, plan: CutPlan
 ) -> CutGraphs | tuple[FlatteningReason, ...]:
-    """The two graphs, or why values cannot go through. `key`: of the new action."""
+    """Return the two graphs, or the reasons for which values cannot pass between them. `key`: the
+    key of the new action."""
     given = _given(selection)
     inner = _inner(selection, name, plan, given)
     action = replace(
@@ -239,8 +258,11 @@ def cut(
 
 
 def _given(selection: Selection) -> dict[tuple[Key, str], Parameter]:
-    """Inputs of entry actions that have a value and can get another from outside: those belong to the
-    action that stands for the sub-graph, since what is handed to that passes by inputs with a value."""
+    """Return inputs of entry actions that have a value and can get another one from outside.
+
+    They belong to the action that stands for the sub-graph, since a value that is handed to it does
+    not reach an inner input that has a value.
+    """
     found: dict[tuple[Key, str], Parameter] = {}
     for relation in selection.into:
         inputs = slots_of(selection.chosen[relation.child].inputs)
@@ -259,7 +281,7 @@ def _handed(selection: Selection, relation: Relation, inputs: Collection[str]) -
     try:
         return renamed(names_of(parent.outputs), relation.remap, inputs)
     except RemapUnknown:
-        return {}  # which the arrow tells
+        return {}  # the arrow's own check reports it
 
 
 def _inner(
@@ -298,7 +320,8 @@ def _entries(selection: Selection) -> Iterator[Relation]:
 
 
 def _exits(selection: Selection, plan: CutPlan, *, gives: bool) -> Iterator[Relation]:
-    """Who hands over values outside comes last: its outputs are those of the graph."""
+    """Yield the arrows to the exit. An action that hands values over outside comes last: its
+    outputs become those of the graph."""
     ends = ends_within(selection, closing=plan.closing, gives=gives)
     handing = {r.parent for r in selection.out if _gives(selection, r)}
     leading = {r.parent for r in selection.out}
@@ -334,7 +357,7 @@ def _open(parameter: Parameter) -> Parameter:
 
 
 def _labels(graph: Graph) -> Iterator[tuple[str, str]]:
-    """What people sort the graph under, they sort the new one under, too."""
+    """Yield the labels of the graph, which the new graph gets, too."""
     attributes = parse_small(dict(graph.extra).get("gui_attributes", "null"))
     if isinstance(attributes, dict) and "labels" in attributes:
         yield "gui_attributes", dump({"labels": attributes["labels"]})
@@ -356,7 +379,7 @@ def _with_values(
 
 
 def middle_of(places: Iterator[Position | None]) -> Position | None:
-    """The middle of what is taken up by those that stand somewhere."""
+    """Return the middle of the area that these positions cover; None if there is none."""
     there = [place for place in places if place is not None]
     if not there:
         return None
@@ -367,7 +390,7 @@ def middle_of(places: Iterator[Position | None]) -> Position | None:
 def _into(
     selection: Selection, action: Action, against: list[FlatteningReason]
 ) -> Iterator[Relation]:
-    """One arrow for those from one action to all entries."""
+    """Yield for each action outside one arrow in place of its arrows to all entries."""
     by_parent: dict[Key, list[Relation]] = {}
     for relation in selection.into:
         by_parent.setdefault(relation.parent, []).append(relation)
@@ -396,7 +419,7 @@ def _into(
 def _out(
     selection: Selection, action: Action, against: list[FlatteningReason]
 ) -> Iterator[Relation]:
-    """One arrow for those from all ends to one action."""
+    """Yield for each action outside one arrow in place of the arrows from all ends to it."""
     by_child: dict[Key, list[Relation]] = {}
     for relation in selection.out:
         by_child.setdefault(relation.child, []).append(relation)
@@ -420,7 +443,8 @@ def _out(
 def _out_remap(
     selection: Selection, way: Relation, action: Action, against: list[FlatteningReason]
 ) -> tuple[Remap, ...]:
-    """Renamings for what goes out: names stay, but the outputs are those of the graph."""
+    """Return the renamings of an arrow that goes out. Names stay, but the outputs are those of the
+    new graph."""
     child = next(a for a in selection.graph.actions if a.key == way.child)
     outputs = names_of(action.outputs)
     try:

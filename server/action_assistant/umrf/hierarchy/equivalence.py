@@ -1,4 +1,4 @@
-"""What one graph says otherwise than another with the same actions: only what makes a difference to a course.
+"""Compares two graphs with the same actions by what makes a difference to their courses.
 
 See docs/umrf-and-the-engine.md 2.3 and 2.7, and docs/decisions/072-make-and-unpack-a-sub-graph.md.
 """
@@ -26,14 +26,14 @@ _NAMES: Final = {ENTRY: "the entry", EXIT: "the exit"}
 
 
 class BehaviourDifference(NamedTuple):
-    """One thing that is said otherwise. `about`: the action that it concerns, None for the graph."""
+    """One difference in behaviour. `about`: the action that it concerns, None for the graph."""
 
     about: Key | None
     message: str
 
 
 class _ArrowMeaning(NamedTuple):
-    """What an arrow does: which values it hands over by input name."""
+    """The effect of an arrow. `values`: the outputs that it hands over, by input name."""
 
     conditions: Conditions | None
     required: bool
@@ -41,7 +41,7 @@ class _ArrowMeaning(NamedTuple):
 
 
 def behaviour_differences(graph: Graph, other: Graph) -> Iterator[BehaviourDifference]:
-    """What `other` does not say as `graph` does, both under the same keys."""
+    """Yield the differences of `other` from `graph`. Both have the same keys."""
     names = {a.key: a.full_name for a in graph.actions} | _NAMES
     mine, theirs = ({a.key: _action(a) for a in each.actions} for each in (graph, other))
     for key in sorted(mine.keys() | theirs.keys()):
@@ -82,8 +82,11 @@ def _parameter(parameter: Parameter) -> tuple[str, object]:
 
 
 def _arrows(graph: Graph) -> dict[tuple[Key, Key], _ArrowMeaning]:
-    """By parent and child. An arrow that is not waited for and answers nothing does nothing, and whether
-    one waits for the only parent there is makes no difference."""
+    """Return the effects of arrows by parent and child.
+
+    An arrow that is not waited for and answers nothing has no effect, and whether a child waits for
+    its only parent makes no difference.
+    """
     relations = [r for r in graph.relations if not _is_idle(r)]
     parents = Counter(r.child for r in relations)
     by_key = {action.key: action for action in graph.actions}
@@ -112,7 +115,7 @@ def _values(
     relation: Relation, outputs: Mapping[str, object], inputs: Mapping[str, object]
 ) -> Mapping[str, str] | tuple[object, ...]:
     if relation.parent == ENTRY:
-        return relation.remap  # what comes in is not known here
+        return relation.remap  # the values from outside are not known here
     if all(relation.conditions.answer(end) in ("ignore", "bypass") for end in PRECONDITIONS):
         return ()
     try:

@@ -1,8 +1,8 @@
-"""Some actions of a graph made a graph of their own, and one action in their place.
+"""Makes some actions of a graph a graph of their own, with one action in their place.
 
-`extracted` answers the two graphs, with everything in which they would do otherwise than the one did, or
-every reason why there are none. They do the same where made flat again (`flattening`) they are that graph:
-flattening proves what the two do, and `likeness` that nothing was lost on the way.
+`extracted` returns the two graphs with all differences in their behaviour, or every reason for
+which there are none. The two graphs behave alike if, made flat again (`flattening`), they are the
+original graph: flattening proves what the two do, and `equivalence` proves that nothing was lost.
 
 See docs/decisions/072-make-and-unpack-a-sub-graph.md.
 """
@@ -28,13 +28,16 @@ from action_assistant.umrf.hierarchy.inlining import under_keys
 from action_assistant.umrf.hierarchy.reasons import FlatteningReason, HierarchyLevel
 from action_assistant.umrf.model import Graph, Key
 
-#: What no action is called: the engine takes these for the ends of a graph.
+#: Names that no action can have: the engine takes them for the ends of a graph.
 _RESERVED: Final = frozenset({"graph_entry", "graph_exit"})
 
 
 class Extracted(msgspec.Struct, frozen=True, tag="extracted", tag_field="kind"):
-    """The new graph, and the old one in which the action `key` stands for it. `differences`: in what they
-    may do otherwise than the graph did; where there are none, they do the same."""
+    """The new graph, and the old one in which the action `key` stands for it.
+
+    `differences`: how the two may behave otherwise than the graph did; without any they do the
+    same.
+    """
 
     inner: Graph
     outer: Graph
@@ -43,7 +46,7 @@ class Extracted(msgspec.Struct, frozen=True, tag="extracted", tag_field="kind"):
 
 
 class Unextractable(msgspec.Struct, frozen=True, tag="unextractable", tag_field="kind"):
-    """Why no sub-graph can be made of the chosen actions: everything that was found."""
+    """The reasons for which no sub-graph can be made of the chosen actions: all that were found."""
 
     reasons: tuple[FlatteningReason, ...]
 
@@ -52,7 +55,8 @@ Extraction: TypeAlias = Extracted | Unextractable
 
 
 def extracted(graph: Graph, chosen: Collection[Key], name: str, key: Key) -> Extraction:
-    """These actions as a graph of this name. `key`: of the action that stands for it."""
+    """Make these actions a graph of this name. `key`: the key of the action that will stand for
+    it."""
     reasons = [*_unfit_names(graph, name), *_unfit(graph, chosen)]
     selection = selection_of(graph, chosen)
     if selection.chosen:
@@ -105,7 +109,7 @@ def _unfit(graph: Graph, chosen: Collection[Key]) -> Iterator[FlatteningReason]:
 
 
 def _plans(selection: Selection) -> Iterator[CutPlan]:
-    """Ways to cut, the likelier first."""
+    """Yield ways to cut, the most promising first."""
     waiting: dict[Key, int] = {}
     for relation in selection.out:
         waiting[relation.child] = waiting.get(relation.child, 0) + relation.required
@@ -116,7 +120,7 @@ def _plans(selection: Selection) -> Iterator[CutPlan]:
 
 
 def _differences(graph: Graph, found: CutGraphs) -> tuple[FlatteningReason, ...]:
-    """In what the two graphs may do otherwise than the one."""
+    """Return how the two graphs may behave otherwise than the one."""
     flat = flattened(found.outer, {found.inner.name: found.inner})
     if not isinstance(flat, Flattened):
         return flat.reasons

@@ -44,7 +44,7 @@ from action_assistant.umrf.semantics.values import RemapUnknown, renamed, slots_
 
 
 def faults(graph: Graph) -> Iterator[FlatteningReason]:
-    """What keeps one graph of a hierarchy from being looked at."""
+    """Yield the reasons for which one graph of a hierarchy cannot be examined."""
     subject = Subject(graph, PINNED)
     check_structure(subject)
     for problem in subject.problems:
@@ -91,12 +91,13 @@ def _is_choosy(parent: Action, relation: Relation, child: Action) -> bool:
     try:
         found = renamed(slots_of(parent.outputs), relation.remap, inputs)
     except RemapUnknown:
-        return False  # which the courses tell
+        return False  # the courses report it
     return any(inputs[name].allowed for name in found)
 
 
 def inputs_of(graph: Graph) -> frozenset[str]:
-    """What a graph takes as a sub-graph: the inputs of its entry actions that have no value."""
+    """Return the inputs of a graph as a sub-graph: those of its entry actions that have no
+    value."""
     actions = {action.key: action for action in graph.actions}
     entries, _ = ends_of(graph)
     return frozenset(
@@ -109,15 +110,15 @@ def inputs_of(graph: Graph) -> frozenset[str]:
 
 
 def courses_graph(graph: Graph, given: Collection[str]) -> Graph:
-    """The graph as if its entry actions had the values that it is given, and nothing were renamed on
-    the way to them."""
+    """Return the graph as if its entry actions had the given values, without renamings on the way
+    to them."""
     taken: dict[str, set[str]] = {}
     inputs = {action.key: slots_of(action.inputs) for action in graph.actions}
     for entry in ends_of(graph)[0]:
         try:
             found = renamed(given, entry.remap, inputs[entry.child])
         except RemapUnknown:
-            continue  # which the joint tells
+            continue  # `joined` reports it
         taken.setdefault(entry.child, set()).update(found)
     actions = tuple(
         replace(a, inputs=tuple(_filled(p, taken[a.key]) for p in a.inputs))
@@ -138,18 +139,20 @@ def _filled(parameter: Parameter, taken: Collection[str]) -> Parameter:
     return Parameter(parameter.path, dump({"pvf_value": None, **leaf}))
 
 
-#: What a top graph does itself it does flat, too.
+#: Troubles that do not matter in the top graph, since it does the same when it is flat.
 OF_INNER: Final = frozenset({"halts", "waits", "unready", "early", "beside"})
-#: Actions of one graph, as many as the editor takes (decision 20), and levels below each other.
+#: The most actions of one graph, as in the editor (decision 20).
 MOST: Final = 5_000
-#: Reasons that are told: they are the same wherever a graph stands, and may double with each level.
+#: The most reasons that are listed: they repeat wherever a graph stands, and may double with each level.
 REASONS: Final = 100
+#: The most levels below each other.
 DEEPEST: Final = 32
-_SAID: Final = 1_000_000_000  # actions: more are not counted out in a message
+_SAID: Final = 1_000_000_000  # a larger number of actions is not given exactly in a message
 
 
 class FlatOrigin(msgspec.Struct, frozen=True):
-    """Where an action of the flat graph comes from: from the top graph down to the action itself."""
+    """The origin of an action of the flat graph: the levels from the top graph down to the action
+    itself."""
 
     key: Key
     action: str
@@ -157,15 +160,15 @@ class FlatOrigin(msgspec.Struct, frozen=True):
 
 
 class LeftOut(msgspec.Struct, frozen=True):
-    """The description and unknown fields of an action that was a sub-graph, or of the sub-graph:
-    nothing has them now."""
+    """The description and unknown fields of an action that was a sub-graph, or of that graph, which
+    nothing in the flat graph has."""
 
     levels: LevelPath
     fields: tuple[str, ...]
 
 
 class Flattened(msgspec.Struct, frozen=True, tag="flattened", tag_field="kind"):
-    """One graph with the same course. `origins`: in the order of its actions."""
+    """One graph with the same course as the hierarchy. `origins`: in the order of its actions."""
 
     graph: Graph
     origins: tuple[FlatOrigin, ...]
@@ -173,7 +176,8 @@ class Flattened(msgspec.Struct, frozen=True, tag="flattened", tag_field="kind"):
 
 
 class Unflattenable(msgspec.Struct, frozen=True, tag="unflattenable", tag_field="kind"):
-    """Why no graph is known to have the same course: the first `REASONS` of what was found."""
+    """The reasons for which no graph is known to have the same course: the first `REASONS` that
+    were found."""
 
     reasons: tuple[FlatteningReason, ...]
 
@@ -184,9 +188,12 @@ Flattening: TypeAlias = Flattened | Unflattenable
 def flattened(
     graph: Graph, graphs: Mapping[str, Graph], known: Container[str] = frozenset()
 ) -> Flattening:
-    """One graph without sub-graphs that runs the same actions, in the same order, with the same
-    values, and ends alike. `graphs`: those that the engine has indexed, by name. `known`: names of
-    actions, which come before graphs of the same name."""
+    """Return one graph without sub-graphs that runs the same actions in the same order with the
+    same values, and ends alike.
+
+    `graphs`: the graphs that the engine has indexed, by name. `known`: names of actions, which take
+    precedence over graphs of the same name.
+    """
     hierarchy = _Hierarchy(graphs, known)
     if not any(hierarchy.is_sub(action) for action in graph.actions):
         return Flattened(graph, tuple(_plain(graph)))
@@ -204,12 +211,12 @@ def flattened(
 
 
 def _unflattenable(reasons: Iterable[FlatteningReason]) -> Unflattenable:
-    """Each reason once."""
+    """Return these reasons, each once."""
     return Unflattenable(tuple(dict.fromkeys(reasons)))
 
 
 class _Flat(NamedTuple):
-    """One graph of the hierarchy, flat. `origins`: by key, from this graph down."""
+    """One graph of the hierarchy made flat. `origins`: the levels from this graph down, by key."""
 
     graph: Graph
     origins: Mapping[Key, LevelPath]
@@ -218,14 +225,14 @@ class _Flat(NamedTuple):
 
 
 class _Found(NamedTuple):
-    """`flat` is None where there are reasons."""
+    """The result for one graph of the hierarchy. `flat` is None if there are reasons."""
 
     flat: _Flat | None
     reasons: tuple[FlatteningReason, ...]
 
 
 class _Hierarchy:
-    """What was found of each graph: once, wherever it stands."""
+    """Flattens the graphs of a hierarchy, each only once, wherever it stands."""
 
     def __init__(self, graphs: Mapping[str, Graph], known: Container[str]) -> None:
         self.graphs = graphs
@@ -236,12 +243,15 @@ class _Hierarchy:
         self._found: dict[str, _Found] = {}
 
     def is_sub(self, action: Action) -> bool:
-        """Whether an action is called like an indexed graph, and like no action."""
+        """Return whether an action has the name of an indexed graph, and not of a known action."""
         return not action.missing and action.name in self.graphs and action.name not in self.known
 
     def actions_of(self, graph: Graph) -> int:
-        """How many actions one graph would have: counted before anything is made, since that may double
-        with each level. What contains itself, or lies too deep, counts once and is refused elsewhere."""
+        """Return how many actions the flat graph would have.
+
+        They are counted before anything is made, since the number may double with each level. A
+        graph that contains itself or lies too deep counts once and is refused elsewhere.
+        """
         counts: dict[str, int] = {}
 
         def count(of: Graph, above: tuple[str, ...]) -> int:
@@ -258,7 +268,8 @@ class _Hierarchy:
         return count(graph, (graph.name,))
 
     def level(self, graph: Graph, above: tuple[str, ...]) -> _Found:
-        """One graph and all that is in it. `above`: the graphs around it."""
+        """Flatten one graph and all graphs inside it. `above`: the names of the graphs around
+        it."""
         reasons = list(faults(graph))
         inside: dict[Key, _Found] = {}
         for action in graph.actions:
@@ -283,7 +294,7 @@ class _Hierarchy:
         return self._together(graph, flats, seen, given, reasons)
 
     def _sub(self, action: Action, above: tuple[str, ...]) -> _Found:
-        """The sub-graph that an action is."""
+        """Flatten the sub-graph for which an action stands."""
         graph = self.graphs[action.name]
         self.actors |= {action.actor, *(each.actor for each in graph.actions)}
         if graph.name in above or action.name in above:
@@ -309,7 +320,7 @@ class _Hierarchy:
         given: frozenset[str],
         reasons: list[FlatteningReason],
     ) -> _Found:
-        """The graph with all its sub-graphs in their places, if nothing speaks against it."""
+        """Put all sub-graphs of a graph in their places, unless a reason is found against it."""
         kept = {a.full_name for a in graph.actions if a.key not in flats}
         flat = _Flat(graph, dict(_origins(graph, flats)), seen.results, _unknown(graph, flats))
         for key, inner in flats.items():
@@ -333,7 +344,7 @@ def _refused(code: FlatteningCode, message: str) -> _Found:
 
 
 def _troubles(graph: Graph, seen: LevelCourses, *, is_top: bool) -> Iterator[FlatteningReason]:
-    """What the courses of a graph come to that one graph would not."""
+    """Yield the troubles of a graph's courses that the flat graph would not have, as reasons."""
     names = {action.key: action.full_name for action in graph.actions}
     for trouble in seen.troubles:
         if is_top and trouble.kind in OF_INNER:
@@ -361,7 +372,8 @@ def _origins(graph: Graph, subs: Container[Key]) -> Iterator[tuple[Key, LevelPat
 
 
 def _unknown(graph: Graph, flats: Mapping[Key, _Flat]) -> tuple[LeftOut, ...]:
-    """What the actions that were sub-graphs say besides, and those graphs."""
+    """Return the descriptions and unknown fields of the actions that were sub-graphs, and of those
+    graphs."""
     found = []
     for action in graph.actions:
         if (flat := flats.get(action.key)) is not None:
@@ -379,7 +391,7 @@ def _plain(graph: Graph) -> Iterator[FlatOrigin]:
 
 
 def _named(flat: _Flat) -> Flattened:
-    """The graph with a key of twelve characters for each action that comes from below."""
+    """Give each action that comes from a sub-graph a key of twelve characters."""
     keys: dict[Key, Key] = {key: key for key, levels in flat.origins.items() if len(levels) == 1}
     for key, levels in flat.origins.items():
         if key not in keys:

@@ -1,7 +1,8 @@
-"""Puts the actions of a sub-graph where the action stood that was the sub-graph, with their arrows and drawing.
+"""Puts the actions of a sub-graph in the place of the action that stood for it, with their arrows
+and drawing.
 
-The sub-graph keeps its own drawing, with its middle where the action was; what lay beyond the action on one
-side is moved away by as much as the sub-graph needs there.
+The sub-graph keeps its own drawing, with its middle where the action was. Everything beyond the
+action on one side is moved away by as much as the sub-graph needs there.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -25,15 +26,15 @@ from action_assistant.umrf.model import (
     Response,
 )
 
-#: Between actions of a sub-graph that nobody has drawn: along what follows, and beside each other.
+#: The distance between actions of a sub-graph without a drawing: along the arrows, and beside each other.
 ALONG: Final = 280.0
 ASIDE: Final = 140.0
 
-#: What a card takes up on the page, and a little around it.
+#: The size of a card on the page with a margin.
 WIDE: Final = 240.0
 HIGH: Final = 110.0
 
-#: Whether what stands around a sub-graph is moved away, or only where something would lie upon it.
+#: Whether the graph around a sub-graph is always moved away, or only if something would overlap.
 Room: TypeAlias = Literal["always", "needed"]
 
 _Ways: TypeAlias = tuple[tuple[Response, JsonText], ...]
@@ -41,7 +42,7 @@ _Moved: TypeAlias = Callable[[Json], Json]
 
 
 class Drawing:
-    """Puts the actions of one sub-graph where its action stands, and makes room for them."""
+    """Draws the actions of one sub-graph at the place of its action, and makes room for them."""
 
     def __init__(self, around: Graph, action: Action, inside: Graph, room: Room = "always") -> None:
         self._at = action.position
@@ -51,7 +52,7 @@ class Drawing:
             self._half = (0.0, 0.0)
 
     def _lies_upon(self, around: Graph, action: Action) -> bool:
-        """Whether an action of the sub-graph would cover something around it."""
+        """Return whether an action of the sub-graph would overlap something around it."""
         if self._at is None:
             return False
         there = [a.position for a in around.actions if a.key != action.key]
@@ -65,12 +66,13 @@ class Drawing:
         )
 
     def inner(self, action: Action) -> Position | None:
-        """The place of an action of the sub-graph; none where its action had none."""
+        """Return the position of an action of the sub-graph; None if the sub-graph's action had
+        none."""
         place = self._places.get(action.key)
         return self._inner(place) if place is not None and self._at is not None else None
 
     def outer(self, position: Position | None) -> Position | None:
-        """The place of what stands around it."""
+        """Return the position of something around the sub-graph."""
         if position is None or self._at is None:
             return position
         x, y = (
@@ -88,19 +90,19 @@ class Drawing:
         return x, y
 
     def inner_note(self, text: JsonText) -> JsonText:
-        """A note or frame of the sub-graph."""
+        """Return a note or frame of the sub-graph at its new position."""
         return _noted(text, self._shifted_inner)
 
     def outer_note(self, text: JsonText) -> JsonText:
-        """A note or frame around it."""
+        """Return a note or frame around the sub-graph at its new position."""
         return _noted(text, self._shifted_outer)
 
     def inner_ways(self, ways: _Ways) -> _Ways:
-        """Waypoints of a line of the sub-graph."""
+        """Return the waypoints of an arrow of the sub-graph at their new positions."""
         return tuple((each, _each_point(text, self._shifted_inner)) for each, text in ways)
 
     def outer_ways(self, ways: _Ways) -> _Ways:
-        """Waypoints of a line around it."""
+        """Return the waypoints of an arrow around the sub-graph at their new positions."""
         return tuple((each, _each_point(text, self._shifted_outer)) for each, text in ways)
 
     def _shifted_inner(self, point: Json) -> Json:
@@ -114,8 +116,8 @@ class Drawing:
 
 
 def _drawn(graph: Graph, *, right: bool) -> dict[Key, Position]:
-    """The places of a graph's actions; in rows by how far they are from the start, where one of
-    them has none."""
+    """Return the positions of a graph's actions. If one has none, all are put in rows by their
+    distance from the entry."""
     drawn = {a.key: a.position for a in graph.actions if a.position is not None}
     if len(drawn) == len(graph.actions):
         return drawn
@@ -135,7 +137,7 @@ def _drawn(graph: Graph, *, right: bool) -> dict[Key, Position]:
 
 
 def _box(places: Sequence[Position]) -> tuple[Position, Position]:
-    """The middle of these places, and half of what they take up."""
+    """Return the middle of these positions, and half of the width and height that they cover."""
     if not places:
         return (0.0, 0.0), (0.0, 0.0)
     xs, ys = [x for x, _ in places], [y for _, y in places]
@@ -168,12 +170,13 @@ def _each_point(text: JsonText, moved: _Moved) -> JsonText:
     return dump([moved(point) for point in points]) if isinstance(points, list) else text
 
 
-#: What decides where a relation stands among those of its parent, or of its child.
+#: A sort key for the position of a relation among those of its parent, or of its child.
 _Order: TypeAlias = tuple[object, ...]
 
 
 class Inlined(NamedTuple):
-    """A graph without one of its sub-graphs. `keys`: of the sub-graph's actions, by those they had."""
+    """A graph without one of its sub-graphs. `keys`: the new keys of the sub-graph's actions by
+    their old ones."""
 
     graph: Graph
     keys: Mapping[Key, Key]
@@ -193,8 +196,11 @@ def inlined(
     kept: set[str],
     room: Room = "always",
 ) -> Inlined:
-    """The graph with these actions in the place of one. `kept`: full names that nobody else gets; `room`:
-    whether what stands around is moved away where there is room already."""
+    """Return the graph with the actions of `inside` in the place of the action `own`.
+
+    `kept`: full names that no moved action may get. `room`: whether the graph around is moved away
+    even where there is room.
+    """
     action = next(a for a in around.actions if a.key == own)
     there = {a.key for a in around.actions}
     keys = {a.key: _fresh(there, f"{own}/{a.key}") for a in inside.actions}
@@ -226,7 +232,7 @@ def inlined(
 
 
 def under_keys(graph: Graph, keys: Mapping[Key, Key]) -> Graph:
-    """The graph with other keys for some of its actions."""
+    """Return the graph with other keys for some of its actions."""
     actions = tuple(replace(a, key=keys.get(a.key, a.key)) for a in graph.actions)
     relations = tuple(
         replace(r, parent=keys.get(r.parent, r.parent), child=keys.get(r.child, r.child))
@@ -236,7 +242,7 @@ def under_keys(graph: Graph, keys: Mapping[Key, Key]) -> Graph:
 
 
 def identity(parts: Iterable[str], taken: Iterable[str]) -> str:
-    """Twelve letters and digits that follow from these texts alone, and are nobody else's."""
+    """Return twelve letters and digits that depend only on these texts and are not `taken`."""
     there, text = set(taken), "\x1f".join(parts)
     while (found := sha256(text.encode()).hexdigest()[:12]) in there:
         text += "\x1f"
@@ -250,7 +256,7 @@ def _fresh(there: set[Key], key: Key) -> Key:
 
 
 def _free(action: Action, kept: set[str]) -> int:
-    """The number of an action if nobody has its full name, else the lowest that is free."""
+    """Return the number of an action if its full name is free, else the lowest free number."""
     number = action.instance_id
     if action.full_name in kept:
         number = 0
@@ -288,7 +294,7 @@ def _arrows(
                 child=keys[relation.child],
                 waypoints=drawing.inner_ways(relation.waypoints),
             )
-            # Who leads in comes first among the parents, who follows last among the children.
+            # Arrows into the sub-graph come first among the parents, arrows out of it last among the children.
             yield _Arrow(moved, (0, *_of_parent(relation)), (1, *_of_child(relation)))
     for arrow in found.into:
         relation = replace(arrow.relation, child=keys[arrow.relation.child])

@@ -1,4 +1,5 @@
-"""What is said of the place of a sub-graph: what it is joined by, and why it is not.
+"""Values and helpers for the place of a sub-graph: the arrows that join it, and the reasons against
+them.
 
 See docs/umrf-and-the-engine.md 2.7.
 """
@@ -23,7 +24,7 @@ from action_assistant.umrf.semantics.values import RemapUnknown, renamed, slots_
 
 
 class JoinRefused(Exception):
-    """There is no such arrow."""
+    """Raised when no arrow does the same as one of the sub-graph's action."""
 
     def __init__(self, code: FlatteningCode, message: str) -> None:
         super().__init__(message)
@@ -32,13 +33,13 @@ class JoinRefused(Exception):
 
 
 def refuse(code: FlatteningCode, message: str) -> None:
-    """Says that one graph would not do the same."""
+    """Raise `JoinRefused`: a flat graph would not do the same."""
     raise JoinRefused(code, message)
 
 
 class JoinedArrow(NamedTuple):
-    """An arrow into or out of a sub-graph. `instead`: the one of the graph around it; `place`: among
-    those that stand for it."""
+    """An arrow into or out of a sub-graph. `instead`: the arrow of the graph around that it stands
+    for; `place`: its number among the arrows that stand for that one."""
 
     relation: Relation
     instead: Relation
@@ -46,10 +47,13 @@ class JoinedArrow(NamedTuple):
 
 
 class SubGraphPlace(NamedTuple):
-    """A sub-graph in its place. `around`: the graph, with other sub-graphs in their places already;
-    `given`: inputs that `around` takes from the graph around it; `lacks`: whether inputs can be
-    missing when all that the action waits for otherwise is there; `bypassed`: by which outcomes it can
-    be bypassed."""
+    """A sub-graph at its place. `around`: the graph, in which other sub-graphs are in place
+    already.
+
+    `given`: inputs that `around` takes from the graph around it. `lacks`: inputs can be missing
+    when everything else that the action waits for is there. `bypassed`: the outcomes by which the
+    action can be bypassed.
+    """
 
     around: Graph
     action: Action
@@ -60,7 +64,8 @@ class SubGraphPlace(NamedTuple):
 
 
 class JoinedPlace(NamedTuple):
-    """`entries`: the entry actions of the sub-graph with the values that they get."""
+    """The arrows that join a sub-graph. `entries`: its entry actions with the values that they
+    get."""
 
     into: tuple[JoinedArrow, ...]
     out: tuple[JoinedArrow, ...]
@@ -68,13 +73,13 @@ class JoinedPlace(NamedTuple):
 
 
 def in_order(relations: Collection[Relation], *, by_parent: bool) -> list[Relation]:
-    """Relations as the parent lists its children, or the child its parents."""
+    """Return relations in the order of their parent's children, or of their child's parents."""
     ordered = sorted(relations, key=name_order)
     return sorted(ordered, key=lambda r: r.parent_order if by_parent else r.child_order)
 
 
 def ends_of(graph: Graph) -> tuple[list[Relation], list[Relation]]:
-    """The relations at the entry and at the exit, in order."""
+    """Return the relations at the entry and at the exit, in order."""
     entries = [r for r in graph.relations if r.parent == ENTRY]
     exits = [r for r in graph.relations if r.child == EXIT]
     return in_order(entries, by_parent=True), in_order(exits, by_parent=False)
@@ -86,8 +91,12 @@ def renaming(
     wanted: Mapping[str, str],
     usual: tuple[Remap, ...],
 ) -> tuple[Remap, ...]:
-    """Renamings by which exactly these inputs get exactly these outputs. The engine renames inside
-    a sorted tree, so each is tried (docs/umrf-and-the-engine.md 2.7)."""
+    """Return renamings by which exactly these inputs get exactly the wanted outputs. Raises
+    `JoinRefused`.
+
+    The engine renames inside a sorted tree, so each candidate is tried (docs/umrf-and-the-engine.md
+    2.7).
+    """
     least = tuple(Remap(source, name) for name, source in sorted(wanted.items()) if source != name)
     for remap in ((), usual, least):
         sources = {each.source for each in remap}
@@ -102,6 +111,8 @@ def renaming(
 def renamed_or_refused(
     outputs: Collection[str], remap: tuple[Remap, ...], inputs: Collection[str]
 ) -> dict[str, str]:
+    """Return the output that reaches each input (`values.renamed`). Raises `JoinRefused` for an
+    unknown output."""
     try:
         return renamed(outputs, remap, inputs)
     except RemapUnknown as unknown:
@@ -125,7 +136,8 @@ def merged_extra(
 
 
 def leads_to(graph: Graph, start: Key, goal: Key) -> bool:
-    """Whether a way of arrows leads from one action to another; to itself only by a loop."""
+    """Return whether a path of arrows leads from one action to another; to itself only by a
+    loop."""
     children: dict[Key, list[Key]] = {}
     for relation in graph.relations:
         children.setdefault(relation.parent, []).append(relation.child)

@@ -1,7 +1,7 @@
-"""Arrows that lead into and out of a sub-graph once its actions stand in the place of its action.
+"""Finds the arrows into and out of a sub-graph once its actions stand in the place of its action.
 
-`joined` returns them, or every reason why no arrows do the same. See docs/umrf-and-the-engine.md 2.3, 2.6 and
-2.7, and docs/decisions/069-flatten.md.
+`joined` returns them, or every reason for which no arrows do the same. See
+docs/umrf-and-the-engine.md 2.3, 2.6 and 2.7, and docs/decisions/069-flatten.md.
 """
 
 from collections.abc import Collection, Iterator, Sequence
@@ -28,6 +28,7 @@ from action_assistant.umrf.json.text import dump, parse_small
 from action_assistant.umrf.model import (
     ENTRY,
     EXIT,
+    OUTCOMES,
     PRECONDITIONS,
     Action,
     Conditions,
@@ -42,12 +43,12 @@ from action_assistant.umrf.parameters import flat_name
 from action_assistant.umrf.semantics.parts import exit_inputs
 from action_assistant.umrf.semantics.values import Slot, slots_of
 
-#: How an action ends that nobody stops.
-_ENDS: Final[tuple[Precondition, ...]] = ("on_true", "on_false", "on_error")
 _TO_EXIT: Final = frozenset({"run", "stop", "pause", "restart", "ignore"})
 
 
 def ways_out(place: SubGraphPlace, relations: Sequence[Relation]) -> Iterator[JoinedArrow]:
+    """Yield the arrows from the ends of a sub-graph in place of the `relations` that its action
+    had. Raises `JoinRefused`."""
     _, exits = ends_of(place.inside)
     kind = _kind(exits)
     _check_outputs(place, exits, kind, relations)
@@ -68,7 +69,8 @@ def ways_out(place: SubGraphPlace, relations: Sequence[Relation]) -> Iterator[Jo
 
 
 def _kind(exits: Sequence[Relation]) -> str:
-    """`one` way out, `all` of several, or `any` of them."""
+    """Return `one` if a single action leads to the exit, `all` if the exit waits for several, `any`
+    if it waits for none of them."""
     if len(exits) < 2:
         return "one"
     required = {relation.required for relation in exits}
@@ -76,7 +78,7 @@ def _kind(exits: Sequence[Relation]) -> str:
         refuse("exits", "Some of its ways to the exit are required and others are not.")
     if True not in required:
         return "any"
-    if any(r.conditions.answer(end) == "bypass" for r in exits for end in _ENDS):
+    if any(r.conditions.answer(end) == "bypass" for r in exits for end in OUTCOMES):
         refuse(
             "exits", "Its exit waits for several actions, and a bypass ends it without the others."
         )
@@ -84,8 +86,9 @@ def _kind(exits: Sequence[Relation]) -> str:
 
 
 def _required(relation: Relation, exits: Sequence[Relation], kind: str, *, is_only: bool) -> bool:
-    """Whether the child of a sub-graph waits for each of those that stand for it."""
-    told = {relation.conditions.answer(end) for end in _ENDS}
+    """Return whether the child of a sub-graph waits for each of the actions that stand for it.
+    Raises `JoinRefused`."""
+    told = {relation.conditions.answer(end) for end in OUTCOMES}
     if kind == "any":
         if relation.required and not is_only:
             refuse(
@@ -104,12 +107,13 @@ def _required(relation: Relation, exits: Sequence[Relation], kind: str, *, is_on
 
 
 def _may_go_on(exits: Sequence[Relation]) -> bool:
-    """Whether an action at the exit can end without that it ends the sub-graph."""
-    return any(r.conditions.answer(end) == "ignore" for r in exits for end in _ENDS)
+    """Return whether an action at the exit can end without ending the sub-graph."""
+    return any(r.conditions.answer(end) == "ignore" for r in exits for end in OUTCOMES)
 
 
 def _composed(end: Conditions, following: Conditions) -> Conditions:
-    """What follows the sub-graph, as an answer to the action that ends it."""
+    """Return the conditions of what follows the sub-graph, as conditions of the action that ends
+    it."""
     answers = {
         outcome: following.answer(outcome) if end.answer(outcome) != "ignore" else "ignore"
         for outcome in PRECONDITIONS
@@ -144,10 +148,10 @@ def _check_outputs(
 
 
 def _check_end(inside: Graph, end: Relation, following: Sequence[Relation]) -> None:
-    """Whoever ends the sub-graph hands over what the exit waits for, or ends it with an error, or in a
-    way after which nobody is handed anything."""
+    """Refuse an end without the values that the exit waits for, unless it is an error or nobody is
+    handed anything after it."""
     said = end.conditions
-    empty: list[Precondition] = [o for o in _ENDS[:2] if said.answer(o) == "bypass"]
+    empty: list[Precondition] = [o for o in OUTCOMES[:2] if said.answer(o) == "bypass"]
     empty += ["on_error"] if said.on_error not in ("bypass", "ignore") else []
     if any(r.conditions.answer(o) not in ("ignore", "bypass") for o in empty for r in following):
         refuse(
@@ -181,8 +185,7 @@ _Part = TypeVar("_Part")
 
 
 def joined(place: SubGraphPlace) -> JoinedPlace | tuple[JoinRefused, ...]:
-    """The arrows into and out of a sub-graph's actions; all that speaks against it, if anything
-    does."""
+    """Return the arrows into and out of a sub-graph's actions, or every reason against them."""
     relations = place.around.relations
     own = place.action.key
     if any(r.parent == own == r.child for r in relations):
@@ -214,7 +217,8 @@ def _got(parts: Iterator[_Part], against: list[JoinRefused]) -> Iterator[_Part]:
 
 
 def _lets_through(inside: Graph, outcome: Precondition) -> bool:
-    """Whether a bypass of the entry goes to the exit by bypasses, one by one, and nowhere else."""
+    """Return whether a bypass of the entry leads to the exit by bypasses, one after the other, and
+    nowhere else."""
     entries, exits = ends_of(inside)
     if len(entries) != 1 or (len(exits) > 1 and any(r.required for r in exits)):
         return False
@@ -262,7 +266,8 @@ def _into(place: SubGraphPlace, relations: Sequence[Relation]) -> Iterator[Joine
 
 
 def _entry_actions(place: SubGraphPlace) -> Iterator[tuple[Key, Action]]:
-    """The entry actions of the sub-graph, with the values that the file gives to its action."""
+    """Yield the entry actions of the sub-graph, with the values that the file gives to its action.
+    Raises `JoinRefused`."""
     actions = {action.key: action for action in place.inside.actions}
     own = slots_of(place.action.inputs)
     texts = {flat_name(p.path): p for p in place.action.inputs}
@@ -296,7 +301,7 @@ def _entry_actions(place: SubGraphPlace) -> Iterator[tuple[Key, Action]]:
 
 
 def _check_same(outer: Slot, inner: Slot, action: Action) -> None:
-    """A value that goes through both is taken by both or by neither."""
+    """Refuse a value that only one of two inputs on its way would take. Raises `JoinRefused`."""
     place = f"“{outer.name}” and “{inner.name}” of {action.full_name}"
     if inner.has_value():
         refuse("inputs", f"{place}: both have a value in their files.")

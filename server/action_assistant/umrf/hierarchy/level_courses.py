@@ -1,8 +1,8 @@
-"""Every course of one graph, with each sub-graph taken for one action: what decides whether its
-sub-graphs can be put in their places.
+"""Follows every course of one graph, with each sub-graph taken for one action, to decide whether
+the sub-graphs can be flattened.
 
-States are those of `courses.instants`; from each, every end of every action that goes on is followed
-once, in any order. A sub-graph ends with what its own courses end with.
+States are those of `courses.instants`. From each state every end of every running action is
+followed once, in any order. A sub-graph ends with the results with which its own courses end.
 """
 
 from collections.abc import Iterator, Mapping
@@ -14,13 +14,13 @@ from action_assistant.umrf.courses.network import EdgeQuestion, Network
 from action_assistant.umrf.model import OUTCOMES, Graph, Key, Precondition
 from action_assistant.umrf.semantics.transitions import RUNS
 
-#: Places of states that are looked at for one hierarchy: about two seconds.
+#: The most states of single actions that are examined for one hierarchy: about two seconds.
 BUDGET: Final = 2_000_000
 
-#: `halts`, `waits`: the graph does not reach its exit. `unready`: the exit lacks outputs. `early`: something runs when it does, `beside`:
-#: who reaches it asks others as well. `ends`: it reaches it while this sub-graph runs. `again`:
-#: this sub-graph is told something a second time. `crossing`: it is bypassed together with others.
-#: `response`: it is told to do something else. `crash`: of the engine.
+#: `halts`, `waits`: the graph does not reach its exit. `unready`: the exit lacks outputs. `early`: an action runs when
+#: the exit is reached. `beside`: the action that reaches the exit asks others as well. `ends`: the exit is reached while
+#: this sub-graph runs. `again`: this sub-graph is asked a second time. `crossing`: it is bypassed together with others.
+#: `response`: it is asked for another response than run or bypass. `crash`: the engine aborts.
 TroubleKind: TypeAlias = Literal[
     "halts", "waits", "unready", "early", "beside", "ends", "again", "crossing", "response",
     "crash", "undecided",
@@ -28,8 +28,11 @@ TroubleKind: TypeAlias = Literal[
 
 
 class Trouble(NamedTuple):
-    """What a course comes to. `action`: the sub-graph it happens to; else nobody. `by` and `result`:
-    who ended last, and how; the start where it is nobody."""
+    """A property of a course that prevents flattening. `action`: the sub-graph that it concerns, if
+    any.
+
+    `by` and `result`: the action that ended last, and its result; empty at the start.
+    """
 
     kind: TroubleKind
     action: Key | None = None
@@ -38,9 +41,12 @@ class Trouble(NamedTuple):
 
 
 class LevelCourses(NamedTuple):
-    """What all courses of a graph have in common. `lacking`: sub-graphs that wait for an input when
-    all that they wait for otherwise is there. `bypassed`: those that are bypassed, by which
-    outcomes."""
+    """A summary of all courses of a graph. `results`: the outcomes with which it can end.
+
+    `lacking`: sub-graphs that wait for an input when everything else that they wait for is there.
+    `bypassed`: sub-graphs that are bypassed, with the outcomes. `spent`: how many states of single
+    actions were examined.
+    """
 
     results: frozenset[Precondition] = frozenset()
     troubles: tuple[Trouble, ...] = ()
@@ -50,7 +56,7 @@ class LevelCourses(NamedTuple):
 
 
 class _LevelState(NamedTuple):
-    """A state of the graph. `begun`: sub-graphs that have begun, as a mask."""
+    """The state of a graph. `begun`: a mask of the sub-graphs that have begun."""
 
     states: tuple[State, ...]
     running: int
@@ -59,7 +65,7 @@ class _LevelState(NamedTuple):
 
 
 class _LevelInstant(Instant):
-    """An instant that notes what is asked of sub-graphs, and how the exit is reached."""
+    """An instant that records what sub-graphs are asked, and how the exit is reached."""
 
     __slots__ = (
         "_watched",
@@ -84,7 +90,7 @@ class _LevelInstant(Instant):
         self.finished: Precondition | None = None
 
     def _only_ends(self) -> bool:
-        return False  # each edge shall be seen, also where it is known to lead to the exit
+        return False  # every edge is to be recorded, also one that is known to lead to the exit
 
     def _inform(self, index: int, result: Precondition, edges: list[EdgeQuestion | None]) -> None:
         super()._inform(index, result, edges)
@@ -123,8 +129,11 @@ class _LevelInstant(Instant):
         self.crossing = self.crossing or len(self._tasks) > 1
 
     def after(self, before: _LevelState) -> _LevelState:
-        """The state that follows. Times do not matter, since any order of ends is looked at; nor does
-        what has become of actions to which nothing that goes on leads any more."""
+        """Return the state that follows.
+
+        Times are dropped, since any order of ends is followed, and so are states of actions that no
+        running action can reach any more.
+        """
         states = list(before.states)
         for index, state in self.states.items():
             states[index] = state._replace(due=0.0, waiting=False)
@@ -144,8 +153,11 @@ def level_courses(
     *,
     is_top: bool = False,
 ) -> LevelCourses:
-    """All courses of a graph in which these actions are sub-graphs, with what those end with. What the
-    top graph itself ends with need not be known."""
+    """Follow all courses of a graph in which the actions of `inside` are sub-graphs with these
+    results.
+
+    `is_top`: the results of the graph itself need not be known.
+    """
     search = _Courses(graph, inside, is_top=is_top)
     search.look(budget)
     return LevelCourses(
@@ -158,7 +170,7 @@ def level_courses(
 
 
 class _Courses:
-    """The search through all states. The first trouble of a kind is kept for each sub-graph."""
+    """The search through all states. The first trouble of each kind is kept for each sub-graph."""
 
     def __init__(
         self, graph: Graph, inside: Mapping[Key, frozenset[Precondition]], *, is_top: bool
@@ -179,8 +191,11 @@ class _Courses:
     def _telling(
         self, index: int, results: frozenset[Precondition], *, is_top: bool
     ) -> list[Precondition]:
-        """The results of an action that can make a difference: a failed one gives nothing and may
-        begin anew, and what a bypass hands on, or an inner exit, is the result itself."""
+        """Return the results of an action that can make a difference.
+
+        A failed action gives no outputs and may begin again, and a bypass or an inner exit passes
+        the result itself on.
+        """
         told = [edge for edge in self.net.edges[index] if edge is not None]
         ending = any(edge.child == self.net.exit for edge in told) and not is_top
         if ending or any("bypass" in edge.responses.values() for edge in told):
@@ -194,7 +209,7 @@ class _Courses:
         return list(found.values())
 
     def look(self, budget: int) -> None:
-        """Goes through all of them."""
+        """Follow all courses until the budget is used up."""
         net = self.net
         first = _LevelState(tuple(State(has=has) for has in net.has), 0, 0, 0)
         instant = _LevelInstant(net, first, self.watched)
@@ -226,7 +241,7 @@ class _Courses:
     def _seen(
         self, instant: _LevelInstant, before: _LevelState, index: int, result: str
     ) -> _LevelState | None:
-        """Notes what came of an instant. The state after it, if the graph goes on."""
+        """Record the events of an instant, and return the state after it if the graph continues."""
         by = self.net.names[index] if index >= 0 else ""
         for kind, child in instant.told:
             self._tell(Trouble(kind, self.key.get(child), by, result))

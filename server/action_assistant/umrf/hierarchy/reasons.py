@@ -1,4 +1,4 @@
-"""Why a hierarchy cannot be made flat, and where."""
+"""Reasons for which a hierarchy cannot be made flat, with their place."""
 
 from typing import Final, Literal, TypeAlias
 
@@ -17,19 +17,20 @@ FlatteningCode: TypeAlias = Literal[
 
 
 class HierarchyLevel(msgspec.Struct, frozen=True):
-    """One step of the way down to an action: a graph, and an action of it by key and full name."""
+    """One step on the way down to an action: a graph, and an action of it by key and full name."""
 
     graph: str
     key: Key
     action: str
 
 
-#: From the top graph down; the last is the action meant. Empty is the top graph itself.
+#: The levels from the top graph down; the last one is the action that is meant. Empty for the top graph itself.
 LevelPath: TypeAlias = tuple[HierarchyLevel, ...]
 
 
 class FlatteningReason(msgspec.Struct, frozen=True):
-    """One reason why one graph would not do what the hierarchy does. `at`: the action it is about."""
+    """One reason for which one graph would not do the same as the hierarchy. `at`: the action that
+    it concerns."""
 
     code: FlatteningCode
     message: str
@@ -55,7 +56,7 @@ _KINDS: Final[dict[TroubleKind, tuple[FlatteningCode, str]]] = {
 
 
 def of_trouble(trouble: Trouble, at: LevelPath) -> FlatteningReason:
-    """What a course comes to, as a reason."""
+    """Return a trouble of a course as a reason."""
     code, message = _KINDS[trouble.kind]
     when = f", for instance when {trouble.by} ends {trouble.result}" if trouble.by else ""
     return FlatteningReason(code, message.format(when=when), at)

@@ -18,9 +18,11 @@ from action_assistant.umrf.model import Action, Graph, Key
 
 
 class Unpacked(msgspec.Struct, frozen=True, tag="unpacked", tag_field="kind"):
-    """The graph with the actions `keys` in the place of one. `differences`: in what it may do otherwise
-    than the hierarchy did; where there are none, it does the same. `left_out`: fields of the action that no
-    action has now."""
+    """The graph with the actions `keys` in the place of one.
+
+    `differences`: how it may behave otherwise than the hierarchy did; without any it does the same.
+    `left_out`: fields of the replaced action that no action has now.
+    """
 
     graph: Graph
     keys: tuple[Key, ...]
@@ -29,7 +31,7 @@ class Unpacked(msgspec.Struct, frozen=True, tag="unpacked", tag_field="kind"):
 
 
 class Unpackable(msgspec.Struct, frozen=True, tag="unpackable", tag_field="kind"):
-    """Why no arrows would say what those of the action say: everything that was found."""
+    """The reasons for which no arrows say the same as those of the action: all that were found."""
 
     reasons: tuple[FlatteningReason, ...]
 
@@ -38,9 +40,12 @@ Unpacking: TypeAlias = Unpacked | Unpackable
 
 
 def unpacked(graph: Graph, key: Key, inside: Graph) -> Unpacking:
-    """The graph with the actions of `inside` in the place of the action `key`. Other sub-graphs stay
-    what they are. What is new keeps the key that it has inside, so that an action which was made a
-    sub-graph and comes back is the same; where that is taken, its key follows from those that there are."""
+    """Return the graph with the actions of `inside` in the place of the action `key`. Other
+    sub-graphs stay as they are.
+
+    New actions keep the keys that they have inside, so that an action which was extracted and
+    unpacked again is the same. Where a key is taken, the new one follows from the existing ones.
+    """
     action = next(a for a in graph.actions if a.key == key)
     reasons = tuple(dict.fromkeys(_differences(graph, action, inside)))
     if not inside.actions or any(reason.code == "signature" for reason in reasons):
@@ -66,7 +71,8 @@ def _at(graph: Graph, action: Action) -> tuple[HierarchyLevel, ...]:
 
 
 def _differences(graph: Graph, action: Action, inside: Graph) -> Iterator[FlatteningReason]:
-    """What is not known to stay the same, where this action alone is a sub-graph."""
+    """Yield the reasons for which the graph is not known to behave the same if only this action is
+    a sub-graph."""
     name = _unused(graph, inside)
     alone = tuple(replace(a, name=name) if a.key == action.key else a for a in graph.actions)
     found = flattened(replace(graph, actions=alone), {name: replace(inside, name=name)})
@@ -88,7 +94,7 @@ def _differences(graph: Graph, action: Action, inside: Graph) -> Iterator[Flatte
 
 
 def _unused(*graphs: Graph) -> str:
-    """A name that nothing has."""
+    """Return a name that no action has."""
     taken = "\n".join(action.name for graph in graphs for action in graph.actions)
     name = "Unpacked"
     while name in taken:

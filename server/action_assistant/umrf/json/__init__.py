@@ -1,1 +1,1 @@
-"""JSON text: within bounds, with the spelling of its numbers, and with places."""
+"""JSON text within bounds, with places and the spelling of numbers."""

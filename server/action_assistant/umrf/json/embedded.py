@@ -1,4 +1,4 @@
-"""UMRF graphs inside other JSON: how they are described."""
+"""Types for UMRF graphs inside other JSON, with their schema."""
 
 from typing import Annotated, Any, Final, TypeAlias
 
@@ -8,7 +8,7 @@ _OBJECT: Final[dict[str, Any]] = {"type": "object", "additionalProperties": True
 
 #: Any JSON object.
 JsonObject: TypeAlias = Annotated[msgspec.Raw, msgspec.Meta(extra_json_schema=_OBJECT)]
-#: A graph in an answer; its numbers are spelled as they were given.
+#: A graph in an answer, with its numbers spelled as they were given.
 UmrfGraph: TypeAlias = Annotated[
     msgspec.Raw, msgspec.Meta(extra_json_schema={**_OBJECT, "description": "A UMRF graph."})
 ]

@@ -1,7 +1,7 @@
-"""Where values stand in a JSON text: pointers to lines and columns.
+"""Finds the line and column of JSON pointers in a text.
 
-One pass over the tokens, which enters only what is asked for; so it costs no more than the text is
-long.
+One pass over the tokens enters only the objects and lists that are asked for, so the cost is at
+most the length of the text.
 """
 
 import json
@@ -18,7 +18,7 @@ _BLANK: Final = re.compile(r"[ \t\r\n]*")
 
 
 def pointer(*keys: str | int) -> str:
-    """The JSON pointer (RFC 6901) that leads through these keys."""
+    """Return the JSON pointer (RFC 6901) that leads through these keys."""
     path = ""
     for key in keys:
         if isinstance(key, str) and ("~" in key or "/" in key):
@@ -29,8 +29,8 @@ def pointer(*keys: str | int) -> str:
 
 
 class Place(msgspec.Struct, frozen=True):
-    """A value in a text. `line` and `column` (characters, both from 1): where it begins, with its
-    key if it has one."""
+    """The place of a value in a text. `line` and `column` (characters, both from 1): its beginning,
+    with its key if it has one."""
 
     path: str
     line: int
@@ -48,9 +48,10 @@ class _Wanted:
 
 
 def places_of(text: str, paths: Iterable[str]) -> dict[str, Place]:
-    """The place of each pointer; of one that leads nowhere, that of the value in which it ends.
+    """Return the place of each pointer. A pointer that leads nowhere has the place of the value in
+    which it ends.
 
-    `text` is JSON, without doubled keys.
+    `text` is JSON without double keys.
     """
     paths = set(paths)
     root = _Wanted()
@@ -80,9 +81,11 @@ def _place(root: _Wanted, path: str, lines: "_Lines") -> Place:
 
 
 def _find(text: str, root: _Wanted) -> None:
-    """Sets where each of what is wanted begins."""
+    """Set the start of each value that is wanted."""
     root.start = _after_blanks(text, 0)
-    above: list[tuple[_Wanted, int | None]] = []  # what is open, and the number of its last item
+    above: list[
+        tuple[_Wanted, int | None]
+    ] = []  # open objects and lists, with the last item's number
     node, item = root, None
     value: _Wanted | None = root
     is_key = False
@@ -115,7 +118,7 @@ def _find(text: str, root: _Wanted) -> None:
 
 
 def _after(text: str, at: int) -> int:
-    """The offset behind the object or list that was opened before `at`."""
+    """Return the offset after the object or list that was opened before `at`."""
     depth = 1
     while depth and (bracket := _BRACKET.match(text, at)):
         depth += 1 if bracket[1] in "[{" else -1
@@ -136,12 +139,13 @@ def _item(node: _Wanted, index: int, text: str, at: int) -> _Wanted | None:
 
 
 def key_of(token: str) -> str:
-    """The text that a JSON string spells."""
+    """Return the text that a JSON string spells."""
     return str(json.loads(token, strict=False)) if "\\" in token else token[1:-1]
 
 
 def doubled_in(text: str) -> tuple[str, int] | None:
-    """The pointer to the first key that stands twice in one object, and where it does so again."""
+    """Return the pointer of the first key that occurs twice in one object, and the offset of its
+    second occurrence; else None."""
     for path, offset, fresh in _members(text):
         if not fresh:
             return path, offset
@@ -149,7 +153,7 @@ def doubled_in(text: str) -> tuple[str, int] | None:
 
 
 def path_at(text: str, offset: int) -> str:
-    """The pointer to the value that begins at an offset, or to the last one before it."""
+    """Return the pointer of the value that begins at an offset, or of the last one before it."""
     last = ""
     for path, start, _ in _members(text):
         if start > offset:
@@ -159,9 +163,10 @@ def path_at(text: str, offset: int) -> str:
 
 
 def _members(text: str) -> Iterator[tuple[str, int, bool]]:
-    """Every key and item: its pointer, where it begins, and whether the key is new in its object.
+    """Yield every key and item: its pointer, its offset, and whether the key is new in its object.
 
-    Also of a text that is no JSON, as far as it looks like it."""
+    Also works on a text that is not valid JSON, as far as it resembles JSON.
+    """
     heads: list[tuple[str, set[str] | int]] = []
     path, is_key = "", False
     for token in _TOKEN.finditer(text):
@@ -191,17 +196,17 @@ def _members(text: str) -> Iterator[tuple[str, int, bool]]:
 
 
 def place_at(text: str, offset: int) -> tuple[int, int]:
-    """Line and column of an offset, both from 1."""
+    """Return line and column of an offset, both from 1."""
     return text.count("\n", 0, offset) + 1, offset - text.rfind("\n", 0, offset)
 
 
 class _Lines:
-    """The same for many offsets."""
+    """Finds line and column of many offsets of one text."""
 
     def __init__(self, text: str) -> None:
         self._starts = [0, *(found.end() for found in re.finditer("\n", text))]
 
     def of(self, offset: int) -> tuple[int, int]:
-        """Line and column of an offset."""
+        """Return line and column of an offset, both from 1."""
         line = bisect_right(self._starts, offset)
         return line, offset - self._starts[line - 1] + 1

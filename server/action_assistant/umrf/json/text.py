@@ -1,7 +1,7 @@
-"""JSON text within bounds, with the spelling of its numbers.
+"""Parses and prints JSON text within bounds, and keeps the spelling of numbers.
 
-Python's own scanner does the reading; what it lacks is checked before (size, nesting, number of
-values) or through its hooks (double keys, NaN, spelling), so that no input costs more than its size.
+Python's own scanner does the reading. Size, nesting and the number of values are checked before;
+double keys, NaN and spelling through its hooks. So no input costs more than its size.
 """
 
 import json
@@ -21,7 +21,7 @@ from action_assistant.umrf.json.places import pointer as pointer
 MAX_BYTES: Final = 10 * 1024 * 1024
 MAX_DEPTH: Final = 64
 MAX_VALUES: Final = 1_000_000
-#: Longest spelling of a number; a double needs 25.
+#: The longest spelling of a number; a double needs 25 characters.
 MAX_NUMBER: Final = 1_000
 
 _STRING: Final = re.compile(r'"(?:[^"\\]|\\.)*+(?:"|\\?\Z)', re.DOTALL)
@@ -30,10 +30,10 @@ _SURROGATE: Final = re.compile(r"[\ud800-\udfff]|\\u[dD][89a-fA-F]")
 
 
 class Unreadable(Exception):
-    """The text is no JSON, no UMRF, or beyond the limits.
+    """Raised for a text that is no JSON, no UMRF, or beyond the limits.
 
-    `path` is a JSON pointer into the text, empty for the whole; `line` and `column` count characters
-    from 1.
+    `path` is a JSON pointer into the text, empty for all of it; `line` and `column` count
+    characters from 1.
     """
 
     def __init__(
@@ -55,7 +55,7 @@ class Unreadable(Exception):
 
 
 class Number(msgspec.Struct, frozen=True):
-    """A number as it is spelled."""
+    """A number in its original spelling."""
 
     text: str
 
@@ -69,7 +69,7 @@ Json: TypeAlias = "dict[str, Json] | list[Json] | str | bool | Number | None"
 
 
 def parse(text: str | bytes) -> Json:
-    """The value of a JSON text. Raises `Unreadable`."""
+    """Parse a JSON text. Raises `Unreadable`."""
     text = decoded(text)
     _bound(text)
     hooks = _Hooks(text)
@@ -92,8 +92,7 @@ def parse(text: str | bytes) -> Json:
 
 
 def parse_small(text: str) -> Json:
-    """The value of a text that a person or program put into a field; a text that is no JSON
-    stands for itself. Never raises."""
+    """Parse the text of one field. A text that is no JSON is returned as it is. Never raises."""
     try:
         return parse(text)
     except Unreadable:
@@ -101,26 +100,26 @@ def parse_small(text: str) -> Json:
 
 
 def dump(value: Json) -> str:
-    """Compact JSON text; what `parse` reads gives the same value."""
+    """Return compact JSON text; `parse` reads the same value from it."""
     out: list[str] = []
     _compact(value, out)
     return "".join(out)
 
 
 def dump_indented(value: Json) -> str:
-    """JSON text with two blanks per level."""
+    """Return JSON text with an indentation of two blanks for each level."""
     out: list[str] = []
     _indented(value, "\n", out)
     return "".join(out)
 
 
 def number(value: float) -> Number:
-    """A number in its shortest spelling, whole numbers without a point."""
+    """Return a number in its shortest spelling, whole numbers without a point."""
     return Number(str(int(value)) if value.is_integer() and abs(value) < 1e15 else repr(value))
 
 
 class _Hooks:
-    """What the scanner calls for every object and number."""
+    """Callbacks of the scanner for objects and numbers."""
 
     def __init__(self, text: str) -> None:
         self.doubled = False
@@ -146,18 +145,19 @@ class _Hooks:
         raise Unreadable("not-json", message, line=line, column=column)
 
     def _where(self, token: str) -> tuple[int, int, str]:
-        """Line, column and pointer of where a token stands first; the scanner does not say."""
+        """Return line, column and pointer of the first occurrence of a token; the scanner does not
+        report its place."""
         offset = _without_strings(self._text).find(token)
         return *place_at(self._text, offset), path_at(self._text, offset)
 
 
 def _without_strings(text: str) -> str:
-    """The text with blanks for its strings, so that offsets stay."""
+    """Return the text with its strings replaced by blanks, so that offsets stay."""
     return _STRING.sub(lambda found: " " * len(found[0]), text)
 
 
 def decoded(text: str | bytes) -> str:
-    """The text as `parse` sees it: without a byte order mark. Raises `Unreadable`."""
+    """Return the text as `parse` reads it, without a byte order mark. Raises `Unreadable`."""
     if len(text) > MAX_BYTES:
         raise Unreadable("too-large", "The text is larger than 10 MB.")
     if isinstance(text, str):
@@ -173,7 +173,8 @@ def decoded(text: str | bytes) -> str:
 
 
 def _bound(text: str) -> None:
-    """Refuses what is nested too deeply or has too many values, before anything is built."""
+    """Refuse a text that is nested too deeply or has too many values, before anything is built.
+    Raises `Unreadable`."""
     structure = _NOT_STRUCTURE.sub("", _STRING.sub("", text))
     if len(structure) > MAX_VALUES:
         raise Unreadable("too-large", f"The text has more than {MAX_VALUES:,} values.")
@@ -198,7 +199,7 @@ def _too_deep(text: str) -> Unreadable:
 
 
 def _walk(value: Json, path: str = "") -> Iterator[tuple[str, Json]]:
-    """Every value with its pointer, the outer ones first."""
+    """Yield every value with its pointer, outer values first."""
     yield path, value
     match value:
         case dict():

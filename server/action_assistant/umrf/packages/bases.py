@@ -1,7 +1,8 @@
-"""What was generated last, kept in the package as one file: the base of the next merge.
+"""The base of the next merge: the texts that were generated last, kept in the package as one hidden
+file.
 
-One file, and a hidden one: a second `package.xml` would be a second package to who looks for them. Texts
-are lists of lines, so that histories of changes show it by lines, and merge it.
+A second visible `package.xml` would be a second package to programs that look for them. Texts are
+lists of lines, so that version control shows and merges them by line.
 """
 
 import hashlib
@@ -10,7 +11,7 @@ from typing import Final
 
 import msgspec
 
-#: Below the folder of the package.
+#: The path of the file below the folder of the package.
 BASE_NAME: Final = ".generated.json"
 _ABOUT: Final = (
     "What `action-assistant package` generated last. It merges by it, so keep it with the sources."
@@ -18,26 +19,31 @@ _ABOUT: Final = (
 
 
 class UnreadableBase(Exception):
-    """The file is no base. The message is the end of a sentence."""
+    """Raised for a file that is no base. The message is the end of a sentence."""
 
 
 class UnfinishedFile(msgspec.Struct, frozen=True):
-    """A file that a call began to write: `digest` of what it was to hold, and `text` generated for it."""
+    """A file that a call began to write. `digest`: the hash of its intended content; `text`: the
+    text generated for it."""
 
     digest: str
     text: bytes
 
 
 class GenerationBase(msgspec.Struct, frozen=True):
-    """Texts by path below the package. `unfinished` is there while a call writes, or if it was killed."""
+    """Generated texts by path below the package. `unfinished` is set while a call writes, or if the
+    call was killed."""
 
     files: dict[str, bytes] = {}
     unfinished: dict[str, UnfinishedFile] = {}
 
     def settled(self, there: Mapping[str, bytes]) -> dict[str, bytes]:
-        """What each file was made from. Of an unfinished call that is the newer text where its file
-        arrived: merging it in once more could repeat lines. What was not there before it came by it,
-        also if it was edited since."""
+        """Return the generated text on which each file is based, given the files that are `there`.
+
+        For an unfinished call this is the newer text if its file has arrived: to merge it again
+        could repeat lines. A file that was not there before came from that call, even if it was
+        edited since.
+        """
         arrived = {
             path: each.text
             for path, each in self.unfinished.items()
@@ -59,12 +65,12 @@ class _StoredBase(msgspec.Struct, frozen=True, omit_defaults=True, forbid_unknow
 
 
 def digest(content: bytes) -> str:
-    """By which an unfinished file is known again."""
+    """Return the hash by which an unfinished file is recognised."""
     return hashlib.sha256(content).hexdigest()
 
 
 def write_base(base: GenerationBase) -> bytes:
-    """The content of the file."""
+    """Return the content of the base file."""
     stored = _StoredBase(
         about=_ABOUT,
         format=1,
@@ -78,7 +84,7 @@ def write_base(base: GenerationBase) -> bytes:
 
 
 def read_base(content: bytes) -> GenerationBase:
-    """Raises `UnreadableBase`."""
+    """Read the content of the base file. Raises `UnreadableBase`."""
     try:
         stored = msgspec.json.decode(content, type=_StoredBase)
         if stored.format != 1:

@@ -1,4 +1,4 @@
-"""One ROS package with several actions: the files of each, built together."""
+"""Generates one ROS package with several actions: the files of each, built together."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -19,14 +19,14 @@ from action_assistant.umrf.packages.naming import (
     snake_case,
 )
 
-#: What a package has once: template and language by path.
+#: The files that a package has once: template and language by path.
 _SHARED: Final = {
     ".clang-format": ("clang_format", "yaml"),
     "CMakeLists.txt": ("bundle_cmake_lists", "cmake"),
     "README.md": ("bundle_readme", "markdown"),
     "package.xml": ("package", "xml"),
 }
-#: What it has of each action.
+#: The files that it has for each action.
 _OF_ACTIONS: Final = re.compile(
     r"include/([a-z0-9_]+)/(?:(?:in|out)put_parameters|temoto_action)\.hpp"
     r"|src/([a-z0-9_]+)\.cpp|test/([a-z0-9_]+)_test\.cpp|([a-z0-9_]+)\.umrf\.json"
@@ -34,7 +34,7 @@ _OF_ACTIONS: Final = re.compile(
 
 
 class _BundledAction(msgspec.Struct, frozen=True):
-    """What the README says of an action."""
+    """The facts about an action that the README lists."""
 
     name: str
     package: str
@@ -42,8 +42,11 @@ class _BundledAction(msgspec.Struct, frozen=True):
 
 
 def bundle_files(package: str, actions: Sequence[Action]) -> dict[str, bytes]:
-    """Contents by path below the folder of a package with all these actions. Raises
-    `ImpossiblePackage`; paths are those of packages of single actions where they speak of one."""
+    """Return contents by path below the folder of a package with all these actions. Raises
+    `ImpossiblePackage`.
+
+    Files of a single action have the same paths as in its own package.
+    """
     refusals = [*_against(package, actions), *check_names(action.name for action in actions)]
     found: dict[str, bytes] = {}
     for action in actions:
@@ -72,7 +75,7 @@ def bundle_files(package: str, actions: Sequence[Action]) -> dict[str, bytes]:
 
 
 def is_of_bundle(path: str) -> bool:
-    """Whether a package of several actions may have this file, whatever they are."""
+    """Return whether a package of several actions can have this file, whatever its actions are."""
     return path in _SHARED or _OF_ACTIONS.fullmatch(path) is not None
 
 

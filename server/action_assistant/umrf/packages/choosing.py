@@ -1,4 +1,4 @@
-"""Which actions a graph has that packages can be made for: one for each name."""
+"""Selects the actions of a graph for which packages can be made: one for each name."""
 
 from collections.abc import Iterator
 
@@ -11,8 +11,10 @@ from action_assistant.umrf.signatures import signature_of
 
 
 def distinct_actions(graph: Graph) -> tuple[Action, ...]:
-    """The first action of each name, in the order of the graph. Values are left out: each node gives
-    its own, and in the file of an action they would be those of every graph."""
+    """Return the first action of each name, in the order of the graph, without values.
+
+    Each use gives its own values; in the file of an action they would apply to every graph.
+    """
     found: dict[str, Action] = {}
     for action in graph.actions:
         if not action.missing:
@@ -21,7 +23,8 @@ def distinct_actions(graph: Graph) -> tuple[Action, ...]:
 
 
 def disagreements(graph: Graph) -> tuple[NameRefusal, ...]:
-    """Actions of one name whose parameters differ: the engine would find the package for some only."""
+    """Return refusals for actions of one name whose parameters differ: the engine would find the
+    package for some only."""
     return tuple(_disagreements(graph))
 
 

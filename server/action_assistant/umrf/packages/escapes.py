@@ -1,7 +1,7 @@
-"""Texts of people inside C++, CMake, XML and Markdown: a type of its own for each place.
+"""Escapes texts of people for C++, CMake, XML and Markdown, with a type for each kind of place.
 
-What stands in a template is ours; what is put into it was written by anybody. A template takes nothing
-but the types that its language lists, so a text that no filter has made safe cannot get into a file.
+Templates are ours; texts that are put into them were written by anybody. A template accepts only
+the types that its language lists, so a text that no filter has made safe cannot get into a file.
 """
 
 import math
@@ -27,72 +27,72 @@ _MARKDOWN_ESCAPES: Final = {ord(each): f"\\{each}" for each in r"\`*_{}[]()<>#+-
 
 
 class SafeText(str):
-    """A text that may stand in one kind of place. Only the functions of this module make any."""
+    """A text that is safe in one kind of place. Only the functions of this module make one."""
 
     __slots__ = ()
 
 
 class CppName(SafeText):
-    """An identifier, or several with `.` between them."""
+    """An identifier, or several joined by `.`."""
 
     __slots__ = ()
 
 
 class CppType(SafeText):
-    """A type that a parameter may have."""
+    """A C++ type that a parameter can have."""
 
     __slots__ = ()
 
 
 class CppString(SafeText):
-    """A string literal with its quotes."""
+    """A C++ string literal with its quotes."""
 
     __slots__ = ()
 
 
 class CppInitial(SafeText):
-    """What a member is at first, in braces."""
+    """The initial value of a member, in braces."""
 
     __slots__ = ()
 
 
 class CppComment(SafeText):
-    """What stands inside `/* */`, or after `//` where it has one line."""
+    """Text inside `/* */`, or after `//` if it has one line."""
 
     __slots__ = ()
 
 
 class PackageName(SafeText):
-    """The name of a package, which means nothing special in any of the languages."""
+    """The name of a package, which has no special meaning in any of the languages."""
 
     __slots__ = ()
 
 
 class CMakeString(SafeText):
-    """A quoted argument with its quotes."""
+    """A quoted CMake argument with its quotes."""
 
     __slots__ = ()
 
 
 class XmlText(SafeText):
-    """Text between tags, or an attribute between quotes."""
+    """Text between XML tags, or in a quoted attribute."""
 
     __slots__ = ()
 
 
 class MarkdownText(SafeText):
-    """Text of a paragraph, without any markup."""
+    """Text of a paragraph without any markup."""
 
     __slots__ = ()
 
 
 class Blanks(SafeText):
-    """What a line is indented by."""
+    """The indentation of a line."""
 
     __slots__ = ()
 
 
-#: What templates of each language take.
+#: The types that templates of each language accept.
 ACCEPTED: Final[dict[str, tuple[type[SafeText], ...]]] = {
     "cpp": (CppName, CppType, CppString, CppInitial, CppComment, PackageName, Blanks),
     "cmake": (CMakeString, PackageName),
@@ -103,22 +103,25 @@ ACCEPTED: Final[dict[str, tuple[type[SafeText], ...]]] = {
 
 
 def cpp_name(text: str) -> CppName:
-    """Raises ValueError for what is no identifier."""
+    """Return an identifier. Raises ValueError for any other text."""
     if not all(_WORD.fullmatch(part) for part in text.split(".")):
         raise ValueError(f"no identifier: {text!r}")
     return CppName(text)
 
 
 def cpp_type(text: str) -> CppType:
-    """Raises ValueError for what no parameter has."""
+    """Return the type of a parameter. Raises ValueError for any other text."""
     if not _TYPE.fullmatch(text):
         raise ValueError(f"no type of a parameter: {text!r}")
     return CppType(text)
 
 
 def cpp_string(text: str) -> CppString:
-    """A literal of UTF-8. Octal escapes end after three digits, whatever follows them; `?` could be
-    part of a trigraph."""
+    """Return a UTF-8 string literal.
+
+    Octal escapes end after three digits, whatever follows them. `?` is escaped, since it could be
+    part of a trigraph.
+    """
 
     def octal(found: re.Match[str]) -> str:
         return "".join(f"\\{byte:03o}" for byte in found[0].encode("utf-8", "replace"))
@@ -128,8 +131,8 @@ def cpp_string(text: str) -> CppString:
 
 
 def cpp_initial(value: str | float | bool | tuple[str | float | bool, ...] | None) -> CppInitial:
-    """Return the initializer of a member; empty braces for None. Raises ValueError for numbers that are
-    none."""
+    """Return the initializer of a member; empty braces for None. Raises ValueError for a number
+    that is not finite."""
     values = () if value is None else value if isinstance(value, tuple) else (value,)
     return CppInitial(f"{{{', '.join(map(_literal, values))}}}")
 
@@ -145,49 +148,55 @@ def _literal(value: str | float | bool) -> str:
 
 
 def cpp_comment(text: str, indent: int = 0) -> CppComment:
-    """Lines that go on below ` * `, `indent` blanks in. The end of a comment, its beginning, trigraphs
-    and backslashes at the end of a line are taken apart; what cannot be seen is spelled out."""
+    """Return the text of a comment whose lines continue below ` * `, indented by `indent` blanks.
+
+    The end and beginning of comments, trigraphs and backslashes at the end of a line are taken
+    apart; invisible characters are spelled out.
+    """
     apart = visible(text).replace("*/", "* /").replace("/*", "/ *").replace("??", "? ?")
     lines = [re.sub(r"\\(?=\s*$)", r"\\ .", line).rstrip() for line in apart.split("\n")]
     return CppComment(f"\n{' ' * indent} * ".join(lines))
 
 
 def package_name(text: str) -> PackageName:
-    """Raises ValueError for what is none."""
+    """Return the name of a package. Raises ValueError for any other text."""
     if not _PACKAGE_NAME.fullmatch(text):
         raise ValueError(f"no name of a package: {text!r}")
     return PackageName(text)
 
 
 def cmake(text: str) -> CMakeString:
-    """No variable, no list and no generator expression is seen in it."""
+    """Return a quoted argument in which CMake sees no variable, list or generator expression."""
     return CMakeString(f'"{visible(text).translate(_CMAKE_ESCAPES)}"')
 
 
 def xml(text: str) -> XmlText:
-    """Characters that XML cannot have are spelled out."""
+    """Return escaped text. Characters that XML cannot have are spelled out."""
     return XmlText(visible(text).translate(_XML_ESCAPES))
 
 
 def markdown(text: str) -> MarkdownText:
-    """One paragraph, also of a text that has several: no line begins a list, a heading or a fence."""
+    """Return one paragraph, also for a text with several: no line can begin a list, a heading or a
+    fence."""
     return MarkdownText(" ".join(visible(text).split()).translate(_MARKDOWN_ESCAPES))
 
 
 def blanks(depth: int) -> Blanks:
-    """Two for each level."""
+    """Return an indentation of two blanks for each level."""
     return Blanks("  " * depth)
 
 
 def visible(text: str) -> str:
-    """The text with `U+202E` for each character that steers and cannot be seen; lines stay."""
+    """Return the text with `U+202E` in place of each invisible control character; line breaks
+    stay."""
     return _CONTROLS.sub(
         lambda found: f"U+{ord(found[0]):04X}", text.replace("\r\n", "\n").replace("\t", " ")
     )
 
 
 def only(language: str) -> Callable[[Any], SafeText]:
-    """For `finalize` of templates of a language: raises TypeError for every other value."""
+    """Return the `finalize` function for templates of a language, which raises TypeError for values
+    of other types."""
     accepted = ACCEPTED[language]
 
     def finalize(value: Any) -> SafeText:

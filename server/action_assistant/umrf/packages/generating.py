@@ -1,4 +1,4 @@
-"""The files of an action package, from the description of its action."""
+"""Generates the files of an action package from the description of its action."""
 
 from functools import cache
 from pathlib import Path
@@ -30,12 +30,12 @@ _FILES: Final = {
 }
 
 
-#: Where sources lie that are written once, for people to go on with.
+#: The folders of sources that are generated once, for people to continue.
 _SOURCES: Final = ("src/", "test/")
 
 
 class ImpossiblePackage(Exception):
-    """There can be no package of the action; `refusals` say why."""
+    """Raised if there can be no package of the action; `refusals` are the reasons."""
 
     def __init__(self, refusals: tuple[NameRefusal, ...]) -> None:
         super().__init__(" ".join(refusal.sentence for refusal in refusals))
@@ -43,8 +43,11 @@ class ImpossiblePackage(Exception):
 
 
 def package_files(action: Action) -> dict[str, bytes]:
-    """Contents by path (with `/`) below the folder of the package, whose name is
-    `naming.snake_case(action.name)`. Raises `ImpossiblePackage`."""
+    """Return contents by path (with `/`) below the folder of the package, whose name is
+    `naming.snake_case(action.name)`.
+
+    Raises `ImpossiblePackage`.
+    """
     refusals = check_name(action.name)
     inputs, against_inputs = structure(action, "input_parameters")
     outputs, against_outputs = structure(action, "output_parameters")
@@ -69,12 +72,12 @@ def package_files(action: Action) -> dict[str, bytes]:
 
 
 def possible_files(package: str) -> frozenset[str]:
-    """All paths that `package_files` may have for a package of this name."""
+    """Return all paths that `package_files` may have for a package of this name."""
     return frozenset(path.format(package) for path in (*_FILES, "{}.umrf.json"))
 
 
 def is_source(path: str) -> bool:
-    """Whether what is generated there is a beginning, which people go on with."""
+    """Return whether the generated file is a beginning that people continue."""
     return path.startswith(_SOURCES)
 
 
@@ -84,21 +87,24 @@ def _wanted(template: str, inputs: ParameterStruct, outputs: ParameterStruct) ->
 
 
 def _described(action: Action) -> Action:
-    """The action apart from any graph: without number, actor, place and relations."""
+    """Return the action apart from any graph: without number, actor, position and relations."""
     extra = tuple((k, v) for k, v in action.extra if k not in {*RELATIONS, "instance_id"})
     return msgspec.structs.replace(action, instance_id=0, actor="", position=None, extra=extra)
 
 
 def rendered(template: str, language: str, known: dict[str, Any]) -> bytes:
-    """A template of a language, filled in."""
+    """Render a template of a language."""
     text = environment(language).get_template(f"{template}.jinja").render(known)
     return text.encode()
 
 
 @cache
 def environment(language: str) -> Environment:
-    """Where templates of a language are rendered: what has no type of `escapes.ACCEPTED` raises
-    TypeError, what is not given raises UndefinedError."""
+    """Return the environment that renders templates of a language.
+
+    A value of a type that is not in `escapes.ACCEPTED` raises TypeError, a missing value raises
+    UndefinedError.
+    """
     made = Environment(
         loader=FileSystemLoader(_TEMPLATES),
         autoescape=False,

@@ -1,8 +1,8 @@
-"""Merging a text that was changed on two sides, by lines: what both leave apart is taken together, what
-they both touch is a conflict.
+"""Merges a text that was changed on two sides, line by line. Changes that lie apart are combined;
+changes to the same lines are a conflict.
 
-Of our own, since libraries for it are under the GPL or compare by characters, where halves of two
-lines would make a third that nobody wrote.
+This is our own, since libraries for it are under the GPL or compare by characters, where halves of
+two lines would make a third one that nobody wrote.
 """
 
 from collections.abc import Iterator, Sequence
@@ -15,8 +15,8 @@ _Lines: TypeAlias = tuple[bytes, ...]
 
 
 class MergeConflict(msgspec.Struct, frozen=True):
-    """One place that both sides changed. `line`: where it begins in `ours`, from 1; `base`, `ours`,
-    `theirs`: the lines of each, none where they are deleted."""
+    """One place that both sides changed. `line`: its first line in `ours`, from 1. `base`, `ours`,
+    `theirs`: the lines of each; empty where they were deleted."""
 
     line: int
     base: tuple[bytes, ...]
@@ -25,15 +25,17 @@ class MergeConflict(msgspec.Struct, frozen=True):
 
 
 class MergedText(msgspec.Struct, frozen=True):
-    """What became of a merge. With conflicts, `content` is `ours` as it was."""
+    """The result of a merge. With conflicts, `content` is `ours` unchanged."""
 
     content: bytes
     conflicts: tuple[MergeConflict, ...] = ()
 
 
 class _LineChange(msgspec.Struct, frozen=True):
-    """Lines `first` to `last` (exclusive) of the base become `lines` on a side; an insertion has
-    `first == last`. `start` is the line of that side at which they begin."""
+    """The change of lines `first` to `last` (exclusive) of the base into `lines` on one side.
+
+    An insertion has `first == last`. `start` is the line of that side at which they begin.
+    """
 
     side: Literal["ours", "theirs"]
     first: int
@@ -41,15 +43,18 @@ class _LineChange(msgspec.Struct, frozen=True):
     lines: tuple[bytes, ...]
 
     def touches(self, other: "_LineChange") -> bool:
-        """Whether their order or result would be a guess. Replaced lines may lie next to each other;
-        next to an insertion, nobody knows which lines it belongs to."""
+        """Return whether the order or the result of two changes would be a guess.
+
+        Replaced lines may be adjacent; an insertion next to changed lines may belong to either of
+        them.
+        """
         if self.first == self.last or other.first == other.last:
             return self.first <= other.last and other.first <= self.last
         return self.first < other.last and other.first < self.last
 
 
 def merged(base: bytes, ours: bytes, theirs: bytes) -> MergedText:
-    """`ours` with what `theirs` changed of `base`. A line ends with a line feed; all else is its own."""
+    """Return `ours` with the changes of `theirs` to `base`. A line ends with a line feed only."""
     if theirs in (base, ours):
         return MergedText(ours)
     if ours == base:
@@ -81,13 +86,15 @@ def merged(base: bytes, ours: bytes, theirs: bytes) -> MergedText:
 
 
 def _split(text: bytes) -> _Lines:
-    """With their ends. `splitlines` would end lines at single carriage returns, too."""
+    """Return the lines with their ends. `splitlines` would also end lines at single carriage
+    returns."""
     *lines, rest = text.split(b"\n")
     return (*(line + b"\n" for line in lines), *([rest] if rest else ()))
 
 
 def _edits(old: _Lines, new: _Lines) -> Iterator[tuple[str, int, int, int, int]]:
-    """What makes one of the other, as `SequenceMatcher.get_opcodes` has it, without what is equal."""
+    """Yield the changes from `old` to `new` as in `SequenceMatcher.get_opcodes`, without equal
+    parts."""
     found = SequenceMatcher(None, old, new, autojunk=False).get_opcodes()
     return (each for each in found if each[0] != "equal")
 
@@ -98,7 +105,7 @@ def _changes(side: Literal["ours", "theirs"], base: _Lines, lines: _Lines) -> It
 
 
 def _clusters(changes: Sequence[_LineChange]) -> Iterator[list[_LineChange]]:
-    """Changes that can only be judged together."""
+    """Yield groups of changes that have to be judged together."""
     cluster: list[_LineChange] = []
     for change in changes:
         if any(change.touches(each) for each in cluster if each.side != change.side):
@@ -114,7 +121,7 @@ def _clusters(changes: Sequence[_LineChange]) -> Iterator[list[_LineChange]]:
 def _applied(
     base: _Lines, changes: Sequence[_LineChange], first: int, last: int
 ) -> tuple[bytes, ...]:
-    """Lines `first` to `last` of the base with these changes."""
+    """Return lines `first` to `last` of the base with these changes."""
     found: list[bytes] = []
     for change in changes:
         found += (*base[first : change.first], *change.lines)
@@ -123,14 +130,15 @@ def _applied(
 
 
 def _taken_over(base: _Lines, ours: _Lines, theirs: _Lines) -> bool:
-    """Whether `ours` has all that `theirs` changed, and differs elsewhere: a person took it over by hand."""
+    """Return whether `ours` has everything that `theirs` changed and differs only elsewhere: a
+    person merged it by hand."""
     new = [
         (_said(base[start:end]) > _said(theirs[first:last]), first, last)
         for _, start, end, first, last in _edits(base, theirs)
     ]
     own = [(first, last) for _, first, last, _, _ in _edits(theirs, ours)]
     return not any(
-        # What became fewer lines leaves nothing to know it by: own lines beside may stand for it.
+        # A change to fewer lines cannot be recognised in `ours`: own lines next to it may stand for it.
         (start <= last and first <= end) if fewer else (start < last and first < end)
         for fewer, first, last in new
         for start, end in own
@@ -138,5 +146,5 @@ def _taken_over(base: _Lines, ours: _Lines, theirs: _Lines) -> bool:
 
 
 def _said(lines: _Lines) -> int:
-    """How many lines have anything in them."""
+    """Return how many lines are not blank."""
     return sum(1 for line in lines if line.strip())

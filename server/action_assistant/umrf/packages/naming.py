@@ -1,7 +1,9 @@
-"""Names of packages, classes and libraries: how the engine derives them from an action's name, and which are refused.
+"""Derives the names of packages, classes and libraries from an action's name, and checks which are
+possible.
 
 The engine takes the name of an action for its class and, in snake case, for its library
-(docs/umrf-and-the-engine.md 5). Names that C++, the included headers, ROS or CMake use are listed here.
+(docs/umrf-and-the-engine.md 5). Names that C++, the included headers, ROS or CMake use are listed
+here.
 """
 
 import errno
@@ -117,7 +119,7 @@ PACKAGE_NAMES: Final = _words(
 )
 
 
-#: Of a name; file systems have 255 bytes for it with what is added.
+#: The most characters of a name; file systems have 255 bytes for it and what is added.
 MAX_NAME: Final = 100
 _IDENTIFIER: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _ROS_NAME: Final = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
@@ -125,8 +127,8 @@ _CAPITALS: Final = re.compile(r"[A-Z][A-Z0-9_]+")
 
 
 class NameRefusal(msgspec.Struct, frozen=True):
-    """Why there can be no package of something. `place` is a JSON pointer below the action's name,
-    `reason` a sentence."""
+    """A reason for which there can be no package. `place` is a JSON pointer below the action's
+    name, `reason` a sentence."""
 
     place: str
     reason: str
@@ -136,13 +138,15 @@ class NameRefusal(msgspec.Struct, frozen=True):
 
     @property
     def sentence(self) -> str:
-        """Place and reason."""
+        """The place and the reason, joined by a colon."""
         return f"{self.place}: {self.reason}"
 
 
 def snake_case(name: str) -> str:
-    """The name of package, folder and library. ASCII alone, as the engine's locale has it: `TaURDF`
-    is `ta_u_r_d_f`."""
+    """Return the name of package, folder and library, for example `ta_u_r_d_f` for `TaURDF`.
+
+    Only ASCII letters change, as in the engine's locale.
+    """
     first, rest = name[:1].translate(_LOWER), name[1:]
     return first + re.sub("[A-Z]", lambda found: "_" + found[0].translate(_LOWER), rest)
 
@@ -151,13 +155,14 @@ _LOWER: Final = {code: code + 32 for code in range(ord("A"), ord("Z") + 1)}
 
 
 def check_name(name: str) -> tuple[NameRefusal, ...]:
-    """What stands against a package of an action of this name; nothing if it can be."""
+    """Return the reason against a package of an action of this name; empty if it is possible."""
     reason = next(_against(name), None)
     return () if reason is None else (NameRefusal(name, reason),)
 
 
 def check_names(names: Iterable[str]) -> tuple[NameRefusal, ...]:
-    """The same of several that lie side by side, and those of them that would be one package."""
+    """Return the reasons against packages of these names, including names that would give the same
+    package."""
     listed = list(dict.fromkeys(names))
     found = [refusal for name in listed for refusal in check_name(name)]
     taken: dict[str, str] = {}
@@ -170,13 +175,13 @@ def check_names(names: Iterable[str]) -> tuple[NameRefusal, ...]:
 
 
 def check_package(package: str) -> tuple[NameRefusal, ...]:
-    """What stands against a package of this name."""
+    """Return the reason against a package of this name; empty if it is possible."""
     reason = next(_against_package(package), None)
     return () if reason is None else (NameRefusal(package, reason),)
 
 
 def _against(name: str) -> Iterator[str]:
-    """Reasons, the gravest first."""
+    """Yield reasons against an action's name, the gravest first."""
     package = snake_case(name)
     if not name:
         yield "The action has no name."
@@ -213,8 +218,11 @@ def _against_package(package: str) -> Iterator[str]:
 
 
 def member_name(key: str) -> str:
-    """The C++ member for a key of parameters. What is no letter, digit or single _ between them becomes
-    one; what C++ or a header has taken gets one at its end. Several keys may have the same member."""
+    """Return the C++ member for a key of parameters. Several keys may have the same member.
+
+    Characters other than letters, digits and single _ between them become _; a name that C++ or a
+    header uses gets one at its end.
+    """
     word = re.sub("_+", "_", re.sub("[^A-Za-z0-9]", "_", key)).strip("_")
     if not word or word[0].isdigit():
         word = f"p_{word}".rstrip("_")

@@ -1,4 +1,5 @@
-"""What a new generation does to a package in which people have worked. Nothing here reads or writes."""
+"""Computes the changes of a package in which people have worked when it is generated again. Nothing
+here reads or writes files."""
 
 from collections.abc import Mapping
 from xml.etree import ElementTree
@@ -18,22 +19,22 @@ from action_assistant.umrf.packages.merging import MergeConflict, merged
 
 
 class GeneratedChange(msgspec.Struct, frozen=True):
-    """What was generated for a file last, and what is now."""
+    """The text generated for a file last time, and now."""
 
     last: bytes
     now: bytes
 
 
 class Regeneration(msgspec.Struct, frozen=True):
-    """What becomes of a package; paths are below it. While there is anything in `conflicts`, `differing`
-    or `broken`, nothing may be written.
+    """The changes of a package; paths are below it. Nothing may be written while there are
+    `conflicts`, `differing` or `broken`.
 
-    `writes`: contents of files that change or are missing, without the base. `removals`: files that are no
-    longer generated and are as they were generated. `kept`: such files that people have changed.
-    `by_hand`: what is generated anew for files that are not written, or in conflict. `differing`: what is
-    generated for files that no generation is known to have made. `broken`: why files that were merged could not be read.
-    `base` is what is to be remembered afterwards, None where it is so already; `announced` while files are
-    written.
+    `writes`: contents of files that change or are missing, without the base. `removals`: files that
+    are no longer generated and are as they were generated. `kept`: such files that people have
+    changed. `by_hand`: the new text of files that are not written, or in conflict. `differing`: the
+    new text of files that no known generation has made. `broken`: the reasons for which merged
+    files could not be read. `base`: the new content of the base file, None if it does not change.
+    `announced`: its content while files are written.
     """
 
     writes: dict[str, bytes] = {}
@@ -47,8 +48,8 @@ class Regeneration(msgspec.Struct, frozen=True):
     announced: bytes = b""
 
 
-class _PackageReader:
-    """A regeneration while it is put together."""
+class _RegenerationBuilder:
+    """Collects the changes of a regeneration."""
 
     def __init__(self) -> None:
         self.writes: dict[str, bytes] = {}
@@ -57,7 +58,9 @@ class _PackageReader:
         self.differing: dict[str, bytes] = {}
         self.broken: dict[str, str] = {}
 
-    def look_at(self, path: str, last: bytes | None, there: bytes | None, now: bytes) -> None:
+    def add_file(self, path: str, last: bytes | None, there: bytes | None, now: bytes) -> None:
+        """Decide about one file from the text generated last, the text that is there, and the text
+        generated now."""
         if there == now:
             return
         if last is None:
@@ -74,6 +77,8 @@ class _PackageReader:
             self.merge(path, last, there, now)
 
     def merge(self, path: str, last: bytes, there: bytes, now: bytes) -> None:
+        """Merge the newly generated text into a file, unless there is a conflict or the result
+        could not be read."""
         found = merged(last, there, now)
         if found.conflicts:
             self.conflicts[path] = found.conflicts
@@ -90,29 +95,32 @@ class _PackageReader:
 def regenerated(
     package: str, now: Mapping[str, bytes], there: Mapping[str, bytes], base: GenerationBase | None
 ) -> Regeneration:
-    """`now`: what `package_files` gives; `there`: what the package has at these paths and at those that
-    the base names."""
-    # The base is a file, which anybody may have written: it may name what we make, and nothing else.
+    """Return the changes of a package.
+
+    `now`: the result of `package_files`; `there`: the contents of the package at these paths and at
+    those that the base names.
+    """
+    # Anybody may have written the base file, so paths that we never generate are ignored.
     settled = (base or GenerationBase()).settled(there)
     last = {path: text for path, text in settled.items() if _is_possible(package, now, path)}
-    reader = _PackageReader()
+    builder = _RegenerationBuilder()
     for path, text in now.items():
-        reader.look_at(path, last.get(path), there.get(path), text)
+        builder.add_file(path, last.get(path), there.get(path), text)
     left = [path for path in sorted(last) if path not in now and path in there]
     kept = tuple(path for path in left if there[path] != last[path])
     same = {path: text for path, text in now.items() if there.get(path) == text}
-    # Of what stays although it is no longer generated the base stays too: it may be generated again.
+    # The base of a kept file stays, since the file may be generated again.
     known = GenerationBase(dict(now) | {path: last[path] for path in kept})
     return Regeneration(
-        writes=reader.writes,
+        writes=builder.writes,
         removals=tuple(path for path in left if path not in kept),
         kept=kept,
-        by_hand=reader.by_hand,
-        conflicts=reader.conflicts,
-        differing=reader.differing,
-        broken=reader.broken,
+        by_hand=builder.by_hand,
+        conflicts=builder.conflicts,
+        differing=builder.differing,
+        broken=builder.broken,
         base=None if known == base else write_base(known),
-        announced=_announced(reader.writes, now, last | same),
+        announced=_announced(builder.writes, now, last | same),
     )
 
 
@@ -126,23 +134,27 @@ def _announced(
 def readable_paths(
     package: str, now: Mapping[str, bytes], base: GenerationBase | None
 ) -> tuple[str, ...]:
-    """The paths at which `regenerated` has to know what is there."""
+    """Return the paths whose contents `regenerated` has to know."""
     known = base or GenerationBase()
     told = (*known.files, *known.unfinished)
     return tuple(sorted({*now, *(path for path in told if _is_possible(package, now, path))}))
 
 
 def _is_possible(package: str, now: Mapping[str, bytes], path: str) -> bool:
-    """Whether a generation for this package could have made a file. What several actions had together
-    has files of actions that are no longer among them."""
+    """Return whether a generation for this package could have made a file.
+
+    A package of several actions may have files of actions that are no longer among them.
+    """
     if f"{package}.umrf.json" in now:
         return path in possible_files(package)
     return is_of_bundle(path)
 
 
 def _against(path: str, before: bytes, content: bytes) -> str | None:
-    """Why a merged file cannot be, if people left one that can: lines of two sides may be good each for
-    itself, and no JSON together."""
+    """Return the reason for which a merged file is invalid, unless it was invalid before.
+
+    Lines of two sides may each be valid alone and together be no JSON.
+    """
     reason = _unreadable(path, content)
     return None if reason is None or _unreadable(path, before) else reason
 

@@ -1,4 +1,4 @@
-"""Parameters of an action as C++ has them: structs in structs, a member for each value."""
+"""Describes parameters of an action as C++ structs: nested structs with a member for each value."""
 
 import math
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ Field: TypeAlias = Literal["input_parameters", "output_parameters"]
 Scalar: TypeAlias = str | float | bool
 Initial: TypeAlias = Scalar | tuple[Scalar, ...] | None
 
-#: C++ types by native ones. Of others the engine knows no value: it hands on what an action gave.
+#: C++ types by native types. The engine passes values of other types on as an action gave them.
 CPP_TYPES: Final = {
     "string": "std::string",
     "strings": "std::vector<std::string>",
@@ -28,8 +28,12 @@ OPAQUE: Final = "boost::any"
 
 
 class StructValue(msgspec.Struct, frozen=True):
-    """One parameter. `flat`: its name in the engine (`pose::x`); `access`: below the outermost struct
-    (`pose.x`); `kind` as in the file. `initial`: what it is until somebody says otherwise; None: empty."""
+    """One parameter. `flat`: its name in the engine (`pose::x`); `access`: its path below the
+    outermost struct (`pose.x`).
+
+    `kind`: its type in the file. `initial`: its value until code sets another one; None for an
+    empty one.
+    """
 
     flat: str
     access: str
@@ -39,18 +43,21 @@ class StructValue(msgspec.Struct, frozen=True):
 
     @property
     def cpp_type(self) -> str:
-        """Of the member."""
+        """The C++ type of the struct member."""
         return CPP_TYPES.get(self.kind, OPAQUE)
 
     @property
     def opaque(self) -> bool:
-        """Whether only actions know what is in it."""
+        """True if only actions know the type of the value."""
         return self.kind not in CPP_TYPES
 
 
 class StructLine(msgspec.Struct, frozen=True):
-    """One line of a declaration, `depth` levels in: `open` of a struct (`name` its type), `member`, or
-    `close` (`name` the member of that type, `kind`; empty for the outermost)."""
+    """One line of a declaration, `depth` levels in.
+
+    `open` begins a struct (`name` is its type), `member` declares a value, `close` ends a struct
+    (`name` is the member of the type `kind`; empty for the outermost struct).
+    """
 
     does: Literal["open", "member", "close"]
     depth: int
@@ -60,19 +67,20 @@ class StructLine(msgspec.Struct, frozen=True):
 
 
 class ParameterStruct(msgspec.Struct, frozen=True):
-    """All parameters of one side. `lines` declare them, `values` are in the order of the file."""
+    """All parameters of one side. `lines` declare them, `values` are in file order."""
 
     lines: tuple[StructLine, ...]
     values: tuple[StructValue, ...]
 
     @property
     def any_opaque(self) -> bool:
-        """Whether a member is a `boost::any`."""
+        """True if one of the members is a `boost::any`."""
         return any(value.opaque for value in self.values)
 
 
 class _StructGroup:
-    """A struct while it is put together: members by their C++ names, with the keys that they are from."""
+    """A struct under construction: members by their C++ names, with the keys from which they
+    come."""
 
     def __init__(self) -> None:
         self.members: dict[str, tuple[str, _StructGroup | StructValue]] = {}
@@ -90,9 +98,10 @@ class _StructReader:
         self.refusals.append(NameRefusal(f"{self.place}/{path}", reason))
 
     def add(self, parameter: Parameter) -> None:
+        """Add a parameter, or note the reason against it."""
         keys, leaf = keys_of(parameter.path), parse_small(parameter.text)
         if leaf == {}:
-            return  # an empty group has nothing in it
+            return  # an empty group has no member
         reason = _against(keys, leaf) or (_against_output(leaf) if self.gives else None)
         if reason is not None:
             self.refuse(parameter.path, reason)
@@ -120,8 +129,8 @@ class _StructReader:
 
 
 def structure(action: Action, field: Field) -> tuple[ParameterStruct, tuple[NameRefusal, ...]]:
-    """One side of an action, and why it cannot be: keys that C++ cannot tell apart, types that the
-    engine does not read."""
+    """Return one side of an action as a struct, with refusals of parameters that C++ or the engine
+    cannot represent."""
     reader = _StructReader(action, field)
     for parameter in action.inputs if field == "input_parameters" else action.outputs:
         reader.add(parameter)
@@ -140,7 +149,8 @@ def _lines(group: _StructGroup, kind: str, member: str, depth: int) -> Iterator[
 
 
 def _type_of(name: str, around: str, group: _StructGroup) -> str:
-    """`pose_t` for `pose`; another where the struct around or a member beside has that name."""
+    """Return the type of a nested struct: `pose_t` for `pose`, extended if the struct around or a
+    member has that name."""
     kind = f"{name}_t"
     others = {f"{each}_t" for each in group.members if each != name}
     while kind == around or kind in group.members or kind in others:
@@ -176,7 +186,8 @@ def _against(keys: tuple[str, ...], leaf: Json) -> str | None:
 
 
 def _against_output(leaf: Json) -> str | None:
-    """Engines compare single values alone, so that no list is among allowed ones."""
+    """Return the reason against an output: engines compare only single values with allowed ones,
+    and no lists."""
     assert isinstance(leaf, dict)
     if leaf["pvf_type"] in {"strings", "numbers", "bools"} and _allowed(leaf):
         return "The engine takes no list as an output that has allowed values."
@@ -189,9 +200,11 @@ def _allowed(leaf: dict[str, Json]) -> list[Json]:
 
 
 def _default(leaf: dict[str, Json]) -> Initial:
-    """What an output is until the action says otherwise, as in simulations: the value of the file, else
-    the first allowed one that C++ can spell. An engine aborts at the end of an action that leaves an
-    output with allowed values empty."""
+    """Return the initial value of an output, as in simulations: the value of the file, else the
+    first allowed value that C++ can spell.
+
+    An engine aborts at the end of an action that leaves an output with allowed values empty.
+    """
     given = [leaf["pvf_value"]] if "pvf_value" in leaf else []
     return next(
         (said for each in (*given, *_allowed(leaf)) if (said := _spelled(each)) is not None), None
@@ -199,7 +212,7 @@ def _default(leaf: dict[str, Json]) -> Initial:
 
 
 def _spelled(value: Json) -> Initial:
-    """The value where C++ has literals for it."""
+    """Return a value that has a C++ literal, else None."""
     if not isinstance(value, list):
         return _scalar(value)
     members = tuple(each for member in value if (each := _scalar(member)) is not None)
@@ -207,7 +220,7 @@ def _spelled(value: Json) -> Initial:
 
 
 def _scalar(value: Json) -> Scalar | None:
-    """A single value where C++ has a literal for it. A text with NUL would end there."""
+    """Return a single value that has a C++ literal, else None. A text with NUL would end there."""
     if isinstance(value, bool) or (isinstance(value, str) and "\x00" not in value):
         return value
     if isinstance(value, Number) and math.isfinite(value.value):

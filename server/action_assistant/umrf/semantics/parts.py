@@ -126,7 +126,7 @@ class Node:
 
     @property
     def active(self) -> bool:
-        """Whether the engine counts the action as active: it runs, is paused or stops."""
+        """True while the engine counts the action as active: it runs, is paused or stops."""
         return self.state in ACTIVE
 
     def activity(self, at_ms: float) -> int:

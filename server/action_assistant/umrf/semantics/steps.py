@@ -23,7 +23,7 @@ MOST: Final = 20_000  # the most events of one course
 
 
 class ExpectedStep(msgspec.Struct, frozen=True):
-    """One step of a course: an event of an action, or of the graph if `node` is empty."""
+    """One step of a course: an event of an action, or of the graph if no action is named."""
 
     graph: str
     node: str

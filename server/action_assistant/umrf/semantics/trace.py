@@ -28,7 +28,7 @@ class GraphStateEvent(msgspec.Struct, frozen=True, tag_field="kind", tag="graph_
 
 
 class EdgeEval(msgspec.Struct, frozen=True, tag_field="kind", tag="edge"):
-    """A child was asked for its response. `edge` is `parent => child`, `eval` is `result ->
+    """A child was asked for its response: `parent => child` was evaluated to `result ->
     response`."""
 
     t_ms: float
