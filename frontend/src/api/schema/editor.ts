@@ -49,7 +49,7 @@ export interface EditorApi {
     };
     /**
      * Activity
-     * @description What goes on in a process: open sockets; rooms of an editor; runs and robots of a runner.
+     * @description The activity of a process: open sockets, rooms of an editor, runs and robots of a runner.
      */
     Activity: {
         sockets: number;
@@ -783,7 +783,7 @@ export interface EditorApi {
     };
     /**
      * Invited
-     * @description What a link invites to, and who made it.
+     * @description The role that a link invites to, and who made the link.
      */
     Invited: {
         id: string;
@@ -803,7 +803,7 @@ export interface EditorApi {
     };
     /**
      * JournalState
-     * @description What the writer of the journal does. `failing`: why the newest transaction was not stored.
+     * @description The state of the journal's writer. `failing` says why the newest transaction was not stored.
      */
     JournalState: {
         database: string;
@@ -901,8 +901,10 @@ export interface EditorApi {
     };
     /**
      * Load
-     * @description What a process takes: seconds of a processor, bytes of memory, descriptors; and how late its loop
-     *     was at worst, in the last minute. Null where the system does not say.
+     * @description The resources that a process uses: seconds of processor time, bytes of memory, descriptors.
+     *
+     *     `loop_lag_s` is the largest lag of its event loop in the last minute. Null means that the system
+     *     does not tell.
      */
     Load: {
         cpu_s: number;
@@ -1176,7 +1178,7 @@ export interface EditorApi {
     };
     /**
      * Person
-     * @description Somebody who acts now, and may do what the role allows.
+     * @description A person who acts now, with a role that says what they may do.
      */
     Person: {
         id: string;
@@ -1186,7 +1188,7 @@ export interface EditorApi {
     };
     /**
      * PersonRef
-     * @description Somebody who acted. `id` is opaque and stable for a browser; `name` is theirs to choose.
+     * @description A person who acted. `id` is opaque and stable for a browser; people choose `name` themselves.
      */
     PersonRef: {
         id: string;
@@ -1273,8 +1275,9 @@ export interface EditorApi {
     };
     /**
      * ProblemDetails
-     * @description What a client is told about a refusal. `type` is stable; `detail` is for people. By `request_id`
-     *     the lines of the log are found.
+     * @description The description of a refusal for a client.
+     *
+     *     `type` is stable; `detail` is for people. `request_id` finds the lines of the log.
      */
     ProblemDetails: {
         type: string;
@@ -1299,7 +1302,7 @@ export interface EditorApi {
     };
     /**
      * ProcessStatus
-     * @description One of the two processes, now. `backups` are the editor's to know.
+     * @description The present state of one of the two processes. Only the editor knows `backups`.
      */
     ProcessStatus: {
         /** @enum {string} */
@@ -1319,7 +1322,7 @@ export interface EditorApi {
     };
     /**
      * ProcessVersions
-     * @description Of the program, of the Python under it, and of the tables in its database.
+     * @description The versions of the program, of its Python, and of the tables in its database.
      */
     ProcessVersions: {
         program: string;
@@ -1349,8 +1352,9 @@ export interface EditorApi {
     };
     /**
      * Readiness
-     * @description Whether the process can do its work, and what stands in the way. `parts`: what each lacks, null
-     *     where it works. Without `rclpy` a process is ready.
+     * @description The answer to whether the process can do its work, and what prevents it.
+     *
+     *     `parts` says what each part lacks, null where it works. Without `rclpy` a process is ready.
      */
     Readiness: {
         ready: boolean;
@@ -1441,7 +1445,7 @@ export interface EditorApi {
     };
     /**
      * RobotLink
-     * @description How a robot is, and when it last answered.
+     * @description The state of the connection to a robot, and when it last answered.
      */
     RobotLink: {
         name: string;
@@ -1461,8 +1465,9 @@ export interface EditorApi {
     };
     /**
      * ServerProof
-     * @description That a server knows the token: an HMAC over a challenge and the address, `HOST:PORT`, at which
-     *     the connection was taken.
+     * @description The proof that a server knows the token.
+     *
+     *     It is an HMAC over a challenge and over the address, `HOST:PORT`, that accepted the connection.
      */
     ServerProof: {
         address: string;
@@ -1484,8 +1489,10 @@ export interface EditorApi {
     };
     /**
      * SignIn
-     * @description What the page sends: the token or an invitation on first sight, a name when the person gives
-     *     one. An invitation is `ID.SECRET`, as its link has it.
+     * @description The body of a sign-in: the token or an invitation at first, and a name when the person gives
+     *     one.
+     *
+     *     An invitation is `ID.SECRET`, as its link has it.
      */
     SignIn: {
         /** @default null */
@@ -1497,7 +1504,7 @@ export interface EditorApi {
     };
     /**
      * SignedIn
-     * @description Who the page is speaking for. `named` is false until the person has given a name.
+     * @description The person who is signed in. `named` is false until the person has given a name.
      */
     SignedIn: {
         person: EditorApi["Person"];

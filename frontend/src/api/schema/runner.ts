@@ -71,7 +71,7 @@ export interface RunnerApi {
     };
     /**
      * Activity
-     * @description What goes on in a process: open sockets; rooms of an editor; runs and robots of a runner.
+     * @description The activity of a process: open sockets, rooms of an editor, runs and robots of a runner.
      */
     Activity: {
         sockets: number;
@@ -626,7 +626,7 @@ export interface RunnerApi {
     };
     /**
      * JournalState
-     * @description What the writer of the journal does. `failing`: why the newest transaction was not stored.
+     * @description The state of the journal's writer. `failing` says why the newest transaction was not stored.
      */
     JournalState: {
         database: string;
@@ -701,8 +701,10 @@ export interface RunnerApi {
     };
     /**
      * Load
-     * @description What a process takes: seconds of a processor, bytes of memory, descriptors; and how late its loop
-     *     was at worst, in the last minute. Null where the system does not say.
+     * @description The resources that a process uses: seconds of processor time, bytes of memory, descriptors.
+     *
+     *     `loop_lag_s` is the largest lag of its event loop in the last minute. Null means that the system
+     *     does not tell.
      */
     Load: {
         cpu_s: number;
@@ -889,8 +891,9 @@ export interface RunnerApi {
     };
     /**
      * ProblemDetails
-     * @description What a client is told about a refusal. `type` is stable; `detail` is for people. By `request_id`
-     *     the lines of the log are found.
+     * @description The description of a refusal for a client.
+     *
+     *     `type` is stable; `detail` is for people. `request_id` finds the lines of the log.
      */
     ProblemDetails: {
         type: string;
@@ -907,7 +910,7 @@ export interface RunnerApi {
     };
     /**
      * ProcessStatus
-     * @description One of the two processes, now. `backups` are the editor's to know.
+     * @description The present state of one of the two processes. Only the editor knows `backups`.
      */
     ProcessStatus: {
         /** @enum {string} */
@@ -927,7 +930,7 @@ export interface RunnerApi {
     };
     /**
      * ProcessVersions
-     * @description Of the program, of the Python under it, and of the tables in its database.
+     * @description The versions of the program, of its Python, and of the tables in its database.
      */
     ProcessVersions: {
         program: string;
@@ -981,8 +984,9 @@ export interface RunnerApi {
     };
     /**
      * Readiness
-     * @description Whether the process can do its work, and what stands in the way. `parts`: what each lacks, null
-     *     where it works. Without `rclpy` a process is ready.
+     * @description The answer to whether the process can do its work, and what prevents it.
+     *
+     *     `parts` says what each part lacks, null where it works. Without `rclpy` a process is ready.
      */
     Readiness: {
         ready: boolean;
@@ -1160,7 +1164,7 @@ export interface RunnerApi {
     };
     /**
      * RobotLink
-     * @description How a robot is, and when it last answered.
+     * @description The state of the connection to a robot, and when it last answered.
      */
     RobotLink: {
         name: string;
@@ -1448,8 +1452,9 @@ export interface RunnerApi {
     };
     /**
      * ServerProof
-     * @description That a server knows the token: an HMAC over a challenge and the address, `HOST:PORT`, at which
-     *     the connection was taken.
+     * @description The proof that a server knows the token.
+     *
+     *     It is an HMAC over a challenge and over the address, `HOST:PORT`, that accepted the connection.
      */
     ServerProof: {
         address: string;

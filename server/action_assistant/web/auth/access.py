@@ -64,7 +64,7 @@ def device_cookie_name(page_port: int) -> str:
 
 
 def person_of(connection: ASGIConnection[Any, Any, Any, Any]) -> Person:
-    """Who is asking. Every route behind the door may call this."""
+    """Return the person who sent a request. Only routes behind the access control may call this."""
     person: Person = connection.scope["state"]["person"]
     return person
 
@@ -102,7 +102,7 @@ class Needs:
 
 
 def known_person(connection: ASGIConnection[Any, Any, Any, Any]) -> Person | None:
-    """Who this browser speaks for, or spoke for until the session expired."""
+    """Return the person of this browser's session, also of an expired one; None without any."""
     state = connection.scope["state"]
     session: Session | None = state.get("session") or state.get("expired")
     return session.person if session is not None else None
@@ -327,11 +327,11 @@ class Access:
 
 
 def _nobody(_: str) -> None:
-    """Nobody wants to know."""
+    """Ignore which person a connection belongs to."""
 
 
 def _ended(session: Session | None, *, signed_out: bool = False) -> Refused:
-    """Why somebody without a session that lasts is not let in."""
+    """Return the refusal for a client whose session is missing, signed out, expired or revoked."""
     if session is None:
         return Unauthenticated(
             "Open the link that the server printed, or send its token as a Bearer token."
@@ -344,7 +344,7 @@ def _ended(session: Session | None, *, signed_out: bool = False) -> Refused:
 
 
 def _lasts(scope: HTTPScope | WebSocketScope, headers: dict[str, str]) -> bool:
-    """Whether this may stay open: sockets, and streams of events."""
+    """Return whether a connection may stay open for long: a WebSocket or a stream of events."""
     if scope["type"] == ScopeType.WEBSOCKET:
         return True
     return "text/event-stream" in headers.get("accept", "") or scope["path"].endswith("/events")

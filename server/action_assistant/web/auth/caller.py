@@ -18,15 +18,17 @@ if TYPE_CHECKING:
 
 
 class Caller(NamedTuple):
-    """Who waits for what is being done now. What is done for nobody may end. `device`: the browser that
-    they ask with, whoever is signed in there; "" where that is not known."""
+    """Identifies the client for whom a request works, so that abandoned work can be cancelled.
+
+    `device` is the browser, whoever is signed in there; "" if unknown.
+    """
 
     person: str
     receive: "Receive | None" = None  # a socket's messages are not ours to read
     device: str = ""
 
     async def gone(self) -> None:
-        """Wait until they have gone. Only after the request was read."""
+        """Wait until the client has disconnected. Call it only after the request body was read."""
         if self.receive is None:
             await anyio.sleep_forever()
         else:
@@ -43,7 +45,7 @@ _CALLER: Final[ContextVar[Caller | None]] = ContextVar("caller", default=None)
 
 
 def caller() -> Caller | None:
-    """Whoever asked for what this task does; None when nobody did."""
+    """Return the client for whom this task works; None if the task works for no client."""
     return _CALLER.get()
 
 
@@ -54,7 +56,7 @@ def device() -> str:
 
 
 def asked_by(asking: Caller | None) -> None:
-    """What this task does from here on is asked for by them."""
+    """Set the client for whom this task works from now on."""
     _CALLER.set(asking)
 
 
@@ -66,7 +68,7 @@ def done_for_person() -> None:
 
 @contextmanager
 def acting_for(person: str) -> Iterator[None]:
-    """What is asked for inside is asked for by this person."""
+    """Set the person for whom the work inside the block is done."""
     token = _CALLER.set(Caller(person))
     try:
         yield

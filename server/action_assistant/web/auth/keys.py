@@ -28,14 +28,14 @@ _MIN_TOKEN: Final = 32  # characters; the tokens made here have 43 (256 bit)
 
 
 class PersonRef(msgspec.Struct, frozen=True):
-    """Somebody who acted. `id` is opaque and stable for a browser; `name` is theirs to choose."""
+    """A person who acted. `id` is opaque and stable for a browser; people choose `name` themselves."""
 
     id: str
     name: str
 
 
 class Person(PersonRef, frozen=True):
-    """Somebody who acts now, and may do what the role allows."""
+    """A person who acts now, with a role that says what they may do."""
 
     role: Role = "viewer"
 
@@ -53,12 +53,12 @@ class Session(msgspec.Struct, frozen=True):
 
     @property
     def expired(self) -> bool:
-        """Whether it opens nothing but Stop any more."""
+        """Return whether the session has expired: it then allows nothing but Stop."""
         return time.time() >= self.expires
 
 
 class Sealed(msgspec.Struct, frozen=True, array_like=True):
-    """What a cookie carries."""
+    """The payload of a session cookie."""
 
     id: str
     person: str
@@ -69,8 +69,10 @@ class Sealed(msgspec.Struct, frozen=True, array_like=True):
 
 
 class ServerProof(msgspec.Struct, frozen=True):
-    """That a server knows the token: an HMAC over a challenge and the address, `HOST:PORT`, at which
-    the connection was taken."""
+    """The proof that a server knows the token.
+
+    It is an HMAC over a challenge and over the address, `HOST:PORT`, that accepted the connection.
+    """
 
     address: str
     proof: str
@@ -115,7 +117,7 @@ class Keys:
         return cls(given, "ACTION_ASSISTANT_TOKEN") if given else None
 
     def opens(self, token: str) -> bool:
-        """Whether this is the token."""
+        """Return whether a text is the token of this server."""
         return hmac.compare_digest(token.encode(errors="replace"), self.token.encode())
 
     def new_session(
@@ -142,7 +144,10 @@ class Keys:
         return ServerProof(address, self._proof(challenge, address))
 
     def proven(self, challenge: str, proof: ServerProof, *, at: str | None = None) -> bool:
-        """Whether somebody else knows the token; `at` which address, if it has to be that one."""
+        """Return whether another server has proven that it knows the token.
+
+        With `at`, the proof has to name this address.
+        """
         if at is not None and proof.address != at:
             return False
         expected = self._proof(challenge, proof.address)
@@ -159,7 +164,7 @@ class Keys:
         return hashlib.scrypt(self.token.encode(), salt=salt, n=1 << 14, r=8, p=1, dklen=32)
 
     def sealed(self, session: Session) -> str:
-        """The cookie's value."""
+        """Return the value of the cookie for a session."""
         person = session.person
         fields = Sealed(
             session.id, person.id, person.name, session.expires, person.role, session.invitation

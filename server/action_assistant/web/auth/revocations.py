@@ -48,26 +48,29 @@ class Revocations:
             self._marks = set()
 
     def holds(self, invitation: str | None) -> bool:
-        """Whether a session that came in by this invitation has ended. None: by the token."""
+        """Return whether an invitation was revoked. None stands for sessions that came in by the
+        token."""
         if invitation is None:
             return False
         return _ID.fullmatch(invitation) is None or self._is_marked(invitation)
 
     def ended(self, session: Session) -> bool:
-        """Whether somebody ended this one session."""
+        """Return whether this one session was ended."""
         return _SESSION_ID.fullmatch(session.id) is None or self._is_marked(_SESSION + session.id)
 
     def ends(self, session: Session) -> bool:
-        """Whether it opens nothing any more, also no Stop."""
+        """Return whether a session may do nothing any more, not even Stop."""
         return self.holds(session.invitation) or self.ended(session)
 
     def ends_now(self) -> Callable[[Session], bool]:
-        """What `ends` answers at this moment, for many sessions: the folder is looked at once, and not
-        for each of them."""
+        """Return the function `ends` for the present moment.
+
+        It reads the folder once, and so suits a check of many sessions.
+        """
         return self._ends_in_mind if self._take_up() else self.ends
 
     def every(self) -> frozenset[str]:
-        """All invitations."""
+        """Return the ids of all revoked invitations."""
         return frozenset(name for name in tuple(self._names()) if _ID.fullmatch(name))
 
     def add(self, invitation: str) -> None:
@@ -84,7 +87,7 @@ class Revocations:
         self._mark(_SESSION + session)
 
     def write_again(self) -> None:
-        """What could not be written. Raises Unavailable when it still cannot."""
+        """Write the marks that could not be written before. Raise Unavailable if they still cannot."""
         for mark in tuple(self._unwritten):
             self._mark(mark)
 

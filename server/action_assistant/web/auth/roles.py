@@ -41,15 +41,15 @@ _MAY: Final[Mapping[Role, str]] = {
 
 
 def allowed(role: Role, permission: Permission) -> bool:
-    """Whether somebody of this role may do that."""
+    """Return whether a role has a permission."""
     return rank(role) >= rank(_FROM[permission])
 
 
 def rank(role: Role) -> int:
-    """How much a role may do, to compare it with others."""
+    """Return the rank of a role, for comparisons."""
     return _RANK[role]
 
 
 def may(role: Role) -> str:
-    """What a role may do, in words that follow `may`."""
+    """Return in words what a role may do; the words follow `may`."""
     return _MAY[role]

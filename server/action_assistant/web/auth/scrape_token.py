@@ -14,12 +14,12 @@ class ScrapeToken:
         self._digest = None if token is None else _digest(token)
 
     def opens(self, method: str, path: str, token: str) -> bool:
-        """Whether this token is it, and this is what it opens."""
+        """Return whether the token is right and the request is `GET /metrics`."""
         wanted = self._digest
         is_it = wanted is not None and hmac.compare_digest(_digest(token), wanted)
         return is_it and method == "GET" and path == METRICS
 
 
 def _digest(token: str) -> bytes:
-    """As long for each token."""
+    """Return a digest of the token, which has the same length for every token."""
     return hashlib.sha256(token.encode(errors="replace")).digest()

@@ -37,7 +37,7 @@ class OpenSession(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class SessionFiles:
-    """All of them, as far as the disk had room to note them."""
+    """Stores the open sessions as files, as far as the disk has room."""
 
     def __init__(self, data: Path, revoked: Revocations) -> None:
         self._folder = data / FOLDER
@@ -61,7 +61,7 @@ class SessionFiles:
         self._noted[session.id] = session
 
     def every(self) -> list[OpenSession]:
-        """Those that open something still, the newest first. Forgets the others."""
+        """Return the sessions that still allow something, the newest first, and forget the others."""
         found = []
         with contextlib.suppress(FileNotFoundError):
             for path in list(self._folder.glob("*.json")):

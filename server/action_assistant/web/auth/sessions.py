@@ -37,8 +37,11 @@ _Asking = Request[Any, Any, Any]
 
 
 class SignIn(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What the page sends: the token or an invitation on first sight, a name when the person gives
-    one. An invitation is `ID.SECRET`, as its link has it."""
+    """The body of a sign-in: the token or an invitation at first, and a name when the person gives
+    one.
+
+    An invitation is `ID.SECRET`, as its link has it.
+    """
 
     token: str | None = None
     invitation: Annotated[str, msgspec.Meta(max_length=200)] | None = None
@@ -46,7 +49,7 @@ class SignIn(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SignedIn(msgspec.Struct, frozen=True):
-    """Who the page is speaking for. `named` is false until the person has given a name."""
+    """The person who is signed in. `named` is false until the person has given a name."""
 
     person: Person
     named: bool
@@ -59,7 +62,7 @@ class InvitationQuestion(msgspec.Struct, frozen=True, forbid_unknown_fields=True
 
 
 class Invited(msgspec.Struct, frozen=True):
-    """What a link invites to, and who made it."""
+    """The role that a link invites to, and who made the link."""
 
     id: str
     role: Role
@@ -74,10 +77,10 @@ class Revocation(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class InvitationRegistry(Protocol):
-    """Knows invitations."""
+    """Knows the invitations and the people who came in by them."""
 
     def look(self, proof: str) -> Invited:
-        """What a link invites to. Raises Unauthenticated."""
+        """Return the invitation that a link proves. Raise Unauthenticated."""
 
     async def welcome(self, invitation: str, person: PersonRef) -> None:
         """Remember who came in by it."""
@@ -103,12 +106,12 @@ class Sessions:
         self._pace = RateLimit(_TRIES_AT_ONCE, _TRIES_PER_MINUTE) if limits else None
 
     def look(self, invitation: str, request: _Asking) -> Invited:
-        """What a link leads to. Raises Unauthenticated, TooMany."""
+        """Return the invitation of a link. Raise Unauthenticated or TooMany."""
         self._admit(request)
         return self._reception().look(invitation)
 
     async def session(self, data: SignIn, request: _Asking) -> Session:
-        """What somebody gets who signs in. Raises Unauthenticated, TooMany, BadInput."""
+        """Return the session for a sign-in. Raise Unauthenticated, TooMany or BadInput."""
         name = " ".join((data.name or "").split())
         match data:
             case SignIn(token=None, invitation=None):
@@ -176,7 +179,7 @@ class Sessions:
         return response
 
     def _jar(self, request: _Asking) -> tuple[bool, str]:
-        """Whether a cookie for whoever asks is `Secure`, and its path."""
+        """Return whether the client's cookie is `Secure`, and its path."""
         if self._addresses is None:
             return False, "/"
         return self._addresses.jar(request.headers.get("host", ""))
@@ -197,7 +200,7 @@ def session_routes(
     addresses: Addresses | None = None,
     limits: bool = True,
 ) -> list[ControllerRouterHandler]:
-    """The routes under `/api/session`."""
+    """Return the routes under `/api/session`."""
     sessions = Sessions(keys, page_port, reception, addresses=addresses, limits=limits)
 
     @get("/api/session", summary="Who is signed in")

@@ -40,7 +40,7 @@ class HelpSite:
 
     @staticmethod
     def knows(path: str) -> bool:
-        """Whether this path is the documentation's."""
+        """Return whether a path belongs to the documentation."""
         return path == _HELP or path.startswith(f"{_HELP}/")
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:

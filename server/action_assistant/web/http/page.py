@@ -52,7 +52,7 @@ class Page:
         return self._rooted[root]
 
     def knows(self, path: str, accepts_html: bool) -> bool:
-        """Whether this path is public: a file of the page, or one of its addresses."""
+        """Return whether a path is public: a file of the page or one of its addresses."""
         if path in self._files or path == "/":
             return True
         return accepts_html and not path.startswith(_NOT_PAGES)

@@ -32,8 +32,10 @@ _PLACE: Final = msgspec.Meta(
 
 
 class ProblemDetails(msgspec.Struct, frozen=True, omit_defaults=True):
-    """What a client is told about a refusal. `type` is stable; `detail` is for people. By `request_id`
-    the lines of the log are found."""
+    """The description of a refusal for a client.
+
+    `type` is stable; `detail` is for people. `request_id` finds the lines of the log.
+    """
 
     type: str
     title: str
@@ -54,7 +56,7 @@ def problem_of(refused: Refused) -> bytes:
 
 
 def problem_handlers() -> ExceptionHandlersMap:
-    """For `Litestar(exception_handlers=…)`."""
+    """Return the handlers for `Litestar(exception_handlers=…)`."""
     return {
         Refused: _refused,
         HTTPException: _framework,
@@ -80,7 +82,8 @@ def _refused(request: Request[Any, Any, Any], error: Refused) -> Response[bytes]
 
 
 def _framework(request: Request[Any, Any, Any], error: HTTPException) -> Response[bytes]:
-    """What Litestar itself refuses: unknown routes, methods, malformed bodies, over-long ones."""
+    """Answer the refusals of Litestar itself: unknown routes and methods, malformed and too large
+    bodies."""
     phrase = HTTPStatus(error.status_code).phrase
     detail, where = _told(request, error)
     if error.status_code >= 500:
@@ -93,7 +96,7 @@ def _framework(request: Request[Any, Any, Any], error: HTTPException) -> Respons
 def _told(
     request: Request[Any, Any, Any], error: HTTPException
 ) -> tuple[str, dict[str, Any] | None]:
-    """What was wrong in a sentence, and where in the body if that is known."""
+    """Return a sentence about the fault, and its place in the body if that is known."""
     if isinstance(error, ValidationException) and isinstance(error.extra, list):
         wrong = [item for item in error.extra if isinstance(item, dict)]
         said = [
@@ -115,7 +118,7 @@ def _told(
 
 
 def _limit(request: Request[Any, Any, Any]) -> str:
-    """How long a body may be that this route takes."""
+    """Return, as text, the longest body that the route accepts."""
     handler = request.scope.get("route_handler")
     if not isinstance(handler, HTTPRouteHandler):
         return "some bytes"

@@ -25,7 +25,7 @@ _SUBJECT: Final = re.compile(r"/api/(run|graph)s/([^/]{1,64})(?=/|$)")
 
 
 class RequestCounts:
-    """What was answered, and what is open. Only the loop counts."""
+    """Counts answered requests and open connections. Only the event loop may change it."""
 
     def __init__(self) -> None:
         self.answered: Final[Counter[int]] = Counter()  # requests, by status
@@ -40,7 +40,7 @@ class Requests:
         self._counts = counts
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass on."""
+        """Pass a request on, with an id and a count of what is open."""
         if scope["type"] not in _CALLS:  # lifespan
             await self._app(scope, receive, send)
             return
@@ -76,7 +76,7 @@ class Requests:
 
 
 def _id_of(scope: Any) -> str:
-    """What a proxy that is believed calls it; else a name of our own."""
+    """Return the request id of a trusted proxy, or else a new one."""
     if scope.get("state", {}).get(PROXIED):
         for name, value in scope["headers"]:
             if name.lower() == HEADER and _ID.fullmatch(value):

@@ -29,7 +29,8 @@ class BackupsShown(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def backups_shown(state: BackupState | None) -> BackupsShown | None:
-    """What is known of them; None where that cannot be read, which is not that there are none."""
+    """Return the state of backups for people; None if it cannot be read, which does not mean that
+    there are none."""
     if state is None:
         return None
     last, failed, schedule = state.last, state.failed, state.schedule

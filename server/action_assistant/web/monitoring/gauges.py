@@ -21,7 +21,7 @@ class Family(NamedTuple):
     kind: str = "gauge"
 
     def metric(self) -> Metric:
-        """As a registry of Prometheus wants it."""
+        """Return the metric in the form of the Prometheus client."""
         metric = Metric(PREFIX + self.name, self.documentation, self.kind)
         suffix = "_total" if self.kind == "counter" else ""
         values = self.values if isinstance(self.values, Mapping) else {(): self.values}
@@ -39,6 +39,6 @@ class Looked(Collector):
         self._look = look
 
     def collect(self) -> Iterator[Metric]:
-        """As a registry asks."""
+        """Yield the metrics that a Prometheus registry asks for."""
         for family in self._look():
             yield family.metric()

@@ -26,7 +26,7 @@ class LoopLag(Collector):
         )
 
     async def run(self) -> None:
-        """Until cancelled."""
+        """Measure the lag of the event loop until cancelled."""
         loop = asyncio.get_running_loop()
         while True:
             due = loop.time() + _TICK_S
@@ -41,5 +41,5 @@ class LoopLag(Collector):
         return max(self._last, default=0.0)
 
     def collect(self) -> Iterator[Metric]:
-        """As a registry asks."""
+        """Yield the metrics that a Prometheus registry asks for."""
         yield from self._lag.collect()

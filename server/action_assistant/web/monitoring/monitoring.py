@@ -35,7 +35,7 @@ disable_created_metrics()  # type: ignore[no-untyped-call]  # each counter and h
 
 
 class Monitoring:
-    """Of one process."""
+    """Collects the metrics, readiness and status of one process."""
 
     def __init__(self, process: ProcessName, data: Path) -> None:
         self.requests: Final = RequestCounts()
@@ -74,7 +74,8 @@ class Monitoring:
     # --- what is told -------------------------------------------------------------------------
 
     async def readiness(self) -> Readiness:
-        """Whether the process can do its work; known within seconds, whatever hangs."""
+        """Return whether the process can do its work. The answer comes within seconds, whatever
+        hangs."""
         if self._watched is None:
             return Readiness(ready=True)
         found: dict[str, str | None] = {}
@@ -99,7 +100,7 @@ class Monitoring:
         return generate_latest(self._registry).decode().replace(".0\n", "\n")
 
     async def status(self) -> ProcessStatus:
-        """How the process is, for whoever looks after it."""
+        """Return the state of the process for its administrators."""
         watched, storage = self._watched, self._storage
         if watched is None or storage is None:
             raise RuntimeError("the process is not open yet")

@@ -23,8 +23,10 @@ _OPTIONAL: Final = frozenset({"rclpy"})
 
 
 class Readiness(msgspec.Struct, frozen=True):
-    """Whether the process can do its work, and what stands in the way. `parts`: what each lacks, null
-    where it works. Without `rclpy` a process is ready."""
+    """The answer to whether the process can do its work, and what prevents it.
+
+    `parts` says what each part lacks, null where it works. Without `rclpy` a process is ready.
+    """
 
     ready: bool
     problems: tuple[str, ...] = ()
@@ -32,14 +34,15 @@ class Readiness(msgspec.Struct, frozen=True):
 
     @classmethod
     def of(cls, parts: Parts) -> "Readiness":
-        """All parts have to work that are not optional."""
+        """Return the readiness that follows from these parts: all that are not optional have to
+        work."""
         lacking = {name: why for name, why in parts.items() if name not in _OPTIONAL}
         problems = tuple(why for why in lacking.values() if why is not None)
         return cls(not problems, problems, parts)
 
 
 class DiskCheck:
-    """Whether there is room on the disk of a folder."""
+    """Checks whether the disk of a folder has room."""
 
     def __init__(self, folder: Path) -> None:
         async def free() -> int | str:
@@ -51,7 +54,7 @@ class DiskCheck:
         self._free: SharedCheck[int | str] = SharedCheck(free, patience=_PATIENCE_S)
 
     async def problem(self) -> str | None:
-        """What is wrong with it."""
+        """Return a sentence about what is wrong with the disk; None if it is fine."""
         free = await self._free.answer()
         if free is None:
             return f"The disk of the data folder does not answer within {_PATIENCE_S:g} s."

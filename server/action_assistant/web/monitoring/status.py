@@ -25,7 +25,7 @@ _BEGAN: Final = time.time()
 
 
 class ProcessVersions(msgspec.Struct, frozen=True):
-    """Of the program, of the Python under it, and of the tables in its database."""
+    """The versions of the program, of its Python, and of the tables in its database."""
 
     program: str
     python: str
@@ -33,8 +33,11 @@ class ProcessVersions(msgspec.Struct, frozen=True):
 
 
 class Load(msgspec.Struct, frozen=True):
-    """What a process takes: seconds of a processor, bytes of memory, descriptors; and how late its loop
-    was at worst, in the last minute. Null where the system does not say."""
+    """The resources that a process uses: seconds of processor time, bytes of memory, descriptors.
+
+    `loop_lag_s` is the largest lag of its event loop in the last minute. Null means that the system
+    does not tell.
+    """
 
     cpu_s: float
     memory: int | None
@@ -44,7 +47,7 @@ class Load(msgspec.Struct, frozen=True):
 
 
 class JournalState(msgspec.Struct, frozen=True):
-    """What the writer of the journal does. `failing`: why the newest transaction was not stored."""
+    """The state of the journal's writer. `failing` says why the newest transaction was not stored."""
 
     database: str
     waiting: int
@@ -74,7 +77,7 @@ class LaneState(msgspec.Struct, frozen=True):
 
 
 class RobotLink(msgspec.Struct, frozen=True):
-    """How a robot is, and when it last answered."""
+    """The state of the connection to a robot, and when it last answered."""
 
     name: str
     state: str
@@ -86,7 +89,7 @@ class RobotLink(msgspec.Struct, frozen=True):
 
 
 class Activity(msgspec.Struct, frozen=True, kw_only=True):
-    """What goes on in a process: open sockets; rooms of an editor; runs and robots of a runner."""
+    """The activity of a process: open sockets, rooms of an editor, runs and robots of a runner."""
 
     sockets: int
     rooms: int | None = None
@@ -96,7 +99,7 @@ class Activity(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class ProcessStatus(msgspec.Struct, frozen=True, kw_only=True):
-    """One of the two processes, now. `backups` are the editor's to know."""
+    """The present state of one of the two processes. Only the editor knows `backups`."""
 
     process: ProcessName
     at: datetime
@@ -112,12 +115,12 @@ class ProcessStatus(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def began_at() -> datetime:
-    """When this process began."""
+    """Return when this process began."""
     return datetime.fromtimestamp(_BEGAN, UTC)
 
 
 def load_now(loop_lag_s: float) -> Load:
-    """What this process takes."""
+    """Return the resources that this process uses."""
     used = resource.getrusage(resource.RUSAGE_SELF)
     soft, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     return Load(
@@ -130,18 +133,18 @@ def load_now(loop_lag_s: float) -> Load:
 
 
 def versions(schema: str) -> ProcessVersions:
-    """Of this process."""
+    """Return the versions of this process."""
     return ProcessVersions(VERSION, platform.python_version(), schema)
 
 
 def journal_state(journal: Journal) -> JournalState:
-    """What its writer does."""
+    """Return the state of the journal's writer."""
     metrics = journal.metrics
     return JournalState(journal.database_name, metrics.waiting, metrics.busy_s, metrics.failing)
 
 
 def storage_shown(found: Storage | None) -> StorageShown | None:
-    """What was found when it was looked last."""
+    """Return the result of the last look at the storage for people; None before the first."""
     if found is None:
         return None
     at = datetime.fromtimestamp(found.at, UTC)
@@ -149,7 +152,7 @@ def storage_shown(found: Storage | None) -> StorageShown | None:
 
 
 def lane_states(lanes: Sequence[Lane]) -> list[LaneState]:
-    """Each of them."""
+    """Return the state of each worker lane."""
     return [
         LaneState(each.name, each.waiting, each.busy, each.deaths, each.given_up) for each in lanes
     ]

@@ -59,7 +59,7 @@ class StorageWatch:
         self._counted: Mapping[str, int] = {}
 
     async def run(self) -> None:
-        """Until cancelled."""
+        """Look at the storage again and again until cancelled."""
         async with anyio.create_task_group() as tasks:
             tasks.start_soon(self._watch_folders)
             while True:
@@ -71,7 +71,7 @@ class StorageWatch:
                 await anyio.sleep(_LOOK_S)
 
     async def look(self) -> None:
-        """Look now."""
+        """Look at the disk, the database and the backups once."""
         try:
             disk = await to_thread.run_sync(shutil.disk_usage, self._data, abandon_on_cancel=True)
         except OSError as error:

@@ -30,13 +30,13 @@ class Watched:
         self.folders: Final = folders
 
     def families(self) -> Iterator[Family]:
-        """What is so now."""
+        """Return the metrics that are looked up when somebody asks."""
         raise NotImplementedError
 
     def activity(self) -> Activity:
-        """What goes on."""
+        """Return the present activity of the process."""
         raise NotImplementedError
 
     async def parts(self) -> Parts:
-        """What has to work beside journal and disk."""
+        """Return what has to work beside journal and disk."""
         return {}

@@ -35,8 +35,8 @@ def _host_and_port(host: str) -> tuple[str, int | None]:
 
 
 def lan_names() -> tuple[str, ...]:
-    """What others on the network can call this computer, the likeliest first: its addresses, and
-    its name as multicast DNS knows it."""
+    """Return the names of this computer on the network, the likeliest first: addresses, and its
+    mDNS name."""
     found: list[ipaddress.IPv4Address | ipaddress.IPv6Address] = []
     for adapter in ifaddr.get_adapters():
         if adapter.name.startswith(_INNER):
@@ -90,22 +90,22 @@ class Addresses:
 
     @property
     def is_proxied(self) -> bool:
-        """Whether a proxy shows the page at a public address."""
+        """Return whether a proxy shows the page at a public address."""
         return self._public is not None
 
     @property
     def is_encrypted(self) -> bool:
-        """Whether what is sent to the address that others use first cannot be read on its way."""
+        """Return whether the address that others use first is encrypted."""
         return self.secure if self._public is None else self._public.is_secure
 
     def allows_host(self, header: str | None) -> bool:
-        """Whether a request may name this host (DNS rebinding comes with another)."""
+        """Return whether a request may name this host. A request after DNS rebinding names another."""
         if header is None:
             return False
         return self.public_at(header) is not None or self._knows(host_name(header))
 
     def allows_origin(self, origin: str) -> bool:
-        """Whether a page of this origin may talk to us."""
+        """Return whether a page of this origin may send requests."""
         if self._public is not None and origin == self._public.origin:
             return True
         try:
@@ -128,8 +128,11 @@ class Addresses:
         return public if public is not None and public.is_named(*_host_and_port(header)) else None
 
     def replaced_host(self, header: str | None, origin: str) -> str | None:
-        """Why a page of an origin that may ask us cannot: a proxy in between told us another Host,
-        which would make of its page one of this computer. None if all is well."""
+        """Return a sentence if a proxy replaced the Host header of a request from the public page,
+        else None.
+
+        Such a request would look like one from a page of this computer.
+        """
         public = self._public
         if public is None or origin != public.origin or self.public_at(header or ""):
             return None
@@ -139,7 +142,7 @@ class Addresses:
         )
 
     def runner_at(self, header: str, port: int) -> str:
-        """Where the runner is for whoever named this host; without a slash at the end."""
+        """Return the URL of the runner, without a final slash, for a client that named this host."""
         public = self.public_at(header)
         return public.runner if public is not None else self.direct(header, port)
 
@@ -148,16 +151,17 @@ class Addresses:
         return f"{self._scheme}://{_shown(host_name(header) or '127.0.0.1')}:{port}"
 
     def jar(self, header: str) -> tuple[bool, str]:
-        """Whether cookies are `Secure` for whoever named this host, and for which path they are."""
+        """Return whether cookies are `Secure` for a client that named this host, and their path."""
         public = self.public_at(header)
         return (self.secure, "/") if public is None else (public.is_secure, f"{public.path}/")
 
     def is_page(self, url: str) -> bool:
-        """Whether the page can be found there."""
+        """Return whether the page can be found at a URL."""
         return self.allows_origin(url) or (self._public is not None and url == self._public.page)
 
     def names(self) -> tuple[str, ...]:
-        """By which others reach this computer, the likeliest first; empty when they cannot."""
+        """Return the names by which others reach this computer, the likeliest first; empty if they
+        cannot."""
         own = {self._host} - _ANYWHERE - LOOPBACK
         return tuple(dict.fromkeys((*self._named, *own, *self._found)))
 
@@ -168,7 +172,8 @@ class Addresses:
         return tuple(dict.fromkeys((*sorted(LOOPBACK), *self.names())))
 
     def origins(self) -> tuple[str, ...]:
-        """Of the page, as others have to call it; of a public address also the path to it."""
+        """Return the origins of the page as others have to use them; a public one includes its
+        path."""
         public = () if self._public is None else (self._public.page,)
         direct = (f"{self._scheme}://{_shown(name)}:{self._page_port}" for name in self.names())
         return (*public, *direct)
@@ -197,7 +202,7 @@ def addresses_of(
     secure: bool,
     public: PublicUrl | None = None,
 ) -> Addresses:
-    """What the settings of a process come to."""
+    """Return the addresses that follow from the settings of a process."""
     listens_everywhere = share and host in _ANYWHERE
     lan = lan_names if listens_everywhere else None
     return Addresses(

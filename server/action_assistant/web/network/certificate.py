@@ -69,14 +69,14 @@ class Certificate:
         return ssl.create_default_context(cafile=str(self.authority))
 
     def trusting_too(self) -> ssl.SSLContext:
-        """What is trusted anyway, and our own authority if there is one."""
+        """Return a context that trusts the system's authorities, and our own if there is one."""
         context = ssl.create_default_context()
         if self.authority.exists():
             context.load_verify_locations(cafile=str(self.authority))
         return context
 
     def fingerprint(self) -> str:
-        """Of the authority, as browsers show it: SHA-256."""
+        """Return the SHA-256 fingerprint of the authority as browsers show it."""
         found = x509.load_pem_x509_certificate(self.authority.read_bytes())
         return found.fingerprint(hashes.SHA256()).hex(":").upper()
 

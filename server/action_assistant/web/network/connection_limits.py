@@ -49,7 +49,7 @@ class ConcurrencyLimit:
 
     @asynccontextmanager
     async def turn(self, person: str) -> AsyncIterator[None]:
-        """One of them, as long as you are inside."""
+        """Wait for one of the person's turns, and hold it inside the block."""
         turn, waiting = self._turns.get(person, (anyio.Semaphore(self._most), 0))
         self._turns[person] = turn, waiting + 1
         try:

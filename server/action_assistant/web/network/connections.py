@@ -45,7 +45,7 @@ class Connection:
 
     @property
     def is_over(self) -> bool:
-        """Whether its descriptor is free again."""
+        """Return whether the connection's descriptor is free again."""
         return self._wire.fileno() < 0
 
     def end(self) -> None:
@@ -78,11 +78,11 @@ class ConnectionsByHolder:
         return self._peers.get(peer)
 
     def most(self) -> dict[Peer, Connection]:
-        """Those of whoever holds most."""
+        """Return the connections of the holder that has most of them."""
         return max(self._by.values(), key=len)
 
     def add(self, peer: Peer, connection: Connection) -> None:
-        """One more."""
+        """Add a connection of its holder; a forgotten one of the same peer goes."""
         before = self._peers.get(peer)
         if before is not None:  # its end was not noticed yet
             self.remove(peer, before)
@@ -101,7 +101,7 @@ class ConnectionsByHolder:
 
 
 class ConnectionHolder:
-    """Whom a connection is held by, as that becomes known."""
+    """Tells the connection limits who holds a connection, as soon as that is known."""
 
     def __init__(
         self, connections: "Connections", peer: Peer | None, connection: Connection | None
@@ -111,11 +111,11 @@ class ConnectionHolder:
         self._connection = connection
 
     def asked(self, address: str) -> None:
-        """A proxy that is believed asks for this address."""
+        """Count the connection for this address, which a trusted proxy names."""
         self._hold(f"@{address}", is_stranger=True)
 
     def known(self, person: str) -> None:
-        """This person is signed in."""
+        """Count the connection for this signed-in person."""
         self._hold(person, is_stranger=False)
 
     def _hold(self, holder: str, *, is_stranger: bool) -> None:
@@ -124,7 +124,11 @@ class ConnectionHolder:
 
 
 class Connections:
-    """All of a process. The door says who is known on which; `is_proxy` which addresses ask for others."""
+    """Accepts and limits all connections of a process.
+
+    The access control reports who is known on which connection. `is_proxy` says which addresses
+    send requests for others.
+    """
 
     def __init__(self, limit: int, is_proxy: Callable[[str], bool] = lambda _: False) -> None:
         self._is_proxy = is_proxy
@@ -140,7 +144,7 @@ class Connections:
     def listen(
         self, listener: socket.socket, factory: Factory, context: ssl.SSLContext | None
     ) -> None:
-        """Accept from now on."""
+        """Accept connections at a listening socket from now on."""
         listener.setblocking(False)
         self._listeners.append(listener)
         asyncio.get_running_loop().add_reader(listener, self._accept, listener, factory, context)
@@ -189,8 +193,11 @@ class Connections:
         factory: Factory,
         context: ssl.SSLContext | None,
     ) -> None:
-        """Something has come. Until then a connection costs next to nothing: many that say nothing
-        would take the time of those that do."""
+        """Open a connection once its first bytes have come.
+
+        Until then a connection costs next to nothing, so that many silent ones take no time from
+        the others.
+        """
         asyncio.get_running_loop().remove_reader(wire)
         connection.is_silent = False
         self._keep(self._open(connection, wire, factory, context))
@@ -246,7 +253,7 @@ class Connections:
                 self._forget(peer, each)
 
     async def _sweep(self) -> None:
-        """Whoever has asked for nothing in time has had it."""
+        """End connections that sent no request in time, again and again."""
         while True:
             await asyncio.sleep(_SWEEP_S)
             self._forget_gone()
@@ -274,7 +281,7 @@ class Connections:
             connection.since = time.monotonic()
 
     def hold(self, peer: Peer, connection: Connection, holder: str, *, is_stranger: bool) -> None:
-        """Somebody else holds a connection now."""
+        """Count a connection for another holder from now on."""
         if connection.holder == holder:
             return
         self._forget(peer, connection)
@@ -290,7 +297,7 @@ class Connections:
 
 
 def _in_use() -> int:
-    """Descriptors."""
+    """Return the number of descriptors in use."""
     try:
         return len(os.listdir("/proc/self/fd"))  # noqa: PTH208 - counted, not visited
     except OSError:

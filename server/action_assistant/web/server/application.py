@@ -154,10 +154,10 @@ def _answers_strangers(path: str) -> bool:
 
 
 def _decisions(inner: Litestar) -> dict[tuple[str, str], Permission]:
-    """What one must be allowed to do to call a route, by path and method.
+    """Return the permission that each route needs, by path and method.
 
-    Reading is everybody's who is signed in. Other routes have to say; those that do not are missing
-    here, and are for owners only.
+    Reading needs no more than being signed in. Other routes have to name their permission; those
+    that do not are missing here, and only owners may call them.
     """
     found: dict[tuple[str, str], Permission] = {}
     for route in inner.routes:

@@ -38,43 +38,43 @@ _PIECES: Final = 10_000  # of one message; empty ones would not end at the limit
 _TOO_BIG: Final = 1009
 
 
-class Taker(Protocol):
-    """Who takes a socket over. Called on the event loop; must not raise."""
+class MessageReceiver(Protocol):
+    """Receives the messages of a socket. Called on the event loop; must not raise."""
 
     def heard(self, message: bytes | None) -> None:
-        """A message has come; None for text."""
+        """Handle a message; None stands for a text message."""
 
     def may_write(self) -> None:
-        """What was written has gone out far enough."""
+        """Resume sending: enough of what was written has gone out."""
 
     def gone(self) -> None:
-        """Nothing will come any more."""
+        """Handle the end of the socket: no message will come any more."""
 
 
-class Nobody:
-    """Takes what comes after somebody has let go."""
+class IgnoringReceiver:
+    """Ignores the messages that come after a socket was released."""
 
     def heard(self, message: bytes | None) -> None:
-        """Nothing."""
+        """Ignore the message."""
 
     def may_write(self) -> None:
-        """Nothing."""
+        """Write nothing more."""
 
     def gone(self) -> None:
-        """Nothing."""
+        """Ignore the end of the socket."""
 
 
 class DirectSocket(WebSocketProtocol):
-    """One socket. `taker` hears its messages, once there is one."""
+    """A WebSocket whose messages go directly to a `MessageReceiver`, once there is one."""
 
     def __init__(self, *args: Any, **more: Any) -> None:
         super().__init__(*args, **more)
-        self._taker: Taker | None = None
+        self._receiver: MessageReceiver | None = None
         self._rest = bytearray()  # of a frame that is not complete, or not to be read yet
         #: Bytes of a message of several frames that has begun; None where none has.
         self._in_pieces: int | None = None
         self._pieces = 0  # of that message
-        self._is_held = False  # its taker wants to hear nothing now
+        self._is_held = False  # its receiver wants to hear nothing now
         self._held_until = 0.0  # in the time of the loop
         self._waits = False  # until others had their turn
         self._late_ping: bytes | None = None  # the newest, of who reads nothing
@@ -92,14 +92,14 @@ class DirectSocket(WebSocketProtocol):
         event.headers.clear()  # the parser keeps it for as long as the socket is open
 
     async def receive(self) -> ASGIReceiveEvent:
-        """What an application is told that takes nothing over."""
+        """Return the next event for an application that did not take the socket over."""
         event = await super().receive()
         if self._waits:
             self._pause_reading()  # the usual way goes on when all was fetched
         return event
 
     async def send(self, message: ASGISendEvent) -> None:
-        """What an application says that takes nothing over."""
+        """Send an event of an application that did not take the socket over."""
         await super().send(message)
         if message["type"] == "websocket.accept" and self.handshake_complete:
             self.response.headers.clear()  # sent
@@ -108,15 +108,15 @@ class DirectSocket(WebSocketProtocol):
 
     # --- for whoever takes it over ------------------------------------------------------------
 
-    def take_over(self, taker: Taker) -> None:
-        """From now on, once the handshake is over, `taker` hears what comes, and nobody else."""
-        self._taker = taker
+    def take_over(self, receiver: MessageReceiver) -> None:
+        """From now on, once the handshake is over, `receiver` hears what comes, and nobody else."""
+        self._receiver = receiver
         self.scope["headers"] = []  # whoever is let in was asked for everything
         self._go_on()
 
     def let_go(self) -> None:
-        """Nobody hears anything any more. The application may still close the socket."""
-        self._taker = Nobody()
+        """Release the socket: its messages are ignored from now on. The application may still close the socket."""
+        self._receiver = IgnoringReceiver()
         self.resume_hearing()
 
     def pause_hearing(self) -> None:
@@ -133,7 +133,7 @@ class DirectSocket(WebSocketProtocol):
 
     @property
     def is_writable(self) -> bool:
-        """Whether little enough waits to be sent."""
+        """Return whether little enough is waiting to be sent."""
         return self.writable.is_set()
 
     def write_framed(self, data: bytes) -> bool:
@@ -168,7 +168,7 @@ class DirectSocket(WebSocketProtocol):
     # --- for the transport --------------------------------------------------------------------
 
     def data_received(self, data: bytes) -> None:
-        """Something has come."""
+        """Handle received bytes; one short message, nearly always the case, takes a fast path."""
         if not self.handshake_initiated:
             super().data_received(data)
             return
@@ -178,7 +178,7 @@ class DirectSocket(WebSocketProtocol):
             and data[0] == _WHOLE_BINARY
         ):
             size = len(data) - 6
-            if 0 <= size < _SHORT and data[1] == 0x80 | size and self._taker is not None:
+            if 0 <= size < _SHORT and data[1] == 0x80 | size and self._receiver is not None:
                 self._tell(apply_mask(data[6:], data[2:6]))  # nearly always: one short message
                 return
         self._rest += data
@@ -187,29 +187,29 @@ class DirectSocket(WebSocketProtocol):
         self._cut()
 
     def resume_writing(self) -> None:
-        """There is room again."""
+        """Continue after the transport has room again: send a delayed ping and notify the receiver."""
         super().resume_writing()
         ping, self._late_ping = self._late_ping, None
         if ping is not None and not self.transport.is_closing():
             super().data_received(ping)
-        if self._taker is not None:
-            self._taker.may_write()
+        if self._receiver is not None:
+            self._receiver.may_write()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """It is over."""
+        """Notify the receiver that the connection is over."""
         super().connection_lost(exc)
         self._rest.clear()
-        if self._taker is not None:
-            self._taker.gone()
+        if self._receiver is not None:
+            self._receiver.gone()
 
     def shutdown(self) -> None:
-        """The process ends."""
+        """Close the socket because the process shuts down."""
         super().shutdown()
-        if self._taker is not None:
-            self._taker.gone()
+        if self._receiver is not None:
+            self._receiver.gone()
 
     def may_be_unread(self) -> bool:
-        """Whether the answer to the last ping may have come without having been read."""
+        """Return whether the answer to the last ping may be received but not read yet."""
         # What came while nobody listened takes its time also after that.
         was_held = self._is_held or self._held_until >= self.ping_sent_at
         return was_held or self._waits or super().may_be_unread()
@@ -245,9 +245,11 @@ class DirectSocket(WebSocketProtocol):
             self._read_on()
 
     def _frame(self) -> tuple[int, int]:
-        """Where the payload of the next frame begins, and where it ends: beyond what has come, where
-        that is not known yet. One that nobody may send has no payload and ends where the bytes do:
-        the usual parser refuses it by its head."""
+        """Return where the payload of the next frame begins and ends.
+
+        The end lies beyond the received bytes while it is not known yet. A frame that is not
+        allowed has no payload and ends where the bytes do: the usual parser refuses it by its head.
+        """
         rest, there = self._rest, len(self._rest)
         start = 6
         if there < 2:
@@ -267,7 +269,7 @@ class DirectSocket(WebSocketProtocol):
     def _deal_with(self, frame: bytes, start: int) -> None:
         """One frame, whose payload begins there."""
         first = frame[0]
-        usual = self._taker is None or self._in_pieces is not None
+        usual = self._receiver is None or self._in_pieces is not None
         if first == _WHOLE_BINARY and start and not usual:
             self._tell(apply_mask(frame[start:], frame[start - 4 : start]))
             return
@@ -290,13 +292,13 @@ class DirectSocket(WebSocketProtocol):
 
     def _drain(self) -> None:
         """Hand over what went the usual way."""
-        while self._taker is not None and not self._is_held and not self.queue.empty():
+        while self._receiver is not None and not self._is_held and not self.queue.empty():
             event = self.queue.get_nowait()
             if event["type"] == "websocket.receive":
                 self._read_on()  # the usual way has nobody read until this one is fetched
-                self._taker.heard(event.get("bytes"))
+                self._receiver.heard(event.get("bytes"))
             elif event["type"] == "websocket.disconnect":
-                self._taker.gone()
+                self._receiver.gone()
 
     def _pause_reading(self) -> None:
         if not self.read_paused and not self.transport.is_closing():
@@ -310,8 +312,8 @@ class DirectSocket(WebSocketProtocol):
                 self.transport.resume_reading()
 
     def _tell(self, message: bytes) -> None:
-        if self._taker is not None and not self.close_sent:
-            self._taker.heard(message)
+        if self._receiver is not None and not self.close_sent:
+            self._receiver.heard(message)
 
 
 def direct_socket(

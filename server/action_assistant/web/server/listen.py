@@ -112,7 +112,7 @@ def _configured(app: ASGIApp, identity: "TlsIdentity | None", *, direct: bool) -
 
 
 class TlsIdentity:
-    """Who we are under TLS: a certificate, renewed in time and when our names have changed."""
+    """Keeps the certificate of this server, and renews it in time and when its names change."""
 
     def __init__(self, certificate: "Certificate", names: Callable[[], Sequence[str]]) -> None:
         self.certificate: Final = certificate
@@ -120,7 +120,10 @@ class TlsIdentity:
         self._loaded = 0  # when the certificate that is in use was written
 
     def keep(self, config: uvicorn.Config) -> None:
-        """Look now and then. New connections get the new certificate, open ones stay."""
+        """Watch the certificate on a daemon thread.
+
+        New connections get the new certificate; open ones keep theirs.
+        """
 
         def look() -> None:
             while True:
@@ -141,10 +144,10 @@ class TlsIdentity:
 
 
 class StreamEndings:
-    """Around an application: when the process is told to end, streams without an end get one.
+    """An ASGI middleware that ends streams without an end when the process shuts down.
 
-    A listener to server-sent events is told that its peer has gone, which is how it would end
-    anyway; requests that are being answered are left alone.
+    A listener to server-sent events is told that its peer has gone. Other requests are answered to
+    their end.
     """
 
     def __init__(self, app: ASGIApp) -> None:
@@ -152,11 +155,11 @@ class StreamEndings:
         self._told = asyncio.Event()
 
     def begin(self) -> None:
-        """End every stream."""
+        """End every stream from now on."""
         self._told.set()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass on."""
+        """Pass a request on, and end its stream at a shutdown."""
         if scope["type"] != ScopeType.HTTP:
             await self._app(scope, receive, send)
             return
@@ -180,7 +183,7 @@ class StreamEndings:
             await send({"type": "http.response.body", "body": b"", "more_body": False})
 
     async def _next(self, receive: Receive) -> Any:
-        """What comes after a request is only that the peer has gone; or that we go."""
+        """Return the disconnect of the client, or one of our own at a shutdown."""
         gone = asyncio.ensure_future(receive())
         told = asyncio.ensure_future(self._told.wait())
         try:
@@ -192,15 +195,17 @@ class StreamEndings:
 
 
 class ActivityTracker:
-    """Around everything: says for which connection something is being done, and for whom. A request
-    whose body does not come is not waited for."""
+    """An ASGI middleware that reports which connections are being answered, and for whom.
+
+    It also refuses requests whose announced body does not come in time.
+    """
 
     def __init__(self, app: ASGIApp, connections: Connections) -> None:
         self._app = app
         self._connections = connections
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass on."""
+        """Pass a request on while its connection counts as being answered."""
         if scope["type"] not in _CALLS:  # lifespan
             await self._app(scope, receive, send)
             return
@@ -233,15 +238,19 @@ class ActivityTracker:
 
 
 def _waits_for_body(scope: Scope) -> bool:
-    """Whether a body was announced, and means anything. What is asked with others is answered without
-    it: whoever waits for their end would hear of a failure there."""
+    """Return whether a request announced a body that is read.
+
+    A method without a body is answered without waiting for one, since a client would take a failure
+    there for a failed request.
+    """
     if scope["type"] != ScopeType.HTTP or scope["method"] in _WITHOUT_BODY:
         return False
     return any(name == b"content-length" and value != b"0" for name, value in scope["headers"])
 
 
 def _own_share() -> tuple[bytes, bytes]:
-    """What this process has done, and how long it took, since a Stop came in (milliseconds)."""
+    """Return the header with the time since a Stop came in: processor time and wall time, in
+    milliseconds."""
     cpu, wall = _RECEIVED.get()
     spent, took = time.process_time() - cpu, time.perf_counter() - wall
     return b"server-timing", f"cpu;dur={1e3 * spent:.3f}, total;dur={1e3 * took:.3f}".encode()
@@ -255,12 +264,12 @@ class _Http(H11Protocol):
         self._strict = self.conn = _Strict(h11.SERVER, HEAD_LIMIT)
 
     def data_received(self, data: bytes) -> None:
-        """Something has come."""
+        """Handle received bytes, and note the time for the header of a Stop."""
         _RECEIVED.set((time.process_time(), time.perf_counter()))
         super().data_received(data)
 
     def send_400_response(self, msg: str) -> None:
-        """The refusal that fits."""
+        """Refuse a malformed request."""
         if not self._strict.in_crumbs:
             super().send_400_response(msg)
             return
@@ -268,7 +277,7 @@ class _Http(H11Protocol):
         self.transport.close()
 
     def shutdown(self) -> None:
-        """The process ends."""
+        """Close the connection because the process shuts down."""
         if not self.transport.is_closing():
             end_connection(self.transport, super().shutdown)
             return

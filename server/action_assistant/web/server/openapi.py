@@ -72,7 +72,7 @@ class OpenApiText(JsonRenderPlugin):
         self._turn = anyio.Lock()
 
     def made(self) -> bytes:
-        """The text, made anew."""
+        """Return a newly rendered document."""
         return msgspec.json.encode(self.make())
 
     def router(self) -> Router:
@@ -101,7 +101,7 @@ class OpenApiText(JsonRenderPlugin):
 
 
 def openapi_config(title: str, text: OpenApiText) -> OpenAPIConfig:
-    """What Litestar has to know of the document."""
+    """Return the OpenAPI configuration for Litestar."""
     schemes: dict[str, Any] = {"token": SecurityScheme(type="http", scheme="bearer")}
     return OpenAPIConfig(
         title=title,
@@ -183,12 +183,12 @@ class _Types:
         self._answered: list[tuple[object, dict[str, Any]]] = []
 
     def asked(self, kind: object) -> dict[str, Any]:
-        """What stands for a body of this type."""
+        """Return the schema of a request body of this type; it is filled in later."""
         self._asked.append((kind, {}))
         return self._asked[-1][1]
 
     def answered(self, kind: object) -> dict[str, Any]:
-        """What stands for an answer of this type."""
+        """Return the schema of an answer of this type; it is filled in later."""
         self._answered.append((kind, {}))
         return self._answered[-1][1]
 
@@ -241,14 +241,17 @@ def _structs(types: Iterable[object]) -> dict[type, kinds.StructType]:
 
 
 def _may_lack(struct: kinds.StructType) -> bool:
-    """Whether bodies may lack fields that answers always have."""
+    """Return whether request bodies may lack fields that answers always have."""
     defaults = any(not field.required for field in struct.fields)
     return defaults and not struct.cls.__struct_config__.omit_defaults
 
 
 def _complete(shape: dict[str, Any], struct: kinds.StructType, *, only_answered: bool) -> None:
-    """What msgspec's own schema of a struct does not say: that answers always have the fields that
-    have a default, or else never as null; and that times are times."""
+    """Add to a struct's schema what msgspec does not say.
+
+    Answers always have the fields with a default, or never have them as null. Times have the format
+    `date-time`.
+    """
     omits = struct.cls.__struct_config__.omit_defaults
     shape["description"] = re.sub(r"\bNone\b", "null", cleandoc(struct.cls.__doc__ or ""))
     for field in struct.fields:
@@ -267,7 +270,7 @@ def _complete(shape: dict[str, Any], struct: kinds.StructType, *, only_answered:
 
 
 def _has_default(field: kinds.Field) -> bool:
-    """Whether a field that is not given has a value; `UNSET` is none, and never sent."""
+    """Return whether a missing field gets a value. `UNSET` is no value and never sent."""
     return field.default is not msgspec.NODEFAULT or field.default_factory is not msgspec.NODEFAULT
 
 

@@ -32,10 +32,11 @@ _Address = ipaddress.IPv4Address | ipaddress.IPv6Address
 
 
 class Forwarded:
-    """An ASGI middleware: `scope["client"]` is who asked the last proxy that is believed.
+    """An ASGI middleware that sets `scope["client"]` to the client that asked the last trusted
+    proxy.
 
-    Of `X-Forwarded-For` only what believed proxies wrote counts, from its end; everybody can write
-    the beginning. Nothing else of what proxies say is read: the public address is a setting.
+    Of `X-Forwarded-For` only the end counts, which trusted proxies wrote; everybody can write its
+    beginning. Nothing else that proxies say is read: the public address is a setting.
     """
 
     def __init__(self, app: ASGIApp, proxies: tuple[Network, ...]) -> None:
@@ -43,7 +44,7 @@ class Forwarded:
         self._proxies = proxies
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass on."""
+        """Pass a request on, with the address of the client that a trusted proxy names."""
         if scope["type"] in _CALLS and self._proxies:
             peer: Any = scope.get("client")
             if peer and self.is_proxy(peer[0]):
@@ -56,7 +57,8 @@ class Forwarded:
         await self._app(scope, receive, send)
 
     def _asker(self, peer: str, chain: list[str]) -> str | None:
-        """Who asked; None when it was the peer itself."""
+        """Return the address of the client behind trusted proxies; None if the peer itself is the
+        client."""
         found = None
         address = _address(peer)
         while address is not None and self._believes(address) and chain:
@@ -65,7 +67,7 @@ class Forwarded:
         return found
 
     def is_proxy(self, peer: str) -> bool:
-        """Whether who connects from this address is believed."""
+        """Return whether this address is that of a trusted proxy."""
         address = _address(peer)
         return address is not None and self._believes(address)
 
@@ -74,10 +76,10 @@ class Forwarded:
 
 
 class Mounted:
-    """An ASGI middleware: a path below `mount` is one of ours without it.
+    """An ASGI middleware that removes the path `mount` at which a proxy shows this server.
 
-    Proxies pass paths on as they are. What comes without the mount is answered, too: from this
-    computer, or through a proxy that takes it off.
+    Proxies pass paths on unchanged. A path without the mount is answered too: it comes from this
+    computer, or through a proxy that removes the mount itself.
     """
 
     def __init__(self, app: ASGIApp, mount: str) -> None:
@@ -86,7 +88,7 @@ class Mounted:
         self._raw = mount.encode()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass on."""
+        """Pass a request on without the mount in its path."""
         if not self._mount or scope["type"] not in _CALLS:
             await self._app(scope, receive, send)
             return
@@ -107,7 +109,7 @@ class Mounted:
         await self._app(call, receive, send)
 
     def _located(self, send: Send) -> Send:
-        """What was made is where the proxy shows it."""
+        """Return a `send` that adds the mount to the Location header."""
 
         async def located(message: Message) -> None:
             if message["type"] == "http.response.start":
@@ -141,7 +143,7 @@ def misrouted(runner_port: int) -> ControllerRouterHandler:
 
 
 def _nobody(_: str) -> None:
-    """Nobody wants to know."""
+    """Ignore whose request this is."""
 
 
 async def _lead(send: Send, location: str) -> None:

@@ -18,10 +18,10 @@ _RESTARTING: Final = 1012  # the close code of a server that ends
 
 
 class WebSocketProtocol(WebSocketsSansIOProtocol):
-    """One socket."""
+    """uvicorn's protocol for one WebSocket, which ends in every state without an error."""
 
     def shutdown(self) -> None:
-        """The process ends."""
+        """Close the socket because the process shuts down."""
         if not self.transport.is_closing():
             end_connection(self.transport, super().shutdown)
             return
@@ -30,12 +30,13 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
         self.queue.put_nowait({"type": "websocket.disconnect", "code": _RESTARTING})
 
     def send_500_response(self) -> None:
-        """The answer to a request for an upgrade that got none."""
+        """Answer a request for an upgrade that the application did not answer."""
         if not self.conn.eof_sent:  # else it was refused already, by the parser perhaps
             super().send_500_response()
 
     def keepalive_timeout(self) -> None:
-        """No pong was heard in time."""
+        """End the connection after a missing pong, unless the pong may be received but not read
+        yet."""
         if not self.may_be_unread():
             super().keepalive_timeout()
             return
@@ -45,7 +46,7 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
         self.schedule_ping()
 
     def may_be_unread(self) -> bool:
-        """Whether the answer to the last ping may have come without having been read."""
+        """Return whether the answer to the last ping may be received but not read yet."""
         return self.read_paused
 
 

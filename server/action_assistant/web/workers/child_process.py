@@ -31,7 +31,8 @@ _TIRED: Final = 256 << 20  # bytes in use after which a worker makes room for a 
 
 @cache
 def _context() -> "ForkServerContext":
-    """Where processes are forked from one that has nothing but what they need. Not on Windows."""
+    """Return the context that forks workers from a process without other state. It does not exist
+    on Windows."""
     return multiprocessing.get_context("forkserver")
 
 

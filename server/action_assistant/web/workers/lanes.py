@@ -50,11 +50,14 @@ _DIED: Final = "The process that worked on this has died; nothing came of it."
 
 
 class RunInWorker(Protocol):
-    """A way to do work that takes long without holding up a Stop, or other people: in another
-    process, so that it is a function of a module, and what it is given and returns are values."""
+    """Runs a function in another process, so that the event loop stays free for Stop and for other
+    people.
+
+    The function has to be one of a module; its arguments and its result are values.
+    """
 
     def __call__(self, work: Callable[..., T], /, *args: Any) -> Awaitable[T]:
-        """The outcome of `work(*args)`."""
+        """Return the result of `work(*args)`."""
         ...
 
 
@@ -197,7 +200,7 @@ class Lane:
 
     @property
     def name(self) -> str:
-        """What it is called."""
+        """Return the name of the lane."""
         return self._name
 
     @property
@@ -211,7 +214,7 @@ class Lane:
         return sum(self._waiting.values())
 
     async def warm(self) -> None:
-        """Have a worker ready."""
+        """Start a worker if none is ready or busy."""
         if not self._idle and not self._busy:
             self._idle.append(await self._hired())
 
@@ -254,7 +257,7 @@ async def kept_warm(*lanes: Lane) -> AsyncIterator[None]:
 
 
 async def _keep_warm(lane: Lane) -> None:
-    """Whoever comes next shall not have to wait for a worker to be made."""
+    """Keep a worker ready, so that the next request does not wait for a new process."""
     await anyio.sleep(_FIRST_S)
     while True:
         try:
@@ -265,7 +268,7 @@ async def _keep_warm(lane: Lane) -> None:
 
 
 class _Worker:
-    """A process, as whoever asks it sees it."""
+    """One worker process, as its parent sees it."""
 
     def __init__(self, process: "ForkServerProcess", wire: Connection) -> None:
         self._process = process
@@ -281,21 +284,21 @@ class _Worker:
 
     @property
     def lives(self) -> bool:
-        """Whether it has not died meanwhile, for want of memory say."""
+        """Return whether the process is alive; it may have died, for example for want of memory."""
         return self._process.is_alive()
 
     def asked(self, request: bytes) -> bytes:
-        """Have one thing done. Raises OSError, EOFError when the process has died."""
+        """Send one request and return the reply. Raise OSError or EOFError if the process has died."""
         self._wire.send_bytes(request)
         return self._wire.recv_bytes()
 
     def ran_out(self) -> bool:
-        """Whether it, being dead, was ended by the timer of its own processor time."""
+        """Return whether the dead process was ended by its timer of processor time."""
         self._process.join(_ENDING_S)
         return self._process.exitcode == -signal.SIGPROF
 
     def kill(self) -> None:
-        """End it, whatever it does. Who waits for it learns at once."""
+        """Kill the process. A caller that waits for its reply gets an error at once."""
         if self._process.is_alive():  # a number that has been given back may be somebody else's
             self._process.kill()
         # Its thread may still read from the wire: that ends by itself, since the other end is closed.
