@@ -54,8 +54,11 @@ class StoredColumns(NamedTuple):
 
 
 def linked(before: bytes, stream: str, events: StoredColumns) -> int:
-    """How many of these events, from the first one on, are in the chain that goes on from `before`. As
-    `link` for each says, in half the time."""
+    """Return how many of these events, counted from the first, continue the chain that ends at
+    `before`.
+
+    The result is that of `link` for each event, in half the time.
+    """
     told = {
         pair: _names(stream, *pair) for pair in set(zip(events.kinds, events.authors, strict=True))
     }
@@ -71,7 +74,8 @@ def linked(before: bytes, stream: str, events: StoredColumns) -> int:
 
 @lru_cache(maxsize=1024)
 def _names(*texts: str) -> bytes:
-    """What is the same in most links of a stream."""
+    """Encode the texts that are the same in most links of a stream. Damaged text must not raise
+    here: the check reports it."""
     # Damaged text has to be told, not to fail.
     encoded = [text.encode("utf-8", "surrogateescape") for text in texts]
     return b"".join(pack(">I", len(data)) + data for data in encoded)
@@ -129,7 +133,7 @@ class Inspector:
 
     @property
     def damage(self) -> Damage | None:
-        """Something that is wrong with what was seen so far; None when nothing is."""
+        """Return one fault of the events that were inspected so far; None without any."""
         return next(iter(self._damages.values()), None)
 
     def findings(self, ends: Iterable[Sequence[Any]] | None) -> list[Damage]:
@@ -147,7 +151,8 @@ class Inspector:
         return sorted(self._damages.values(), key=lambda each: (each.stream, each.seq))
 
     def _written(self, ends: Iterable[Sequence[Any]]) -> dict[str, Head]:
-        """Where streams end as the database says, of which no value need be what was stored."""
+        """Return the heads of streams as the database has them. A value of the wrong type is noted
+        as damage."""
         heads = {}
         for stream, seq, chain in ends:
             if (type(stream), type(seq), type(chain)) == (str, int, bytes):

@@ -20,7 +20,7 @@ Before: TypeAlias = Callable[[Connection, Branch, str], object]
 
 
 def no_copy(connection: Connection, branch: Branch, revision: str) -> None:
-    """Nothing comes before: of what is a copy itself, or is new."""
+    """Make no copy before an upgrade: the database is a copy itself, or new."""
 
 
 class WriterSession(Protocol):
@@ -32,7 +32,7 @@ class WriterSession(Protocol):
         """Do work that uses this session."""
 
     def alive(self) -> bool:
-        """Whether the connection was still there when last heard of."""
+        """Return whether the connection still existed when it was last used."""
 
     def begin(self) -> None:
         """Open a transaction in which nobody else can write."""
@@ -53,7 +53,7 @@ class Database(Protocol):
 
     @property
     def name(self) -> str:
-        """What people may read: without a password."""
+        """Return the name of the database for people: without a password."""
 
     @property
     def address(self) -> str:
@@ -61,7 +61,7 @@ class Database(Protocol):
 
     @property
     def is_local(self) -> bool:
-        """Whether a commit waits for a disk of this machine, and for nothing else."""
+        """Return whether a commit waits for nothing but a disk of this machine."""
 
     @property
     def patience(self) -> float:
@@ -69,7 +69,7 @@ class Database(Protocol):
 
     @property
     def faults(self) -> tuple[type[Exception], ...]:
-        """Everything that its driver raises."""
+        """Return all exception types that the driver raises."""
 
     def open(self, branch: Branch, before: Before = no_copy) -> WriterSession:
         """Become the only writer, migrate, connect. `before` is called where tables are about to
@@ -85,7 +85,8 @@ class Database(Protocol):
         """Connect again after a failure; whatever the last session left unfinished is over then."""
 
     def lost(self, error: Exception) -> bool:
-        """Whether a fault is the database's, so that nothing can be written, or the statement's."""
+        """Return whether a fault is that of the database, so that nothing can be written, and not
+        of the statement."""
 
     async def ask(self, question: Callable[[Connection], T]) -> T:
         """Read, without waiting for the writer."""
@@ -101,17 +102,17 @@ class Database(Protocol):
         """Bytes of the database, and of a log beside it, by `database` and `wal`. Raises OSError."""
 
     def complaints(self, connection: Connection) -> list[str]:
-        """What the database itself finds wrong with its files."""
+        """Return the faults that the database itself finds in its files."""
 
     async def close(self) -> None:
-        """Finish reading."""
+        """Close the connections that read."""
 
     def disown(self) -> None:
-        """Let others write."""
+        """Release the lock, so that another process may write."""
 
 
 def cause_of(error: Exception) -> str:
-    """What a fault says, without a full stop."""
+    """Return the text of a fault without a full stop."""
     cause: object = error.orig if isinstance(error, DBAPIError) else error
     if isinstance(cause, OSError) and cause.errno is not None:
         return os.strerror(cause.errno)

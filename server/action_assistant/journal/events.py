@@ -10,11 +10,11 @@ if TYPE_CHECKING:  # workers read events too, and need no database
 
 
 class Event(msgspec.Struct, frozen=True, gc=False):
-    """Something that happened. Never changed, never deleted.
+    """A fact of the log. It is never changed and never deleted.
 
-    `seq` is gapless per stream from 1; `position` orders all streams of one journal. `kind` is past
-    tense with a version (`graph.updated.v1`). `at` is in microseconds since 1970, UTC: for people,
-    never for ordering.
+    `seq` counts the events of a stream from 1 without gaps; `position` orders all streams of one
+    journal. `kind` is in the past tense with a version (`graph.updated.v1`). `at` is in
+    microseconds since 1970, UTC: for people, never for ordering.
     """
 
     stream: str
@@ -48,12 +48,12 @@ class Addition(msgspec.Struct, frozen=True):
 
 
 def bare(events: Iterable[Event], usual: str) -> list[BareEvent]:
-    """The same, without what is usual."""
+    """Return events without their kind and time where the kind is the usual one."""
     return [(e.body, *((None, None) if e.kind == usual else (e.kind, e.at))) for e in events]
 
 
 class StreamSnapshot(msgspec.Struct, frozen=True):
-    """What a stream added up to at `seq`. A cache: it may vanish at any time."""
+    """The state of a stream at `seq`. It is a cache: it may vanish at any time."""
 
     stream: str
     seq: int

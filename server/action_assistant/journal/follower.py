@@ -11,7 +11,7 @@ _HELD: Final = 1000  # events that wait for a follower in memory; after that it 
 
 
 class Follower:
-    """What waits for one follower."""
+    """The queue of committed events for one reader, of bounded size."""
 
     def __init__(self) -> None:
         self._waiting: deque[Event] = deque()
@@ -20,7 +20,8 @@ class Follower:
         self._news = asyncio.Event()
 
     def hear(self, events: Sequence[Event]) -> None:
-        """What was committed just now."""
+        """Queue events that were just committed; a full queue is dropped, and the reader reads the
+        log instead."""
         if not events or self._missed:
             return
         if len(self._waiting) + len(events) > _HELD:
@@ -31,18 +32,18 @@ class Follower:
         self._news.set()
 
     def wake(self) -> None:
-        """There is more to read."""
+        """Drop the queue, and tell the reader to read the log."""
         self._waiting.clear()
         self._missed = True
         self._news.set()
 
     def end(self) -> None:
-        """Nothing will come any more."""
+        """End the queue: no event will come any more."""
         self._ended = True
         self._news.set()
 
     async def next(self) -> list[Event] | None:
-        """What came; empty when something was missed and has to be read; None at the end."""
+        """Wait for events and return them; return [] if the log has to be read, None at the end."""
         await self._news.wait()
         found = list(self._waiting)
         if self._ended and not found and not self._missed:

@@ -53,13 +53,14 @@ _Shape: TypeAlias = tuple[object, ...]
 
 
 class Findings(NamedTuple):
-    """What is there beside ours; and what has our name and is not as we make it, in words."""
+    """The objects of a schema that are not this program's, and those of this program that were
+    altered."""
 
     strangers: tuple[SchemaObject, ...]
     altered: tuple[str, ...]
 
     def sentences(self) -> list[str]:
-        """Say both."""
+        """Return one sentence for each finding."""
         strange = [f"{each} was not made by this program" for each in self.strangers]
         return [*strange, *self.altered]
 

@@ -25,7 +25,7 @@ ReadKept = Callable[[str], Iterable[Event]]
 
 
 class LogHead(msgspec.Struct, frozen=True):
-    """Where a log ended: its last position, and the digest of all heads, in hex."""
+    """The end of a log: its last position, and the digest of all heads in hex."""
 
     position: int
     digest: str

@@ -139,13 +139,17 @@ class Journal(JournalReader):
     def append_then(
         self, addition: Addition, done: Callable[[int | None, BaseException | None], None]
     ) -> None:
-        """As `append`, for who does not wait: `done` is called on the loop after COMMIT with the newest
-        seq, or with what `append` would raise. It must not raise. Raises Unavailable if closed."""
+        """Append without waiting.
+
+        `done` is called on the loop after COMMIT, with the newest seq or with the exception that
+        `append` would raise. It must not raise. Raise Unavailable if the journal is closed.
+        """
         is_brief = sum([len(draft.body) for draft in addition.drafts]) <= _BRIEF
         self._queue(Job(lambda transaction: transaction.add(addition), done, is_brief=is_brief))
 
     def follow(self) -> AbstractAsyncContextManager[AsyncIterator[Event]]:
-        """What is committed from now on, in order. Memory is bounded: who is slow reads later."""
+        """Yield the events that are committed from now on, in order. Memory is bounded: a slow
+        reader reads the log later."""
         return self._following()
 
     async def keep_snapshot(self, stream: str, seq: int, state: bytes) -> None:
@@ -207,10 +211,10 @@ class Journal(JournalReader):
         return await self._write(again)
 
     async def verify(self, tell: Callable[[int], None] = lambda _: None) -> list[Damage]:
-        """What is wrong with the log: the first damaged event of each stream, none when all is well.
+        """Return the first damage of each stream; an empty list for a sound log.
 
-        Finds every change of a stored event and every one that is missing. `tell` hears how many
-        events have been looked at. Raises Unavailable.
+        Every changed and every missing event is found. `tell` is called with the number of events
+        that were inspected. Raise Unavailable.
         """
         inspector = Inspector(taken_out)
         after = 0
@@ -230,7 +234,7 @@ class Journal(JournalReader):
         return [*found, *(Damage("", 0, text) for text in complaints)]
 
     async def health(self) -> str | None:
-        """Why nothing can be stored at the moment; None when it can. Writes nothing."""
+        """Return why nothing can be stored at the moment; None if it can. Nothing is written."""
         try:
             await self._write(lambda transaction: transaction.connection)
         except Unavailable as error:
@@ -238,12 +242,13 @@ class Journal(JournalReader):
         return None
 
     async def parts(self) -> Mapping[str, str | None]:
-        """What of it works (None), or why it does not: tried by writing, and said within seconds."""
+        """Return for each part None if it works, else the reason. This tries to write, and answers
+        within seconds."""
         return await self._probe.parts()
 
     @property
     def metrics(self) -> CommitMetrics:
-        """What the writer has done."""
+        """Return the metrics of the writer."""
         return self._writer.metrics
 
     async def ask(self, question: Callable[[Connection], T]) -> T:
@@ -257,7 +262,7 @@ class Journal(JournalReader):
 
     @property
     def database_name(self) -> str:
-        """What people may read: without a password."""
+        """Return the name of the database for people: without a password."""
         return self._database.name
 
     async def bytes_in_use(self) -> dict[str, int]:

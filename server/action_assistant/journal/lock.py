@@ -43,12 +43,13 @@ def own(path: Path) -> int:
 
 
 def holder(path: Path) -> Holder | None:
-    """Who has locked a database, where the system tells: Linux does, of processes that can be seen."""
+    """Return the process that has locked a database; None if the system does not tell. Linux tells
+    it for visible processes."""
     return _holder(path.with_name(f"{path.name}.lock"))
 
 
 def is_program(pid: int) -> bool:
-    """Whether a process is one of this program, as far as its command line says so."""
+    """Return whether a process runs this program, by its command line."""
     try:
         words = Path(f"/proc/{pid}/cmdline").read_bytes()
     except OSError:
@@ -97,7 +98,7 @@ def _user_of(pid: int) -> int:
 
 
 def _holder(lock: Path) -> Holder | None:
-    """Who holds it, where the system tells: Linux does, of processes that can be seen from here."""
+    """Return the process that holds a lock file; None if the system does not tell."""
     try:
         there = lock.stat()
         place = f"{os.major(there.st_dev):02x}:{os.minor(there.st_dev):02x}:{there.st_ino}"

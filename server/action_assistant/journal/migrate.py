@@ -88,7 +88,7 @@ def recognize(connection: Connection) -> set[str]:
 
 
 def _newer(connection: Connection, name: str, revision: str) -> str:
-    """Who made a database that this version does not know, what this version is, and the ways out."""
+    """Return a sentence about a database of a newer version: its version, ours, and the ways out."""
     writer = last_writer(connection)
     newest = revisions_of(revision.partition("_")[0])[-1]
     return (
@@ -116,8 +116,10 @@ def _name_of(connection: Connection) -> str:
 
 
 def _is_foreign(connection: Connection, current: set[str]) -> bool:
-    """Whether tables are there that we did not make. A database on a server may hold others, too, as
-    long as their names are not in our way."""
+    """Return whether a database has tables that this program did not make.
+
+    A database on a server may hold other tables, as long as their names differ from ours.
+    """
     there = set(inspect(connection).get_table_names()) - {VERSIONS.name}
     if connection.dialect.name == "sqlite":
         if connection.exec_driver_sql("PRAGMA application_id").scalar():

@@ -88,12 +88,12 @@ class PostgresSession:
         return self._loop.run_until_complete(self._open.run_sync(lambda _: work()))
 
     def alive(self) -> bool:
-        """Whether the connection was still there when last heard of."""
+        """Return whether the connection still existed when it was last used."""
         self._loop.run_until_complete(_hear())
         return not self._raw.is_closed()
 
     def begin(self) -> None:
-        """Open a transaction."""
+        """Open a transaction on the server."""
         self.say("BEGIN")
 
     def say(self, command: str) -> None:
@@ -173,7 +173,8 @@ class Postgres:
             raise CannotStart(f"Cannot use {self._the}: {cause_of(error)}.") from error
 
     def look(self, question: Callable[[Connection], object]) -> None:
-        """Nothing: whoever changes tables asks in the same transaction, and nothing else alters any."""
+        """Ask nothing: whoever changes tables asks inside the same transaction, and nothing else
+        alters them."""
 
     def migrate(self, upgrade: Callable[[Connection], T]) -> T:
         """Run a change of the schema in one transaction. Raises CannotStart."""
@@ -215,7 +216,7 @@ class Postgres:
             await asyncio.sleep(0.05)
 
     def lost(self, error: Exception) -> bool:
-        """Whether the server or the connection is at fault."""
+        """Return whether a fault is that of the server or the connection, and not of the statement."""
         cause: Any = error.orig if isinstance(error, DBAPIError) else error
         if isinstance(error, DBAPIError) and error.connection_invalidated:
             return True
@@ -249,16 +250,16 @@ class Postgres:
         return {"database": int(connection.exec_driver_sql(asked).scalar_one())}
 
     def complaints(self, connection: Connection) -> list[str]:
-        """Nothing: the server looks after its own files."""
+        """Return an empty list: the server checks its own files."""
         del connection
         return []
 
     async def close(self) -> None:
-        """Finish reading."""
+        """Close the connections that read."""
         await self._readers.dispose()
 
     def disown(self) -> None:
-        """Nothing: the lock went with the session that wrote."""
+        """Do nothing: the lock ended with the session that wrote."""
 
     def _engine(self, server: dict[str, str], **options: Any) -> AsyncEngine:
         return create_async_engine(
@@ -278,7 +279,7 @@ class Postgres:
 
 
 def weakness(connection: Connection) -> str:
-    """Why nothing may be written to a database, for whoever only looks; empty where nothing is wrong."""
+    """Return why nothing may be written to a database; "" if nothing is wrong. Only reads."""
     for name, (allowed, why) in _SETTINGS.items():
         if name == _READ_ONLY:  # as whoever only looks has it
             value = "on" if connection.execute(select(func.pg_is_in_recovery())).scalar() else "off"

@@ -25,7 +25,7 @@ class ProgramVersion(NamedTuple):
 
 
 def last_writer(connection: Connection) -> ProgramVersion | None:
-    """Who wrote last; None where versions did not say so yet."""
+    """Return the version that wrote last; None for databases of versions that did not note it."""
     if not inspect(connection).has_table(written_by.name):
         return None
     row = connection.execute(_LAST).first()

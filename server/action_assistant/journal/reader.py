@@ -55,10 +55,10 @@ _KEPT: Final = select(_snapshot.seq, _snapshot.proof, _snapshot.state).where(
 
 
 class JournalReader:
-    """Who can ask a database, in whichever way."""
+    """Reads events from a database. Subclasses decide how a question reaches it."""
 
     async def _ask(self, question: Callable[[Connection], T]) -> T:
-        """The answer. Raises Unavailable."""
+        """Return the answer to a question. Raise Unavailable."""
         raise NotImplementedError
 
     async def read(

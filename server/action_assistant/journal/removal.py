@@ -33,12 +33,12 @@ class StreamRemoved(msgspec.Struct, frozen=True):
 
     @property
     def end(self) -> Head:
-        """Where the stream ended."""
+        """Return the head at which the stream ended."""
         return Head(self.seq, bytes.fromhex(self.chain))
 
 
 def taken_out(event: Event) -> tuple[str, Head] | None:
-    """Which stream an event says was taken out, and where that ended."""
+    """Return the stream that an event removes from the log, and its end; None for other events."""
     if event.stream != STREAM or event.kind != StreamRemoved.kind:
         return None
     removed = msgspec.json.decode(event.body, type=StreamRemoved)

@@ -56,7 +56,7 @@ _SCAN: Final = (
 
 
 class SqliteSession:
-    """The connection that writes."""
+    """The connection that writes to a SQLite file."""
 
     def __init__(self, path: Path, driver: Any) -> None:
         self._engine = create_engine(
@@ -81,11 +81,11 @@ class SqliteSession:
             raise
 
     def run(self, work: Callable[[], T]) -> T:
-        """Do work that uses this session."""
+        """Run work that uses this session, and return its result."""
         return work()
 
     def alive(self) -> bool:
-        """Always: a file does not go away."""
+        """Return True: a file does not disconnect."""
         return True
 
     def begin(self) -> None:
@@ -197,14 +197,14 @@ class Sqlite:
         return SqliteSession(self._path, self._driver)
 
     def lost(self, error: Exception) -> bool:
-        """Whether the file is at fault."""
+        """Return whether a fault is that of the file, and not of the statement."""
         return not isinstance(
             error,
             IntegrityError | ProgrammingError | InterfaceError | DataError | UnicodeDecodeError,
         )
 
     async def ask(self, question: Callable[[Connection], T]) -> T:
-        """Read, on a thread."""
+        """Answer a question on a thread that reads."""
 
         def asked() -> T:
             with self._engine.connect() as connection:
@@ -213,7 +213,7 @@ class Sqlite:
         return await asyncio.get_running_loop().run_in_executor(self._threads, asked)
 
     async def at_one_moment(self, question: Callable[[Connection], T]) -> T:
-        """Read in one transaction."""
+        """Answer a question in one transaction, so that all of it sees the same state."""
 
         def asked(connection: Connection) -> T:
             connection.exec_driver_sql("BEGIN")
@@ -244,17 +244,17 @@ class Sqlite:
         }
 
     def complaints(self, connection: Connection) -> list[str]:
-        """What SQLite finds wrong with the file."""
+        """Return the faults that SQLite finds in the file."""
         found = connection.exec_driver_sql("PRAGMA integrity_check").scalars().all()
         return [text for text in found if text != "ok"]
 
     async def close(self) -> None:
-        """Finish reading."""
+        """Close the connections that read."""
         await asyncio.to_thread(self._threads.shutdown)
         self._engine.dispose()
 
     def disown(self) -> None:
-        """Let others write."""
+        """Release the lock, so that another process may write."""
         if self._lock is not None:
             os.close(self._lock)
             self._lock = None
@@ -301,8 +301,10 @@ def _readable(path: Path) -> Iterator[Path]:
 
 
 def inspected(path: Path, tell: Callable[[int], None] = lambda _: None) -> tuple[int, list[Damage]]:
-    """How many events a file holds, and what is wrong with them; at whatever revision its tables are.
-    Changes nothing. Raises sqlite3.Error."""
+    """Return the number of events in a file and their damages, at any revision of its tables.
+
+    The file is not changed. Raise sqlite3.Error.
+    """
     inspector, after = Inspector(taken_out), 0
     with closing(sqlite3.connect(f"{path.as_uri()}?mode=ro", uri=True)) as database:
         database.execute("BEGIN")

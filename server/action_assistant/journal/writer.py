@@ -34,7 +34,7 @@ _LAST: Final = select(func.coalesce(func.max(editor_tables.editor_event.c.positi
 
 
 def now() -> int:
-    """Microseconds since 1970."""
+    """Return the time in microseconds since 1970."""
     return time.time_ns() // 1000
 
 
@@ -123,7 +123,7 @@ class Transaction:
         return head.seq
 
     def end(self, stream: str) -> Head:
-        """Where a stream ends, with what earlier jobs of this transaction added to it."""
+        """Return the head of a stream, with the events that earlier jobs of this transaction added."""
         return self._head(stream)
 
     def attempt(self, job: Job[Any], database: Database) -> Outcome:
@@ -233,7 +233,7 @@ class Writer:
         return self._commit(jobs)
 
     def is_quick(self, jobs: Sequence[Job[Any]]) -> bool:
-        """Whether `commit` would not take long with these (decision 94)."""
+        """Return whether `commit` would be quick with these jobs (decision 94)."""
         return (
             self._database.is_local
             and self.metrics.quick.are_quick
@@ -245,7 +245,7 @@ class Writer:
 
     @property
     def is_alive(self) -> bool:
-        """Whether the thread goes on."""
+        """Return whether the writer's thread runs."""
         return self._thread.is_alive()
 
     def close(self) -> None:
@@ -263,7 +263,7 @@ class Writer:
                 return
 
     def _next(self) -> tuple[list[Job[Any]], bool]:
-        """Everything that waits, at least one; whether to end after it."""
+        """Wait for jobs and return all of them, and whether the writer has to end after them."""
         found: list[Job[Any]] = []
         jobs = self._jobs.get()
         while jobs is not None:
@@ -304,7 +304,8 @@ class Writer:
     def _settled(
         self, transaction: Transaction | None, done: list[Outcome], jobs: int, error: Exception
     ) -> list[Outcome]:
-        """What became of jobs whose transaction failed: everything or nothing, or nobody knows."""
+        """Return the outcomes of jobs whose transaction failed: all stored, none stored, or
+        unknown."""
         text = f"Nothing can be stored at the moment: {cause_of(error)}."
         if transaction is not None and transaction.committing and transaction.last is not None:
             match self._stored(*transaction.last):
@@ -315,7 +316,7 @@ class Writer:
         return [(None, Unavailable(text), [])] * jobs
 
     def _stored(self, event: Event, chain: bytes) -> bool | None:
-        """Whether an event is in the log; None when the database cannot be asked for too long."""
+        """Return whether an event is in the log; None if the database cannot be asked in time."""
         table = editor_tables.editor_event
         found = select(table.c.chain).where(table.c.position == event.position)
         until = time.monotonic() + self._database.patience
@@ -365,7 +366,7 @@ def _check_text(text: str) -> None:
 
 
 def _told(error: Exception) -> Exception:
-    """What a job's own failure is to the one who asked for it."""
+    """Return the exception that a caller gets for the failure of its job."""
     if isinstance(error, IntegrityError):
         return Conflict(f"This is in the way of something that is already stored: {error.orig}.")
     if isinstance(error, DBAPIError):

@@ -57,8 +57,12 @@ def log_tables(metadata: MetaData) -> tuple[Table, Table, Table]:
 
 
 def written_by_table(metadata: MetaData) -> Table:
-    """Which versions of this program have written to a database, since when (a new row for each), and
-    at which revision of the tables. Older versions read its last row, so it stays as it is."""
+    """Return the table of the program versions that wrote to a database, with a row for each
+    change.
+
+    A row says since when, and at which revision of the tables. Older versions read the last row, so
+    the table stays as it is.
+    """
     return Table(
         "written_by",
         metadata,

@@ -23,7 +23,8 @@ _LATE: Final = 3600.0  # seconds beyond the time of the next one, at least
 
 
 class OffSite(msgspec.Struct, frozen=True):
-    """What became of the command that takes a finished backup elsewhere. `why`: it failed."""
+    """The result of the command that takes a finished backup elsewhere. `why` is the reason of a
+    failure."""
 
     seconds: float
     why: str | None = None
@@ -75,8 +76,11 @@ class BackupSchedule(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class BackupState(msgspec.Struct, frozen=True, kw_only=True):
-    """All of it. `failed`: since the last one that was made. `proven`: the last rehearsal that found a
-    backup sound; `rehearsed`: the last of all. `schedule`: None when nobody makes them regularly."""
+    """The state of the backups of a data folder.
+
+    `failed` is a failure since the last backup. `proven` is the last rehearsal that found a backup
+    sound, `rehearsed` the last one. `schedule` is None when no regular backups are planned.
+    """
 
     last: BackupMade | None = None
     failed: BackupFailed | None = None
@@ -85,15 +89,16 @@ class BackupState(msgspec.Struct, frozen=True, kw_only=True):
     schedule: BackupSchedule | None = None
 
     def is_late(self, now: float) -> bool:
-        """Whether a backup should have been made by now: whoever makes them does not run, or fails."""
+        """Return whether a scheduled backup is late: the process that makes them does not run, or
+        fails."""
         if self.schedule is None:
             return False
         return now > self.schedule.next + max(_LATE, self.schedule.every / 4)
 
 
 def backup_state(data: Path) -> BackupState | None:
-    """What is known of the backups of a data folder; None when it cannot be read, which is not the
-    same as that there are none."""
+    """Return the state of the backups; None if it cannot be read, which does not mean that there
+    are none."""
     try:
         return msgspec.json.decode((data / FILE).read_bytes(), type=BackupState)
     except FileNotFoundError:
@@ -123,7 +128,7 @@ def note(data: Path, change: Callable[[BackupState], BackupState]) -> None:
 
 
 def made(data: Path, backup: BackupMade) -> None:
-    """A backup is there."""
+    """Note a finished backup in the state."""
     note(data, lambda state: msgspec.structs.replace(state, last=backup, failed=None))
 
 

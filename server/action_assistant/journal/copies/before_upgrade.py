@@ -48,7 +48,7 @@ class UpgradeCopy(NamedTuple):
 
 
 def copy_at(path: Path) -> UpgradeCopy | None:
-    """What the name of a file says; None when it is no copy."""
+    """Return the copy that a file name describes; None for other files."""
     revision, _, stamp = path.stem.partition("-")
     named = revision.partition("_")[0]
     try:
@@ -63,7 +63,7 @@ def copy_at(path: Path) -> UpgradeCopy | None:
 
 
 def copies_in(folder: Path) -> list[UpgradeCopy]:
-    """Those that are there, the newest first."""
+    """Return the copies in a folder, the newest first."""
     found = [copy for path in folder.glob("*.db") if (copy := copy_at(path)) is not None]
     return sorted(found, key=lambda each: (each.made_at, each.path), reverse=True)
 
@@ -216,8 +216,11 @@ def _rows_of(connection: Connection, table: Table) -> Iterator[list[dict[str, An
 
 
 def _proven(part: Path, before: Callable[[], list[Damage]]) -> int:
-    """How many events a copy holds. Damage that was there before is in it, too, and is told. Raises
-    CannotStart when there is other damage."""
+    """Return the number of events in a copy. Raise CannotStart if it has damage that the original
+    had not.
+
+    Damage of the original is copied as well, and logged.
+    """
     events, damages = inspected(part)
     if damages and damages != before():
         raise CannotStart(_refusal(part.parent, "the copy is not what was copied"))

@@ -63,7 +63,7 @@ def copy(
 
 
 def sentence(damage: Damage) -> str:
-    """What is wrong, for people."""
+    """Return a damage as a sentence."""
     return f"{damage.stream or 'the file'}, event {damage.seq}: {damage.why}"
 
 
@@ -115,8 +115,10 @@ def _copy(
 
 
 def _is_older(old: Connection, new: Connection) -> bool:
-    """Whether all events of a log are those of another, which may have gone on since. A link of the
-    chain stands for all that an event says."""
+    """Return whether a log holds exactly the first events of another log.
+
+    The links of the chains are compared, which stand for everything that an event holds.
+    """
     event = editor_event.c
     chosen = select(event.position, event.stream, event.seq, event.chain).order_by(event.position)
     after = 0

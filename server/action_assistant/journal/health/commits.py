@@ -70,7 +70,7 @@ class CommitMetrics(Collector):
         self._ended(jobs)
 
     def failed(self, jobs: int, why: str) -> None:
-        """The transaction failed."""
+        """Count a transaction that failed."""
         self.failing = why
         self.quick.took(self.busy_s)
         self._failures += 1
@@ -92,7 +92,7 @@ class CommitMetrics(Collector):
         return 0.0 if since is None else time.monotonic() - since
 
     def collect(self) -> Iterator[Metric]:
-        """As a registry asks."""
+        """Yield the metrics that a Prometheus registry asks for."""
         yield from self._seconds.collect()
         yield CounterMetricFamily(
             "action_assistant_commit_failures",

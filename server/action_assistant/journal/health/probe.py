@@ -33,7 +33,7 @@ class JournalProbe:
         self._reading = SharedCheck(lambda: _tried(read, self._misfit), patience=_PATIENCE_S)
 
     async def parts(self) -> dict[str, str | None]:
-        """What of the journal works (None), or why it does not."""
+        """Return for each part of the journal None if it works, else the reason."""
         parts: dict[str, str | None] = {"database": None, "writer": None, "schema": None}
         if not self._is_alive():
             parts["writer"] = (
@@ -66,7 +66,7 @@ class JournalProbe:
 
 
 async def _tried(way: Asked, question: Callable[[Connection], Any]) -> str:
-    """Why it failed."""
+    """Return the reason why a question failed, or the text for success."""
     try:
         said: str | None = await way(question)
     except Unavailable as error:

@@ -14,8 +14,12 @@ _SHARE: Final = 1 / 6
 
 
 class QuickCommits:
-    """Of the last hundred commits no more than five took longer than 20 ms, and none longer than 100 ms; all
-    of them took a sixth of the time in which they came. Of the first twenty nothing is known yet."""
+    """Decides from the last hundred commits whether a commit may run on the event loop.
+
+    At most five of them may have taken longer than 20 ms and none longer than 100 ms, and all
+    together at most a sixth of the time in which they came. The first twenty commits never run
+    there.
+    """
 
     def __init__(self) -> None:
         self._last: deque[tuple[float, float]] = deque(maxlen=_REMEMBERED)  # seconds, and when
@@ -23,7 +27,7 @@ class QuickCommits:
         self._slow = self._far_too_slow = 0
 
     def took(self, seconds: float) -> None:
-        """Another one is over, wherever it was done."""
+        """Note the duration of a commit in seconds."""
         if len(self._last) == _REMEMBERED:
             self._count(self._last[0][0], -1)
         self._last.append((seconds, time.monotonic()))
@@ -37,7 +41,7 @@ class QuickCommits:
 
     @property
     def are_quick(self) -> bool:
-        """Whether the next one may hold up the loop."""
+        """Return whether the next commit may run on the event loop."""
         if len(self._last) < _KNOWN or self._slow > _MOST_SLOW or self._far_too_slow:
             return False
         return self._all <= _SHARE * (time.monotonic() - self._last[0][1])

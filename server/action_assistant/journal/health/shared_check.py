@@ -55,7 +55,7 @@ class SharedCheck(Generic[T]):
 
     @property
     def failure(self) -> BaseException | None:
-        """Why the question that was asked last has no answer; None where it has one, or is under way."""
+        """Return the exception of the last question; None if it has an answer or is under way."""
         task = self._task
         return (
             task.exception() if task is not None and task.done() and not task.cancelled() else None
@@ -78,6 +78,6 @@ class SharedCheck(Generic[T]):
 
 
 def _heard(task: "asyncio.Task[T]") -> None:
-    """Whoever began it may not wait; `failure` tells."""
+    """Fetch the exception of a task whose caller may not wait any more; `failure` reports it."""
     if not task.cancelled():
         task.exception()

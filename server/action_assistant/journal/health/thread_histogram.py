@@ -21,14 +21,14 @@ class ThreadHistogram(Collector):
         self._sum = 0.0
 
     def observe(self, values: Sequence[float]) -> None:
-        """Count all of these."""
+        """Count all of these values."""
         bounds, counts = self._bounds, self._counts
         for value in values:
             counts[bisect_left(bounds, value)] += 1
         self._sum += sum(values)
 
     def collect(self) -> Iterator[Metric]:
-        """As a registry asks."""
+        """Yield the metrics that a Prometheus registry asks for."""
         names = (*map(floatToGoString, self._bounds), "+Inf")
         buckets = list(zip(names, accumulate(self._counts), strict=True))
         yield HistogramMetricFamily(
