@@ -136,3 +136,29 @@ def test_a_start_anew_waits_for_what_still_loads_and_for_its_whole_course() -> N
 def test_a_loading_time_is_seconds_that_are_not_negative(seconds: object) -> None:
     with pytest.raises(ValueError, match="behaviours/A/0"):
         script_from({"behaviours": {"A": [{"load_s": seconds}]}})
+
+
+def failing_start(following: Conditions) -> Graph:
+    """When A fails, B is run and C is bypassed. D answers C with `following`."""
+    graph = graph_of(
+        "entry>A", "A>B", "A>C", "C>D", "B>exit", "D>exit",
+        AB=Conditions("run", "run", "run"), AC=Conditions("run", "run", "bypass"), CD=following,
+    )  # fmt: skip
+    return optional(graph, "B>exit", "D>exit")
+
+
+def test_an_error_that_starts_one_action_and_halts_the_graph_by_a_bypass_is_told() -> None:
+    """However long B loads: the same end that triggers it halts the graph."""
+    graph = failing_start(Conditions("run", "run"))
+    calls = script(A=[Behaviour(result="on_error")], B=[Behaviour(load_s=0.01)])
+    assert "H14" in hazards(list(simulate(graph, script=calls)))
+    (message,) = told(graph, "H14")
+    assert message.startswith("If A_0 ends with on_error, C_0 is bypassed")
+    assert "while B_0 still loads" in message
+
+
+def test_an_error_whose_bypass_leads_on_halts_nothing() -> None:
+    graph = failing_start(Conditions("run", "run", "run"))
+    calls = script(A=[Behaviour(result="on_error")], B=[Behaviour(load_s=0.01)])
+    assert "H14" not in hazards(list(simulate(graph, script=calls)))
+    assert told(graph, "H14") == []

@@ -4,7 +4,7 @@ and an end that leaves an action running. Only what can happen is reported.
 See docs/umrf-and-the-engine.md 2.3 and 2.5; H4, H5, H12, H14.
 """
 
-from collections.abc import Collection, Container, Mapping
+from collections.abc import Collection, Container, Iterator, Mapping
 from typing import Final
 
 import msgspec
@@ -128,9 +128,9 @@ def check_loading(
 ) -> None:
     """Report ends that halt the graph beside an action that may still load (H14), as one problem.
 
-    `nested` as in `check_responses`. Ends with on_error are not reported: every graph that ignores
-    the errors of one branch would have them, and an action would have to fail while another one
-    loads.
+    `nested` as in `check_responses`. Of ends with on_error only those are reported that start an action
+    and halt the graph themselves: every graph that ignores the errors of one branch would have the
+    others, and an action would have to fail while another one loads.
     """
     if "H14" not in subject.facts.hazards:
         return
@@ -145,10 +145,21 @@ def check_loading(
                 continue
             if beside := concurrency.running_after(action.key, outcome) - runs_at_once:
                 found.append((action, outcome, beside))
-    if not found:
+    failing = list(_failing_starts(subject, reports, runs_at_once))
+    if not found and not failing:
+        return
+    others = more(len(found) + len(failing) - 1, "end", "ends")
+    if failing:
+        action, bypassed, started = failing[0]
+        message = (
+            f"If {action.full_name} ends with on_error, {subject.name(bypassed)} is bypassed, nothing "
+            f"follows that, and the graph is HALTED while {_shortened(subject, started)} still loads (its "
+            "library, its onInit): this engine does not count what loads as running. It then runs all "
+            f"the same, and nothing follows it.{others}"
+        )
+        subject.report("H14", "warning", message, action=action)
         return
     action, outcome, beside = found[0]
-    others = more(len(found) - 1, "end", "ends")
     who = _shortened(subject, beside)
     who = who if len(beside) == 1 else f"one of {who}"
     message = (
@@ -157,6 +168,31 @@ def check_loading(
         f"then runs all the same, and nothing follows it.{others}"
     )
     subject.report("H14", "warning", message, action=action)
+
+
+def _failing_starts(
+    subject: Subject, reports: _Reports, runs_at_once: Container[Key]
+) -> Iterator[tuple[Action, Key, set[Key]]]:
+    """Yield the actions that fail, start others and bypass one after which nothing follows.
+
+    With each comes the bypassed action and the set of started ones: those that wait for nothing else.
+    """
+    for action in subject.real:
+        if "on_error" not in reports.get(action.key, ()):
+            continue
+        answers = {r.child: r.conditions.on_error for r in subject.outgoing.get(action.key, [])}
+        started = {
+            child
+            for child, answer in answers.items()
+            if answer == "run" and child not in {EXIT, action.key} and child not in runs_at_once
+            if all(r.parent == action.key for r in subject.incoming[child] if r.required)
+        }
+        for child, answer in answers.items() if started else ():
+            leading = subject.outgoing.get(child, [])
+            halts = all(r.conditions.on_error == "ignore" for r in leading)
+            if answer == "bypass" and child != EXIT and halts:
+                yield action, child, started
+                break
 
 
 def check_endless(subject: Subject, reports: _Reports, concurrency: Concurrency) -> None:
