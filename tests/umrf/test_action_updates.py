@@ -26,7 +26,7 @@ def values(graph: Graph, key: str) -> dict[str, object]:
     return {each.path: msgspec.json.decode(each.text).get("pvf_value") for each in found.inputs}
 
 
-def test_a_use_keeps_its_values_and_what_nobody_knows() -> None:
+def test_a_use_keeps_its_values_and_unknown_fields() -> None:
     use = action("a", "Go", takes=parameters(speed=leaf(pvf_value=2, mine=["kept"])))
     known = action("", "Go", takes=parameters(speed=leaf(pvf_value=1, pvf_required=False)))
     (after,) = updated(Graph(name="g", actions=(use,)), known).actions
@@ -63,13 +63,13 @@ def test_a_renaming_that_nobody_has_asked_for_is_no_renaming() -> None:
     assert values(updated(graph, known, suggested(graph, known)), "a") == {"velocity": 2}
 
 
-def test_of_two_that_could_be_it_none_is_suggested() -> None:
+def test_an_ambiguous_renaming_is_not_suggested() -> None:
     known = action("", "Go", takes=parameters(velocity=leaf(), torque=leaf()))
     graph = Graph(name="g", actions=(action("a", "Go", takes=parameters(speed=leaf())),))
     assert suggested(graph, known) == NO_RENAMES
 
 
-def test_what_flowed_along_an_arrow_flows_on_after_renamings() -> None:
+def test_values_along_an_arrow_survive_renamings() -> None:
     graph = Graph(
         name="g",
         actions=(
@@ -114,7 +114,7 @@ def test_no_renaming_of_an_output_that_went_is_left_for_the_engine_to_abort_on()
     assert relation.remap == ()
 
 
-def test_a_use_differs_by_what_counts_only() -> None:
+def test_a_use_differs_only_in_members_that_count() -> None:
     known = action("", "Go", takes=parameters(a=leaf(pvf_value=1), b__c=leaf("string")))
     same = action(
         "x", "Go", takes=parameters(b__c=leaf("string", pvf_required=True), a=leaf(pvf_example=3))

@@ -286,7 +286,7 @@ def test_facts_decide_which_hazards_there_are() -> None:
     assert check(graph, None, fixed) == []
 
 
-def test_of_equal_problems_the_first_thousand_are_told() -> None:
+def test_the_first_thousand_of_equal_problems_are_reported() -> None:
     many = [{"name": f"Z{i}"} for i in range(5_000)]
     graph = file(A | {"children": [{"name": "B"}, *many]}, B)
     assert [p.code for p in problems(graph)] == ["ghost"] * 1_000
@@ -309,7 +309,7 @@ def test_any_graph_is_checked(graph: Graph) -> None:
 
 @given(graphs())
 @settings(max_examples=examples(150))
-def test_what_check_says_can_never_run_does_not_run(graph: Graph) -> None:
+def test_an_action_that_check_says_never_runs_does_not_run(graph: Graph) -> None:
     never = {
         problem.where.aid
         for problem in check(graph)

@@ -29,7 +29,7 @@ def _difference(before: Graph, after: Graph) -> Difference:
     return difference((0, by_name(before)), (0, by_name(after)))
 
 
-def test_what_a_robot_notices_comes_before_what_only_looks_otherwise() -> None:
+def test_changes_for_a_robot_come_before_changes_of_the_drawing() -> None:
     after = _graph(speed=0.9, child="Load", x=40, graph_description="to the dock")
     assert list(lines(_difference(_graph(), after))) == [
         "~ graph",
@@ -47,7 +47,7 @@ def test_what_a_robot_notices_comes_before_what_only_looks_otherwise() -> None:
     ]
 
 
-def test_where_cards_stand_means_nothing_to_a_robot() -> None:
+def test_positions_of_cards_mean_nothing_to_a_robot() -> None:
     found = _difference(_graph(), _graph(x=40))
     assert not is_same(found)
     assert is_same(without_looks(found))

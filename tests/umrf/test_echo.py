@@ -18,7 +18,7 @@ def echoed(text: str) -> str:
     return digest(echo(read(text).graph, PINNED))
 
 
-def test_what_the_engine_printed_is_the_echo_of_what_it_read() -> None:
+def test_the_engine_prints_the_echo_of_the_graph_that_it_read() -> None:
     differing = []
     cases = lines(family("engine") / "validation.jsonl")
     assert cases
@@ -38,7 +38,7 @@ def test_an_echo_echoes_itself(graph: Graph) -> None:
     assert digest(echo(read(write(once)).graph, PINNED)) == digest(once)
 
 
-def test_a_value_that_a_parent_hands_over_does_not_count_others_do() -> None:
+def test_only_values_that_no_parent_hands_over_count() -> None:
     file = """{"graph_name": "g", "graph_entry": [{"name": "A"}], "graph_exit": [{"name": "B"}],
       "actions": [
         {"name": "A", "type": "sync", "output_parameters": {"out": {"pvf_type": "string"}},

@@ -34,7 +34,7 @@ def started(traces: list[Trace]) -> list[str]:
     return [t.node for t in traces if isinstance(t, NodeStateEvent) and t.state == "RUNNING"]
 
 
-def test_there_are_some() -> None:
+def test_examples_exist() -> None:
     assert len(EXAMPLES) >= 4
 
 

@@ -74,7 +74,7 @@ def test_an_example_is_offered_as_the_value_that_its_type_wants(
         {"pvf_type": "number"},
     ],
 )
-def test_what_is_no_value_of_the_type_is_not_offered(leaf: Any) -> None:
+def test_an_example_of_another_type_is_not_offered(leaf: Any) -> None:
     graph = graph_of(x=leaf)
     assert offered(graph) == []
     assert with_examples(graph, check(graph)) == graph

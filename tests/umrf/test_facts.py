@@ -31,7 +31,7 @@ def test_a_commit_that_nobody_measured_keeps_its_name() -> None:
         ({"commit": 7}, "/commit"),
     ],
 )
-def test_what_cannot_be_true_of_an_engine_is_refused_with_the_place(
+def test_an_impossible_fact_is_refused_with_its_place(
     profile: dict[str, object], path: str
 ) -> None:
     with pytest.raises(BadProfile) as refused:

@@ -25,7 +25,9 @@ NEEDED = '{"pvf_type":"number"}'
 GIVEN = '{"pvf_type":"number","pvf_value":2}'
 
 
-def test_it_takes_what_the_first_actions_lack_and_gives_what_the_last_one_gives() -> None:
+def test_a_graph_takes_the_missing_inputs_of_its_entries_and_gives_outputs_of_its_last_exit() -> (
+    None
+):
     graph = drawn(
         action("One", {"a": NEEDED, "b": GIVEN}),
         action("Two", {"c": NEEDED}, {"d": GIVEN}),
@@ -38,7 +40,7 @@ def test_it_takes_what_the_first_actions_lack_and_gives_what_the_last_one_gives(
     assert found.outputs == (Parameter("d", NEEDED),)
 
 
-def test_what_one_of_two_first_actions_needs_is_needed() -> None:
+def test_an_input_that_one_of_two_entries_requires_is_required() -> None:
     for texts in ((FREE, NEEDED), (NEEDED, FREE)):
         one, two = (
             action(key, {"a": text}) for key, text in zip(("One", "Two"), texts, strict=True)
@@ -48,6 +50,6 @@ def test_what_one_of_two_first_actions_needs_is_needed() -> None:
 
 
 @given(graphs())
-def test_its_parameters_are_those_that_a_check_compares(graph: Graph) -> None:
+def test_a_graph_has_the_parameters_that_a_check_compares(graph: Graph) -> None:
     own, checked = signature_of(action_of_graph(graph)), signature_of_graph(graph)
     assert own.inputs.keys() == checked.inputs.keys()

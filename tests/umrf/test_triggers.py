@@ -54,7 +54,7 @@ def seen(before: SeenAfter, state: str, nodes: Mapping[str, str]) -> SeenAfter:
     stop_ms=st.none() | st.floats(0, 4_000),
     looks_ms=st.lists(st.sampled_from([5.0, 30.0, 90.0, 400.0]), min_size=1, max_size=4),
 )
-def test_whatever_begins_late_was_said_to_be_loading(
+def test_an_action_that_begins_late_was_reported_as_loading(
     graph: Graph,
     results: list[str],
     times: list[float],
@@ -147,22 +147,22 @@ def test_an_outcome_that_the_arrow_ignores_triggers_nothing() -> None:
     assert told(line(only_errors), "STOPPED", "E..") == ("B_0",)
 
 
-def test_passing_by_reaches_what_lies_behind() -> None:
+def test_a_bypass_reaches_the_actions_behind_it() -> None:
     assert told(line(Conditions(on_error="bypass")), "STOPPED", "E..") == ("C_0",)
 
 
-def test_what_is_loaded_will_run_whatever_was_seen() -> None:
+def test_a_loaded_action_will_run_whatever_was_seen() -> None:
     assert told(line(), "STOPPED", "FI.", SeenAfter(active=frozenset({"A_0"}))) == ("B_0",)
 
 
-def test_a_join_needs_all_that_it_waits_for() -> None:
+def test_a_join_needs_every_required_parent() -> None:
     wait = Relation(parent="a", child="c", conditions=GO)
     joined = line(extra=(wait,))
     assert told(joined, "STOPPED", "F..") == ("B_0",)
     assert told(joined, "STOPPED", "FF.") == ("C_0",)
 
 
-def test_where_all_goes_in_turn_a_graph_that_ended_by_itself_is_at_rest() -> None:
+def test_a_sequential_graph_that_ended_by_itself_is_at_rest() -> None:
     branch = line(Conditions(on_true="run"))
     other = Relation(parent="a", child=EXIT, conditions=Conditions(on_false="bypass"))
     graph = msgspec.structs.replace(branch, relations=(*branch.relations, other))
@@ -171,14 +171,14 @@ def test_where_all_goes_in_turn_a_graph_that_ended_by_itself_is_at_rest() -> Non
     assert told(graph, "STOPPED", "F..") == ("B_0",)
 
 
-def test_a_leaf_that_halts_a_graph_says_nothing_of_what_loads_beside_it() -> None:
+def test_a_leaf_that_halts_a_graph_proves_nothing_about_loading_actions() -> None:
     fork = Relation(parent="a", child="c", conditions=GO)
     arrows = tuple(each for each in line().relations if (each.parent, each.child) != ("b", "c"))
     graph = msgspec.structs.replace(line(), relations=(*arrows, fork))
     assert told(graph, "HALTED", "FF.", SeenAfter(drained=True)) == ("C_0",)
 
 
-def test_of_two_branches_the_one_that_has_begun_rules_the_other_out() -> None:
+def test_a_branch_that_has_begun_rules_the_other_out() -> None:
     one, other = Conditions(on_true="run"), Conditions(on_false="run")
     beside = Relation(parent=ENTRY, child="d", conditions=ENTRY_CONDITIONS)
     arrows = (

@@ -154,7 +154,7 @@ def test_its_fixes_make_either_way_end_the_graph(value: Graph) -> None:
     assert {ended(value, decided) for decided in ("on_true", "on_false")} == {"FINISHED"}
 
 
-def test_what_runs_side_by_side_is_waited_for() -> None:
+def test_concurrent_actions_are_waited_for() -> None:
     """A branch that is not waited for would run on in a graph that no stop reaches any more."""
     value = graph(
         [work(0), work(1), work(2)],
@@ -168,7 +168,7 @@ def test_what_runs_side_by_side_is_waited_for() -> None:
     assert problem.fix is None
 
 
-def test_a_sub_graph_gives_out_what_reached_its_exit() -> None:
+def test_a_sub_graph_gives_the_values_that_reached_its_exit() -> None:
     inner = decision(pvf_required=False)
     calls = {"OxWork_0": (Behaviour(result="on_false"),)}
     outer = codec.read(
@@ -240,7 +240,7 @@ def test_an_output_has_one_default_everywhere(
         assert (structs.values[0].initial or "") == left
 
 
-def test_what_hangs_on_the_value_that_an_action_gives_is_not_certain() -> None:
+def test_a_problem_that_depends_on_an_output_value_is_not_certain() -> None:
     """The other end could give one of the values that the exit takes in."""
     ends = [work(0), echo(1), echo(2, pvf_allowed_values=["ok"])]
     ways = [(0, 1, only("on_true")), (0, 2, only("on_false"))]

@@ -49,7 +49,7 @@ def scripted(graph: Graph, calls: Calls) -> Script:
 
 @given(busy_graphs(), CALLS)
 @settings(max_examples=examples(200), deadline=None, suppress_health_check=list(HealthCheck))
-def test_what_runs_at_once_in_any_simulation_was_said_to_be_able_to(
+def test_actions_that_run_at_once_in_a_simulation_may_run_at_once(
     graph: Graph, calls: Calls
 ) -> None:
     subject = Subject(graph, PINNED)
@@ -87,7 +87,7 @@ def lively_graphs(draw: st.DrawFn) -> Graph:
 
 @given(st.one_of(busy_graphs(), lively_graphs()), CALLS)
 @settings(max_examples=examples(300), deadline=None, suppress_health_check=list(HealthCheck))
-def test_a_hazard_of_any_simulation_is_one_that_check_told(graph: Graph, calls: Calls) -> None:
+def test_a_hazard_of_any_simulation_is_reported_by_check(graph: Graph, calls: Calls) -> None:
     told = {problem.code for problem in check(graph)}
     failed = False  # what halts a graph by an error is not told
     for trace in simulate(graph, script=scripted(graph, calls), max_events=400, until_ms=60_000):
@@ -123,7 +123,7 @@ def asks(name: str, *said: str) -> dict[str, Any]:
     return {"name": name, "required": False, "conditions": [*said, *SAFE]}
 
 
-def test_a_pause_of_what_cannot_be_running_then_is_no_pause() -> None:
+def test_a_pause_of_an_action_that_cannot_run_then_is_ignored() -> None:
     """C is asked to pause before it ever ran."""
     pausing = asks("A", "on_true -> pause", "on_false -> ignore")
     idle = graph(action("A", children=["B", "C"]), action("B", ["A"], ["C"]),
@@ -140,7 +140,7 @@ def together(value: Graph) -> Concurrency:
     return Concurrency(subject, reach.runs, reach.reports)
 
 
-def test_what_has_reported_and_is_started_again_runs_beside_what_waited_for_it() -> None:
+def test_an_action_that_starts_again_runs_beside_one_that_waited_for_it() -> None:
     """B begins with the graph, and again when A ends; C needs both."""
     twice = graph(action("A", children=["B", "C"]),
                   action("B", [{"name": "A", "required": False, "conditions": SAFE}], ["C"]),
@@ -153,7 +153,7 @@ def test_what_has_reported_and_is_started_again_runs_beside_what_waited_for_it()
     assert not together(once).may_run(first, after)
 
 
-def test_what_was_bypassed_has_reported_before_what_leads_to_it_begins() -> None:
+def test_a_bypassed_action_has_reported_before_its_parent_begins() -> None:
     """A bypasses F, which C leads to; J needs B and F, so that it begins when C does."""
     value = graph(action("A", children=["B", "F"]), action("B", ["A"], ["C", "J"]),
                   action("C", ["B"], ["F"]),
@@ -163,7 +163,7 @@ def test_what_was_bypassed_has_reported_before_what_leads_to_it_begins() -> None
     assert together(value).may_run(joined, before)
 
 
-def test_what_runs_one_after_the_other_is_not_run_while_a_stop_is_on_its_way() -> None:
+def test_actions_in_sequence_are_not_run_during_a_stop() -> None:
     """Three in a circle and a timer that stops them all: only one of them runs at a time."""
     stop = asks("T", "on_true -> stop", "on_false -> stop")
     names = "ABC"
@@ -218,7 +218,7 @@ def test_thirty_ways_out_are_told_once_with_all_their_places() -> None:
     assert len({p.relation for p in (problem.where, *problem.also)}) == 30
 
 
-def test_what_kills_the_engine_comes_before_what_may() -> None:
+def test_certain_crashes_come_before_possible_ones() -> None:
     stop = asks("A", "on_true -> stop")
     value = graph(
         action("A", children=["C"]),
@@ -233,7 +233,7 @@ def test_what_kills_the_engine_comes_before_what_may() -> None:
     assert warnings.index("H12") < warnings.index("H3")
 
 
-def test_what_waits_for_another_does_not_begin_beside_it() -> None:
+def test_an_action_that_waits_for_another_does_not_begin_beside_it() -> None:
     """B and C both follow A, and C waits for B, too."""
     value = graph(
         action("A", children=["B", "C"]),
@@ -290,7 +290,9 @@ def test_a_spontaneous_action_that_outlasts_the_graph_when_all_goes_well_is_an_e
     assert len(begun) > 20
 
 
-def test_one_that_outlasts_the_graph_on_another_way_is_possible_with_its_condition() -> None:
+def test_an_action_that_outlasts_the_graph_on_another_course_is_reported_with_its_condition() -> (
+    None
+):
     safe = {"name": "A", "conditions": ["on_true -> ignore", "on_false -> run", *SAFE]}
     assert endless(lively(graph(action("A"), exits=[safe]), "A")) == (
         "warning",
@@ -318,7 +320,7 @@ def test_a_spontaneous_action_that_throws_begins_again_as_on_the_real_node() -> 
     assert begun[-1] >= 1_900
 
 
-def test_one_that_is_stopped_on_the_way_to_the_exit_outlasts_nothing() -> None:
+def test_an_action_that_is_stopped_before_the_exit_does_not_outlast_the_graph() -> None:
     stops = {
         "name": "B",
         "required": False,

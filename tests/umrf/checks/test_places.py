@@ -243,7 +243,7 @@ def reading_of(file: Any) -> Reading:
 GO: dict[str, Any] = {"name": "Go", "type": "sync"}
 
 
-def test_what_is_missing_has_its_place_where_it_would_be() -> None:
+def test_a_missing_value_has_the_place_where_it_would_be() -> None:
     file = {"graph_name": "g", "actions": [{"name": "Go"}]}
     assert places(file)["type-missing"] == "/actions/0"
     reading = reading_of({"umrf_actions": [{"name": "Go", "effect": "synchronous"}]})
@@ -272,7 +272,7 @@ def test_a_condition_is_quoted_where_it_stands() -> None:
     assert "“on_true -> skip”" in wrong.message
 
 
-def test_what_stands_on_the_wrong_side_is_pointed_at_there() -> None:
+def test_a_field_on_the_wrong_side_has_its_place_there() -> None:
     children = [{"name": "B", "conditions": ["on_true -> run"]}]
     parents = [{"name": "A", "remap": []}]
     actions = [GO | {"name": "A", "children": children}, GO | {"name": "B", "parents": parents}]
@@ -295,7 +295,7 @@ def test_what_stands_on_the_wrong_side_is_pointed_at_there() -> None:
         ('[{"graph_name": "g", "actions": []}]', "not-umrf", ("", 1, 1)),
     ],
 )
-def test_what_cannot_be_read_has_its_place(
+def test_an_unreadable_text_has_the_place_of_the_reason(
     text: str, code: str, place: tuple[str, int, int]
 ) -> None:
     with pytest.raises(Unreadable) as caught:

@@ -192,7 +192,7 @@ def test_pausing_a_sub_graph_is_told() -> None:
     assert any("Inner_0 is a sub-graph: a pause of it never completes" in m for m in messages)
 
 
-def test_of_the_recorded_sub_graphs_the_one_that_halted_is_found() -> None:
+def test_the_recorded_sub_graph_that_halted_is_found() -> None:
     library = {
         inner.name: inner
         for path in (family("engine") / "subgraphs").glob("*.json")
@@ -262,7 +262,7 @@ def test_an_error_two_levels_down_is_told_with_the_way_to_it() -> None:
     )
 
 
-def test_what_an_action_two_levels_down_lacks_is_an_error_of_the_outermost_graph() -> None:
+def test_a_missing_input_two_levels_down_is_an_error_of_the_outermost_graph() -> None:
     needy = graph("Grip", action("A", input_parameters={"text": TEXT}))
     outer = graph("outer", action("Fetch"))
     (problem,) = check(outer, graphs={"Fetch": graph("Fetch", action("Grip")), "Grip": needy})
@@ -301,7 +301,7 @@ def test_graphs_that_contain_each_other_far_inside_are_found_once_and_with_their
     assert problem.inside.levels == ("Around_0",)
 
 
-def test_of_very_many_errors_inside_some_are_told_with_the_number_of_the_others() -> None:
+def test_some_of_many_errors_inside_are_reported_with_the_number_of_the_others() -> None:
     lone = [action("A", instance_id=i, children=[], type="sync") for i in range(60)]
     inner = graph("Inner", *lone)
     one = check(graph("outer", action("Inner")), graphs={"Inner": inner})

@@ -58,7 +58,7 @@ def test_a_deviation_ends_as_when_the_engine_goes_through_all_of_it(
         assert told(found) == told(simulated_outcome(net, graph, name, outcome)[0]), (name, outcome)
 
 
-def test_what_runs_on_when_the_usual_course_is_finished_is_not_finished_with_it() -> None:
+def test_a_deviating_course_continues_after_the_end_of_the_baseline() -> None:
     """A graph that A0 ends while A1 begins; if A0 is false, A1 goes on to an end of its own."""
     arrows = [
         Relation(parent=ENTRY, child="k0", conditions=ENTRY_CONDITIONS),
@@ -89,7 +89,7 @@ def test_a_bypass_passes_the_outcome_on_so_it_is_tried_though_it_is_the_answer_t
 
 @given(busy_graphs(8))
 @settings(max_examples=examples(60), deadline=None, suppress_health_check=list(HealthCheck))
-def test_what_is_not_tried_cannot_end_otherwise(graph: Graph) -> None:
+def test_a_course_that_is_not_tried_ends_like_the_baseline(graph: Graph) -> None:
     """An outcome that no child answers in another way is no way of its own."""
     trials = Trials(graph)
     ways = {(t.action.full_name if t.action else "", t.outcome) for t in trials}
@@ -149,7 +149,7 @@ def test_every_way_through_a_large_graph_of_any_shape_is_tried(shape: str) -> No
     assert coverage.tried == coverage.ways == len(ends) > 150
 
 
-def test_ways_that_are_not_tried_any_more_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_courses_that_are_not_tried_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("action_assistant.umrf.checks.trials.BUDGET", 20)
     (problem,) = [p for p in check(trap(60, 50)) if p.code == "not-tried"]
     assert problem.severity == "warning"

@@ -86,7 +86,7 @@ def every_arrow(graph: Graph, depth: int) -> set[OutcomeArrow]:
 
 @given(busy_graphs(4))
 @settings(max_examples=examples(60), deadline=None, suppress_health_check=list(HealthCheck))
-def test_what_any_ends_take_is_found_and_what_cannot_be_found_is_taken_by_none(
+def test_every_arrow_that_some_ends_take_is_found_and_no_other(
     graph: Graph,
 ) -> None:
     possible = every_arrow(graph, DEPTH)

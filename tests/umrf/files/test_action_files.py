@@ -80,7 +80,7 @@ def test_every_readable_action_of_the_corpus_survives_writing(verdicts: Verdicts
 
 @given(st.data())
 @settings(max_examples=examples(80))
-def test_what_is_written_is_read_as_the_same_action(data: st.DataObject) -> None:
+def test_a_written_action_is_read_as_the_same_action(data: st.DataObject) -> None:
     action: Action = data.draw(actions("a1", "Go", data.draw(st.integers(0, 3))))
     assert read_action(write_action(action)).action == action
 
@@ -127,6 +127,6 @@ def test_relations_in_the_file_of_an_action_are_kept() -> None:
 @pytest.mark.parametrize(
     "text", ["[]", "{}", '{"graph_name": "g", "actions": []}', "", '{"name": 5}']
 )
-def test_what_is_no_action_is_refused(text: str) -> None:
+def test_a_file_that_is_no_action_is_refused(text: str) -> None:
     with pytest.raises(Unreadable):
         read_action(text)

@@ -42,7 +42,7 @@ def file_of(**fields: object) -> str:
 
 @given(graphs())
 @settings(max_examples=examples(120), deadline=None, suppress_health_check=[HealthCheck.too_slow])
-def test_what_is_written_is_read_as_the_same_graph(graph: Graph) -> None:
+def test_a_written_graph_is_read_as_the_same_graph(graph: Graph) -> None:
     reading = read(write(graph))
     assert normal(reading.graph) == normal(graph)
     assert reading.dialect == "D3"
@@ -152,7 +152,7 @@ def test_a_name_without_an_action_becomes_a_ghost_and_is_never_written_as_one() 
     assert normal(read(write(graph)).graph) == normal(graph)
 
 
-def test_of_two_actions_with_one_name_a_reference_means_the_one_that_lists_back() -> None:
+def test_a_reference_to_twins_means_the_one_that_lists_back() -> None:
     actions = [
         {"name": "A", "type": "sync", "children": [{"name": "B"}]},
         {"name": "B", "type": "sync"},
@@ -222,7 +222,7 @@ def test_run_states_are_told_and_not_written() -> None:
         ({"actions": [{"name": "A", "type": "sync", "runtime": {}}]}, "runtime-illegal"),
     ],
 )
-def test_what_the_graph_cannot_show_any_more_is_a_problem_of_the_text(
+def test_an_error_that_the_graph_does_not_show_is_a_problem_of_the_text(
     fields: dict[str, object], code: str
 ) -> None:
     assert code in {problem.code for problem in read(file_of(**fields)).problems}
@@ -294,7 +294,7 @@ def test_attributes_of_others_stay_beside_ours() -> None:
     ],
     ids=lambda value: str(value)[:30],
 )
-def test_what_cannot_be_read_is_refused_with_its_place(text: str, code: str, path: str) -> None:
+def test_an_unreadable_text_is_refused_with_its_place(text: str, code: str, path: str) -> None:
     with pytest.raises(Unreadable) as caught:
         read(text)
     assert (caught.value.code, caught.value.path) == (code, path)
@@ -382,7 +382,9 @@ def test_json_text_is_spelled_back(text: str) -> None:
         ('{"[[[": ' + "[" * 70, (1, 72)),
     ],
 )
-def test_what_json_cannot_hold_is_refused_with_its_place(text: str, place: tuple[int, int]) -> None:
+def test_a_value_that_json_cannot_hold_is_refused_with_its_place(
+    text: str, place: tuple[int, int]
+) -> None:
     with pytest.raises(Unreadable) as refused:
         read(text)
     assert (refused.value.line, refused.value.column) == place

@@ -194,14 +194,14 @@ def test_a_graph_in_which_one_action_stops_another_ends(
     assert ends(stopping(required, shape), work_s) == last
 
 
-def test_what_stops_an_action_is_not_waited_for_and_nothing_follows_its_failure() -> None:
+def test_a_stopping_parent_is_not_required_and_its_failure_starts_nothing() -> None:
     graph = read(stopping(None, "worker")).graph
     stop = next(r for r in graph.relations if (r.parent, r.child) == ("a2", "a3"))
     assert not stop.required
     assert msgspec.structs.astuple(stop.conditions) == ("stop", "stop", "ignore", "ignore")
 
 
-def test_an_action_that_waits_for_what_stops_it_is_told_where_it_stands() -> None:
+def test_an_action_that_waits_for_its_stopping_parent_is_reported_with_its_place() -> None:
     reading = read(stopping(True, "worker"))
     (waits,) = [p for p in reading.problems if p.code == "stop-awaited"]
     assert waits.where.path == "/umrf_actions/2/parents/1"
@@ -232,15 +232,13 @@ def test_we_are_never_laxer_than_the_engines_parser() -> None:
 
 
 @pytest.mark.skipif(not verdicts(), reason=NO_CORPUS)
-def test_what_was_translated_is_a_current_file() -> None:
+def test_a_translated_file_is_a_current_one() -> None:
     for verdict in verdicts():
         again = read(write(read((CORPUS / verdict["file"]).read_bytes()).graph))
         assert (again.dialect, again.notes, again.problems) == ("D3", (), ()), verdict["file"]
 
 
-def test_what_was_written_from_an_old_file_is_not_old_even_if_a_field_could_not_be_translated() -> (
-    None
-):
+def test_a_file_written_from_an_old_one_is_current_even_with_an_untranslated_field() -> None:
     parent = {"name": "A", "condition": ["what is this"]}
     actions = [
         {"name": "A", "type": "sync", "children": [{"name": "B"}]},

@@ -62,7 +62,7 @@ def test_the_ends_of_the_graph_have_names_of_their_own() -> None:
     assert said(read(write(graph)).graph) == said(graph)
 
 
-def test_of_a_pair_that_is_listed_twice_each_has_its_own() -> None:
+def test_relations_listed_twice_have_waypoints_of_their_own() -> None:
     actions = [
         {"name": "A", "type": "sync", "children": [{"name": "B"}, {"name": "B"}]},
         {"name": "B", "type": "sync", "parents": [{"name": "A"}, {"name": "A"}]},
@@ -86,11 +86,11 @@ def test_of_a_pair_that_is_listed_twice_each_has_its_own() -> None:
         {key: value for key, value in BEND.items() if key != "points"},
     ],
 )
-def test_what_fits_no_line_is_left_out(odd: object) -> None:
+def test_waypoints_that_fit_no_relation_are_left_out(odd: object) -> None:
     assert said(read(having(odd, BEND)).graph) == {"A_0>B_0;0 run": POINTS}
     assert said(read(having(odd)).graph) == {}
 
 
-def test_what_is_no_list_is_left_out() -> None:
+def test_waypoints_that_are_no_list_are_left_out() -> None:
     file = FILE | {"gui_attributes": {"action_assistant": {"waypoints": {"a": BEND}}}}
     assert said(read(json.dumps(file)).graph) == {}

@@ -46,7 +46,7 @@ def test_layout_labels_and_unknown_fields_are_kept() -> None:
     assert arrows["entry", "A"].waypoints == (("run", "[[5,5]]"),)
 
 
-def test_the_interface_is_what_crosses_the_border_and_what_nobody_gives() -> None:
+def test_the_interface_has_values_that_cross_the_border_and_missing_ones() -> None:
     graph = with_values(
         CHAIN,
         A=({}, {"p": TEXT}),

@@ -151,7 +151,7 @@ SAME = {
 
 
 @pytest.mark.parametrize("what", SAME)
-def test_what_can_be_a_sub_graph_does_the_same(what: str) -> None:
+def test_a_selection_that_can_be_a_sub_graph_behaves_the_same(what: str) -> None:
     graph, chosen = SAME[what]
     found = extracted(graph, set(chosen), "S", "new")
     assert isinstance(found, Extracted), found
@@ -249,7 +249,7 @@ OTHERWISE = {
 
 
 @pytest.mark.parametrize("what", OTHERWISE)
-def test_what_may_go_otherwise_is_told(what: str) -> None:
+def test_a_difference_in_behaviour_is_reported(what: str) -> None:
     code, graph, chosen = OTHERWISE[what]
     found = extracted(graph, set(chosen), "S", "new")
     assert isinstance(found, Extracted)
@@ -291,7 +291,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("what", REFUSED)
-def test_what_cannot_be_a_sub_graph_says_why_and_where(what: str) -> None:
+def test_a_selection_that_cannot_be_a_sub_graph_has_a_reason_with_its_place(what: str) -> None:
     code, graph, chosen = REFUSED[what]
     found = extracted(graph, set(chosen), "S", "new")
     assert isinstance(found, Unextractable)
@@ -346,7 +346,7 @@ def test_sub_graphs_of_sub_graphs_count_as_actions() -> None:
     assert told["courses"] > told["all"] / 10
 
 
-def test_what_lies_between_the_chosen_is_named() -> None:
+def test_an_action_between_the_chosen_ones_is_named() -> None:
     found = extracted(CHAIN, {"A", "C"}, "S", "new")
     assert isinstance(found, Unextractable)
     first = found.reasons[0]

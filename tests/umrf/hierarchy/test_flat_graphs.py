@@ -53,7 +53,7 @@ def test_a_graph_without_sub_graphs_stays_as_it_is() -> None:
     assert found.graph is CHAIN
 
 
-def test_unknown_fields_survive_and_what_has_no_place_is_told() -> None:
+def test_unknown_fields_survive_and_fields_without_a_place_are_reported() -> None:
     outer = changed(CHAIN, "S", extra=(("team", '"red"'),))
     outer = changed(outer, "A", extra=(("mark", "1"),))
     relations = (

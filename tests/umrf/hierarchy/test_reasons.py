@@ -55,7 +55,7 @@ ACCEPTED = {
 
 
 @pytest.mark.parametrize("what", ACCEPTED)
-def test_what_can_be_flat_has_the_same_course(what: str) -> None:
+def test_a_hierarchy_that_becomes_flat_has_the_same_course(what: str) -> None:
     outer, sub = ACCEPTED[what]
     found = flattened(outer, {"S": sub})
     assert isinstance(found, Flattened)
@@ -183,7 +183,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("what", REFUSED)
-def test_what_cannot_be_flat_says_why(what: str) -> None:
+def test_a_hierarchy_that_cannot_become_flat_has_a_reason(what: str) -> None:
     code, outer, sub = REFUSED[what]
     found = flattened(outer, {"S": sub})
     assert isinstance(found, Unflattenable)
@@ -200,7 +200,7 @@ def test_a_reason_leads_to_its_place_at_any_depth() -> None:
     assert "when X_0 ends on_error" in reason.message
 
 
-def test_all_reasons_are_told_and_not_the_first_alone() -> None:
+def test_all_reasons_are_reported_not_only_the_first() -> None:
     outer = graph_of("entry>S", "S>T", "T>exit", ST=ENGINE_DEFAULTS)
     halting = inner("entry>X", "X>exit", Xexit=SAFE)
     found = flattened(
@@ -212,7 +212,7 @@ def test_all_reasons_are_told_and_not_the_first_alone() -> None:
     ]  # fmt: skip
 
 
-def test_more_than_is_looked_at_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_more_courses_than_are_examined_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(flattening, "BUDGET", 10)
     found = flattened(CHAIN, {"S": TWO})
     assert isinstance(found, Unflattenable)
@@ -255,7 +255,9 @@ FORCED = [
 
 
 @pytest.mark.parametrize("what", FORCED)
-def test_what_is_refused_would_go_otherwise(what: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_refused_hierarchy_would_behave_otherwise(
+    what: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The reasons are none out of caution: made flat all the same, the course is another one."""
     _, outer, sub = REFUSED[what]
     monkeypatch.setattr(flattening, "_troubles", lambda *_, **__: iter(()))
@@ -273,7 +275,7 @@ def test_what_is_refused_would_go_otherwise(what: str, monkeypatch: pytest.Monke
         play()
 
 
-def test_what_doubles_with_each_level_is_counted_before_anything_is_made(
+def test_actions_that_double_with_each_level_are_counted_first(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     levels = 16

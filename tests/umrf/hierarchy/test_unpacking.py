@@ -28,7 +28,7 @@ def again(graph: Graph, back: Unpacked) -> Graph:
 
 
 @pytest.mark.parametrize("what", SAME)
-def test_what_was_made_is_unpacked_to_what_there_was(what: str) -> None:
+def test_an_extracted_sub_graph_unpacks_to_the_original_graph(what: str) -> None:
     graph, chosen = SAME[what]
     places = {a.key: (float(40 * n), float(200 * n)) for n, a in enumerate(graph.actions)}
     graph = replace(
@@ -51,7 +51,7 @@ def test_what_was_made_is_unpacked_to_what_there_was(what: str) -> None:
 
 
 @pytest.mark.timeout(900)
-def test_any_graph_is_made_and_unpacked_or_it_is_said_why_not() -> None:
+def test_any_graph_is_extracted_and_unpacked_or_refused_with_a_reason() -> None:
     told = Counter[str]()
 
     @settings(
@@ -138,7 +138,7 @@ def test_of_two_places_of_one_sub_graph_only_one_is_unpacked() -> None:
     assert back.differences == ()
 
 
-def test_what_may_go_otherwise_is_told_with_its_place() -> None:
+def test_a_difference_in_behaviour_is_reported_with_its_place() -> None:
     halting = inner("entry>X", "X>Y", "Y>exit", XY=Conditions("run"))
     back = unpacked(CHAIN, "S", halting)
     assert isinstance(back, Unpacked)
@@ -147,14 +147,14 @@ def test_what_may_go_otherwise_is_told_with_its_place() -> None:
     assert "Unpacked" not in reason.message
 
 
-def test_what_has_no_such_arrows_is_refused() -> None:
+def test_a_sub_graph_without_equivalent_arrows_is_refused() -> None:
     text = leaf("string")
     other = with_values(CHAIN, S=({"p": text}, {}))
     assert isinstance(unpacked(other, "S", TWO), Unpackable)
     assert isinstance(unpacked(CHAIN, "S", replace(TWO, actions=(), relations=())), Unpackable)
 
 
-def test_what_would_be_covered_makes_room() -> None:
+def test_actions_that_would_be_covered_are_moved() -> None:
     at = {"A": (0.0, 0.0), "S": (0.0, 200.0), "B": (0.0, 400.0)}
     outer = replace(CHAIN, actions=tuple(replace(a, position=at[a.name]) for a in CHAIN.actions))
     places = {"X": (0.0, 0.0), "Y": (0.0, 400.0)}

@@ -71,7 +71,7 @@ def test_a_name_that_no_package_can_have_is_refused(package: str, reason: str) -
         bundle_files(package, (DRIVE,))
 
 
-def test_what_stands_against_any_of_the_actions_stands_against_all() -> None:
+def test_a_refusal_of_one_action_refuses_the_package() -> None:
     with pytest.raises(ImpossiblePackage) as refused:
         bundle_files("kitchen", (DRIVE, described(name="class"), described(name="drive")))
     assert {each.place for each in refused.value.refusals} == {"class", "drive"}

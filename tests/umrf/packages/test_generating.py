@@ -113,7 +113,7 @@ def test_a_text_of_one_language_is_none_of_another() -> None:
         ({"a": {"pvf_type": "bool", "pvf_allowed_values": [True, 1]}}, "a value that is no bool"),
     ],
 )
-def test_parameters_that_cannot_be_are_named_with_the_reason(
+def test_impossible_parameters_are_named_with_the_reason(
     parameters: dict[str, object], words: str
 ) -> None:
     for side in ("input_parameters", "output_parameters"):

@@ -54,7 +54,7 @@ def test_changes_that_lie_apart_are_taken_together(ours: bytes, theirs: bytes, b
         (BASE.rstrip(), BASE + b"new\n", 5),
     ],
 )
-def test_what_overlaps_is_a_conflict_with_its_line_and_changes_nothing(
+def test_overlapping_changes_are_a_conflict_with_its_line(
     ours: bytes, theirs: bytes, line: int
 ) -> None:
     found = merged(BASE, ours, theirs)
@@ -125,7 +125,7 @@ def test_a_merge_of_different_lines_may_be_done_twice(kept: list[tuple[str, str]
 
 @settings(max_examples=examples(100))
 @given(texts, texts)
-def test_what_one_side_alone_changed_is_taken_as_it_is(base: bytes, changed: bytes) -> None:
+def test_a_change_of_one_side_alone_is_taken(base: bytes, changed: bytes) -> None:
     assert merged(base, base, changed).content == changed
     assert merged(base, changed, base).content == changed
     assert merged(base, changed, changed).content == changed

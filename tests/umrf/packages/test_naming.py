@@ -60,7 +60,7 @@ def test_packages_are_called_as_the_engine_looks_for_them(name: str, package: st
         ("Aux", "have for themselves"),
     ],
 )
-def test_names_that_cannot_be_are_refused_with_the_reason(name: str, words: str) -> None:
+def test_impossible_names_are_refused_with_the_reason(name: str, words: str) -> None:
     (refusal,) = check_name(name)
     assert refusal.place == name
     assert words in refusal.reason

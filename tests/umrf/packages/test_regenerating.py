@@ -50,7 +50,7 @@ def test_a_base_shows_texts_by_lines() -> None:
         b'<<<<<<< HEAD\n{"about": "", "format": 1, "files": {}}',
     ],
 )
-def test_what_is_no_base_is_refused(content: bytes) -> None:
+def test_a_file_that_is_no_base_is_refused(content: bytes) -> None:
     with pytest.raises(UnreadableBase):
         read_base(content)
 
@@ -104,7 +104,7 @@ def test_of_a_killed_call_files_that_arrived_are_known_by_what_they_hold() -> No
     }
 
 
-def test_what_has_to_be_read_is_what_is_generated_or_was() -> None:
+def test_files_to_read_are_those_generated_now_or_before() -> None:
     now = package_files(described())
     header = "include/ta_try/input_parameters.hpp"
     base = GenerationBase({header: b"", "../own": b"", "own": b""})

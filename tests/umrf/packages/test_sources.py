@@ -78,12 +78,12 @@ def test_the_package_of_any_description_is_laid_out_as_its_style_says(action: Ac
 
 @given(text=hostile_texts)
 @settings(max_examples=examples(400), deadline=None)
-def test_no_text_changes_what_the_sources_are_made_of(text: str) -> None:
+def test_no_text_changes_the_tokens_of_the_sources(text: str) -> None:
     assert shape(with_text(text)) == shape(with_text("harmless"))
 
 
 @pytest.mark.parametrize("text", HOSTILE)
-def test_no_known_way_out_of_a_literal_or_comment_is_one(text: str) -> None:
+def test_no_known_escape_from_a_literal_or_comment_works(text: str) -> None:
     assert shape(with_text(text)) == shape(with_text("harmless"))
 
 
@@ -133,7 +133,9 @@ def test_cmake_sees_no_variable_in_a_description() -> None:
         {"name": "move_arm"},
     ],
 )
-def test_what_broke_other_generators_compiles(fields: dict[str, Any], tmp_path: Path) -> None:
+def test_descriptions_that_broke_other_generators_compile(
+    fields: dict[str, Any], tmp_path: Path
+) -> None:
     assert compile_errors(laid_out(package_files(described(**fields)), tmp_path)) == ""
 
 

@@ -13,7 +13,7 @@ from action_assistant.umrf.semantics import (
 from umrf.semantics.traces import graph_of, graph_states, hazards, script, states
 
 
-def test_a_stop_stops_what_runs_and_starts_nothing() -> None:
+def test_a_stop_stops_running_actions_and_starts_none() -> None:
     commands = [(500.0, "stop", None)]
     traces = list(simulate(graph_of("entry>A", "A>B", "B>exit"), commands=commands))
     assert states(traces, "A") == ["INITIALIZED", "RUNNING", "STOPPING", "FINISHED"]

@@ -53,7 +53,7 @@ def test_a_leaf_beside_a_loading_action_halts_the_graph_and_the_action_moves_the
     assert (halted, begun[-1]) == (210, 1_700)
 
 
-def test_what_has_loaded_when_the_leaf_ends_keeps_the_graph_running() -> None:
+def test_an_action_that_has_loaded_when_the_leaf_ends_keeps_the_graph_running() -> None:
     quick = script_from({"behaviours": {"OxWork_1": [{"after_s": 2}], "*": [{"load_s": 0.01}]}})
     traces = list(simulate(leaf_beside_loading(), script=quick))
     assert graph_states(traces)[-1] == "FINISHED"
@@ -97,7 +97,7 @@ def test_a_sub_graph_runs_at_once_so_that_a_leaf_beside_it_halts_nothing() -> No
     assert "H14" in {problem.code for problem in check(beside("C"))}
 
 
-def test_a_stop_passes_by_what_loads_and_says_so() -> None:
+def test_a_stop_does_not_reach_a_loading_action_and_reports_it() -> None:
     graph = graph_of("entry>A", "A>exit")
     slow = script(A=[Behaviour(load_s=3.0)])
     traces = list(simulate(graph, script=slow, commands=[(1_000, "stop", None)]))
@@ -106,7 +106,7 @@ def test_a_stop_passes_by_what_loads_and_says_so() -> None:
     assert hazards(traces) == ["H14"]
 
 
-def test_a_second_run_of_what_still_loads_kills_the_engine_and_the_check_tells_it() -> None:
+def test_a_second_run_of_a_loading_action_kills_the_engine_and_the_check_reports_it() -> None:
     graph = optional(graph_of("entry>A", "entry>B", "A>C", "B>C", "C>exit"), "A>C", "B>C")
     calls = script(A=[Behaviour(after_s=0.1)], B=[Behaviour(after_s=0.5)], C=[Behaviour(load_s=1)])
     traces = list(simulate(graph, script=calls))
@@ -119,7 +119,7 @@ def test_a_second_run_of_what_still_loads_kills_the_engine_and_the_check_tells_i
     assert hazards(list(simulate(graph, script=calls))) == []
 
 
-def test_a_start_anew_waits_for_what_still_loads_and_for_its_whole_course() -> None:
+def test_a_new_start_waits_until_a_loading_action_has_run() -> None:
     graph = graph_of("entry>A", "A>exit")
     engine = Engine(script=Script({"*": (Behaviour(load_s=1.0, after_s=0.5),)}))
     engine.start(graph, 0.0)

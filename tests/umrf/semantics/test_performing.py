@@ -59,7 +59,7 @@ def returned(number: int, result: str = "on_true", **more: Any) -> Returned:
     return Returned(number=number, result=result, **more)
 
 
-def test_it_runs_until_the_performer_says_how_it_ended() -> None:
+def test_a_performed_action_runs_until_the_performer_reports_its_end() -> None:
     performer = Performing("Work")
     engine = made(performer)
     engine.start(sequence("line", 2), 0)
@@ -73,7 +73,7 @@ def test_it_runs_until_the_performer_says_how_it_ended() -> None:
     assert states(engine, "line") == ("FINISHED", {"Work_0": "FINISHED", "Work_1": "FINISHED"})
 
 
-def test_what_it_does_not_perform_the_script_says() -> None:
+def test_actions_that_are_not_performed_follow_the_script() -> None:
     performer = Performing("Other")
     script = script_from({"behaviours": {"Work": [{"after_s": 2, "result": "on_error"}]}})
     engine = made(performer, script=script)
@@ -83,7 +83,7 @@ def test_what_it_does_not_perform_the_script_says() -> None:
     assert states(engine, "line")[1] == {"Work_0": "ERROR"}
 
 
-def test_a_stopped_one_has_five_seconds_and_is_given_up_then() -> None:
+def test_a_stopped_call_is_given_up_after_five_seconds() -> None:
     performer = Performing("Work")
     engine = made(performer)
     engine.start(sequence("line", 1), 0)
@@ -104,7 +104,7 @@ def test_a_stopped_one_has_five_seconds_and_is_given_up_then() -> None:
     assert states(engine, "line") == ("RUNNING", {"Work_0": "RUNNING"})
 
 
-def test_one_that_obeys_its_stop_is_stopped_whatever_it_returns() -> None:
+def test_a_call_that_obeys_its_stop_ends_stopped_whatever_it_returns() -> None:
     performer = Performing("Work")
     engine = made(performer)
     engine.start(sequence("line", 1), 0)
@@ -116,7 +116,7 @@ def test_one_that_obeys_its_stop_is_stopped_whatever_it_returns() -> None:
     assert [each.state for each in traces if isinstance(each, GraphStateEvent)] == ["STOPPED"]
 
 
-def test_what_returns_while_it_is_paused_goes_on_when_the_graph_does() -> None:
+def test_a_call_that_returns_while_paused_continues_with_the_graph() -> None:
     performer = Performing("Work")
     engine = made(performer)
     engine.start(sequence("line", 2), 0)
@@ -144,7 +144,7 @@ def test_each_visit_of_a_loop_is_a_call_of_its_own() -> None:
     assert [call.node for call in performer.calls[:3]] == ["Work_0", "Work_1", "Work_0"]
 
 
-def test_a_stop_of_a_paused_one_is_in_vain_on_an_engine_that_cannot_do_that() -> None:
+def test_a_stop_of_a_paused_call_fails_on_an_engine_that_cannot_do_it() -> None:
     """Its thread waits to be resumed for ever, whether its code has returned or was killed (H5)."""
     performer = Performing("Work")
     engine = made(performer, PINNED)
@@ -159,7 +159,7 @@ def test_a_stop_of_a_paused_one_is_in_vain_on_an_engine_that_cannot_do_that() ->
     assert engine.locked
 
 
-def test_what_outlives_its_graph_or_is_told_twice_changes_nothing() -> None:
+def test_a_late_or_repeated_return_changes_nothing() -> None:
     performer = Performing("Work")
     engine = made(performer)
     engine.start(two_ends(), 0)
@@ -174,7 +174,7 @@ def test_what_outlives_its_graph_or_is_told_twice_changes_nothing() -> None:
     assert engine.executing(300) == []
 
 
-def test_its_outputs_are_what_the_children_begin_with() -> None:
+def test_outputs_of_a_call_reach_its_children() -> None:
     from runner.links.behaviours.written import action, chain, parameter
 
     performer = Performing("Gives", "Takes")

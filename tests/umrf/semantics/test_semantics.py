@@ -52,7 +52,7 @@ def test_a_parent_that_is_not_required_runs_the_child_again() -> None:
     assert states(traces, "C").count("RUNNING") == 2
 
 
-def test_what_was_received_stays_received_in_a_loop() -> None:
+def test_a_parent_that_has_reported_counts_in_every_lap() -> None:
     graph = optional(
         graph_of("entry>A", "entry>B", "A>C", "B>C", "C>A", "C>exit", CA=Conditions("run"),
                  Cexit=Conditions("ignore", "run")),
@@ -128,7 +128,7 @@ def test_in_a_sub_graph_whose_pause_hangs_the_last_action_never_ends() -> None:
     assert states(traces, "B") == ["RUNNING", "PAUSE_REQUESTED"]
 
 
-def test_what_hangs_deep_inside_of_a_pause_is_shown_running_at_each_level() -> None:
+def test_a_pause_that_hangs_deep_inside_is_shown_running_at_each_level() -> None:
     inner = msgspec.structs.replace(graph_of("entry>X", "X>Y", "Y>exit"), name="C")
     middle = msgspec.structs.replace(graph_of("entry>C", "C>exit"), name="B")
     traces = list(
