@@ -120,12 +120,18 @@ test("choices wait beside the edits, each tab changes only its own, and no copy 
   expect(await call(page, "read", ADA)).toEqual([]);
 });
 
+/** Waits until the clock of the page has gone on, so that what is written next is newer. */
+async function nextTick(page: Page): Promise<void> {
+  const now = await page.evaluate(() => Date.now());
+  await page.waitForFunction((before) => Date.now() > before + 1, now);
+}
+
 test("of several epochs the one that was used last stands at the end", async ({ page }) => {
   await call(page, "write", ADA, "old", { ...NOTHING, waits: [edit("1")] });
-  await page.waitForTimeout(5);
+  await nextTick(page);
   await call(page, "write", ADA, "new", NOTHING);
   expect(await call(page, "read", ADA)).toMatchObject([{ epoch: "old" }, { epoch: "new" }]);
-  await page.waitForTimeout(5);
+  await nextTick(page);
   await call(page, "write", ADA, "old", { ...NOTHING, durable: [edit("1")] });
   expect(await call(page, "read", ADA)).toMatchObject([{ epoch: "new" }, { epoch: "old" }]);
 });

@@ -99,18 +99,95 @@ export async function boxOf(locator: Locator) {
     const now = JSON.stringify(box);
     if (now === before) return box;
     before = now;
-    // A machine with much to do draws few frames: without one in between nothing could have moved.
-    await locator.page().evaluate(frames);
-    await locator.page().waitForTimeout(80);
+    // Counted in frames: a busy machine draws few of them, and between two frames nothing can move.
+    await frames(locator.page(), 8);
   }
 }
 
-function frames(): Promise<void> {
-  return new Promise((done) => {
-    const next = (left: number) =>
-      left > 0 ? requestAnimationFrame(() => next(left - 1)) : done();
-    next(3);
+/** Waits until the page has drawn this many frames. */
+export async function frames(page: Page, count: number): Promise<void> {
+  await page.evaluate(
+    (all) =>
+      new Promise<void>((done) => {
+        const next = (left: number) =>
+          left > 0 ? requestAnimationFrame(() => next(left - 1)) : done();
+        next(all);
+      }),
+    count,
+  );
+}
+
+/** After this many frames in a row without any movement the page is at rest. */
+const STILL_FRAMES = 12;
+
+/** Waits until nothing is loading, no part of the canvas moves, and no animation that ends is running. */
+export async function atRest(page: Page): Promise<void> {
+  await expect(page.locator(".mantine-Skeleton-root")).toHaveCount(0);
+  await page.evaluate(
+    (least) =>
+      new Promise<void>((done) => {
+        let before = "";
+        let still = 0;
+        const look = () => {
+          const parts = document.querySelectorAll(".react-flow__viewport, .react-flow__node");
+          const now = [...parts].map((part) => JSON.stringify(part.getBoundingClientRect())).join();
+          const isMoving = document
+            .getAnimations()
+            .some(
+              ({ playState, effect }) =>
+                playState === "running" && effect?.getComputedTiming().endTime !== Infinity,
+            );
+          still = now === before && !isMoving ? still + 1 : 0;
+          before = now;
+          if (still >= least) done();
+          else requestAnimationFrame(look);
+        };
+        look();
+      }),
+    STILL_FRAMES,
+  );
+}
+
+/** Presses the button *Fit* and waits until the view has come to rest. */
+export async function fitView(page: Page): Promise<void> {
+  await page.getByRole("button", { name: "Fit", exact: true }).click();
+  await atRest(page);
+}
+
+/** Holds a button for as long as it asks for; `down` and `up` are those of a mouse, a key or a finger. */
+export async function hold(
+  button: Locator,
+  down: () => Promise<unknown>,
+  up: () => Promise<unknown>,
+): Promise<void> {
+  const element = await button.elementHandle();
+  if (element === null) throw new Error(`${button} is not there`);
+  await element.evaluate((pressed) => {
+    const held = new Promise<void>((done) => {
+      let isHeld = false;
+      const look = () => {
+        const was = isHeld;
+        isHeld = pressed.hasAttribute("data-holding");
+        if ((was && !isHeld) || !pressed.isConnected) done();
+      };
+      const watch = { subtree: true, childList: true, attributeFilter: ["data-holding"] };
+      new MutationObserver(look).observe(document, watch);
+    });
+    Object.assign(pressed, { held });
   });
+  await down();
+  await element.evaluate((pressed) => Reflect.get(pressed, "held") as Promise<void>);
+  await up();
+}
+
+/** Holds a button by the key Enter. */
+export async function holdEnter(page: Page, button: Locator): Promise<void> {
+  await button.focus();
+  await hold(
+    button,
+    () => page.keyboard.down("Enter"),
+    () => page.keyboard.up("Enter"),
+  );
 }
 
 /** Lays out the graph, which takes a moment. */
@@ -132,9 +209,11 @@ export async function start(page: Page): Promise<void> {
   await expect(button).toBeEnabled();
   const box = await boxOf(button);
   await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
-  await page.mouse.down();
-  await page.waitForTimeout(900);
-  await page.mouse.up();
+  await hold(
+    button,
+    () => page.mouse.down(),
+    () => page.mouse.up(),
+  );
 }
 
 /** Gives an action a parameter of text with a value. */

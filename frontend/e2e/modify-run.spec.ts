@@ -1,7 +1,7 @@
 /** A running graph is changed from the page, where that is safe: the simulator says that it is. */
 
 import { expect, test } from "@playwright/test";
-import { add, give, saved, start } from "./canvas";
+import { add, card, give, saved, start } from "./canvas";
 import { Product } from "./product";
 
 const product = new Product();
@@ -42,7 +42,7 @@ test("what is on screen is sent to the running robot, after what becomes differe
   await saved(other.page);
   await add(other.page, "Theirs");
   await saved(other.page);
-  await page.waitForTimeout(1_000); // in which the page follows
+  await expect(card(page, "Theirs")).toBeAttached(); // the page has followed
   await expect(changes.getByRole("listitem")).toHaveCount(1);
   await expect(changes).toContainText('delay: "0.5" → "0.9"');
   await other.context.close();

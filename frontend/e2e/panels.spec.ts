@@ -1,7 +1,7 @@
 /** What stands beside the canvas: the lists, folded to a rail and back, and the details. */
 
 import { expect, test } from "@playwright/test";
-import { card, saved } from "./canvas";
+import { atRest, card, saved } from "./canvas";
 import { LONG, Product } from "./product";
 
 const product = new Product();
@@ -82,11 +82,11 @@ test("beside the rail the details are there while something is chosen, or when a
   await expect(details).toBeHidden();
 
   // The card that is chosen stays where it is.
-  await page.waitForTimeout(400); // the view has come to rest
+  await atRest(page);
   const at = await card(page, "Wait", 0).boundingBox();
   await card(page, "Wait", 0).click();
   await expect(details.getByRole("textbox", { name: "Name" })).toHaveValue("Wait");
-  await page.waitForTimeout(400);
+  await atRest(page);
   expect(await card(page, "Wait", 0).boundingBox()).toEqual(at);
   await expect(ask).toHaveCount(0);
   await page.keyboard.press("Escape");

@@ -1,7 +1,7 @@
 /** On a phone, with fingers only: a graph is made, connected, given a parameter, started, stopped. */
 
 import { expect, type Locator, type Page, test } from "@playwright/test";
-import { saved } from "./canvas";
+import { hold, saved } from "./canvas";
 import { LONG, Product } from "./product";
 
 const product = new Product();
@@ -11,15 +11,17 @@ test.afterAll(() => product.dispose());
 
 const PHONE = { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true };
 
-/** A finger that stays where it is for a while. */
-async function press(page: Page, on: Locator, ms: number): Promise<void> {
+/** A finger that rests on a button for as long as it asks for. */
+async function press(page: Page, on: Locator): Promise<void> {
   const box = await on.boundingBox();
   if (box === null) throw new Error("it is not on screen");
   const touch = { x: box.x + box.width / 2, y: box.y + box.height / 2 };
   const hand = await page.context().newCDPSession(page);
-  await hand.send("Input.dispatchTouchEvent", { type: "touchStart", touchPoints: [touch] });
-  await page.waitForTimeout(ms);
-  await hand.send("Input.dispatchTouchEvent", { type: "touchEnd", touchPoints: [] });
+  await hold(
+    on,
+    () => hand.send("Input.dispatchTouchEvent", { type: "touchStart", touchPoints: [touch] }),
+    () => hand.send("Input.dispatchTouchEvent", { type: "touchEnd", touchPoints: [] }),
+  );
 }
 
 const pane = (page: Page, name: string) =>
@@ -134,7 +136,7 @@ test("STOP is at one place, apart from Start, and everything is large enough for
 
   const start = page.getByRole("button", { name: /^Start v1 in the simulator/ });
   await expect(start).toBeEnabled();
-  await press(page, start, 900);
+  await press(page, start);
   await pane(page, "Run");
   await expect(page.locator('[data-tone="run"]').first()).toBeVisible();
   await page.getByRole("button", { name: /^Stop / }).tap();

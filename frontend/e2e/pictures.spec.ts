@@ -2,7 +2,7 @@
 
 import { resolve } from "node:path";
 import { expect, type Page, test } from "@playwright/test";
-import { card, saved } from "./canvas";
+import { atRest, card, fitView, holdEnter, saved } from "./canvas";
 import { DOMAIN, NO_ROS, StandIn } from "./emulated-robot";
 import { Product } from "./product";
 
@@ -17,6 +17,7 @@ test.beforeAll(() => product.start());
 test.afterAll(() => product.dispose());
 
 async function picture(page: Page, name: string): Promise<void> {
+  await atRest(page);
   await page.screenshot({ path: resolve(FOLDER, `${name}.png`) });
 }
 
@@ -29,8 +30,7 @@ async function whole(page: Page): Promise<void> {
     return end === null || over === null || end.y + end.height > over.y;
   };
   for (let i = 0; i < 3 && (i === 0 || (await hidden())); i += 1) {
-    await page.getByRole("button", { name: "Fit", exact: true }).click();
-    await page.waitForTimeout(500);
+    await fitView(page);
   }
   await page.mouse.move(720, 880);
 }
@@ -103,7 +103,6 @@ test("why a run failed", async ({ browser }) => {
   const why = page.getByRole("region", { name: "Why" });
   await expect(why.getByRole("listitem").first()).toContainText("Ben pressed Stop while Look ran");
   await why.getByRole("button").first().click();
-  await page.waitForTimeout(1_200);
   await picture(page, "why-light");
   await context.close();
 });
@@ -126,13 +125,11 @@ for (const scheme of ["light", "dark"] as const) {
     await expect(card(page, "DriveTo").getByText("running")).toBeVisible({ timeout: 20_000 });
     await whole(page);
     await card(page, "DriveTo").click({ position: { x: 50, y: 30 } });
-    await page.waitForTimeout(900);
     await picture(page, `editor-${scheme}`);
     await page.getByRole("button", { name: /^Stop run/ }).click();
     await ended(run);
     await page.goto(product.url);
     await expect(page.getByRole("heading", { name: `delivery_${scheme}` })).toBeVisible();
-    await page.waitForTimeout(800);
     await picture(page, `graphs-${scheme}`);
     await context.close();
     await mari.context.close();
@@ -175,10 +172,8 @@ test("what was, and what was otherwise", async ({ browser }) => {
     const { page, context } = await product.person(browser, "Ada", options);
     await page.goto(`${product.url}/runs/${bad}`);
     await expect(card(page, "IsValveClosed").getByText("error")).toBeVisible();
-    await page.waitForTimeout(1_200);
     await picture(page, `run-${scheme}`);
     await page.goto(`${product.url}/runs`);
-    await page.waitForTimeout(900);
     await picture(page, `runs-${scheme}`);
     if (scheme === "light") {
       for (const run of await page.getByLabel(/^Choose run \d+ to compare/).all()) {
@@ -187,12 +182,10 @@ test("what was, and what was otherwise", async ({ browser }) => {
       }
       await page.getByRole("button", { name: "Compare the two" }).click();
       await expect(page.getByText("here they part").first()).toBeVisible();
-      await page.waitForTimeout(600);
       await picture(page, "compare-light");
       await page.goto(`${product.url}/runs?graph=${id}`);
       await page.getByRole("link", { name: "Statistics" }).click();
       await expect(page.getByText(/of \d+ runs finished true/)).toBeVisible();
-      await page.waitForTimeout(600);
       await picture(page, "statistics-light");
     }
     await context.close();
@@ -219,7 +212,6 @@ for (const scheme of ["light", "dark"] as const) {
     await page.getByRole("tab", { name: "JSON" }).click();
     await expect(page.getByRole("textbox", { name: "JSON of the graph" })).toBeVisible();
     await page.getByRole("button", { name: /^arm/ }).last().click();
-    await page.waitForTimeout(600);
     await picture(page, `json-${scheme}`);
     await context.close();
   });
@@ -234,11 +226,9 @@ for (const [name, width, height] of [
     const { page, context } = await product.person(browser, "Ada", options);
     await page.goto(await graph("valve_inspection"));
     await saved(page);
-    await page.waitForTimeout(800);
     await picture(page, `editor-${name}`);
     if (name === "phone") {
       await page.getByRole("radiogroup").getByText("Outline", { exact: true }).tap();
-      await page.waitForTimeout(500);
       await picture(page, "outline-phone");
     }
     await context.close();
@@ -287,19 +277,14 @@ test.describe("robots", () => {
       await page.goto(`${product.url}/robots`);
       await expect(page.getByText("answers", { exact: true })).toHaveCount(2, { timeout: 40_000 });
       await chosen(page, url, ["David", "Rover"]);
-      await page.waitForTimeout(2_500);
       await picture(page, `start-${scheme}`);
       await page.getByRole("checkbox", { name: /^Rover/ }).uncheck();
       const begin = page.getByRole("button", { name: /^Start v\d+ on David/ });
       await expect(begin).toBeEnabled();
-      await begin.focus();
-      await page.keyboard.down("Enter");
-      await page.waitForTimeout(900);
-      await page.keyboard.up("Enter");
+      await holdEnter(page, begin);
       await expect(page.getByText(/proof \d/)).toBeVisible();
       await page.goto(`${product.url}/robots`);
       await page.getByRole("tab", { name: "What others told it" }).first().click();
-      await page.waitForTimeout(1_200);
       await picture(page, `robots-${scheme}`);
       await page.keyboard.press("Control+.");
       await expect(page.getByText(/Run \d+: stopped/)).toBeVisible();
@@ -311,23 +296,17 @@ test.describe("robots", () => {
     const options = { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true };
     const { page, context } = await product.person(browser, "Ada", options);
     await page.goto(`${product.url}/robots`);
-    await page.waitForTimeout(1_200);
     await picture(page, "robots-phone");
     await chosen(page, `${product.url}/graphs/${await product.chain(3)}`, ["David", "Carol"]);
-    await page.waitForTimeout(600);
     await picture(page, "start-phone");
     await page.getByRole("checkbox", { name: /^David/ }).uncheck();
     const begin = page.getByRole("button", { name: /^Start v\d+ on Carol/ });
     await expect(begin).toBeEnabled();
-    await begin.focus();
-    await page.keyboard.down("Enter");
-    await page.waitForTimeout(900);
-    await page.keyboard.up("Enter");
+    await holdEnter(page, begin);
     await expect(page.getByRole("button", { name: /^Stop run/ })).toBeVisible();
     await carol.kill();
     await page.getByRole("button", { name: /^Stop run/ }).tap();
     await expect(page.getByRole("alert")).toContainText("STOP UNCONFIRMED");
-    await page.waitForTimeout(1_500);
     await picture(page, "stop-unconfirmed-phone");
     await context.close();
   });

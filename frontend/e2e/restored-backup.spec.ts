@@ -3,7 +3,7 @@
 import { readFileSync } from "node:fs";
 import { join } from "node:path";
 import { expect, type Page, test } from "@playwright/test";
-import { add, card, saved } from "./canvas";
+import { add, atRest, card, saved } from "./canvas";
 import { LONG, Product } from "./product";
 
 const product = new Product();
@@ -43,7 +43,7 @@ async function pictures(page: Page, name: string): Promise<void> {
     await page.emulateMedia({ colorScheme: scheme });
     for (const width of [1440, 390]) {
       await page.setViewportSize({ width, height: width === 390 ? 844 : 900 });
-      await page.waitForTimeout(150); // the dialog glides
+      await atRest(page);
       await page.screenshot({ path: test.info().outputPath(`${name}-${scheme}-${width}.png`) });
     }
   }

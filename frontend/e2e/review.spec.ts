@@ -1,7 +1,7 @@
 /** Looking back: find a run, replay it, compare it with another, run it again with a fault. */
 
 import { expect, type Page, test } from "@playwright/test";
-import { card } from "./canvas";
+import { card, frames } from "./canvas";
 import { type Person, Product } from "./product";
 
 interface Run {
@@ -110,12 +110,13 @@ test("what the page showed live is what the replay shows of that moment", async 
   await expect
     .poll(
       async () => {
-        const [before, at] = [await states(), Date.now()];
-        await page.waitForTimeout(200); // what is about to come has come then
+        const [before, from] = [await states(), Date.now()];
+        await frames(page, 12); // in which the page shows what was on its way
         if (String(await states()) !== String(before)) return false;
+        const at = (from + Date.now()) / 2;
         const known = live.map((each) => String(each.states));
         if (before.length === 3 && !known.includes(String(before))) {
-          live.push({ at: at + 100, states: before });
+          live.push({ at, states: before });
         }
         return before.length === 3 && before.every((word) => word.includes("true"));
       },

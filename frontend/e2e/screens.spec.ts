@@ -3,7 +3,7 @@
 import { mkdirSync } from "node:fs";
 import { resolve } from "node:path";
 import { type Browser, expect, type Page, test } from "@playwright/test";
-import { saved, start } from "./canvas";
+import { atRest, CARD, saved, start } from "./canvas";
 import { Product } from "./product";
 
 test.skip(process.env.SCREENS !== "1", "takes pictures to be looked at: make screens");
@@ -64,7 +64,7 @@ async function make(
 
 /** What a page shows once it has come to rest. */
 async function taken(page: Page, name: string): Promise<void> {
-  await page.waitForTimeout(900);
+  await atRest(page);
   await page.screenshot({ path: resolve(FOLDER, `${name}.png`) });
 }
 
@@ -124,7 +124,7 @@ test("graphs of every size", async ({ browser }) => {
     // Where it runs and what has ended, at one glance.
     await start(page);
     await expect(page.getByText("running", { exact: true }).first()).toBeVisible();
-    await page.waitForTimeout(3_500);
+    await expect(page.locator(`${CARD} [data-tone="true"]`).first()).toBeVisible();
     await page.getByRole("button", { name: "Fit", exact: true }).click();
     await taken(page, `size-${size}-runs`);
     await page.getByRole("button", { name: /^Stop run/ }).click();

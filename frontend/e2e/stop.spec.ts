@@ -1,7 +1,7 @@
 /** Stop whatever else is broken: the editor frozen or dead, ten tabs, a full disk, no runner. */
 
 import { execFileSync } from "node:child_process";
-import { expect, type Page, test } from "@playwright/test";
+import { expect, type Page, type Request, test } from "@playwright/test";
 import { boxOf, saved, start } from "./canvas";
 import { Product } from "./product";
 
@@ -94,14 +94,19 @@ test("while it cannot be sent the page says so, and goes on trying until it is p
   await running(page);
   const runner = product.pid("runner");
   process.kill(runner, "SIGSTOP");
+  const isStop = (request: Request) =>
+    request.method() === "POST" && new URL(request.url()).pathname.endsWith("/stop");
   try {
+    const failed = page.waitForEvent("requestfailed", isStop);
     await page
       .getByRole("button", { name: /^Stop / })
       .first()
       .click();
     const alert = page.getByRole("alert").filter({ hasText: "NOT SENT: use the hardware stop" });
     await expect(alert).toBeVisible();
-    await page.waitForTimeout(3_000); // longer than one try may take
+    // One try has got no answer in its time, and the next one is sent.
+    await failed;
+    await page.waitForRequest(isStop);
     await expect(alert).toBeVisible();
     await nothingCovered(page);
     // Neither the bar, the list, the strip nor a card says that it runs: nobody knows.

@@ -1,7 +1,7 @@
 /** With fingers only: a tablet does the whole job, and a phone does it too. */
 
 import { type CDPSession, expect, type Locator, type Page, test } from "@playwright/test";
-import { arrows, card, saved } from "./canvas";
+import { arrows, atRest, card, saved } from "./canvas";
 import { LONG, Product, pause } from "./product";
 
 const product = new Product();
@@ -132,7 +132,7 @@ test("a tablet: open, add, connect, set a parameter, start, stop", async ({ brow
   const exit = page.locator(".react-flow__node").filter({ has: page.getByLabel("End with") });
   // Held upright, what runs to the right does not fit beside the bars at once.
   await page.getByRole("button", { name: "Fit", exact: true }).tap();
-  await page.waitForTimeout(400);
+  await atRest(page);
   await tie(page, when("Grip", "true"), exit);
   const drawn = ["Grip_0 > exit", "Look_0 > Grip_0", "entry > Look_0"];
   await expect.poll(() => arrows(product, id)).toEqual(drawn);
@@ -149,7 +149,7 @@ test("a tablet: open, add, connect, set a parameter, start, stop", async ({ brow
 
   // One finger drags a card.
   await page.getByRole("button", { name: "Fit", exact: true }).tap();
-  await page.waitForTimeout(400);
+  await atRest(page);
   const before = await grip(card(page, "Grip"));
   await fingers.move({ from: before, to: [before[0] + 90, before[1] + 30] });
   await expect
@@ -184,7 +184,7 @@ test("a tablet: two fingers zoom, a resting one opens the menu, taps choose seve
   await expect.poll(() => zoom(page)).toBeGreaterThan(scale * 1.1);
   const menu = page.getByRole("menu");
   await page.getByRole("button", { name: "Fit", exact: true }).tap();
-  await page.waitForTimeout(400);
+  await atRest(page);
   await fingers.rest(await grip(card(page, "Wait", 0)), menu);
   await expect(menu.getByRole("menuitem", { name: /^Duplicate/ })).toBeVisible();
   expect(await small(page, '[role="menu"]')).toEqual([]);

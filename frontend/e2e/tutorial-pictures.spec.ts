@@ -2,7 +2,7 @@
 
 import { resolve } from "node:path";
 import { expect, type Page, test } from "@playwright/test";
-import { arrows, card, saved } from "./canvas";
+import { arrows, atRest, card, fitView, holdEnter, saved } from "./canvas";
 import { DOMAIN, NO_ROS, StandIn } from "./emulated-robot";
 import { Product } from "./product";
 
@@ -24,7 +24,7 @@ test.afterAll(async () => {
 });
 
 async function picture(page: Page, name: string): Promise<void> {
-  await page.waitForTimeout(900);
+  await atRest(page);
   await page.screenshot({ path: resolve(FOLDER, `tutorial-${name}.png`) });
 }
 
@@ -41,18 +41,10 @@ async function chosen(page: Page, name: string): Promise<void> {
   await expect(page.locator(".react-flow__node.selected")).toContainText(name);
 }
 
-async function showAll(page: Page): Promise<void> {
-  await page.getByRole("button", { name: "Fit", exact: true }).click();
-  await page.waitForTimeout(600);
-}
-
-async function hold(page: Page, name: RegExp): Promise<void> {
+async function holdNamed(page: Page, name: RegExp): Promise<void> {
   const button = page.getByRole("button", { name });
   await expect(button).toBeEnabled({ timeout: 45_000 });
-  await button.focus();
-  await page.keyboard.down("Enter");
-  await page.waitForTimeout(900);
-  await page.keyboard.up("Enter");
+  await holdEnter(page, button);
 }
 
 test("start it, and draw", async ({ browser }) => {
@@ -90,7 +82,7 @@ test("start it, and draw", async ({ browser }) => {
       "entry > GoToPlant_0",
     ]);
   await page.keyboard.press("Escape");
-  await showAll(page);
+  await fitView(page);
   await picture(page, "graph");
   expect(failures).toEqual([]);
   await context.close();
@@ -104,15 +96,15 @@ test("try it, run it and stop it in the simulator", async ({ browser }) => {
   const bar = page.getByRole("region", { name: "Dry-run" });
   await bar.getByRole("button", { name: /^true/ }).click();
   await expect(bar).toContainText("GoToPlant ends true");
-  await showAll(page);
+  await fitView(page);
   await picture(page, "dry-run");
   await bar.getByRole("button", { name: "Close the dry-run" }).click();
 
-  await hold(page, /^Start v1 in the simulator/);
+  await holdNamed(page, /^Start v1 in the simulator/);
   await expect(card(page, "Water").getByText("running")).toBeVisible({ timeout: 20_000 });
-  await showAll(page);
+  await fitView(page);
   await picture(page, "run");
-  await hold(page, /^Start v1 in the simulator/);
+  await holdNamed(page, /^Start v1 in the simulator/);
   await page.keyboard.press("Control+.");
   await expect(page.getByText(/Run 2: stopped/)).toBeVisible();
   await context.close();
@@ -137,14 +129,14 @@ test("run it on a robot to practise with", async ({ browser }) => {
   await page.getByRole("checkbox", { name: /^David/ }).check();
   await expect(page.getByText(/David answered after/)).toBeVisible({ timeout: 45_000 });
   await picture(page, "start");
-  await hold(page, /^Start v1 on David$/);
+  await holdNamed(page, /^Start v1 on David$/);
   await expect(card(page, "GoToPlant").getByText("running")).toBeVisible({ timeout: 20_000 });
   await page.keyboard.press("Control+.");
   await expect(page.getByText(/Run 3: stopped/)).toBeVisible();
 
   // A second time, and it is frozen while it drives.
   await page.getByRole("button", { name: "Choose where to start" }).click();
-  await hold(page, /^Start v1 on David$/);
+  await holdNamed(page, /^Start v1 on David$/);
   await expect(card(page, "GoToPlant").getByText("running")).toBeVisible({ timeout: 20_000 });
   david.freeze();
   await expect(page.getByText("unknown").first()).toBeVisible({ timeout: 20_000 });

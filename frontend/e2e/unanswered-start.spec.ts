@@ -140,9 +140,13 @@ test("what was asked for without a network is not sent when there is one again",
   const tried = sent.length;
   await context.setOffline(false);
   await saved(page);
-  await page.waitForTimeout(1_500); // in which what was queued would go
   expect(sent.slice(tried)).toEqual([]);
   expect(await runs()).toHaveLength(before);
+  // A start of now is the first that arrives, and stays the only one.
+  await start(page);
+  await expect.poll(async () => (await runs()).length).toBe(before + 1);
+  await stopAll(page);
+  expect(await runs()).toHaveLength(before + 1);
 });
 
 test("a browser that believes to be without a network holds nothing back", async () => {

@@ -1,7 +1,7 @@
 /** What is seen: text stays readable on opening, Fit shows the whole, the view follows a run. */
 
 import { expect, type Page, test } from "@playwright/test";
-import { card, saved, start } from "./canvas";
+import { card, fitView, saved, start } from "./canvas";
 import { LONG, Product } from "./product";
 
 const product = new Product();
@@ -41,8 +41,7 @@ for (const [what, viewport, least] of [
     await expect(card(page, "Wait", 59)).not.toBeInViewport();
 
     // Fit shows all of it, also when it is pressed once more.
-    const fit = page.getByRole("button", { name: "Fit", exact: true });
-    await fit.click();
+    await fitView(page);
     await expect(card(page, "Wait", 59)).toBeInViewport({ ratio: 0.99 });
     await expect(card(page, "Wait", 0)).toBeInViewport({ ratio: 0.99 });
     await expect.poll(() => zoom(page)).toBeLessThan(least);
@@ -50,13 +49,11 @@ for (const [what, viewport, least] of [
     let all = 0;
     await expect(async () => {
       const before = await zoom(page);
-      await fit.click();
-      await page.waitForTimeout(400);
+      await fitView(page);
       all = await zoom(page);
       expect(all).toBeCloseTo(before, 3);
     }).toPass();
-    await fit.click();
-    await page.waitForTimeout(400);
+    await fitView(page);
     expect(await zoom(page)).toBeCloseTo(all, 3);
     await context.close();
   });

@@ -1,4 +1,7 @@
-/** An action on the canvas: robot, name, state, two parameters; its input before it, its four outcomes behind. */
+/**
+ * The card of an action: its robot, name, state and parameters, with a handle for its input and one
+ * for each outcome.
+ */
 import { IconGhost2, IconMessageCircle } from "@tabler/icons-react";
 import { Handle, type NodeProps, Position } from "@xyflow/react";
 import { memo, use, useRef } from "react";
@@ -29,7 +32,7 @@ import { SinceSpot } from "./marks/since-marks";
 import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "./outcome";
 import { STATE_LETTER } from "./zoom-detail";
 
-/** What it says of a run. */
+/** Shows the state of an action in a run, its duration and its number of visits. */
 export function CardState({ progress }: { progress: Progress }) {
   const now = useNow(1000, progress.since !== null);
   const parts: string[] = [];
@@ -47,7 +50,7 @@ export function CardState({ progress }: { progress: Progress }) {
   );
 }
 
-/** What it is called. */
+/** Shows the name of an action, and its old name where two moments are compared. */
 function Head({ action, oldName }: { action: Action; oldName: string | null }) {
   return (
     <div className={style.head} data-head>
@@ -62,7 +65,7 @@ function Head({ action, oldName }: { action: Action; oldName: string | null }) {
   );
 }
 
-/** What is read on it. */
+/** Shows everything that is read on a card: head, state and parameters. */
 function Words({ data, selected }: Pick<NodeProps<CardNode>, "data" | "selected">) {
   const { action, progress, givers } = data;
   const rows = cardRows(action.inputs, givers, progress?.inputs);
@@ -86,7 +89,7 @@ function Words({ data, selected }: Pick<NodeProps<CardNode>, "data" | "selected"
   );
 }
 
-/** Outcomes stand 22 px apart at the right, however high the card is, else along its lower edge. */
+/** Return the place of the i-th outcome: 22 px apart on the right side, else spread along the lower edge. */
 function spotOf(i: number, right: boolean): React.CSSProperties {
   return right ? { top: `calc(50% + ${(i - 1.5) * 22}px)` } : { left: `${14 + i * 24}%` };
 }

@@ -1,4 +1,4 @@
-/** Dragging actions from the library to the canvas. */
+/** Drags actions from the library to the canvas. */
 import type { NewAction } from "../graph/edit";
 import { PointerDrag } from "../ui/pointer-drag";
 

@@ -1,4 +1,7 @@
-/** Where arrows begin and end on cards and ends, known without drawing them. */
+/**
+ * Computes the places at which arrows start and end on cards and on the entry and exit, without
+ * rendering them.
+ */
 import { type NodeHandle, Position as Side } from "@xyflow/react";
 import { type Action, type Direction, ENTRY, type EXIT, type Key } from "../graph/model";
 import { cardSize, pillSize } from "./geometry/arrange";
@@ -52,7 +55,10 @@ interface Known {
   readonly handles: NodeHandle[];
 }
 
-/** The same object for the same words: what is equal has to stay identical. */
+/**
+ * Sizes and handles by direction and size; equal requests get the identical object, so that React
+ * renders nothing again.
+ */
 const known = new Map<string, Known>();
 
 function remembered(name: string, make: () => Known): Known {
@@ -61,7 +67,7 @@ function remembered(name: string, make: () => Known): Known {
   return found;
 }
 
-/** How large a card is before it is drawn: what lies out of sight need never be. */
+/** Return the size and the handles of a card that is not rendered; cards out of sight never are. */
 export function expectedCard(
   action: Pick<Action, "inputs">,
   direction: Direction,

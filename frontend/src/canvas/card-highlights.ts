@@ -1,33 +1,38 @@
-/** Highlights on cards: whose robot's actions stand out, who gives and takes a value, open threads. */
+/**
+ * Highlights on cards: the actions of one robot, the two ends of a data flow, open comments, and
+ * what no expected course visits.
+ */
 import { createContext, type ReactNode, useSyncExternalStore } from "react";
 import type { Key, Precondition } from "../graph/model";
 
-/** The actions that give a value, and those that take it. */
+/** The actions that give a value, and the actions that take it. */
 interface TouchedActions {
   readonly producers: ReadonlySet<Key>;
   readonly consumers: ReadonlySet<Key>;
 }
 
-/** Outcomes of arrows that nothing takes, by relation, and actions that nothing comes to. */
+/** Outcomes of arrows that no expected course takes, by relation, and actions that it never visits. */
 export interface UntakenPlaces {
   readonly outcomes: ReadonlyMap<string, readonly Precondition[]>;
   readonly actions: ReadonlySet<Key>;
 }
 
 interface CardHighlights {
-  /** The robot whose actions stand out; null: all. The empty name is that of any robot. */
+  /**
+   * The robot whose actions are highlighted; null: all actions. The empty name stands for actions
+   * of any robot.
+   */
   readonly robot: string | null;
-  /** Open threads by action. */
+  /** The number of open comment threads by action. */
   readonly openThreads: ReadonlyMap<Key, number>;
-  /** What no expected course takes, while that is looked at. */
+  /** Outcomes and actions that no expected course takes; null while coverage is not shown. */
   readonly untaken: UntakenPlaces | null;
-  /** Whom the parameter in focus ties together; null: none is in focus. */
+  /** The actions that the focused parameter connects; null: no parameter is focused. */
   readonly touched: TouchedActions | null;
 }
 
 const ALL: CardHighlights = { robot: null, openThreads: new Map(), untaken: null, touched: null };
 
-/** One for the page: there is one canvas. Cards listen for themselves, so that few draw again. */
 class CardHighlightStore {
   #now: CardHighlights = ALL;
   #listeners = new Set<() => void>();
@@ -48,12 +53,12 @@ class CardHighlightStore {
 
 export const cardHighlights = new CardHighlightStore();
 
-/** The robot whose actions stand out. */
+/** Return the robot whose actions are highlighted; null: all actions. */
 export function useHighlightedRobot(): string | null {
   return useSyncExternalStore(cardHighlights.subscribe, () => cardHighlights.now().robot);
 }
 
-/** Whether the actions of a robot are to step back. */
+/** Return whether a robot's actions are dimmed, since another robot is highlighted. */
 export function useIsDimmed(robot: string): boolean {
   return useSyncExternalStore(cardHighlights.subscribe, () => {
     const lit = cardHighlights.now().robot;
@@ -61,7 +66,7 @@ export function useIsDimmed(robot: string): boolean {
   });
 }
 
-/** Whether an action gives the value in focus, or takes it. */
+/** Return whether an action gives or takes the value of the focused parameter. */
 export function useDataRole(key: Key): "gives" | "takes" | undefined {
   return useSyncExternalStore(cardHighlights.subscribe, () => {
     const { touched } = cardHighlights.now();
@@ -70,7 +75,7 @@ export function useDataRole(key: Key): "gives" | "takes" | undefined {
   });
 }
 
-/** How many open threads there are about an action. */
+/** Return the number of open comment threads about an action. */
 export function useOpenThreadCount(key: Key): number {
   return useSyncExternalStore(
     cardHighlights.subscribe,
@@ -80,7 +85,7 @@ export function useOpenThreadCount(key: Key): number {
 
 const NONE: readonly Precondition[] = [];
 
-/** The outcomes of a relation that nothing takes, while that is looked at. */
+/** Return the outcomes of a relation that no expected course takes; empty while coverage is not shown. */
 export function useUntakenOutcomes(relation: string): readonly Precondition[] {
   return useSyncExternalStore(
     cardHighlights.subscribe,
@@ -88,7 +93,7 @@ export function useUntakenOutcomes(relation: string): readonly Precondition[] {
   );
 }
 
-/** Whether nothing comes to an action, while that is looked at. */
+/** Return whether no expected course visits an action; false while coverage is not shown. */
 export function useIsUnvisited(key: Key): boolean {
   return useSyncExternalStore(
     cardHighlights.subscribe,
@@ -96,5 +101,5 @@ export function useIsUnvisited(key: Key): boolean {
   );
 }
 
-/** What stands in place of the state where something else than one run is shown. */
+/** Replaces the state on cards where the canvas shows something else than one run. */
 export const CardStateContext = createContext<((key: Key) => ReactNode) | null>(null);

@@ -1,4 +1,4 @@
-/** What a card says of its inputs: at rest, in a run, and all of it while it is selected. */
+/** The lines of a card that show its input parameters; a selected card shows all of them. */
 import { IconArrowLeft } from "@tabler/icons-react";
 import type { CardRow } from "../graph/parameters/card-rows";
 import { isolated } from "../words/isolated";
@@ -13,11 +13,11 @@ const TITLES: Readonly<Record<CardRow["kind"], string>> = {
 
 interface LineProps {
   row: CardRow;
-  /** The visit that it belongs to was not seen but follows from other things. */
+  /** The visit that reported the value was inferred, not observed. */
   inferred: boolean;
-  /** What it was, where two moments are compared. */
+  /** The value at the earlier of two moments that are compared. */
   old: string | undefined;
-  /** It says something else at the other moment. */
+  /** The value is another one at the other moment. */
   differs: boolean;
 }
 
@@ -45,13 +45,13 @@ function Line({ row, inferred, old, differs }: LineProps) {
 
 interface Props {
   rows: readonly CardRow[];
-  /** How many stand in the card; the others below it while it is selected. */
+  /** The number of lines within the card; the others stand below it while it is selected. */
   most: number;
   selected: boolean;
   inferred: boolean;
-  /** What rows were, by their name: those come first. */
+  /** Old values by the name of their row; these rows come first. */
   old?: ReadonlyMap<string, string> | undefined;
-  /** Rows that differ from those of another moment, by their name: those come first, too. */
+  /** Names of the rows that differ from the other moment; these rows come first, too. */
   differing?: ReadonlySet<string> | undefined;
 }
 

@@ -1,4 +1,7 @@
-/** A graph as nodes and edges of the canvas; what did not change keeps its identity. */
+/**
+ * Turns a graph into nodes and edges of the canvas. Unchanged elements keep their identity, so that
+ * they are not rendered again.
+ */
 import { type Edge, type Node, Position as Side } from "@xyflow/react";
 import { relationId } from "../graph/document-keys";
 import type { Note } from "../graph/edit/notes";
@@ -32,10 +35,10 @@ export type CardNode = Node<
     action: Action;
     progress: Progress | null;
     mark: ProblemMark | null;
-    /** The colour of somebody else who has it selected. */
+    /** The colour of another person who has selected it. */
     other: string | null;
     direction: Direction;
-    /** Which outputs reach its inputs. */
+    /** The outputs that reach each of its inputs. */
     givers: InputGivers | undefined;
   },
   "action"
@@ -53,27 +56,30 @@ export type Arrow = Edge<
     relation: string;
     outcome: Precondition;
     response: Response;
-    /** What the whole relation says; only the first arrow of a relation has it. */
+    /** Responses of the whole relation; only its first arrow has them, the others null. */
     answers: readonly OutcomeResponse[] | null;
-    /** What is wrong with the relation; on its first arrow. */
+    /** Problems of the relation; only its first arrow has them. */
     mark: ProblemMark | null;
-    /** The line on which it runs, with the other outcomes of the same response. */
+    /** The line that it shares with the other outcomes of the same response. */
     bundle: Bundle;
-    /** The first of its bundle draws the line, and what the whole bundle says. */
+    /** True for the first arrow of a bundle, which draws the line and the pill. */
     lead: boolean;
     entry: boolean;
     lit: boolean;
-    /** The outcome of the bundle that came in the parent's last visit. */
+    /** The outcome of this bundle with which the parent's last visit ended; null: none of them. */
     came: Precondition | null;
-    /** The parent has ended, and with none of the bundle's outcomes. */
+    /** The parent has ended with an outcome that is not in this bundle. */
     passed: boolean;
-    /** It begins at a folded frame, where no outcome has a port of its own. */
+    /** It starts at a folded frame, which has no handles for single outcomes. */
     portless?: boolean;
   },
   "outcome"
 >;
 
-/** The outcomes that get the same response, together, in the fixed order of outcomes. */
+/**
+ * Group the outcomes of a relation by response, in the fixed order of outcomes; ignored outcomes
+ * are left out.
+ */
 export function responsesOf(relation: Relation): OutcomeResponse[] {
   const answers: { outcomes: Precondition[]; response: Response }[] = [];
   for (const outcome of OUTCOMES) {
@@ -93,15 +99,15 @@ export interface NodeOptions {
   marks: ProblemMarks;
   others?: ReadonlyMap<Key, string>;
   measured: ReadonlyMap<Key, { width?: number; height?: number }>;
-  /** A note as it is while somebody drags its edges. */
+  /** The note with the size that it has while its edges are being dragged. */
   resized?: Note | null;
-  /** How large the cards are in which a graph is expanded. */
+  /** Sizes of the cards in which a graph is expanded. */
   expanded?: Sizes | undefined;
 }
 
 export type ArrowOptions = Pick<NodeOptions, "selected" | "progress" | "marks">;
 
-/** On which sides arrows leave and arrive. */
+/** The sides at which arrows leave and enter cards, by direction. */
 const SIDES = {
   right: { sourcePosition: Side.Right, targetPosition: Side.Left },
   down: { sourcePosition: Side.Bottom, targetPosition: Side.Top },
@@ -127,7 +133,7 @@ function place(
   };
 }
 
-/** The card of an action: the same as before when nothing that it shows has changed. */
+/** Return the node of an action: the identical `before` if nothing that the card shows has changed. */
 function cardOf(
   action: Action,
   { direction, givers }: Pick<CardNode["data"], "direction" | "givers">,
@@ -162,7 +168,10 @@ function cardOf(
   return { ...place(action.key, options, direction, expected), type: "action", ariaLabel, data };
 }
 
-/** `before`: what was drawn last; it is looked at first, since of many cards few change at once. */
+/**
+ * Return all nodes of a graph in drawing order. `before`: the nodes drawn last, whose unchanged
+ * elements are used again.
+ */
 export function nodesOf(
   graph: Graph,
   options: NodeOptions,
@@ -191,17 +200,17 @@ export function nodesOf(
   return [...notes.frames, ...ends, ...cards, ...notes.notes];
 }
 
-/** Whether the arrow has been taken: its parent ended this way in its last visit. */
+/** Return whether an arrow has been taken: its parent's last visit ended with this outcome. */
 function isLit(relation: Relation, outcome: Precondition, options: ArrowOptions): boolean {
   const parent = options.progress.get(relation.parent);
   if (relation.parent === ENTRY) return options.progress.size > 0;
   return parent !== undefined && `on_${parent.tone}` === outcome;
 }
 
-const FARTHEST = 1e7; // px; a file may put a card anywhere
-const END_WIDTH = 84; // px of an end that are seen, in the middle of its place
+const FARTHEST = 1e7; // px; a file may place a card anywhere
+const END_WIDTH = 84; // px of the entry and exit that are visible, in the middle of their box
 
-/** While both ends of a line are dragged its waypoints go along. */
+/** Return the waypoints of a bundle; they move along while both of its ends are dragged by the same way. */
 function viaOf(bundle: Bundle, moved: Positions): readonly Position[] {
   const { waypoints, source: parent, target: child } = bundle;
   const by = waypoints.length > 0 ? movedTogether({ parent, child }, moved) : null;
@@ -209,11 +218,14 @@ function viaOf(bundle: Bundle, moved: Positions): readonly Position[] {
 }
 
 interface SceneOptions extends Pick<NodeOptions, "places" | "measured" | "marks"> {
-  /** Where everything stands while nobody drags it. */
+  /** Places as they are while nothing is dragged. */
   rest?: Positions | undefined;
 }
 
-/** What lines are drawn between. `offset` is that of the scene before. */
+/**
+ * Return the input of the router: cards that stand in the way, and the lines to draw. `offset`:
+ * that of the previous scene.
+ */
 export function sceneOf(graph: Graph, options: SceneOptions, offset: number | null): Scene {
   const { direction } = graph;
   const cards: SceneCard[] = [];
@@ -264,7 +276,7 @@ function arrowWords(relation: Relation, outcome: Precondition, names: Names): st
   return `Arrow from ${from}, when ${outcomeWord[outcome]}: ${relation.conditions[outcome]} ${to}`;
 }
 
-/** What arrows have to know of cards: the same as before when it says the same. */
+/** Names of the cards, which arrows need for their labels. Unchanged names keep the identical object. */
 export interface CardSurroundings {
   readonly names: Names;
 }
@@ -310,7 +322,8 @@ function arrowsOf(relation: Relation, options: ArrowOptions, { names }: CardSurr
       sourceHandle: entry ? "start" : outcome,
       targetHandle: "in",
       selected,
-      // Where several begin or end, the chosen one is the one whose end can be taken.
+      // Where several arrows start or end, the selected one lies on top, so that its end can be
+      // dragged.
       ...(selected ? { zIndex: 1 } : {}),
       data: {
         ...{ relation: id, outcome, response, bundle, lead, entry, came },
@@ -333,7 +346,10 @@ export function edgesOf(
     .flatMap((relation) => arrowsOf(relation, options, around));
 }
 
-/** `next`, with every element of `before` that says the same in its place. */
+/**
+ * Return `next`, in which every element that equals one of `before` is replaced by the identical
+ * old object.
+ */
 export function keepEqual<T extends { id: string; data?: object }>(
   before: readonly T[],
   next: T[],

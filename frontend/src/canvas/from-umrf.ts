@@ -1,4 +1,7 @@
-/** A published version (canonical UMRF) as a graph to draw. Total: what does not fit is left out. */
+/**
+ * Reads canonical UMRF, such as a published version, as a graph to draw. It never fails: members
+ * that do not fit are left out.
+ */
 import { parametersFrom } from "../graph/edit";
 import {
   type Action,
@@ -80,7 +83,10 @@ function remaps(value: unknown): Remap[] {
   return list(value).map((item) => ({ source: text(item.from), target: text(item.to) }));
 }
 
-/** Waypoints stand in files by the names of the actions (docs/decisions/052-waypoints.md). */
+/**
+ * Return the relations with the waypoints of a file, which name actions by full names
+ * (docs/decisions/052-waypoints.md).
+ */
 function bent(relations: readonly Relation[], actions: readonly Action[], told: unknown) {
   const names = new Map(actions.map((each) => [each.key, fullName(each)]));
   const nameOf = (key: Key) => names.get(key) ?? key;
@@ -100,7 +106,7 @@ function bent(relations: readonly Relation[], actions: readonly Action[], told: 
   });
 }
 
-/** What `actions` of a UMRF object and its ends say. */
+/** Return the graph of a UMRF object: its actions, relations, places, notes and waypoints. */
 export function fromUmrf(umrf: unknown): Graph {
   const root = object(umrf);
   const raw = list(root.actions);

@@ -1,4 +1,4 @@
-/** A graph to look at: the canvas of the run page and of previews. */
+/** A read-only canvas, as run pages and comparisons show it. */
 import { Background, BackgroundVariant, ReactFlow, type Viewport } from "@xyflow/react";
 import { type ReactNode, useEffect, useMemo, useState } from "react";
 import type { Graph, Key } from "../graph/model";
@@ -20,17 +20,17 @@ interface Props {
   selected?: ReadonlySet<string>;
   label: string;
   onSelect?: (key: Key | null) => void;
-  /** Tells apart what several on one page say of themselves. */
+  /** Distinguishes several canvases on one page. */
   id?: string;
-  /** Its view follows another one: it does not fit what it shows by itself. */
+  /** Another canvas moves its view, so it does not fit the graph by itself. */
   led?: boolean;
-  /** The person has moved the view. */
+  /** Called when the person has moved the view. */
   onPanned?: (to: Viewport) => void;
-  /** What else belongs into it. */
+  /** Further elements within the canvas. */
   children?: ReactNode;
 }
 
-const LARGE = 150; // cards, of which those out of sight are not drawn
+const LARGE = 150; // cards; beyond this number, cards out of sight are not rendered in a view that is led
 
 export function GraphView(props: Props) {
   const { graph, progress, selected = NONE, label, onSelect, led = false, onPanned } = props;
@@ -52,7 +52,8 @@ export function GraphView(props: Props) {
   const [lines] = useState(() => new LineStore());
   useEffect(() => lines.show(sceneOf(graph, options, lines.offset)), [lines, graph, options]);
   useEffect(() => () => lines.close(), [lines]);
-  // It fits what it shows once, on its first drawing: of a plain layout, and of the one that follows.
+  // The view fits the graph once, when it is first drawn: for a plain layout, and again for the
+  // final one.
   if (laidOut === null) return <div aria-busy="true" aria-label={label} role="img" />;
   return (
     <LineContext value={lines}>
@@ -77,11 +78,11 @@ export function GraphView(props: Props) {
         onPaneClick={() => onSelect?.(null)}
         nodesDraggable={false}
         nodesConnectable={false}
-        panActivationKeyCode={null} // Space plays the replay
+        panActivationKeyCode={null} // the space key plays the replay
         edgesFocusable={false}
         fitView={!led}
         onlyRenderVisibleElements={led && nodes.length > LARGE}
-        // A move without an event is the page's own.
+        // A move without an event was made by the page.
         onMove={(event, to) => event !== null && onPanned?.(to)}
         fitViewOptions={{ maxZoom: 1, padding: 0.12 }}
         minZoom={led ? 0.08 : 0.1}

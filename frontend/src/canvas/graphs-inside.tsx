@@ -12,42 +12,47 @@ export interface InsideSignProps {
   readonly name: string;
 }
 
-/** An action on the way inside. */
+/** One action on the way to an inner graph. */
 export interface InnerStep {
   readonly key: Key;
   readonly name: string;
 }
 
 interface GraphsInside {
-  /** The names of graphs by their id. */
+  /** Names of all graphs by id. */
   readonly names: ReadonlyMap<string, string>;
-  /** The ids of other graphs by the name of the actions that stand for them. */
+  /** Ids of the other graphs by the name of the actions that stand for them. */
   readonly byName: ReadonlyMap<string, string>;
-  /** Whether actions of others with this graph's name stand for it, and for no older one. */
+  /** Whether actions with this graph's name stand for it, and not for an older graph of the same name. */
   readonly isNamed: boolean;
-  /** Opens the graph for which an action stands. One that is drawn inside of others is told by all their
-   * keys, joined by "/"; where it stands for none, the graph in which it is is opened. */
+  /**
+   * Opens the graph for which an action stands. `path`: keys of the expanded actions down to it,
+   * joined by "/". If the action stands for no graph, the graph that contains it opens.
+   */
   enter(path: string): void;
-  /** Opens a graph inside by the actions that lead there, outermost first, with one thing of it chosen. */
+  /**
+   * Opens an inner graph by the actions that lead to it, outermost first, and selects one of its
+   * elements.
+   */
   show(by: readonly InnerStep[], chosen: string | null): void;
-  /** What is drawn in place, without going anywhere. */
+  /** Expands graphs on the cards of their actions, without leaving the graph on the canvas. */
   readonly expand: {
     toggle(path: string): void;
-    /** One level more than is expanded now, everywhere. */
+    /** Expands one more level everywhere. */
     expandMore(): void;
     collapseAll(): void;
     isAnyExpanded(): boolean;
   };
-  /** Back to the action through which one came; null where one came through none. */
+  /** Returns to the action through which the person came; null if the graph was opened directly. */
   readonly leave: (() => void) | null;
-  /** What is drawn at such an action. */
+  /** The component with the buttons that open and expand a graph, drawn on the card of its action. */
   readonly Sign: ComponentType<InsideSignProps>;
 }
 
-/** One for the page: there is one canvas. Null while nothing is known of other graphs. */
+/** The page has one canvas, hence one store. Null until the other graphs are known. */
 export const graphsInside = new Watched<GraphsInside | null>(null);
 
-/** The sign of an action that stands for a graph. */
+/** Draws the buttons of an action that stands for a graph, once they are loaded. */
 export function InsideSpot({ of, name }: InsideSignProps) {
   const { subscribe, now } = graphsInside;
   const Sign = useSyncExternalStore(subscribe, () =>
@@ -56,13 +61,16 @@ export function InsideSpot({ of, name }: InsideSignProps) {
   return Sign && <Sign of={of} name={name} />;
 }
 
-/** What a graph is called. */
+/** Shows the name of a graph. */
 export function NameOfGraph({ id }: { id: string }) {
   const { subscribe, now } = graphsInside;
   return useSyncExternalStore(subscribe, () => now()?.names.get(id)) ?? "…";
 }
 
-/** By id. An action of the library comes first: then no graph is meant by the name. */
+/**
+ * Return the ids of the other graphs with an action that stands for a graph. If the library has an
+ * action of that name, it is meant instead of the graph.
+ */
 export function usedIn(
   actions: readonly LibraryAction[],
   graph: { readonly id: string; readonly name: string },
@@ -76,7 +84,7 @@ export interface LevelFrameProps {
   readonly progress: Progress | null;
 }
 
-/** Something that is drawn on the card of an action, from its upper left corner. */
+/** Something drawn on the card of an action; its place is relative to the card's upper left corner. */
 export interface PartOnCard extends Size {
   /** Keys of the actions that lead there, joined by "/". */
   readonly path: string;
@@ -84,22 +92,22 @@ export interface PartOnCard extends Size {
   readonly y: number;
   readonly action: Action;
   readonly progress: Progress | null;
-  /** The graph that it stands for is drawn on it in turn. */
+  /** The graph that it stands for is itself expanded on it. */
   readonly expanded: boolean;
 }
 
 interface ExpandedGraphs {
   readonly sizes: Sizes;
-  /** What is drawn on such a card. */
+  /** The component that draws the expanded graph. */
   readonly Frame: ComponentType<LevelFrameProps>;
-  /** The actions on it, as they are now. */
+  /** Returns the actions drawn on a card in their current states. */
   partsOf(key: Key): readonly PartOnCard[];
 }
 
-/** One for the page: there is one canvas. Null while nothing is expanded. */
+/** The page has one canvas, hence one store. Null while nothing is expanded. */
 export const expandedGraphs = new Watched<ExpandedGraphs | null>(null);
 
-/** How large the card of an action is while it is expanded, and what is drawn on it. */
+/** Return the size of an expanded card and the component that draws its graph; null if it is not expanded. */
 export function useExpandedCard(key: Key): { size: Size; Frame: ExpandedGraphs["Frame"] } | null {
   const { subscribe, now } = expandedGraphs;
   const size = useSyncExternalStore(subscribe, () => now()?.sizes.get(key));
@@ -107,5 +115,5 @@ export function useExpandedCard(key: Key): { size: Size; Frame: ExpandedGraphs["
   return size && Frame ? { size, Frame } : null;
 }
 
-/** One for the page: there is one canvas. */
+/** Problems of the graph on the canvas, including those of its inner graphs. */
 export const toldOnCanvas = new Watched<readonly ToldProblem[]>([]);

@@ -1,13 +1,16 @@
-/** Through which actions one came into a graph, in its address: `?in=GRAPH~ACTION`, outermost first. Pure. */
+/**
+ * The levels through which a person came into a graph, kept in the address: `?in=GRAPH~ACTION`,
+ * outermost first. Pure.
+ */
 import type { Key } from "../graph/model";
 
-/** The action `action` of the graph `graph` was entered. */
+/** The graph `graph`, and its action `action` that was entered. */
 export interface Level {
   readonly graph: string;
   readonly action: Key;
 }
 
-const MOST = 20; // levels; whoever goes on in a circle forgets where it began
+const MOST = 20; // levels; on a longer way, for example in a cycle, the outermost are dropped
 const LEVEL = /^([\w-]{1,64})~([\w-]{1,64})$/;
 
 export function levelsOf(search: string): Level[] {
@@ -25,7 +28,10 @@ function address(graph: string, levels: readonly Level[], action: Key | null): s
   return `/graphs/${encodeURIComponent(graph)}${text === "" ? "" : `?${text}`}`;
 }
 
-/** A graph inside, entered from where one is by these actions, with one of its own or an arrow chosen. */
+/**
+ * Return the address of an inner graph that is entered by these levels from the current one, with
+ * an action or arrow of it selected.
+ */
 export function addressInside(
   search: string,
   by: readonly Level[],
@@ -35,7 +41,10 @@ export function addressInside(
   return address(graph, [...levelsOf(search), ...by], action);
 }
 
-/** The n-th graph around, with the action chosen through which one came; null: there is none. */
+/**
+ * Return the address of the n-th surrounding graph, with the action selected that was entered;
+ * null: there is no such level.
+ */
 export function addressAround(search: string, n: number): string | null {
   const levels = levelsOf(search);
   const to = levels[n];

@@ -1,4 +1,7 @@
-/** An arrow from an outcome: the first of a bundle draws its line and pill, each its own port. */
+/**
+ * The arrow of one outcome. The first arrow of a bundle draws the line and the pill; each draws the
+ * piece from its own port.
+ */
 import { BaseEdge, EdgeLabelRenderer, type EdgeProps, useStoreApi } from "@xyflow/react";
 import { memo, use, useLayoutEffect, useRef, useState } from "react";
 import { lazyPart } from "../ui/parts/lazy-part";
@@ -27,7 +30,10 @@ const BendHandles = lazyPart(() =>
 
 type ArrowData = NonNullable<Arrow["data"]>;
 
-/** One outcome colours its line, and so does the one that came; several have none in common. */
+/**
+ * Return the colour of a bundle: that of its only outcome or of the outcome that came, else a
+ * neutral one.
+ */
 export function toneOf({
   bundle,
   entry,
@@ -40,13 +46,13 @@ export function toneOf({
   return only && others.length === 0 ? only : "edge";
 }
 
-/** How far a pill moves away from its card, to make room for ports. */
+/** Return the place of a pill; it moves away from its card while single ports are shown. */
 function played({ pill, docked, direction }: RoutedLine, open: boolean): Point | null {
   if (!pill || !docked || !open) return pill;
   return direction === "right" ? [pill[0] + PILL_PLAY, pill[1]] : [pill[0], pill[1] + PILL_PLAY];
 }
 
-/** From a port to the pill that speaks for it. */
+/** Return the corners of the piece from a port to the pill of its bundle. */
 function stub(line: RoutedLine, x: number, y: number, pill: Point): Point[] {
   const [side] = line.points;
   if (line.direction === "right") {
@@ -57,7 +63,7 @@ function stub(line: RoutedLine, x: number, y: number, pill: Point): Point[] {
   return [[x, y - 10], [x, turn], [pill[0], turn], pill];
 }
 
-/** In a drawing of lines there is no room for notices. */
+/** Draws nothing where the error notice of a failed part would be; it has no place within SVG. */
 const nowhere = () => null;
 
 export const OutcomeArrow = memo(function OutcomeArrow(props: EdgeProps<Arrow>) {
@@ -69,7 +75,7 @@ export const OutcomeArrow = memo(function OutcomeArrow(props: EdgeProps<Arrow>) 
   const [endX, endY] = line?.points.at(-1) ?? [targetX, targetY];
   const [dx, dy] = line?.direction === "right" ? [0, endY - targetY] : [endX - targetX, 0];
   useLayoutEffect(() => {
-    // React Direction puts the end that can be taken where the input of the card is.
+    // React Flow places the handle that moves the end of an arrow at the input of the card.
     const edge = group.current?.closest<SVGGElement>(".react-flow__edge");
     edge?.style.setProperty("--end", `${dx}px ${dy}px`);
   }, [dx, dy]);
@@ -133,14 +139,17 @@ function BundleLine({ id, data, line, pill, selected, opened }: BundleProps & { 
   );
 }
 
-/** What came is one line, what went is dashed, what changed is double: its middle is left out. */
+/**
+ * Added lines are solid, removed ones dashed, and changed ones double: this style paints the gap in
+ * the middle.
+ */
 const CHANGED_LINES = {
   added: { strokeDasharray: "none" },
   removed: { strokeDasharray: "7 5" },
   changed: { stroke: "var(--canvas)", strokeWidth: 1.6, strokeDasharray: "none" },
 } as const;
 
-/** What a bundle says; whoever cannot see it hears it from its arrows. */
+/** Shows outcomes and response of a bundle. Screen readers get the same from the label of the arrow. */
 function Pill({ id, data, pill: [x, y], selected }: BundleProps & { pill: Point }) {
   const store = useStoreApi();
   const editing = use(LineEditingContext);
@@ -160,7 +169,7 @@ function Pill({ id, data, pill: [x, y], selected }: BundleProps & { pill: Point 
           data-passed={data.passed || undefined}
           data-change={change?.change}
           data-untaken={never.length > 0 || undefined}
-          // Once for a relation, whatever it says: who looks for it finds one.
+          // One pill of each relation has the id, so that tests and searches find one element.
           data-relation={data.answers || data.entry ? data.relation : undefined}
           style={{ transform: `translate(-50%, -50%) translate(${x}px, ${y}px)` }}
         >
@@ -199,7 +208,7 @@ function Pill({ id, data, pill: [x, y], selected }: BundleProps & { pill: Point 
 
 interface GlyphsProps {
   outcomes: readonly Outcome[];
-  /** Those that no expected course takes. */
+  /** Outcomes that no expected course takes. */
   untaken: readonly Outcome[];
 }
 
@@ -216,7 +225,7 @@ export function Glyphs({ outcomes, untaken }: GlyphsProps) {
   ));
 }
 
-/** From the pill to where an outcome is dragged. */
+/** Draws the line from the pill to the place to which an outcome is dragged. */
 function DraggedLine({ from, dragged }: { from: Point; dragged: DraggedOutcome }) {
   const { outcome, at } = dragged;
   return (
@@ -241,7 +250,7 @@ export const TIPS = {
   changed: "var(--changed)",
 } as const;
 
-/** Arrow heads in the colours of the outcomes; once per canvas. */
+/** Defines the arrow heads in all colours; each canvas renders it once. */
 export function ArrowTips() {
   return (
     <svg aria-hidden className={style.tips}>

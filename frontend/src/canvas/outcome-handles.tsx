@@ -9,12 +9,12 @@ import type { Point } from "./arrows/scene";
 import { OutcomeSign, outcomeColor, outcomeWord } from "./outcome";
 import style from "./outcome-arrow.module.css";
 
-const STILL = 3; // px on the screen that a press may move
+const STILL = 3; // px on screen that a press may move without being a drag
 
-/** An outcome on its way to another card. */
+/** An outcome that is being dragged to another card. */
 export interface DraggedOutcome {
   readonly outcome: Precondition;
-  /** On the canvas. */
+  /** The place of the pointer, in canvas coordinates. */
   readonly at: Point;
 }
 
@@ -84,13 +84,13 @@ export function OutcomeHandles(props: Parameters<typeof useOutcomeDrag>[0]) {
       onPointerMove={(event) => drag.move(event, outcome)}
       onPointerUp={drag.drop}
       onPointerCancel={drag.stop}
-      // The arrow has its own answer to these two; every other key is a shortcut as elsewhere.
+      // The arrow itself would react to Enter and Space; other keys are shortcuts as everywhere.
       onKeyDown={(event) => {
         if (["Enter", " "].includes(keyOf(event))) event.stopPropagation();
       }}
       onClick={(event) => {
         event.stopPropagation();
-        // A press of Enter or Space has no pointer, hence no clicks to count.
+        // A click that Enter or Space causes has a click count of 0.
         if (event.detail === 0) editing.choose(bundle, outcome);
       }}
     >

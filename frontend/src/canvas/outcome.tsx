@@ -1,4 +1,4 @@
-/** The four outcomes of an action: sign, word and colour, always together. */
+/** The four outcomes of an action, each with its sign, word and colour. */
 import { IconCheck, IconExclamationMark, IconSquareFilled, IconX } from "@tabler/icons-react";
 
 export const OUTCOMES = ["on_true", "on_false", "on_error", "on_stopped"] as const;

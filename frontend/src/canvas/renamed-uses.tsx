@@ -1,4 +1,7 @@
-/** Asks, once a graph is called otherwise, whether the actions that stand for it in others follow. */
+/**
+ * Asks after a graph was renamed whether the actions of other graphs that stand for it get the new
+ * name, too.
+ */
 import { Button, Checkbox, Group, Modal, Stack } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { useState } from "react";
@@ -11,7 +14,7 @@ export interface RenamedUse {
 }
 
 interface Props {
-  /** The graph that was renamed. */
+  /** The id of the graph that was renamed. */
   graph: string;
   before: string;
   name: string;

@@ -1,4 +1,4 @@
-/** A graph as one SVG picture, drawn from the same elements as the canvas. Pure. */
+/** Draws a graph as one SVG picture from the same elements as the canvas. Pure. */
 
 import { type Note, notesOf } from "../graph/edit/notes";
 import type { Direction, Graph, Key, Position, Precondition } from "../graph/model";
@@ -26,7 +26,7 @@ const MARGIN = 36; // px
 const FONT = "Inter, system-ui, sans-serif";
 const MONO = "ui-monospace, monospace";
 
-/** Text that means nothing to a reader of XML. What XML cannot hold at all is left out. */
+/** Escape a text for XML; characters that XML cannot hold are dropped. */
 function escaped(text: string): string {
   return text
     .replace(/[^\t\n\r\u0020-\uD7FF\uE000-\uFFFD\u{10000}-\u{10FFFF}]/gu, "")
@@ -37,14 +37,14 @@ function escaped(text: string): string {
     .replaceAll("'", "&#39;");
 }
 
-/** As much of a text as fits, by the mean width of its letters. */
+/** Return as much of a text as fits a width, estimated by the mean width of a letter, both in px. */
 function fitted(text: string, width: number, letter: number): string {
   const most = Math.max(1, Math.floor(width / letter));
   const letters = [...text.replace(/\s+/g, " ")];
   return letters.length <= most ? letters.join("") : `${letters.slice(0, most - 1).join("")}…`;
 }
 
-/** `color` answers the value of a token, `--ink` say. */
+/** Return the picture of a graph. `color` returns the value of a style token such as `--ink`. */
 export function svgPictureOf(
   graph: Graph,
   places: ReadonlyMap<Key, Position>,
@@ -108,7 +108,7 @@ class Painter {
     return { svg, width, height };
   }
 
-  /** A token's value, also of `var(--token)`. */
+  /** Return the escaped value of a token; `var(--token)` is accepted, too. */
   private paint(token: string): string {
     const name = /^var\((--[\w-]+)\)$/.exec(token)?.[1] ?? token;
     return escaped(this.color(name) || "#888888");
@@ -299,7 +299,7 @@ const SIGNS: Readonly<Record<Precondition, string>> = {
   on_stopped: "■",
 };
 
-/** Lines of words that are no longer than a width. */
+/** Break a text into lines that are no longer than a width in px, estimated by the mean width of a letter. */
 function wrapped(text: string, width: number, letter: number): string[] {
   const most = Math.max(4, Math.floor(width / letter));
   return text.split("\n").flatMap((paragraph) => {

@@ -5,21 +5,22 @@ import { useLayoutEffect } from "react";
 import type { Tone } from "../status/progress";
 import "./zoom-detail.css";
 
-/** `sign`: too far for names, the state alone is left. */
+/** How much of a card is drawn. `sign`: names would be too small, only the state is shown. */
 type Detail = "near" | "middle" | "far" | "sign";
 
-/** From this zoom on; below the last one there is nothing less to show. */
+/** The least zoom of each detail; below the last one only signs are shown. */
 const FROM: readonly (readonly [Detail, number])[] = [
   ["near", 0.9],
   ["middle", 0.5],
   ["far", 0.33],
 ];
 /**
- * What was shown changes back only this much later, so that nothing flickers at a threshold. Not so
- * what is near: graphs open at just that zoom (READABLE), and Fit leads to it from further away.
+ * Factors by which the zoom must exceed a threshold before more is shown again, so that nothing
+ * flickers at a threshold. `near` has none: graphs open at exactly that zoom (READABLE), and Fit
+ * may lead to it.
  */
 const PLAY: Readonly<Record<Detail, number>> = { near: 1, middle: 1.05, far: 1.05, sign: 1 };
-/** Zooms are numbers of a machine: 0.9 may be a little less. */
+/** Tolerance for floating-point zooms, such as 0.8999. */
 const SLACK = 0.001;
 
 const ORDER: readonly Detail[] = ["sign", "far", "middle", "near"];
@@ -33,12 +34,15 @@ export function detailAt(zoom: number, before: Detail | null): Detail {
 
 const STEPS = 40;
 
-/** As much of the canvas as one pixel on screen, px; in steps, since each is a restyling of all cards. */
+/**
+ * Return the length of one screen pixel on the canvas, px. It changes in steps, since each change
+ * restyles all cards.
+ */
 export function unitAt(zoom: number): number {
   return STEPS / Math.max(1, Math.floor(zoom * STEPS + SLACK));
 }
 
-/** The state of an action in one letter, for where there is no room for a word. */
+/** One character for the state of an action, where a word has no room. */
 export const STATE_LETTER: Readonly<Record<Tone, string>> = {
   idle: "",
   run: "▶",

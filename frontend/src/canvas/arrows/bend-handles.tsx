@@ -18,7 +18,7 @@ import { LineContext, type LineEditing, LineEditingContext } from "./line-store"
 import { type Point, STEP } from "./scene";
 import type { RoutedLine } from "./simple-lines";
 
-/** The middle of a piece; a waypoint that is made there has this place among the others. */
+/** The middle of a piece. `index`: the place among the waypoints of one that is added there. */
 interface PieceMiddle {
   readonly index: number;
   readonly at: Point;
@@ -28,7 +28,7 @@ const PILL = 24; // px of a line that its pill covers, on either side of its mid
 
 const between = (a: Point, b: Point) => Math.abs(a[0] - b[0]) + Math.abs(a[1] - b[1]);
 
-/** How far along a line its corners are. */
+/** Return the distance of each corner from the start of a line, px. */
 function lengthsOf(points: readonly Point[]): number[] {
   let length = 0;
   return points.map((point, i) => {
@@ -37,7 +37,10 @@ function lengthsOf(points: readonly Point[]): number[] {
   });
 }
 
-/** How far along the line a place is, not before `from`; null where the line does not come by. */
+/**
+ * Return the distance of a place from the start of a line, at least `from`; null if the line does
+ * not pass there.
+ */
 function placeOn(
   points: readonly Point[],
   lengths: readonly number[],
@@ -52,7 +55,10 @@ function placeOn(
   return null;
 }
 
-/** The middles of pieces between corners, waypoints and the pill that are at least so long. */
+/**
+ * Return the middles of the pieces between corners, waypoints and the pill that are at least
+ * `least` px long.
+ */
 export function middlesOf({ points, via, pill }: RoutedLine, least: number): PieceMiddle[] {
   const lengths = lengthsOf(points);
   const [start] = points;
@@ -69,7 +75,7 @@ export function middlesOf({ points, via, pill }: RoutedLine, least: number): Pie
     .sort((a, b) => a - b);
   const pieces = cuts.slice(1).map((end, i) => ({ begin: cuts[i] ?? end, end }));
   const longest = Math.max(...pieces.map(({ begin, end }) => end - begin));
-  // A line that nobody has bent yet can be taken somewhere, however short it is.
+  // A line without waypoints has at least one handle, however short it is.
   const enough = via.length > 0 ? least : Math.min(least, longest);
   return pieces.flatMap(({ begin, end }) => {
     if (end - begin < enough) return [];
@@ -89,18 +95,18 @@ function pointAt(points: readonly Point[], lengths: readonly number[], at: numbe
   return [a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share];
 }
 
-/** A waypoint, or the middle of a piece, where there can be one. */
+/** A waypoint, or the middle of a piece in which one can be added. */
 interface BendHandle {
   readonly id: string;
   readonly kind: "bend" | "middle";
-  /** Its place among the waypoints. */
+  /** The index among the waypoints. */
   readonly index: number;
   readonly at: Point;
 }
 
-const STILL = 3; // px on the screen that a press may move
+const STILL = 3; // px on screen that a press may move without being a drag
 
-/** The waypoints with this one at a place. */
+/** Return the waypoints with this one added or moved to a place. */
 const withBend = (via: readonly Point[], { kind, index }: BendHandle, at: Point): Point[] => [
   ...via.slice(0, index),
   at,
@@ -146,11 +152,11 @@ const WAYS: Readonly<Record<string, Point>> = {
   ArrowUp: [0, -1],
   ArrowDown: [0, 1],
 };
-const FAR = 4; // steps with Shift, as of cards
-const LEAST = 48; // px on the screen of a piece that has a handle of its own
+const FAR = 4; // steps with Shift, as for cards
+const LEAST = 48; // px on screen; shorter pieces have no handle
 
 interface BendHandlesProps {
-  /** The arrow that draws the line. */
+  /** The id of the arrow that draws the line. */
   arrow: string;
   bundle: Bundle;
   line: RoutedLine;
@@ -161,7 +167,7 @@ export function BendHandles(props: BendHandlesProps) {
   return editing && <Handles {...props} editing={editing} />;
 }
 
-/** Waypoints first, in their order; then the pieces in which there can be another. */
+/** Return the handles of the waypoints in their order, then those of the pieces. */
 function handlesOf(line: RoutedLine, zoom: number): BendHandle[] {
   const bends = line.via.map(
     (at, index): BendHandle => ({ id: `b${index}`, kind: "bend", index, at }),
@@ -174,7 +180,7 @@ function handlesOf(line: RoutedLine, zoom: number): BendHandle[] {
   ];
 }
 
-/** Gives the keyboard to a bend once it is there; to the arrow after the last one. */
+/** Moves the focus to a bend once it exists; after the last one is removed, to the arrow. */
 function useFocusAfter(count: number, arrow: string) {
   const buttons = useRef(new Map<number, HTMLButtonElement>());
   const wanted = useRef<number | null>(null);
@@ -193,7 +199,7 @@ function Handles({ arrow, bundle, line, editing }: BendHandlesProps & { editing:
   const lines = useContext(LineContext);
   const zoom = useStore(({ transform }) => transform[2]);
   const { buttons, wanted } = useFocusAfter(line.via.length, arrow);
-  // While one is dragged the line goes where it is; the others stay those of before.
+  // During a drag the line follows the pointer, while the other handles stay where they were.
   const before = useRef<readonly BendHandle[]>([]);
   const via = before.current.flatMap(({ kind, at }) => (kind === "bend" ? [at] : []));
   const drag = useBendDrag(bundle.id, via, (next, { index }) => {
@@ -251,7 +257,7 @@ function Handles({ arrow, bundle, line, editing }: BendHandlesProps & { editing:
           onPointerUp={() => drag.end(true)}
           onPointerCancel={() => drag.end(false)}
           onKeyDown={(event) => onKeyDown(event, handle)}
-          // A press of Enter or Space has no pointer, hence no clicks to count.
+          // A click that Enter or Space causes has a click count of 0.
           onClick={({ detail }) => detail === 0 && handle.kind === "middle" && add(handle)}
           onDoubleClick={() => handle.kind === "bend" && remove(handle)}
         />

@@ -1,4 +1,4 @@
-/** Bundles: the outcomes of a relation that get the same response are drawn as one line. Pure. */
+/** Bundles: outcomes of a relation with the same response are drawn as one line. Pure. */
 import { relationId } from "../../graph/document-keys";
 import {
   ENTRY,
@@ -14,25 +14,25 @@ import type { PillSize } from "./scene";
 
 /** One line between two cards. */
 export interface Bundle {
-  /** Stays the same while outcomes come and go. */
+  /** The id stays the same while outcomes are added and removed. */
   readonly id: string;
   readonly relation: string;
   readonly source: Key;
   readonly target: Key;
   readonly response: Response;
-  /** In the fixed order of outcomes; empty for a relation that ignores all of them. */
+  /** In the fixed order of outcomes; empty if the relation ignores all of them. */
   readonly outcomes: readonly Precondition[];
   /** The target does not wait for it. */
   readonly optional: boolean;
-  /** From the entry: there is only one thing it can say. */
+  /** It starts at the entry, which has no outcomes. */
   readonly entry: boolean;
-  /** Through which places people have led it. */
+  /** Places through which people have led the line. */
   readonly waypoints: readonly Position[];
 }
 
 /**
- * The lines of a relation. A pair that a file lists twice has two relations, each with lines of its
- * own, since each is selected and changed for itself.
+ * Return the bundles of a relation. A pair that a file lists twice has two relations with lines of
+ * their own, since each is selected and changed separately.
  */
 export function bundlesOf(relation: Relation): readonly Bundle[] {
   const before = known.get(relation);
@@ -42,7 +42,7 @@ export function bundlesOf(relation: Relation): readonly Bundle[] {
   return bundles;
 }
 
-/** A relation stays the same object until somebody changes it. */
+/** Results by relation; a relation is the same object until somebody changes it. */
 const known = new WeakMap<Relation, readonly Bundle[]>();
 
 function made(relation: Relation): Bundle[] {
@@ -67,20 +67,20 @@ function made(relation: Relation): Bundle[] {
   }));
 }
 
-/** What a pill says besides its glyphs: `run` is what is meant when nothing is said. */
+/** Return the word on a pill beside its signs. The usual response `run` has none. */
 export function pillWord({ response, entry }: Pick<Bundle, "response" | "entry">): string {
   if (entry || response === "run") return "";
   return response === "ignore" ? "ignores all" : response;
 }
 
-/** Parts of a pill, px at zoom 1, as `outcome-arrow.module.css` sets them. */
+/** Measures of a pill in px at zoom 1, as `outcome-arrow.module.css` sets them. */
 const PILL_HEIGHT = 20;
 const EDGE = 13;
 const GLYPH = 13;
 const LETTER = 7.3;
 const BADGE = 34;
 
-/** The room that a bundle's pill needs; null where there is nothing to say. */
+/** Return the size of a bundle's pill, px; null if it has nothing to show. */
 export function pillSizeOf(bundle: Bundle, marked: boolean): PillSize | null {
   const word = pillWord(bundle);
   const glyphs = bundle.entry ? 0 : bundle.outcomes.length;

@@ -1,21 +1,24 @@
-/** Docks: where each line leaves its card, where its pill stands, where it enters the next. Pure. */
+/** Docks: the places where lines leave and enter cards, and where their pills stand. Pure. */
 import { BoxIndex, boxOf, type FlowBox, type Scene, type SceneLine, STEP } from "./scene";
 
-/** Along the direction (`u`) and across it (`v`); rows and columns are steps of the grid. */
+/**
+ * Coordinates along the direction of the graph are `u` and `column`, across it `v` and `row`; rows
+ * and columns count steps of the grid.
+ */
 export interface Dock {
   readonly line: SceneLine;
-  /** Where the line leaves the side of its card. */
+  /** The place at which the line leaves the side of its card. */
   readonly from: { readonly u: number; readonly v: number };
-  /** The line is free to turn from here on. */
+  /** The point after which the line may turn. */
   readonly start: { readonly column: number; readonly row: number };
-  /** From here on it goes straight to the side of the card that it leads to. */
+  /** The point from which the line leads straight to the side of the card that it enters. */
   readonly end: { readonly column: number; readonly row: number };
   readonly to: { readonly u: number; readonly v: number };
-  /** Where the pill stands; null where it finds no room beside its card. */
+  /** The box of the pill; null if there is no room for it beside the card. */
   readonly pill: FlowBox | null;
   /** The piece along the card to a pill beyond its corner. */
   readonly link: FlowBox | null;
-  /** Lines with the same end may lie on each other; so may those with the same start. */
+  /** Lines with the same end may lie on each other, and so may lines with the same start. */
   readonly sharesStart: string;
   readonly sharesEnd: string;
 }
@@ -25,19 +28,19 @@ const PILL_GAP = 8;
 /** px that a pill can move away from its card, to make room for ports. */
 export const PILL_PLAY = 12;
 const AFTER_PILL = 2;
-/** px before a card on which a line goes straight: the head of the arrow and some more. */
+/** px of straight line before a card: the head of the arrow and some more. */
 const APPROACH = 16;
 const BESIDE_PILL = 3;
-/** px from a card to the piece of a line that goes along it. */
+/** px from a card to the piece of a line that leads along it. */
 export const LINK = 4;
-/** Nobody can read more pills beside one card. */
+/** More lines than this leave a card without pills beside it: nobody could read them. */
 const MOST_DOCKED = 40;
 /** px across that a line without a pill takes beside those that have one. */
 const BARE = 8;
 
 interface End {
   readonly box: FlowBox & { key: string };
-  /** The rows of the grid that a line may have here, in the middle of the side. */
+  /** First and last row of the grid that a line may use, in the middle of the side. */
   readonly low: number;
   readonly high: number;
 }
@@ -45,13 +48,14 @@ interface End {
 interface Slot {
   readonly wish: number;
   readonly weight: number;
-  /** Rows to the slot before. */
+  /** The least number of rows to the previous slot. */
   readonly gap: number;
 }
 
 /**
- * Distinct rows for slots in their order, as near to what they wish as can be. `low` to `high` is
- * the side of the card; further rows, as many as `beyond`, cost more. Null when they do not fit.
+ * Return distinct rows for slots in their order, as close to their wishes as possible. `low` to
+ * `high` is the side of the card; up to `beyond` rows outside of it cost more. Null if the slots do
+ * not fit.
  */
 function rowsFor(slots: readonly Slot[], low: number, high: number, beyond: number) {
   const [first, count] = [low - beyond, high - low + 1 + 2 * beyond];
@@ -91,7 +95,7 @@ function rowsFor(slots: readonly Slot[], low: number, high: number, beyond: numb
 const cost_ = ({ cost }: { cost: Float64Array }, at: number) =>
   cost[at] ?? Number.POSITIVE_INFINITY;
 
-/** Rows for slots; where they do not fit, neighbours share one. */
+/** Return rows for slots; where they do not fit, neighbours share a row. */
 function slotRows(slots: readonly Slot[], { low, high }: End, beyond = 0): number[] {
   const wide = rowsFor(slots, low, high, beyond);
   if (wide) return wide;
@@ -104,29 +108,35 @@ function slotRows(slots: readonly Slot[], { low, high }: End, beyond = 0): numbe
   return close ?? slots.map((_, i) => low + Math.floor((i * (high - low + 1)) / slots.length));
 }
 
-/** A line that is on its way to have docks. */
+/** A line whose docks are being computed. */
 interface DockDraft {
   readonly line: SceneLine;
   readonly order: number;
   readonly source: End;
   readonly target: End;
-  /** It leads back. */
+  /** Its target lies before its source. */
   readonly back: boolean;
   into: number;
 }
 
 const center = (end: End) => (end.box.v0 + end.box.v1) / 2;
 
-/** The row on which a line between two cards would be straight; null when there is none. */
+/** Return the row on which a line between two cards would be straight; null if there is none. */
 function straightRow(a: End, b: End): number | null {
   const [low, high] = [Math.max(a.low, b.low), Math.min(a.high, b.high)];
   return low <= high ? Math.round((low + high) / 2) : null;
 }
 
-/** Lines that lead back to a card in the same row keep to one side: they leave and enter there. */
+/**
+ * Rank of lines that lead back to a card in the same row: they leave and enter at the same side,
+ * after all others.
+ */
 const ASIDE = 1e6;
 
-/** Pills so that lines are straight, round the middle of the side where those meet others, or none. */
+/**
+ * Modes in which pills are tried: such that lines are straight, then centred on the side of the
+ * card, then without pills.
+ */
 type Docking = "straight" | "centred" | "bare";
 
 export class DockPlan {
@@ -134,7 +144,7 @@ export class DockPlan {
   private readonly cards = new BoxIndex<FlowBox & { key: string }>();
   private readonly pills = new BoxIndex<FlowBox>();
   private readonly approaches = new BoxIndex<FlowBox>();
-  /** Where lines leave the cards of others. */
+  /** Boxes in which lines leave the cards. */
   private readonly exits = new BoxIndex<FlowBox>();
   private readonly exitOf = new Map<string, FlowBox>();
   private readonly offset: number;
@@ -167,7 +177,7 @@ export class DockPlan {
     this.exits.add(exit);
   }
 
-  /** Where a row of the grid is, px. */
+  /** Return the place of a row of the grid across the direction, px. */
   v(row: number): number {
     return row * STEP + this.offset;
   }
@@ -189,7 +199,7 @@ export class DockPlan {
     return { line, order, source, target, back, into: 0 };
   }
 
-  /** The rows on which lines enter one card. */
+  /** Choose the rows on which lines enter one card. */
   private enter(lines: DockDraft[], direction: Scene["direction"]): void {
     const rank = ({ source, target, back }: DockDraft) =>
       back && straightRow(source, target) !== null ? ASIDE : center(source);
@@ -198,7 +208,8 @@ export class DockPlan {
     if (!first) return;
     const room = first.target.high - first.target.low + 1;
     const gap = lines.length * 2 - 1 <= room ? 2 : 1;
-    // Lines between the same two cards are as far apart as their pills, so that they are straight.
+    // Lines between the same two cards are as far apart as their pills, so that they can be
+    // straight.
     const apart = lines.map(({ line }, i) => {
       const before = lines[i - 1]?.line;
       return before?.source === line.source
@@ -223,7 +234,7 @@ export class DockPlan {
     return { u0: endColumn(draft) * STEP, u1: draft.target.box.u0, v0: v, v1: v + 0.1 };
   }
 
-  /** The rows on which lines leave one card, with their pills. */
+  /** Choose the rows on which lines leave one card, and the boxes of their pills. */
   private leave(
     lines: DockDraft[],
     direction: Scene["direction"],
@@ -256,7 +267,7 @@ export class DockPlan {
       const v = this.v(rows[i] ?? middle);
       return docked && line.pill ? this.pillBox(source.box.u1, v, line.pill, direction) : null;
     });
-    // All or none: a line without a pill would leave between those of the others.
+    // All pills or none: a line without a pill would leave between those of the others.
     if (docked && !pills.every((pill) => pill === null || this.isFree(pill, source)))
       return this.leave(lines, direction, docks === "straight" ? "centred" : "bare");
     if (docked) for (const pill of pills) if (pill) this.pills.add(pill);
@@ -275,7 +286,10 @@ export class DockPlan {
     return { u0, u1: u0 + along, v0: v - across / 2, v1: v + across / 2 };
   }
 
-  /** Whether a pill has room, also to move a little, and its line to turn behind it. */
+  /**
+   * Return whether a pill has room at its place, to move by PILL_PLAY, and for its line to turn
+   * behind it.
+   */
   private isFree(pill: FlowBox, { box }: End): boolean {
     const reach = { ...pill, u0: box.u1, u1: startColumn(pill, box.u1) * STEP };
     return (
@@ -287,7 +301,7 @@ export class DockPlan {
   }
 }
 
-/** The rows from one line to the next that leaves the same card, for the sake of their pills. */
+/** Return the number of rows that the pills of two neighbouring lines need between them. */
 function rowsBetween(a: SceneLine, b: SceneLine, direction: Scene["direction"]): number {
   const across = ({ pill }: SceneLine) =>
     pill === null ? BARE : direction === "right" ? pill.height : pill.width;

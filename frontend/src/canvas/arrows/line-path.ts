@@ -1,4 +1,7 @@
-/** Points of lines as paths of SVG, with round corners; and lines whose ends have moved. Pure. */
+/**
+ * Turns points of lines into SVG paths with round corners, and adapts routed lines to ends that
+ * have moved. Pure.
+ */
 import { LINK } from "./docks";
 import type { Point } from "./scene";
 import type { RoutedLine } from "./simple-lines";
@@ -26,15 +29,16 @@ function towards([x, y]: Point, [toX, toY]: Point, by: number): Point {
   return [x + Math.sign(toX - x) * by, y + Math.sign(toY - y) * by];
 }
 
-/** The points of a line behind its pill, which stands beside the card that it leaves. */
+/** Return the points of a line behind its pill, which stands beside the card that the line leaves. */
 export function behindPill({ points: [first, second, ...rest] }: RoutedLine): Point[] {
   const linked = first !== undefined && second !== undefined && distance(first, second) <= LINK;
   return linked ? rest.slice(1) : second ? [second, ...rest] : [];
 }
 
 /**
- * A routed line between the ends that it has now, which `simple` knows: its own when only sides
- * have moved, stretched until it is routed again, or the simple one where that would turn back.
+ * Return a routed line with its current ends, which `simple` has. If only its ends have moved a
+ * little, its first and last pieces are stretched until it is routed again; the simple line
+ * replaces it where stretching would turn it back.
  */
 export function lineNow(known: RoutedLine | undefined, simple: RoutedLine): RoutedLine {
   if (!known || known.direction !== simple.direction) return simple;
@@ -55,7 +59,7 @@ export function lineNow(known: RoutedLine | undefined, simple: RoutedLine): Rout
 
 const equal = (a: Point, b: Point) => a[0] === b[0] && a[1] === b[1];
 
-/** Enough for a pill and a corner, px; a line that turns earlier is not stretched. */
+/** px; room for a pill and a corner. A line that turns earlier is not stretched. */
 const LEAST = 40;
 
 function stretched(points: readonly Point[], first: Point, last: Point, along: 0 | 1) {

@@ -1,4 +1,4 @@
-/** The lines of one canvas: simple ones at once, routed ones when a worker has them. */
+/** The lines of one canvas: simple ones at once, routed ones when a worker has computed them. */
 
 import { createContext, useCallback, useContext, useSyncExternalStore } from "react";
 import { tick } from "../../clock/server-clock";
@@ -10,37 +10,37 @@ import { type Point, type Scene, STEP } from "./scene";
 import { type RoutedLine, simpleLines } from "./simple-lines";
 
 /**
- * More lines than these are drawn anew after the cards, and for this share of the time only: twenty
- * people who move cards of a thousand would have every frame come late.
+ * With more lines than MANY, lines are updated after the cards and take only this share of the
+ * time: else twenty people who move cards of a large graph would delay every frame.
  */
 const MANY = 300;
 const SHARE = 0.2;
 
-/** Arrows listen for themselves, so that a card that moves draws only its own again. */
+/** Arrows subscribe to their own line, so that a card that moves renders only its own arrows again. */
 export class LineStore {
   private readonly listeners = new Map<string, Set<() => void>>();
   private readonly routed = new Map<string, RoutedLine>();
   private simple: ReadonlyMap<string, RoutedLine> = new Map();
   private lines = new Map<string, RoutedLine>();
   private scene: Scene | null = null;
-  /** The scene as it would be if nobody led a line. */
+  /** The scene without the line that is being dragged. */
   private given: Scene | null = null;
-  /** A line through places to which somebody drags it; `settled`: the next scene has them. */
+  /** The waypoints of a line while it is dragged. `settled`: the next scene has them already. */
   private led: { id: string; via: readonly Point[]; settled: boolean } | null = null;
   private opened: string | null = null;
   private worker: Worker | null = null;
   private busy = false;
   private waiting: Scene | null = null;
-  /** Until when lines stay as they are, and what draws them then. */
+  /** The time until which lines are not updated again, and the timer that updates them then. */
   private restsUntil = 0;
   private resting: ReturnType<typeof setTimeout> | undefined;
 
-  /** The scene as it is now. */
+  /** Takes the current scene and draws its lines, now or when their share of the time allows it. */
   show(given: Scene): void {
     if (this.led?.settled) this.led = null;
     this.given = given;
     const rest = Math.max(0, this.restsUntil - tick());
-    // Of many lines the cards come first, and what is drawn for the first time comes at once.
+    // With many lines the cards come first; the first drawing comes at once.
     const atOnce = this.scene === null || given.lines.length <= MANY;
     if (rest === 0 && atOnce) this.draw();
     else this.resting ??= setTimeout(() => this.draw(), rest);
@@ -61,20 +61,20 @@ export class LineStore {
     this.restsUntil = scene.lines.length > MANY ? began + took / SHARE : 0;
   }
 
-  /** Shows a line through other places while somebody drags them. */
+  /** Draws a line through other waypoints while they are dragged. */
   lead(id: string, via: readonly Point[]): void {
     this.led = { id, via, settled: false };
     if (this.given) this.show(this.given);
   }
 
-  /** The places are let go: where they are `kept`, the next scene has them. */
+  /** Ends a drag. If the waypoints are `kept`, the next scene has them. */
   settle(kept: boolean): void {
     if (!this.led) return;
     this.led = kept ? { ...this.led, settled: true } : null;
     if (!kept && this.given) this.show(this.given);
   }
 
-  /** The nearest place on which lines run. */
+  /** Return the nearest place of the grid on which lines run. */
   snapped([x, y]: Point): Point {
     const { direction, offset } = this.scene ?? { direction: "right", offset: 0 };
     const [column, row] = direction === "right" ? [0, offset] : [offset, 0];
@@ -95,7 +95,7 @@ export class LineStore {
     return this.lines.get(id) ?? null;
   }
 
-  /** Shows the single outcomes of one bundle. */
+  /** Shows the single outcomes of one bundle; null: of none. */
   open(id: string | null): void {
     const before = this.opened;
     if (before === id) return;
@@ -107,7 +107,7 @@ export class LineStore {
     return this.opened === id;
   }
 
-  /** All points of all lines. */
+  /** Yields all points of all lines. */
   *points(): Generator<Point> {
     for (const { points } of this.lines.values()) yield* points;
   }
@@ -125,7 +125,7 @@ export class LineStore {
     };
   }
 
-  /** Ends the worker; the next scene starts another. */
+  /** Ends the worker and forgets the scene; the next scene starts another worker. */
   close(): void {
     clearTimeout(this.resting);
     this.resting = undefined;
@@ -155,7 +155,7 @@ export class LineStore {
     }
   }
 
-  /** One scene at a time; of those that come meanwhile only the last is routed. */
+  /** Sends one scene at a time to the worker; of those that come meanwhile only the last is routed. */
   private send(scene: Scene): void {
     if (typeof Worker === "undefined" || scene.lines.length === 0) return;
     if (this.busy) {
@@ -214,29 +214,29 @@ function sameScene(a: Scene, b: Scene): boolean {
 
 export const LineContext = createContext<LineStore>(new LineStore());
 
-/** The line of a bundle; null while nothing is known of it. */
+/** Return the line of a bundle; null while it is unknown. */
 export function useLine(id: string): RoutedLine | null {
   const store = useContext(LineContext);
   const subscribe = useCallback((tell: () => void) => store.subscribe(id, tell), [store, id]);
   return useSyncExternalStore(subscribe, () => store.lineOf(id));
 }
 
-/** Whether the single outcomes of a bundle are shown. */
+/** Return whether the single outcomes of a bundle are shown. */
 export function useIsOpen(id: string): boolean {
   const store = useContext(LineContext);
   const subscribe = useCallback((tell: () => void) => store.subscribe(id, tell), [store, id]);
   return useSyncExternalStore(subscribe, () => store.isOpen(id));
 }
 
-/** How lines are changed by hand; without it they are only shown. */
+/** Functions that change lines by hand; without them lines are read-only. */
 export interface LineEditing {
-  /** Leads a line through these places. `byKey`: presses in a row are one step of undo. */
+  /** Leads a line through these places. `byKey`: repeated key presses are one step of undo. */
   bend(bundle: Bundle, via: readonly Point[], byKey?: boolean): void;
-  /** Leads one outcome to the card at a place on the screen. */
+  /** Leads one outcome to the card at a place on screen. */
   drop(bundle: Bundle, outcome: Precondition, at: Position): void;
-  /** Asks where to lead one outcome. */
+  /** Asks to which card one outcome shall lead. */
   choose(bundle: Bundle, outcome: Precondition): void;
-  /** What a line is called: “Drive 0 → Grip 0”. */
+  /** Returns the name of a line, such as “Drive 0 → Grip 0”. */
   nameOf(bundle: Bundle): string;
 }
 

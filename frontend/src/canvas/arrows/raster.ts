@@ -1,19 +1,19 @@
-/** The grid of a scene: which of its points cards and pills keep free, which lines go along which. */
+/** The grid of a scene: the points that cards and pills block, and the lines that use each of its steps. */
 import { CLEARANCE, type FlowBox, STEP } from "./scene";
 
-/** What stands round a point: how dear it is to pass there. */
+/** Kinds of points by their distance from cards; the nearer, the more expensive to pass. */
 export const FREE = 0;
 export const NEAR = 1;
 export const TIGHT = 2;
 export const BLOCKED = 3;
 
-/** Larger scenes than this keep simple lines: their cards stand very far apart. */
+/** Scenes with more points keep simple lines: their cards stand very far apart. */
 const MOST_CELLS = 4_000_000;
-const MARGIN = 24; // steps round everything, for lines that go round it
+const MARGIN = 24; // steps around everything, for lines that lead around it
 const PILL_GAP = 3; // px
 const TOUCHING = 2; // px
 
-/** Waypoints farther from all cards than this are left out, px. */
+/** px; waypoints farther from all cards are left out. */
 const FAR = 200 * STEP;
 
 function boundsOf(boxes: readonly FlowBox[]): FlowBox {
@@ -37,7 +37,10 @@ export class Raster {
   readonly width: number;
   readonly height: number;
   readonly ground: Uint8Array;
-  /** Lines on the step from a point to the next along the direction, across it, and turns at a point. */
+  /**
+   * The number of lines on the step from each point along the direction, on the step across it, and
+   * of turns at the point.
+   */
   readonly along: Uint16Array;
   readonly across: Uint16Array;
   readonly turns: Uint16Array;
@@ -58,7 +61,10 @@ export class Raster {
     this.turns = new Uint16Array(cells);
   }
 
-  /** Null when it would be too large. `via`: waypoints, which may lie outside. */
+  /**
+   * Return the raster of a scene; null if it would be too large. `via`: waypoints, which may lie
+   * outside of all cards.
+   */
   static of(
     cards: readonly FlowBox[],
     pills: readonly FlowBox[],
@@ -96,7 +102,7 @@ export class Raster {
     };
   }
 
-  /** Whether a line passes through a box. */
+  /** Return whether a line passes through a box. */
   hasLine(box: FlowBox, gap: number): boolean {
     const { first, last, top, bottom } = this.cells(box, gap);
     for (let row = top; row <= bottom; row += 1) {
@@ -112,7 +118,7 @@ export class Raster {
     return !!(along[cell] || along[cell - 1] || across[cell] || across[cell - width]);
   }
 
-  /** -1 for a point that is not on the raster. */
+  /** Return the index of a point; -1 if it is outside of the raster. */
   cellAt(column: number, row: number): number {
     const [x, y] = [column - this.column0, row - this.row0];
     return x < 0 || y < 0 || x >= this.width || y >= this.height ? -1 : y * this.width + x;
@@ -126,7 +132,7 @@ export class Raster {
     return Math.floor(cell / this.width) + this.row0;
   }
 
-  /** Whether a line lies on a step between corners. */
+  /** Return whether a line lies on one of the steps between these corners. */
   sharesStep(corners: readonly number[]): boolean {
     for (let i = 1; i < corners.length; i += 1) {
       const [a = 0, b = 0] = [corners[i - 1], corners[i]];
@@ -138,7 +144,7 @@ export class Raster {
     return false;
   }
 
-  /** Adds or takes away (`by` is -1) a line through corners of the grid. */
+  /** Add a line through these corners to the counts, or remove it if `by` is -1. */
   mark(corners: readonly number[], by: 1 | -1): void {
     for (let i = 1; i < corners.length; i += 1) {
       const [a = 0, b = 0] = [corners[i - 1], corners[i]];

@@ -2,22 +2,25 @@
 import { BLOCKED, NEAR, type Raster, TIGHT } from "./raster";
 import type { GridPoint } from "./scene";
 
-/** In steps of the grid. */
+/** Costs, in steps of the grid. */
 const PRICE = { turn: 3, crossing: 3, near: 0.5, tight: 8, touch: 60, shared: 240 } as const;
-/** A line that finds no way after looking at this many points keeps its simple one. */
+/** A line keeps its simple way if the search has visited this many points without success. */
 const MOST_STEPS = 400_000;
 
-/** A piece of a line that leads through waypoints. */
+/** One piece of a line that leads through waypoints. */
 interface Leg {
-  /** The direction in which it begins. */
+  /** The direction in which it starts. */
   readonly way: number;
-  /** It begins at a waypoint, where the line may turn although it is there itself. */
+  /** It starts at a waypoint, where the line may turn although the waypoint lies on the line itself. */
   readonly inner: boolean;
-  /** It ends at a waypoint, from where the line goes on to here; else along the direction. */
+  /** The next goal if the piece ends at a waypoint; null: it ends along the direction of the graph. */
   readonly next: { readonly cell: number; readonly last: boolean } | null;
 }
 
-/** Directions: along the direction, across, back, across the other way; `+ 2` is the opposite. */
+/**
+ * Directions: 0 along the direction of the graph, 1 across, 2 back, 3 across the other way; `^ 2`
+ * is the opposite one.
+ */
 const ALONG = 0;
 const WHOLE: Leg = { way: ALONG, inner: false, next: null };
 
@@ -25,7 +28,10 @@ export class Router {
   readonly raster: Raster;
   private readonly price: Float32Array;
   private readonly before: Int32Array;
-  /** The search in which a state was seen last, so that nothing has to be cleared. */
+  /**
+   * The number of the search that last visited a state, so that arrays need not be cleared between
+   * searches.
+   */
   private readonly seen: Int32Array;
   private readonly closed: Int32Array;
   private search = 0;
@@ -33,14 +39,17 @@ export class Router {
 
   constructor(raster: Raster) {
     this.raster = raster;
-    const states = raster.ground.length * 4 + 1; // the last one is a waypoint that is reached
+    const states = raster.ground.length * 4 + 1; // the last state stands for a waypoint that is reached
     this.price = new Float32Array(states);
     this.before = new Int32Array(states);
     this.seen = new Int32Array(states);
     this.closed = new Int32Array(states);
   }
 
-  /** The corners of a way, which without a leg begins and ends along the direction; null: none. */
+  /**
+   * Return the corners of the cheapest way; null if there is none. A whole line starts and ends
+   * along the direction of the graph.
+   */
   route(start: number, end: number, leg: Leg = WHOLE): number[] | null {
     const { ground } = this.raster;
     if (start < 0 || end < 0) return null;
@@ -82,7 +91,7 @@ export class Router {
     return null;
   }
 
-  /** The next point in a direction; -1 at the rim, and where something stands on it. */
+  /** Return the next point in a direction; -1 at the edge of the raster, and where the point is blocked. */
   private beside(cell: number, next: number, end: number): number {
     const { ground, width } = this.raster;
     const x = cell % width;
@@ -101,7 +110,7 @@ export class Router {
     this.heap.push(state, price + least);
   }
 
-  /** What is left to pay at least. */
+  /** Return a lower bound for the remaining cost (the heuristic of A*). */
   private leastFrom(cell: number, way: number, end: number, { next }: Leg): number {
     const { width } = this.raster;
     const dx = (end % width) - (cell % width);
@@ -110,7 +119,7 @@ export class Router {
     return Math.abs(dx) + Math.abs(dy) + PRICE.turn * turns;
   }
 
-  /** The turns that the next leg needs at least, after arriving like this. */
+  /** Return the least number of turns of the next piece after arriving in this direction. */
   private turnsOn(cell: number, way: number, next: NonNullable<Leg["next"]>): number {
     const { width } = this.raster;
     const dx = (next.cell % width) - (cell % width);
@@ -123,7 +132,7 @@ export class Router {
     return inner ? PRICE.turn : this.passing(cell, way, next);
   }
 
-  /** What it costs to pass a point: a turn, a line that is crossed, one that would be touched. */
+  /** Return the cost of passing a point: a turn, a crossing, or touching another line. */
   private passing(cell: number, way: number, next: number): number {
     const { turns, along, across, width } = this.raster;
     const touched = (turns[cell] ?? 0) > 0;
@@ -147,7 +156,7 @@ export class Router {
   }
 }
 
-/** The turns that are left at least, to arrive along the direction. */
+/** Return the least number of turns to arrive along the direction of the graph. */
 function leastTurns(way: number, dx: number, dy: number): number {
   if (way === ALONG) return dx < 0 ? 4 : dy === 0 ? 0 : 2;
   if (way === 2) return 2;
@@ -155,7 +164,7 @@ function leastTurns(way: number, dx: number, dy: number): number {
   return dy === 0 || (way === 1) === dy > 0 ? 1 : 3;
 }
 
-/** The turns that are left at least, to get to a point in whatever direction. */
+/** Return the least number of turns to reach a point in any direction. */
 function turnsTowards(way: number, dx: number, dy: number): number {
   const [ahead, aside] = way & 1 ? [dy, dx] : [dx, dy];
   const forward = way < 2 ? ahead : -ahead;
@@ -163,7 +172,7 @@ function turnsTowards(way: number, dx: number, dy: number): number {
   return forward >= 0 ? 1 : 2;
 }
 
-/** Without the corners at which nothing turns. */
+/** Return the points without those at which nothing turns. */
 export function straightened(cells: number[], width: number): number[] {
   const level = (a: number, b: number) => Math.floor(a / width) === Math.floor(b / width);
   const kept: number[] = [];
@@ -176,7 +185,7 @@ export function straightened(cells: number[], width: number): number[] {
   return kept;
 }
 
-/** A binary heap of states; of equal prices which comes first depends on nothing but their order. */
+/** A binary heap of states; among equal costs the order depends only on the order of insertion. */
 class Heap {
   private states = new Int32Array(1 << 14);
   private keys = new Float64Array(1 << 14);
@@ -202,7 +211,7 @@ class Heap {
     states[i] = state;
   }
 
-  /** The cheapest; -1 when there is none. */
+  /** Remove and return the cheapest state; -1 if the heap is empty. */
   pop(): number {
     if (this.size === 0) return -1;
     const { states, keys } = this;
@@ -233,7 +242,7 @@ class Heap {
   }
 }
 
-/** The waypoints that a line can visit now: on those that are left out stands a card or a pill. */
+/** Return the raster points of the waypoints that are free; those under a card or a pill are left out. */
 export function freeCells(raster: Raster, points: readonly GridPoint[]): number[] {
   const cells = points
     .map(({ column, row }) => raster.cellAt(column, row))
@@ -243,11 +252,11 @@ export function freeCells(raster: Raster, points: readonly GridPoint[]): number[
 
 interface LedWay {
   readonly cells: number[] | null;
-  /** A waypoint to which nothing leads was left out. */
+  /** A waypoint that cannot be reached was left out. */
   readonly missed: boolean;
 }
 
-/** The corners of a way through cells in their order. */
+/** Return the corners of a way that passes these points in their order. */
 export function routeThrough(
   router: Router,
   [start, end]: readonly [number, number],
@@ -276,7 +285,7 @@ export function routeThrough(
   return { cells: straightened(legs.flat(), raster.width), missed };
 }
 
-/** The direction of the last piece of a leg. */
+/** Return the direction of the last piece of a leg; null if it has none. */
 function arrival(corners: readonly number[], width: number): number | null {
   const [a, b] = [corners.at(-2), corners.at(-1)];
   if (a === undefined || b === undefined) return null;

@@ -1,9 +1,9 @@
-/** Routes lines beside the page, so that it never waits for them. */
+/** Routes lines in a web worker, so that the page never waits for them. */
 import { routed, type Ways } from "./routes";
 import type { Scene } from "./scene";
 import type { RoutedLine } from "./simple-lines";
 
-/** Only what is not as it was told before. */
+/** Differences from the previous report. */
 export interface RouterReport {
   readonly changed: readonly RoutedLine[];
   readonly gone: readonly string[];

@@ -1,4 +1,4 @@
-/** The lines of a scene: routed as a whole, or only where something has moved. Pure. */
+/** Routes the lines of a scene: all of them, or only those near something that has moved. Pure. */
 import { type Dock, DockPlan } from "./docks";
 import { BLOCKED, FREE, NEAR, Raster } from "./raster";
 import { freeCells, Router, routeThrough, straightened } from "./router";
@@ -16,25 +16,25 @@ import {
   viaOf,
 } from "./simple-lines";
 
-/** A way over the grid, in columns and rows, so that it outlives the raster. */
+/** A routed way in columns and rows of the grid, so that it outlives the raster. */
 interface Way {
   readonly ends: string;
   readonly corners: readonly (readonly [column: number, row: number])[];
-  /** How many of its points are nearer to a card than lines wish to be. */
+  /** The cost of its points that are nearer to a card than CLEARANCE wishes. */
   readonly near: number;
 }
 
-/** What routing keeps, to route less the next time. */
+/** Ways of the previous scene by line id, so that unchanged lines need not be routed again. */
 export type Ways = ReadonlyMap<string, Way>;
 
 export interface Routed {
   readonly lines: Map<string, RoutedLine>;
   readonly ways: Ways;
-  /** How many lines were looked for. */
+  /** The number of lines that were searched, not taken from the previous scene. */
   readonly searched: number;
 }
 
-/** All lines of a scene. Of `known` those stay whose ends and surroundings are as they were. */
+/** Route all lines of a scene. Lines of `known` stay if their ends and surroundings are unchanged. */
 export function routed(scene: Scene, known: Ways = new Map()): Routed {
   const routing = new Routing(scene);
   return routing.routed(known);
@@ -45,25 +45,25 @@ interface Task {
   readonly ends: string;
   readonly start: number;
   readonly end: number;
-  /** The waypoints that can be visited. */
+  /** Raster points of the waypoints that are free. */
   readonly via: readonly number[];
-  /** The corners of its way; null when there is none. */
+  /** The corners of its way; null if there is none. */
   cells: readonly number[] | null;
-  /** It leaves out a waypoint to which nothing leads now: it is looked for again each time. */
+  /** A waypoint could not be reached and is left out; such a line is searched again each time. */
   missed: boolean;
-  /** The same with the straight pieces at its ends. */
+  /** The corners together with the straight pieces at both ends. */
   whole: readonly number[];
-  /** The way that was known and still is; null for one that was looked for. */
+  /** The way of the previous scene that it keeps; null if it was searched. */
   way: Way | null;
 }
 
-/** px from a pill that does not stand beside its card to cards and pills, and to lines of others. */
+/** px that a pill which does not stand beside its card keeps from cards and pills, and from other lines. */
 const LOOSE_GAPS: readonly (readonly [number, number])[] = [
   [6, 2],
   [3, 1],
 ];
 
-/** How often lines that lie on others are looked at again. */
+/** How often lines that lie on other lines are searched again. */
 const ROUNDS = 4;
 
 class Routing {
@@ -121,14 +121,17 @@ class Routing {
     if (order.length > 0) {
       const router = new Router(raster);
       for (const { task } of order) this.search(task, router);
-      // Once more, now that all the others are there.
+      // Once more, now that all other lines are there.
       for (const { task } of order) if (!this.isStraight(task)) this.search(task, router);
       for (let round = 0; round < ROUNDS && this.part(fresh, round, router); round += 1);
     }
     return { ...this.drawn(), searched: this.tasks.filter(({ way }) => way === null).length };
   }
 
-  /** Looks again for ways of lines that lie on others, later with those of the same cards. */
+  /**
+   * Search lines again that lie on others; from the second round on together with those of the same
+   * cards. Return whether there were any.
+   */
   private part(fresh: readonly Task[], round: number, router: Router): boolean {
     if (!fresh.some((task) => this.liesOnOther(task))) return false;
     const lying = this.tasks.filter((task) => this.liesOnOther(task));
@@ -157,8 +160,10 @@ class Routing {
     return cells !== null && cells.length === 2;
   }
 
-  /** Takes all ways where nothing has changed: also those on others for which there was no room, or
-   * they would be looked for again, and might turn out otherwise, without anybody having moved anything. */
+  /**
+   * Take all known ways if nothing has changed, even those that lie on others for lack of room:
+   * searching them again could change them although nobody moved anything.
+   */
   private allStand(known: Ways): boolean {
     if (known.size !== this.tasks.length) return false;
     const found = this.tasks.map((task) => {
@@ -171,7 +176,7 @@ class Routing {
     return true;
   }
 
-  /** Takes a way that is known, if nothing stands or lies on it now. */
+  /** Take a known way if nothing blocks it and it lies on no other line. */
   private keeps(task: Task, way: Way | undefined): boolean {
     const corners = way && this.standing(task, way);
     if (!corners) return false;
@@ -182,7 +187,7 @@ class Routing {
     return false;
   }
 
-  /** The corners of a way, if its ends are as they were and no card came nearer to it. */
+  /** Return the corners of a known way if its ends are unchanged and no card has come nearer; else null. */
   private standing(task: Task, way: Way): number[] | null {
     const { raster } = this;
     if (!raster || way.ends !== this.endsNow(task)) return null;
@@ -190,14 +195,14 @@ class Routing {
     return corners.includes(-1) || this.nearness(corners) > way.near ? null : corners;
   }
 
-  /** Its ends, and which of its waypoints it can visit. */
+  /** Return an identification of its ends and of the waypoints that it can visit. */
   private endsNow({ ends, via }: Task): string {
     const { raster } = this;
     if (via.length === 0 || !raster) return ends;
     return `${ends} by ${via.map((cell) => [raster.columnOf(cell), raster.rowOf(cell)]).join(" ")}`;
   }
 
-  /** How near to cards a way is; infinite when one stands on it. */
+  /** Return how near a way is to cards; infinite if a card blocks it. */
   private nearness(corners: readonly number[]): number {
     const { raster } = this;
     if (!raster) return 0;
@@ -216,7 +221,7 @@ class Routing {
   }
 
   private search(task: Task, router: Router): void {
-    // What may lie on each other is not in each other's way.
+    // Lines that may lie on each other do not block each other.
     const kin = this.kinOf(task);
     for (const other of kin) this.mark(other, -1);
     task.cells = null;
@@ -243,7 +248,7 @@ class Routing {
     if (task.cells !== null) this.raster?.mark(task.whole, by);
   }
 
-  /** A way with the straight pieces after a pill or card and before the next card. */
+  /** Return the corners of a way with the straight pieces after its pill or card and before the next card. */
   private wholeOf({ cells, dock }: Task): number[] {
     const { raster } = this;
     if (!raster || cells === null) return [];
@@ -286,7 +291,7 @@ class Routing {
     return { lines, ways };
   }
 
-  /** Pills that had no room beside their cards, on the first piece of their lines that has. */
+  /** Place pills that had no room beside their cards on the first free piece of their lines. */
   private placeLoose(
     loose: readonly { task: Task; points: readonly Point[] }[],
     lines: Map<string, RoutedLine>,
@@ -317,7 +322,7 @@ class Routing {
   }
 }
 
-/** Points of a line at which a pill may stand, from its beginning. */
+/** Yield the points of a line at which a pill may stand, from its start. */
 function* places(points: readonly Point[]): Generator<Point> {
   for (let i = 1; i < points.length; i += 1) {
     const [a, b] = [points[i - 1], points[i]];

@@ -1,4 +1,4 @@
-/** What lines are drawn between: cards that stand, bundles, and the grid on which lines run. Pure. */
+/** The input of the router: cards, lines, and the grid on which lines run. Pure. */
 
 import type { Direction } from "../../graph/model";
 
@@ -22,29 +22,29 @@ export interface SceneLine {
   readonly id: string;
   readonly source: string;
   readonly target: string;
-  /** The room that its pill needs. */
+  /** The size of its pill; null if it has none. */
   readonly pill: PillSize | null;
-  /** Through which places people have led it. */
+  /** Places through which people have led it. */
   readonly via?: readonly Point[];
 }
 
-/** All of it can be sent to a worker. */
+/** Everything in it can be sent to a worker. */
 export interface Scene {
   /** Lines leave cards at this side and enter them at the opposite one. */
   readonly direction: Direction;
-  /** Where the grid begins across the direction, 0 to 11 px. */
+  /** The start of the grid across the direction, 0 to 11 px. */
   readonly offset: number;
   readonly cards: readonly SceneCard[];
-  /** In the order in which lines of one card lie beside each other when nothing else decides. */
+  /** In the order in which lines of one card lie beside each other if nothing else decides. */
   readonly lines: readonly SceneLine[];
 }
 
-/** Lines run on a grid of this step, so that they are this far apart or on each other. */
+/** px; lines run on a grid of this step, hence are at least this far apart or lie on each other. */
 export const STEP = 12;
-/** Kept between lines and cards where there is room; a gap of 32 px has a line of the grid. */
+/** px kept between lines and cards where there is room; a gap of 32 px contains a line of the grid. */
 export const CLEARANCE = { wish: 16, least: 10 } as const;
 
-/** A card along and across the direction. */
+/** A box in coordinates along (`u`) and across (`v`) the direction of the graph. */
 export interface FlowBox {
   readonly u0: number;
   readonly u1: number;
@@ -62,8 +62,8 @@ export const pointOf = (u: number, v: number, direction: Direction): Point =>
   direction === "right" ? [u, v] : [v, u];
 
 /**
- * Where most cards have their middle across the direction, on the grid: then lines between cards in a
- * row are straight and leave them in the middle. `before` stays unless another is much better.
+ * Return the offset of the grid for which most cards have their middle on it, so that lines between
+ * cards in a row are straight. `before` stays unless another offset is much better.
  */
 export function gridOffset(
   cards: readonly SceneCard[],
@@ -81,7 +81,7 @@ export function gridOffset(
   return (counts[best] ?? 0) > 1.5 * (counts[before] ?? 0) ? best : before;
 }
 
-/** Where on the grid a waypoint is. */
+/** A waypoint on the grid. */
 export interface GridPoint {
   readonly column: number;
   readonly row: number;
@@ -93,11 +93,11 @@ export function gridPoint([x, y]: Point, { direction, offset }: Scene): GridPoin
 }
 
 const CELL = 256; // px, the side of a bucket
-const ROW = 2 ** 21; // buckets; of those that are farther apart two may be one, which does no harm
+const ROW = 2 ** 21; // buckets; boxes that are farther apart may share a bucket, which is harmless
 
 const cellOf = (at: number) => Math.floor(at / CELL);
 
-/** Boxes by where they are. */
+/** A spatial index of boxes. */
 export class BoxIndex<T extends FlowBox> {
   private readonly buckets = new Map<number, T[]>();
 
@@ -111,7 +111,7 @@ export class BoxIndex<T extends FlowBox> {
     }
   }
 
-  /** Whether anything but what is to be left out comes nearer than `gap` to a box. */
+  /** Return whether any box except `leaveOut` comes closer than `gap` to a box. */
   hits(box: FlowBox, gap: number, leaveOut?: T): boolean {
     const wide = { u0: box.u0 - gap, u1: box.u1 + gap, v0: box.v0 - gap, v1: box.v1 + gap };
     for (let i = cellOf(wide.u0); i <= cellOf(wide.u1); i += 1) {

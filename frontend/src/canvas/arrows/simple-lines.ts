@@ -1,4 +1,7 @@
-/** Lines that know their own ends and waypoints, not what stands between; and how lines are drawn. Pure. */
+/**
+ * Simple lines, which depend only on their own ends and waypoints, and the pieces that simple and
+ * routed lines share. Pure.
+ */
 import type { Direction } from "../../graph/model";
 import { type Dock, DockPlan, LINK } from "./docks";
 import {
@@ -15,17 +18,17 @@ import {
 export interface RoutedLine {
   readonly id: string;
   readonly direction: Direction;
-  /** What it was routed between: while that stays, so may the line. */
+  /** Identifies the ends between which it was routed: while they stay the same, so may the line. */
   readonly ends: string;
-  /** From the side of one card to that of the other. */
+  /** From the side of one card to the side of the other. */
   readonly points: readonly Point[];
-  /** The middle of its pill; null where there is none, or no room for it. */
+  /** The middle of its pill; null if it has none or there is no room. */
   readonly pill: Point | null;
   /** The pill stands beside the card that the line leaves, and can move away from it a little. */
   readonly docked: boolean;
-  /** Its waypoints, on the grid; the line leaves out those on which something stands. */
+  /** Its waypoints on the grid; the line leaves out those that are blocked. */
   readonly via: readonly Point[];
-  /** Between cards that stand too close, or too far away, for a way of its own. */
+  /** It was not routed: its cards stand too close or too far apart. */
   readonly simple: boolean;
 }
 
@@ -43,7 +46,10 @@ export const viaOf = ({ line }: Dock, scene: Scene): GridPoint[] =>
 export const shown = (points: readonly GridPoint[], plan: DockPlan, scene: Scene): Point[] =>
   points.map(({ column, row }) => at(plan, scene.direction, column, row));
 
-/** Lines that only know their own ends: to be drawn until those that were routed are there. */
+/**
+ * Return a line for each dock that ignores what lies between its ends; they are drawn until the
+ * routed ones are there.
+ */
 export function simpleLines(scene: Scene): Map<string, RoutedLine> {
   const plan = new DockPlan(scene);
   return new Map(
@@ -82,7 +88,7 @@ function* simpleWay({ start, end }: Dock): Generator<readonly [number, number]> 
   if (start.column <= end.column) {
     yield [start.column, end.row];
   } else {
-    // Back in a lane beside both.
+    // Back in a lane beside both cards.
     const lane = Math.max(start.row, end.row) + 6;
     yield [start.column, lane];
     yield [end.column, lane];
@@ -90,7 +96,7 @@ function* simpleWay({ start, end }: Dock): Generator<readonly [number, number]> 
   yield [end.column, end.row];
 }
 
-/** From each waypoint to the next with one turn; it arrives from before the card where it can. */
+/** Yield a way with one turn between waypoints; it arrives from before the card where it can. */
 function* simplyThrough(
   { start, end }: Dock,
   via: readonly GridPoint[],
@@ -115,7 +121,7 @@ export function middleOf({ u0, u1, v0, v1 }: FlowBox, direction: Direction): Poi
 export function leaving({ from, start }: Dock, plan: DockPlan, direction: Direction): Point[] {
   const v = plan.v(start.row);
   const first = pointOf(from.u, from.v, direction);
-  // A pill beyond the corner of its card: the line goes along the card to it.
+  // A pill beyond the corner of its card: the line leads along the card to it.
   return from.v === v
     ? [first]
     : [first, pointOf(from.u + LINK, from.v, direction), pointOf(from.u + LINK, v, direction)];
@@ -124,7 +130,7 @@ export function leaving({ from, start }: Dock, plan: DockPlan, direction: Direct
 export const arriving = ({ to }: Dock, direction: Direction): Point =>
   pointOf(to.u, to.v, direction);
 
-/** Without points at which nothing turns. */
+/** Return the points without those at which nothing turns. */
 export function straight(points: readonly Point[]): Point[] {
   const kept: Point[] = [];
   for (const point of points) {

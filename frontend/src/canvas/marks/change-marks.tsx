@@ -11,17 +11,17 @@ import style from "./change-marks.module.css";
 
 export interface ChangeMark {
   readonly change: "added" | "removed" | "changed";
-  /** Who did that last, where it is known. */
+  /** The person who made the last change; null if unknown. */
   readonly by: string | null;
-  /** What the name was; null where it is the same. */
+  /** The earlier name; null if it is the same. */
   readonly oldName: string | null;
-  /** What values were, by the name of their row on the card. */
+  /** Earlier values by the name of their row on the card. */
   readonly oldValues: ReadonlyMap<string, string>;
-  /** The rows on the card that say something else than on the other side, where both are shown. */
+  /** Names of the rows that differ between the two sides, where both are shown. */
   readonly rows?: ReadonlySet<string>;
 }
 
-/** By key of an action or note, and by id of a relation. */
+/** Marks by the key of an action or note, or the id of a relation. */
 export type ChangeMarks = ReadonlyMap<string, ChangeMark>;
 
 function isSameMap<K, V>(a: ReadonlyMap<K, V>, b: ReadonlyMap<K, V>): boolean {
@@ -42,7 +42,7 @@ function isSameMark(a: ChangeMark, b: ChangeMark): boolean {
 
 const NO_ROWS: ReadonlySet<string> = new Set();
 
-/** What is drawn listens for its own mark: from one moment to the next most marks stay. */
+/** Every card and arrow subscribes to its own mark; between two moments most marks stay the same. */
 class ChangeMarkStore {
   #marks: ChangeMarks = new Map();
   #listeners = new Set<() => void>();
@@ -73,7 +73,7 @@ interface ChangeMarkedProps {
   children: ReactNode;
 }
 
-/** A canvas whose cards and arrows have marks. */
+/** Provides the marks of all cards, notes and arrows of one canvas. */
 export function ChangeMarked({ marks, children }: ChangeMarkedProps) {
   const [store] = useState(() => new ChangeMarkStore());
   useLayoutEffect(() => store.set(marks), [store, marks]);
@@ -87,7 +87,7 @@ export function useChangeMark(key: string): ChangeMark | undefined {
   return useSyncExternalStore(subscribe, () => get(key));
 }
 
-/** `beside`: there is another tag at its place. */
+/** Shows the kind of change and its author. `beside`: leaves room for another tag at the same place. */
 export function ChangeTag({ mark, beside = false }: { mark: ChangeMark; beside?: boolean }) {
   const { change, by } = mark;
   return (
@@ -105,7 +105,7 @@ export function ChangeTag({ mark, beside = false }: { mark: ChangeMark; beside?:
   );
 }
 
-/** In the pill of an arrow: the sign alone. */
+/** Shows only the sign of a change, within the pill of an arrow. */
 export function ChangeSign({ mark: { change } }: { mark: ChangeMark }) {
   return (
     <b className={style.sign} data-change={change}>

@@ -5,13 +5,13 @@ import { countsOf, countWords, type ProblemCounts } from "../../graph/problems/p
 import { otherPlaces, type ToldProblem } from "../../graph/problems/told-problems";
 import style from "./problem-marks.module.css";
 
-/** The problems of one card or arrow. */
+/** The counted problems of one card or arrow. */
 export interface ProblemMark extends ProblemCounts {
-  /** What each says, with its code at the end, one a line: what is wrong first. */
+  /** One line for each problem with its code at the end; errors come first. */
   readonly reasons: string;
 }
 
-/** By `aid` or relation id: what the canvas has no place for stands in the list only. */
+/** Marks by action key or relation id. Problems without a place on the canvas appear in the list only. */
 export type ProblemMarks = ReadonlyMap<string, ProblemMark>;
 
 export const NO_PROBLEM_MARKS: ProblemMarks = new Map();
@@ -19,7 +19,7 @@ export const NO_PROBLEM_MARKS: ProblemMarks = new Map();
 export function problemMarksOf(told: readonly ToldProblem[]): ProblemMarks {
   const places = new Map<string, ToldProblem[]>();
   for (const each of told) {
-    if (each.kind === "note") continue; // it would stand on nearly every graph's arrows
+    if (each.kind === "note") continue; // it would mark the arrows of nearly every graph
     const others = each.problems.flatMap((problem) => otherPlaces(problem));
     for (const place of new Set([each.place, ...others])) {
       if (place === null) continue;
@@ -36,7 +36,7 @@ export function problemMarksOf(told: readonly ToldProblem[]): ProblemMarks {
   );
 }
 
-/** The mark as the end of an accessible name; empty without one. */
+/** Return a mark as the end of an accessible name; empty without a mark. */
 export function problemMarkWords(mark: ProblemMark | null | undefined): string {
   if (!mark) return "";
   return `. ${countWords(mark).join(", ")}. ${mark.reasons.replaceAll("\n", " ")}`;

@@ -1,23 +1,23 @@
-/** What is another thing than when a run last went well, as quiet marks on cards and arrows. */
+/** Marks on cards and arrows that have changed since a run last went well. */
 import { type ComponentType, useSyncExternalStore } from "react";
 import { Watched } from "../../ui/watched";
 
 export interface SinceMark {
   readonly change: "added" | "changed";
-  /** What it says otherwise, as people know it: `speed 0.4 → 0.9`; "" of what came. */
+  /** The difference in words, such as `speed 0.4 → 0.9`; empty for what was added. */
   readonly words: string;
-  /** Which of its fields those are, as the history calls them. */
+  /** Names of the changed fields, as the history has them. */
   readonly fields: readonly string[];
 }
 
 export interface SinceMarks {
   readonly graph: string;
   readonly run: number;
-  /** The change after which it was started. */
+  /** The moment (`seq`) at which that run was started. */
   readonly seq: number;
-  /** By key of an action and id of a relation. What is the same again keeps its identity. */
+  /** Marks by action key or relation id. Equal marks keep their identity. */
   readonly marks: ReadonlyMap<string, SinceMark>;
-  /** What is drawn at them: loaded with the marks. */
+  /** The component that draws a mark; it is loaded together with the marks. */
   readonly Sign: ComponentType<SinceSignProps>;
 }
 
@@ -28,11 +28,13 @@ export interface SinceSignProps {
   readonly since: SinceMarks;
 }
 
-/** One for the page: there is one canvas. What is drawn listens for itself, so that little draws again. Null:
- * nothing is marked. */
+/**
+ * The page has one canvas, hence one store; cards and arrows subscribe to their own marks. Null:
+ * nothing is marked.
+ */
 export const sinceMarks = new Watched<SinceMarks | null>(null);
 
-/** The sign of an action or arrow that is another thing than when a run last went well. */
+/** Draws the mark of an action or arrow, if it has one. */
 export function SinceSpot({ of, on }: Pick<SinceSignProps, "of" | "on">) {
   const mark = useSyncExternalStore(sinceMarks.subscribe, () => sinceMarks.now()?.marks.get(of));
   const since = sinceMarks.now();
