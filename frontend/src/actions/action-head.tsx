@@ -1,4 +1,7 @@
-/** The head of an action of the library: its name, edit, undo, and what can be done with it. */
+/**
+ * The head of an open action of the library: its name, and the buttons to edit, undo, export and
+ * delete it.
+ */
 import { ActionIcon, Button, Menu } from "@mantine/core";
 import { IconCheck, IconDots, IconDownload, IconPencil, IconTrash } from "@tabler/icons-react";
 import { actionDownload } from "../api/documents/library";

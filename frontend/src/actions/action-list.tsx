@@ -21,7 +21,7 @@ import { isolated } from "../words/isolated";
 import style from "./actions-page.module.css";
 import { type ActionFilter, addressOf, foundActions, type ListedAction } from "./listing";
 
-/** Up and down go from row to row, and from the search into the list. */
+/** Moves the focus with the arrow keys through the rows, and from the search field into them. */
 function useRowKeys(list: RefObject<HTMLElement | null>): void {
   useEffect(() => {
     const element = list.current;
@@ -39,7 +39,7 @@ function useRowKeys(list: RefObject<HTMLElement | null>): void {
   }, [list]);
 }
 
-/** A plain press of a link inside goes there without loading the page anew. */
+/** Opens a clicked link without loading the page anew; clicks with a modifier key are left to the browser. */
 function useRowPresses(list: RefObject<HTMLElement | null>): void {
   const { base } = useRouter();
   const [, go] = useLocation();
@@ -65,7 +65,7 @@ interface ActionRowProps {
   current: boolean;
 }
 
-/** Where it comes from, when that is not the library. */
+/** Return the origin of an action that is not in the library. */
 function source({ action }: ListedAction): string {
   if (action === null) return "on a robot";
   return action.document === null ? "only in graphs" : "";
@@ -130,11 +130,11 @@ function ActionRows({ actions, current }: ActionRowsProps) {
 interface Props {
   actions: readonly ListedAction[];
   robots: readonly string[];
-  /** Which is open: its address. */
+  /** The address of the open action. */
   current: string | null;
   onNew: (name: string) => void;
   onImport: () => void;
-  /** Below the list. */
+  /** Content below the list. */
   foot: ReactNode;
 }
 
@@ -197,10 +197,10 @@ export function ActionList({ actions, robots, current, onNew, onImport, foot }: 
   const mayEdit = useMay("edit");
   const [search, setSearch] = useState("");
   const [filter, setFilter] = useState<ActionFilter>("all");
-  // Typing is never held up by the list.
+  // Filtering is deferred, so that typing is never delayed.
   const wanted = useDeferredValue(search);
   const shown = useMemo(() => foundActions(actions, filter, wanted), [actions, filter, wanted]);
-  // What the list offers is of one search.
+  // A new action is offered for the text that the list was filtered by.
   const fresh = wanted.trim();
   const exact = actions.some(({ name }) => name === fresh);
   const list = useRef<HTMLDivElement>(null);

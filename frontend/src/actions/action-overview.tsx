@@ -35,10 +35,10 @@ function Row({ facts, free }: { facts: ParameterFacts; free: string }) {
 
 interface ParameterTableProps {
   title: string;
-  /** What is said when there are none. */
+  /** Text shown without parameters. */
   none: string;
   parameters: readonly Parameter[];
-  /** What is said where nothing is asked of a value. */
+  /** Text shown for a parameter without restrictions. */
   free?: string;
 }
 
@@ -74,9 +74,9 @@ function ParameterTable({ title, none, parameters, free = "" }: ParameterTablePr
 
 interface UsedInProps {
   usedIn: readonly string[];
-  /** Of them, those with other parameters. */
+  /** Those of these graphs in which the action has other parameters. */
   differs: readonly string[];
-  /** Makes the action what a graph has; absent where that cannot be done. */
+  /** Copies the parameters of a graph's action to the library; absent where that is not allowed. */
   onTake?: (graph: string, name: string) => void;
 }
 
@@ -119,9 +119,9 @@ export function UsedIn({ usedIn, differs, onTake }: UsedInProps) {
 interface OnRobotsProps {
   name: string;
   knowledge: RobotsKnowledge;
-  /** What the library says; null: nothing. */
+  /** The action in the library; null if it is not there. */
   own: Pick<LibraryAction, "inputs" | "outputs"> | null;
-  /** What can be done with what a robot has. */
+  /** Returns the button for a robot that has the action. */
   offer?: (has: RobotAction) => ReactNode;
 }
 
@@ -167,7 +167,7 @@ interface Props {
   labels: readonly string[];
   inputs: readonly Parameter[];
   outputs: readonly Parameter[];
-  /** Where it is used, and who has it. */
+  /** Sections about the graphs that use it and the robots that have it. */
   children: ReactNode;
 }
 

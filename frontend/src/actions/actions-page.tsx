@@ -17,10 +17,10 @@ import { UnlistedAction } from "./unlisted-action";
 import { useNewActions } from "./use-new-actions";
 
 interface NewActionProps {
-  /** What it is called unless somebody says otherwise; null: nobody asks. */
+  /** The suggested name; null while the dialog is closed. */
   name: string | null;
   busy: boolean;
-  /** Why there is none; empty: nothing stands against it. */
+  /** The reason why the action could not be made; empty without one. */
   wrong: string;
   onClose: () => void;
   onMake: (name: string) => void;
@@ -65,7 +65,7 @@ function NewActionDialog(props: NewActionProps) {
 }
 
 interface Props {
-  /** The document that is open; null: none. */
+  /** The document of the open action; null: none. */
   id: string | null;
   person: { readonly id: string; readonly name: string };
   slots: BarSlots;
@@ -74,7 +74,10 @@ interface Props {
 
 const NONE: readonly LibraryAction[] = [];
 
-/** What the address names besides: an action without a document, and whether it is edited. */
+/**
+ * Return the rest of the address: the name of an action without a document, and whether the action
+ * is being edited.
+ */
 function useAddress() {
   const search = useSearch();
   return useMemo(() => {
@@ -83,7 +86,7 @@ function useAddress() {
   }, [search]);
 }
 
-/** Nothing is chosen. */
+/** Shown while no action is selected. */
 function Nothing({ isEmpty }: { isEmpty: boolean }) {
   return (
     <Empty icon={<IconBolt size={22} />} title={isEmpty ? "No action yet" : "What robots can do"}>

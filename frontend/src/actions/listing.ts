@@ -1,26 +1,26 @@
-/** Which actions the list shows: those of the library, of graphs and of robots. Pure. */
+/** Collects the actions of the library, of graphs and of robots into one list, and filters it. Pure. */
 import type { LibraryAction } from "../api/documents/library";
 import { pathWords } from "../graph/value-text";
 import type { RobotAction, RobotsKnowledge } from "../library/robot-actions";
 
-/** One name. `action`: null where only robots have it. */
+/** One action by its name. `action`: null if only robots have it. */
 export interface ListedAction {
   readonly name: string;
   readonly action: LibraryAction | null;
   readonly robots: readonly RobotAction[];
-  /** What stands under its name. */
+  /** The line below its name. */
   readonly summary: string;
-  /** All that a search looks at. */
+  /** Lower-case text that the search looks through. */
   readonly words: string;
 }
 
-/** Which of them; `robot:NAME` are those that this robot has. */
+/** The filter of the list; `robot:NAME` keeps the actions that this robot has. */
 export type ActionFilter = "all" | "library" | "graphs" | `robot:${string}`;
 
 const names = (list: LibraryAction["inputs"]): string[] =>
   list.map((parameter) => pathWords(parameter.path));
 
-/** Top-level names, each once: a pose is one thing. */
+/** Return the top-level names of the parameters, each once, such as `pose` for `pose.position.x`. */
 function summaryOf(inputs: readonly string[]): string {
   const heads = [...new Set(inputs.map((name) => name.split(".")[0] ?? name))];
   return heads.length === 0 ? "no parameters" : heads.join(", ");
@@ -41,7 +41,7 @@ function ofRobots(name: string, robots: readonly RobotAction[]): ListedAction {
   return { name, action: null, robots, summary: summaryOf(inputs), words };
 }
 
-/** Each name once, in order. */
+/** Return all actions in the order of their names, each name once. */
 export function listedActions(
   library: readonly LibraryAction[],
   { byName }: Pick<RobotsKnowledge, "byName">,
@@ -70,7 +70,7 @@ function passes({ action, robots }: ListedAction, filter: ActionFilter): boolean
   }
 }
 
-/** Those that pass the filter and have every word of the search. */
+/** Return the actions that pass the filter and contain every word of the search. */
 export function foundActions(
   all: readonly ListedAction[],
   filter: ActionFilter,
@@ -82,7 +82,7 @@ export function foundActions(
   );
 }
 
-/** Where it is shown: at its document, else by its name. */
+/** Return the address of an action: that of its document, else one with its name. */
 export function addressOf({ name, action }: Pick<ListedAction, "name" | "action">): string {
   return action?.document
     ? `/actions/${encodeURIComponent(action.document)}`

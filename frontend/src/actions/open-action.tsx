@@ -84,13 +84,14 @@ const TakeOverDialog = lazyPart(() =>
 );
 
 interface TakeOverProps {
-  /** The document of the action. */
+  /** The id of the action's document. */
   id: string;
   has: RobotAction;
 }
 
 function TakeOver({ id, has }: TakeOverProps) {
-  // Null until it was asked for: from then on it stays, and gives the focus back when it closes.
+  // Null until it is opened; from then on the dialog stays mounted, so that it can return the
+  // focus.
   const [open, setOpen] = useState<boolean | null>(null);
   return (
     <>
@@ -116,7 +117,8 @@ interface OlderUsesProps {
 
 function OlderUses({ id, name, count }: OlderUsesProps) {
   const mayEdit = useMay("edit");
-  // Null until it was asked for: from then on it stays, and gives the focus back when it closes.
+  // Null until it is opened; from then on the dialog stays mounted, so that it can return the
+  // focus.
   const [open, setOpen] = useState<boolean | null>(null);
   return (
     <section className={style.notice} aria-label="Older parameters" hidden={count === 0}>
@@ -143,7 +145,7 @@ function OlderUses({ id, name, count }: OlderUsesProps) {
   );
 }
 
-/** Places in the bar of the page, which stays as it is when another action is opened. */
+/** Elements in the top bar that stay when another action is opened. */
 export interface BarSlots {
   readonly status: HTMLElement | null;
   readonly people: HTMLElement | null;
@@ -152,7 +154,7 @@ export interface BarSlots {
 interface Props {
   id: string;
   person: { readonly id: string; readonly name: string };
-  /** What the list says of it; undefined until that is read. */
+  /** The action in the list of the library; undefined while that loads. */
   known: LibraryAction | undefined;
   knowledge: RobotsKnowledge;
   slots: BarSlots;
@@ -163,13 +165,13 @@ interface Props {
 
 const noPanel = () => {};
 
-/** Values are those of uses, so that nothing is to be filled in here. */
+/** Return the problems of the action without missing values: values belong to its uses in graphs. */
 function useTold({ id, graph }: EditorContext, seq: number) {
   const { told } = useToldProblems(id, seq, graph);
   return told.filter((each) => each.kind !== "fill-in" && fieldOfTold(each) !== null);
 }
 
-/** The list says what was edited here as soon as it is stored. */
+/** Refreshes the library as soon as an edit of this action is stored. */
 function useFreshLibrary(seq: number, unsaved: number): void {
   const client = useQueryClient();
   const [opened] = useState(seq);

@@ -1,4 +1,7 @@
-/** What a parameter is, as a row of a table: a pose is one, and what its JSON says besides is told. Pure. */
+/**
+ * Turns parameters into rows of a table; a pose is one row, and unknown members of the JSON are
+ * listed. Pure.
+ */
 import { memberNames, memberText } from "../graph/json-members";
 import type { Parameter } from "../graph/model";
 import { blocksOf } from "../graph/parameters/groups";
@@ -10,11 +13,11 @@ export interface ParameterFacts {
   readonly name: string;
   readonly type: string;
   readonly required: boolean;
-  /** In words; empty: anything. */
+  /** Allowed values in words; empty: anything. */
   readonly allowed: string;
-  /** As it is spelled; null: none. */
+  /** The value as it is written; null: none. */
   readonly value: string | null;
-  /** What else stands there, as `unit`, `example`. */
+  /** Other members, such as `unit m`. */
   readonly more: readonly string[];
 }
 
@@ -26,7 +29,7 @@ const TOLD = new Set([
   "pvf_updatable",
 ]);
 
-/** A text without its quotes, anything else as it is spelled. */
+/** Return a JSON string without its quotes, any other JSON as it is. */
 function plain(text: string): string {
   return text.startsWith('"') ? String(JSON.parse(text)) : text;
 }
@@ -54,7 +57,7 @@ function factsOf({ path, text }: Parameter): ParameterFacts {
   };
 }
 
-/** One row for each thing that people would name. */
+/** Return one row for each parameter, and one for all members of a pose or the like. */
 export function parameterFacts(list: readonly Parameter[]): ParameterFacts[] {
   return blocksOf(list).flatMap((block) => {
     if (block.kind === "single") return [factsOf(block.parameter)];

@@ -1,9 +1,12 @@
-/** Which parameters may only be called otherwise now: suggested by graphs, ticked by people. Pure. */
+/**
+ * Finds parameters that may have been renamed only: some are suggested by graphs, and people
+ * confirm them. Pure.
+ */
 import type { ActionUse, Renames } from "../api/documents/library";
 import type { ParameterSide } from "../graph/document-keys";
 import { memberText } from "../graph/json-members";
 
-/** One that somebody may tick. `graphs`: by how many it is suggested. */
+/** A possible rename. `graphs`: the number of graphs for which it is possible. */
 export interface SuggestedRename {
   readonly side: ParameterSide;
   readonly from: string;
@@ -14,7 +17,7 @@ export interface SuggestedRename {
 export const keyOfRename = ({ side, from, to }: Omit<SuggestedRename, "graphs">): string =>
   `${side} ${from} ${to}`;
 
-/** Those of all graphs, each once, in the order in which they come. */
+/** Return the suggested renames of all graphs, each once, in the order in which they occur. */
 export function suggestedRenames(uses: readonly ActionUse[]): SuggestedRename[] {
   const found = new Map<string, SuggestedRename>();
   for (const { suggested } of uses) {
@@ -33,7 +36,7 @@ const typeOf = (text: unknown): string | null =>
     ? memberText(text, "pvf_type")
     : null;
 
-/** What went and what came in one graph's actions, by side. */
+/** Return the parameters that one graph's actions would lose and gain on this side. */
 function wentAndCame({ difference }: ActionUse, side: ParameterSide) {
   const fields = (difference?.actions ?? []).flatMap((action) => action.fields);
   const own = fields.filter(({ field }) => field.startsWith(`${side}/`));
@@ -48,7 +51,7 @@ function wentAndCame({ difference }: ActionUse, side: ParameterSide) {
   };
 }
 
-/** Those that could be, as far as types go, and that nobody suggests. */
+/** Return further renames that are possible by type and that no graph suggests. */
 export function possibleRenames(
   uses: readonly ActionUse[],
   suggested: readonly SuggestedRename[],
@@ -70,7 +73,10 @@ export function possibleRenames(
   return [...found.values()];
 }
 
-/** Whether ticking one more would call one thing twice, or two things one. */
+/**
+ * Return whether a rename conflicts with those chosen: the same parameter would get two names, or
+ * two parameters one.
+ */
 export function clashes(
   one: SuggestedRename,
   ticked: ReadonlySet<string>,

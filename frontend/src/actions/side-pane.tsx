@@ -14,12 +14,12 @@ import style from "./open-action.module.css";
 
 type BuildFault = ActionBuild["errors"][number];
 
-/** `src/open_gripper.cpp:25:5`; nothing where no file was named. */
+/** Return the place of an error, such as `src/open_gripper.cpp:25:5`; empty if no file was named. */
 export function faultPlace({ file, line, column }: BuildFault): string {
   return [file, line, column].filter((part) => part !== null && part !== "").join(":");
 }
 
-/** What came of it, in a few words. */
+/** Return the result of a build in a few words. */
 export function buildWords({ ended_well, errors }: ActionBuild): string {
   if (ended_well) return "built";
   if (errors.length === 0) return "not built, for errors of others in its package";
@@ -60,7 +60,7 @@ const Comments = lazyPart(() => import("../comments/comments").then((part) => pa
 interface Props {
   id: string;
   action: Action | undefined;
-  /** The moment on screen. */
+  /** The moment (`seq`) on screen. */
   seq: number;
   mayEdit: boolean;
 }

@@ -1,4 +1,4 @@
-/** Making an action of the library what a robot has: what that would change, and the change. */
+/** The dialog that replaces an action of the library by a robot's version, and shows the difference first. */
 import { Button, Modal, Skeleton } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { useQuery, useQueryClient } from "@tanstack/react-query";
@@ -14,14 +14,14 @@ import { isolated } from "../words/isolated";
 import style from "./update-dialog.module.css";
 
 interface Props {
-  /** The document of the action. */
+  /** The id of the action's document. */
   id: string;
   has: RobotAction;
   opened: boolean;
   onClose: () => void;
 }
 
-/** What the robot's own file says, and what it would change in the action as it is now. */
+/** Load the robot's file of an action, and what it would change in the library. */
 function useFileOf(id: string, { robot, action }: RobotAction) {
   const { runner } = useLive();
   return useQuery({
@@ -53,7 +53,7 @@ function useTaking({ id, has, onClose }: Props) {
       onClose();
     } catch (error) {
       setWrong(errorText(error));
-      await found.refetch(); // it may be another change that did not fit
+      await found.refetch(); // the action may have changed meanwhile
     } finally {
       await refreshLibrary(client);
       setBusy(false);

@@ -1,4 +1,4 @@
-/** An action that the library does not have: what graphs or robots know of it, and how to add it. */
+/** Shows an action that is not in the library, as graphs or robots have it, with a button to add it. */
 import { Button } from "@mantine/core";
 import { IconPlus } from "@tabler/icons-react";
 import { useMay } from "../api/use-person";
@@ -11,13 +11,13 @@ interface Props {
   listed: ListedAction;
   knowledge: RobotsKnowledge;
   busy: boolean;
-  /** Adds it as graphs have it. */
+  /** Adds it to the library as graphs have it. */
   onAdd: (name: string) => void;
-  /** Adds it as a robot has it. */
+  /** Adds it to the library as a robot has it. */
   onTake: (has: RobotAction) => void;
 }
 
-/** What is known of it, from graphs before robots. */
+/** Return the parts of an action: those in graphs, else those of the first robot. */
 function shownOf({ action, robots: [first] }: ListedAction) {
   const template = first && robotTemplate(first.action);
   return {

@@ -45,11 +45,11 @@ const toggled = (set: ReadonlySet<string>, key: string): ReadonlySet<string> => 
   return next;
 };
 
-/** What a person has ticked: of renames those that shall be, of graphs those that shall not. */
+/** Keeps the choices of a person: the renames to make, and the graphs to leave out. */
 function useTicks(id: string) {
   const [ticked, setTicked] = useState<ReadonlySet<string>>(new Set());
   const [left, setLeft] = useState<ReadonlySet<string>>(new Set());
-  // Suggestions are those without renames: one that was ticked is suggested no more.
+  // Suggestions are those without any chosen rename; with one, it is not suggested again.
   const plain = useActionUses(id, NO_RENAMES);
   const uses = plain.data?.uses ?? [];
   const suggested = suggestedRenames(uses);
@@ -67,7 +67,7 @@ function useTicks(id: string) {
     suggested: suggested.map(shown),
     possible: possible.map(shown),
     tick: (key: string) => setTicked((now) => toggled(now, key)),
-    /** Of several that exclude each other one, or none. */
+    /** Choose one of several renames that exclude each other, or none. */
     choose: (others: readonly string[], key: string) =>
       setTicked(
         (now) => new Set([...now].filter((each) => !others.includes(each)).concat(key || [])),
@@ -108,7 +108,7 @@ function useUpdate(id: string) {
     busy,
     wrong,
     done,
-    /** What is shown is of other renames than are ticked, until the answer is there. */
+    /** Whether the preview is outdated, because other renames are chosen or it is being loaded. */
     renewing: found.isPlaceholderData || found.isFetching,
     update: () => (found.data ? update(found.data) : Promise.resolve()),
   };
@@ -121,7 +121,7 @@ type Rename = Update["possible"][number];
 const nameOf = ({ side, from }: Rename): string =>
   `${side === "in" ? "" : "output "}${pathWords(from)}`;
 
-/** For each that went, what it may be called now. */
+/** Offers, for each removed parameter, the names that it may have now. */
 function Others({ update }: { update: Update }) {
   const names = [...new Set(update.possible.map(nameOf))];
   if (names.length === 0) return null;

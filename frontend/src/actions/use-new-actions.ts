@@ -1,4 +1,4 @@
-/** New actions of the library: from nothing, from what graphs know, from what a robot has. */
+/** Adds actions to the library, from a name, from graphs or from a robot, and deletes them. */
 import { notifications } from "@mantine/notifications";
 import { useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
@@ -11,7 +11,7 @@ import type { RobotAction } from "../library/robot-actions";
 import { takeFromRobot } from "../library/take-from-robot";
 import { isolated } from "../words/isolated";
 
-/** There is one of that name already. */
+/** Return whether the server refused a name that is taken. */
 function isTaken(error: unknown): boolean {
   return error instanceof Refusal && error.details.status === 409;
 }
@@ -22,7 +22,7 @@ export function useNewActions() {
   const [, go] = useLocation();
   const [busy, setBusy] = useState(false);
   const [wrong, setWrong] = useState("");
-  /** Opens what was made; answers why there is nothing, or nothing. */
+  /** Makes and opens an action. Returns the reason for a failure, or an empty text. */
   const make = async (work: () => Promise<GraphSummary>, editing: boolean): Promise<string> => {
     setBusy(true);
     try {

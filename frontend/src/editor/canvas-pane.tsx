@@ -1,4 +1,4 @@
-/** The canvas with its tools, and what it says while it is empty. */
+/** The canvas with its tools and bars, and the hint on an empty canvas. */
 import { Button, Kbd, Skeleton } from "@mantine/core";
 import { IconFocus2, IconRouteAltLeft } from "@tabler/icons-react";
 import { ReactFlowProvider } from "@xyflow/react";
@@ -38,20 +38,20 @@ interface Props {
   marks: ProblemMarks;
   compact: boolean;
   phone: boolean;
-  /** The run that goes, if one does: the view follows it. */
+  /** The id of the current run, which the view follows; null without one. */
   run: string | null;
-  /** Beside the dry-run, if one is open: how it becomes a run. */
+  /** The button beside an open dry-run that turns it into a run. */
   record: ReactNode;
-  /** The note whose text is being written. */
+  /** The key of the note whose text is being edited. */
   writing: string | null;
-  /** In the lower right corner. */
+  /** Content of the lower right corner. */
   corner: ReactNode;
   past: Past;
-  /** Whether cards that stand nowhere are about to be placed, which is an edit. */
+  /** Called when placing cards without a place starts and ends; that is an edit. */
   onPlacing: (placing: boolean) => void;
 }
 
-/** What is said while there is nothing to see. */
+/** Shows placeholders while the graph loads, and a hint while it is empty. */
 function Emptiness({ waiting, context }: { waiting: boolean; context: EditorContext }) {
   const fingers = useHasFingersOnly();
   if (waiting) {
@@ -97,7 +97,7 @@ function Emptiness({ waiting, context }: { waiting: boolean; context: EditorCont
   );
 }
 
-/** The tools, and what there is to say in the other corner. */
+/** Shows the tools at the bottom left, and `children` in the other corner. */
 function Foot(props: { compact: boolean; hidden: boolean; children: ReactNode }) {
   return (
     <div className={style.foot}>
@@ -210,10 +210,13 @@ function Inside(props: Props) {
 }
 
 const NOTHING: ReadonlyMap<Key, Progress> = new Map();
-/** Runs and problems are of the graph as it is now. */
+/** While the past is shown there is neither a run nor a check of it. */
 const NOTHING_RUNS = { progress: NOTHING, marks: NO_PROBLEM_MARKS, run: null };
 
-/** The canvas keeps up with the hands of others; what stands beside it comes after. */
+/**
+ * Return the context with the graph that the canvas draws. The canvas shows each change of others
+ * at once; panels beside it follow later.
+ */
 function useDrawnContext(seen: SeenPast | null): EditorContext {
   const calm = useEditorContext();
   const now = useGraph();
@@ -221,7 +224,7 @@ function useDrawnContext(seen: SeenPast | null): EditorContext {
   return useMemo<EditorContext>(() => ({ ...calm, graph }), [calm, graph]);
 }
 
-/** Of what this is a draft, if it is one. */
+/** Shows the bar above the canvas of a draft, which leads to its origin. */
 function Above({ id }: { id: string }) {
   return (
     <PartBoundary waiting={null}>
@@ -236,7 +239,7 @@ interface BelowProps {
   past: Past;
 }
 
-/** What plays on the canvas, or which moment of the past it shows. */
+/** Shows the bar of the dry-run, or that of the moment of the past. */
 function Below({ context, record, past }: BelowProps) {
   const { dryRun, past: place } = context;
   if (dryRun) {
@@ -260,7 +263,7 @@ function Below({ context, record, past }: BelowProps) {
   );
 }
 
-/** What begins to run in a dry-run comes into view. */
+/** Brings an action into view when it starts in a dry-run. */
 function useDryRunInView(context: EditorContext): void {
   const { dryRun, positions: places, view } = context;
   const keys = dryRun?.sighting.running.map(({ key }) => key).join(" ") ?? "";

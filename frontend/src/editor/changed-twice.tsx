@@ -18,13 +18,16 @@ import style from "./stranded-edits-dialog.module.css";
 
 interface ToldTwice {
   readonly twice: ChangedTwice;
-  /** "Look: Description". */
+  /** The changed field, such as "Look: Description". */
   readonly title: string;
   readonly mine: string;
   readonly theirs: string;
 }
 
-/** Describes a choice; null for what no person has changed, such as an order that follows from something else. */
+/**
+ * Return both values in words; null for fields that people do not set themselves, such as an order.
+ * `unknown`: the words for a value that is not loaded.
+ */
 function toldOf(twice: ChangedTwice, here: Maps, unknown: string): ToldTwice | null {
   const { root, key, mine, theirs, writes } = twice;
   const [change] = changesOf(
@@ -82,13 +85,10 @@ function only(root: Root, key: string, value: unknown): ValuesByRoot {
   return mapsFrom({ [root]: { [key]: value } });
 }
 
-/**
- * Describes the choices in words. Values of others that came as collected are read from the log when somebody
- * `looks`.
- */
+/** Return all fields with two values, in words. `looks`: loads values of others from the log. */
 function useChangedTwiceTold(found: readonly ChangedTwice[], looks: boolean): readonly ToldTwice[] {
   const { doc } = useRoom();
-  useGraph(); // the names in it
+  useGraph(); // renders again when names change
   const { all, unknown } = useLogged(found, looks);
   if (all.length === 0) return [];
   const here = mapsOf(doc);

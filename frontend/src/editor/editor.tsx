@@ -155,18 +155,18 @@ const LevelStatus = lazyPart(() =>
 const PastDetails = lazyPart(() => import("../past/past-details").then((part) => part.PastDetails));
 const Outline = lazyPart(() => import("../outline/outline").then((part) => part.Outline));
 
-/** What the page around the editor may want to know. */
+/** State of the editor for the parts that the page provides. */
 export interface Shown {
   graph: Graph;
   seq: number;
-  /** Why this moment cannot be started; null when it can. */
+  /** The reason why this moment cannot be started; null if it can. */
   obstacle: string | null;
   selected: string | null;
   pick: (aid: string) => void;
   compact: boolean;
-  /** One thing at a time, for one hand. */
+  /** Phone layout: one part at a time. */
   phone: boolean;
-  /** The strip shows its head only. Null where it has a place of its own. */
+  /** Whether the strip shows only its head; null on a phone, where it has a pane of its own. */
   folded: boolean | null;
   fold: (folded: boolean) => void;
 }
@@ -183,21 +183,21 @@ interface Props {
   me: string;
   known: readonly NewAction[];
   progress: ReadonlyMap<Key, Progress>;
-  /** The run that goes, if one does. */
+  /** The id of the current run; null without one. */
   run: string | null;
   bar: (parts: EditorBarParts) => ReactNode;
   list: (place: (template: NewAction) => void) => ReactNode;
   strip: (shown: Shown) => ReactNode;
   start: (shown: Shown) => ReactNode;
   status: (shown: Shown) => ReactNode;
-  /** Makes the dry-run that is open a run. */
+  /** Returns the button that turns the open dry-run into a run. */
   record: (shown: Shown, script: Script, onStarted: () => void) => ReactNode;
   corner: ReactNode;
-  /** The moment of a run that a dry-run is to begin with; null without one. */
+  /** The moment of a run at which a dry-run shall start; null without one. */
   seed: DryRunSeed | null;
 }
 
-/** What the check of a moment says. */
+/** The result of the check of one moment (`seq`). */
 interface Checked {
   readonly seq: number | undefined;
   readonly told: readonly ToldProblem[];
@@ -262,7 +262,7 @@ interface DetailsProps {
   children: ReactNode;
 }
 
-/** The details; who looks at the history is told first who set what. */
+/** Shows the details; while the history is open, with the author of each field above them. */
 function DetailsPane({ past: { place, seen }, panel, beside, children }: DetailsProps) {
   const { selection } = useEditorContext();
   if (place === null && !(beside && selection.size === 1)) return children;
@@ -306,7 +306,7 @@ function AddPane({ request, ...others }: Omit<Adding, "request"> & { request: Ad
   );
 }
 
-/** What comes before a start stands beside it. */
+/** Return the button of the dry-run followed by that of Start. */
 function withDryRun(start: ReactNode): ReactNode {
   return (
     <>
@@ -316,7 +316,7 @@ function withDryRun(start: ReactNode): ReactNode {
   );
 }
 
-/** What the bar of the page says of this graph. */
+/** Return the contents of the top bar for this graph. */
 function barParts(
   { me, status, start }: Props,
   context: EditorContext,
@@ -342,7 +342,7 @@ function barParts(
   };
 }
 
-/** Opens the dry-run that was asked for. */
+/** Opens a dry-run at the moment of a run, if the address asks for one. */
 function useSeededDryRun({ beginDryRun }: EditorContext, seed: DryRunSeed | null): void {
   useEffect(() => {
     if (seed !== null) beginDryRun(seed);
@@ -351,16 +351,16 @@ function useSeededDryRun({ beginDryRun }: EditorContext, seed: DryRunSeed | null
 
 const NOTHING_TOLD: readonly never[] = [];
 
-/** How the dry-run that is open becomes a run. */
+/** Return the button that turns the open dry-run into a run; null without one. */
 function recordOf({ dryRun }: EditorContext, shown: Shown, record: Props["record"]): ReactNode {
   return dryRun && record(shown, scriptOf(dryRun.decided), dryRun.close);
 }
 
-/** The side panels are drawn when something about them has changed, not with each event of a run. */
+/** Memoized, so that the events of a run do not render the side panels again. */
 const StillInspector = memo(Inspector);
 const StillPeople = memo(People);
 
-/** Puts an action where there is room; whether that was allowed. */
+/** Adds an action where there is room. Return false if the person may not edit. */
 function placeAction(context: EditorContext, template: NewAction): boolean {
   if (!context.mayEdit) return false;
   const at = freePosition(context);
@@ -369,7 +369,7 @@ function placeAction(context: EditorContext, template: NewAction): boolean {
   return true;
 }
 
-/** What is typed right after their keys shall find them. */
+/** Loads panels early whose keyboard shortcuts may be followed by typing at once. */
 function usePreloaded(): void {
   useEffect(() => {
     for (const part of [Inspector, QuickAdd, FindBar]) void part.preload();
@@ -414,7 +414,8 @@ export function Editor(props: Props) {
       past={past}
     />
   );
-  // A dry-run is told apart from runs that are over; one that goes on is never out of sight.
+  // A dry-run or the past hides the strip of runs that are over; a current run always stays
+  // visible.
   const aside = context.dryRun !== null || context.past !== null;
   const strip = aside && props.run === null ? null : props.strip(shown);
   const parts = {

@@ -1,9 +1,9 @@
-/** Taking a graph away as a file: UMRF as the server writes it, or a picture of the canvas. */
+/** Downloads a graph as UMRF, as the server writes it, or as a picture of the canvas. */
 import { notifications } from "@mantine/notifications";
 import { serverPath } from "../api/page-url";
 import type { EditorContext, ExportFormat } from "../edit-actions/editor-context";
 
-/** A name that every file system takes. */
+/** Return a file name that every file system accepts. */
 function fileName(name: string): string {
   const plain = name
     .replace(/[^\p{L}\p{N} ._-]+/gu, "_")

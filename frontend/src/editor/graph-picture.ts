@@ -1,10 +1,10 @@
-/** A picture of the canvas: SVG or PNG. */
+/** Renders the canvas as an SVG or PNG file. */
 import { svgPictureOf } from "../canvas/svg-picture";
 import type { EditorContext } from "../edit-actions/editor-context";
 
 const LARGEST = 8_000; // px of a PNG's longer side; browsers refuse much more
 
-/** The picture as PNG, twice as fine as on screen where that is not too large. */
+/** Return the picture as PNG with two pixels per px, or fewer where it would be too large. */
 async function rasterised(svg: string, width: number, height: number): Promise<Blob> {
   const scale = Math.min(2, LARGEST / Math.max(width, height));
   const image = new Image();

@@ -1,4 +1,4 @@
-/** How much of the graph is wrong and to fill in: the same numbers as in its list, which it opens. */
+/** Shows the numbers of errors, values to fill in and warnings of a graph, and opens their list. */
 import { IconAlertTriangle, IconPencil } from "@tabler/icons-react";
 import { useEffect, useMemo, useRef } from "react";
 import { useProblems } from "../api/graphs";
@@ -10,7 +10,10 @@ import { countsOf } from "../graph/problems/problem-kinds";
 import { type ToldProblem, toldProblems } from "../graph/problems/told-problems";
 import style from "./problem-count.module.css";
 
-/** Problems as they are told. The graph counts as it is when they come: its check is of that moment. */
+/**
+ * Return the problems of a moment with the graph's names, as a list and as marks. Problems of an
+ * older moment are described with the graph of their arrival.
+ */
 export function useToldProblems(id: string, seq: number, graph: Graph) {
   const problems = useProblems(id, seq).data;
   const now = useRef(graph);
@@ -25,7 +28,7 @@ export function useToldProblems(id: string, seq: number, graph: Graph) {
   return { problems, told, marks };
 }
 
-/** How many of each keep it from starting, in words; empty when nothing does. */
+/** Return the counts of problems that block a start, in words; empty if none does. */
 export function blockWords(told: readonly ToldProblem[]): string {
   const { wrong, fillIn } = countsOf(told.filter(({ blocks }) => blocks));
   return [

@@ -1,4 +1,4 @@
-/** One notice over the canvas, with what one can do about it. */
+/** One notice over the canvas, with a button for what the person can do. */
 import type { ReactNode } from "react";
 import style from "./room-notices.module.css";
 

@@ -1,4 +1,4 @@
-/** Notices of the room over the canvas: what happened to edits, each with what one can do. */
+/** Notices over the canvas about this person's edits and the connection, each with what the person can do. */
 import { Button, CloseButton } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconArchive, IconHistory, IconInfoCircle, IconLock, IconUsers } from "@tabler/icons-react";
@@ -36,7 +36,7 @@ const words: Record<ConnectionNotice, string> = {
     "This page showed something else than the server has, so it was loaded anew. This was reported; nothing of yours is lost.",
 };
 
-/** Nobody can change this graph: why, and what can be done. */
+/** Tells why nobody can change this graph, and what to do about it. */
 function ReadOnly() {
   const readOnly = useLinkPart((link) => link.readOnly);
   if (readOnly === undefined) return null;
@@ -79,7 +79,7 @@ function Others() {
   );
 }
 
-/** What this person changed while away and others changed, too. */
+/** Shows the notice about fields that this person and others changed while this person was offline. */
 function ChangedByBoth() {
   const all = useChangedTwice();
   if (all.length === 0) return null;
@@ -90,7 +90,10 @@ function ChangedByBoth() {
   );
 }
 
-/** Whether the dialog is open: for each choice at first, until the person puts it off. */
+/**
+ * Return the state of the dialog for edits that the server did not take. It opens for each new set
+ * of edits until the person postpones it.
+ */
 function useStrandedEditsDialog() {
   const choice = useStrandedEdits();
   const [later, setLater] = useState(false);
@@ -110,7 +113,7 @@ function useStrandedEditsDialog() {
   };
 }
 
-/** Says that an edit was refused before it was made, and how large it was. */
+/** Tells that an edit was refused because a value is too large. */
 function useTooLargeNotice(): void {
   const { doc } = useRoom();
   useEffect(

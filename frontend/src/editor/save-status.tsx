@@ -1,4 +1,4 @@
-/** Whether what is on screen is stored, in words. */
+/** Shows in words whether everything on screen is stored. */
 import {
   IconAlertTriangle,
   IconCheck,
@@ -44,7 +44,10 @@ function changes(n: number): string {
 
 const NO_DRAFTS: DraftCounts = { writing: 0, waiting: 0 };
 
-/** Who may not edit has nothing to save. What is typed in a field and not in the graph yet is not saved. */
+/**
+ * Return the status. People who may not edit have nothing to save; text in a field that is not yet
+ * in the graph counts as unsaved.
+ */
 export function saveStatusText(
   room: RoomLink,
   mayEdit = true,
@@ -84,7 +87,7 @@ const signs = {
 const DRAFTS_WHY =
   "What you typed is not in the graph: it does not fit its field yet, or waits for its button.";
 
-/** What was typed on this page for this graph and is not written. */
+/** Return the number of drafts on this page that are not written to this graph. */
 function useDraftCounts(): DraftCounts {
   const { id } = useEditorContext();
   const { person } = usePerson();

@@ -20,17 +20,17 @@ import style from "./stranded-edits-dialog.module.css";
 interface ChangesFile {
   readonly graph: string;
   readonly made_by: string;
-  /** When the last of them was made. */
+  /** Time of the last of these edits. */
   readonly made_at: string;
   readonly changes: readonly {
     readonly what: string;
     readonly values: readonly { field: string; before: string | null; after: string | null }[];
   }[];
-  /** The whole graph with these changes, by key, as the shared document has it. */
+  /** The whole graph including these changes, by key, as in the shared document. */
   readonly document: { readonly [root: string]: Readonly<Record<string, unknown>> };
 }
 
-/** In one line: "changed action Look". */
+/** Return a change in one line, such as "changed action Look". */
 function changeSentence({ kind, thing, title }: GraphChange): string {
   return thing === "graph" ? `${kind} the graph` : `${kind} ${thing} ${title}`;
 }
@@ -44,7 +44,7 @@ function fileOf(graph: string, by: string, stranded: StrandedEdits): ChangesFile
   return { graph, made_by: by, made_at, changes, document: plain(stranded.here) };
 }
 
-/** Saves them where the browser saves files. */
+/** Downloads the changes as a JSON file. */
 function saveChanges(graph: string, by: string, all: readonly StrandedEdits[]): void {
   const content = all.map((stranded) => fileOf(graph, by, stranded));
   const text = JSON.stringify(content.length === 1 ? content[0] : content, null, 2);
@@ -144,7 +144,7 @@ interface ItemProps {
 
 function Item({ change, taken, onTake }: ItemProps) {
   const { kind, lines } = change;
-  // The title says the name already.
+  // The title has the name already.
   const told = kind === "changed" ? lines : lines.filter(({ field }) => field !== "Name");
   return (
     <li className={style.item} data-kind={change.kind}>
@@ -243,7 +243,7 @@ function Body({ choice, by, onLater }: BodyProps) {
 interface AnswersProps {
   choice: StrandedEditsChoice;
   taken: readonly GraphChange[];
-  /** How many that is, in words. */
+  /** The number of chosen changes, in words. */
   some: string;
   onLater: () => void;
   onSave: () => void;
@@ -288,7 +288,7 @@ function Answers({ choice, taken, some, onLater, onSave }: AnswersProps) {
   );
 }
 
-/** Something that takes its time and may fail. When it succeeds the dialog is gone. */
+/** Runs work that may fail, with its state. On success the dialog closes by itself. */
 function useWork() {
   const [busy, setBusy] = useState(false);
   const [trouble, setTrouble] = useState<string | null>(null);
@@ -305,7 +305,7 @@ function useWork() {
   return { busy, trouble, work };
 }
 
-/** The dialog; `onLater` leaves a word on the page that leads back to it. */
+/** Shows edits that the server did not take. `onLater`: closes it; a notice on the page reopens it. */
 export function StrandedEditsDialog({
   by,
   open,

@@ -1,4 +1,4 @@
-/** Says what others change and how the run goes, for those who do not see the canvas. */
+/** Announces changes of others and the states of a run to screen readers. */
 import { useEffect, useRef } from "react";
 import type * as Y from "yjs";
 import { endsOf, rootOf, splitKey } from "../graph/document-keys";
@@ -9,7 +9,7 @@ import { useRoom } from "../sync/use-room";
 import { announcer } from "../ui/announcer";
 import { isolated } from "../words/isolated";
 
-/** The names of what a transaction touched: actions, and the ends of arrows. */
+/** Return the names of actions, and of the ends of arrows, that a transaction has changed. */
 function touched(graph: Graph, doc: Y.Doc, transaction: Y.Transaction): string[] {
   const names = new Set<string>();
   for (const [type, keys] of transaction.changed) {
@@ -29,7 +29,7 @@ function touched(graph: Graph, doc: Y.Doc, transaction: Y.Transaction): string[]
   return [...names];
 }
 
-/** `begun`: the graph has arrived; what came before is no news. */
+/** Announces changes of others. `begun`: the graph has arrived; its first contents are not announced. */
 export function useRemoteEditAnnouncements(graph: Graph, begun: boolean): void {
   const { doc, presence } = useRoom();
   const latest = useRef(graph);
@@ -51,7 +51,10 @@ export function useRemoteEditAnnouncements(graph: Graph, begun: boolean): void {
   }, [doc, presence, begun]);
 }
 
-/** An action of a run may be in no draft any more, or the draft not here yet: it has its name then. */
+/**
+ * Return the announcement of an action's state. If the graph has no such action, the name in the
+ * run is used.
+ */
 export function runAnnouncement(graph: Graph, key: Key, { name, word }: Progress): string {
   const isDrawn = graph.actions.some((action) => action.key === key);
   return `${isDrawn || name === undefined ? endName(graph, key) : name}: ${word}`;

@@ -1,4 +1,4 @@
-/** The state of an open editor, and the context that edit actions work on. */
+/** The state of an open editor, and the context on which edit actions work. */
 
 import { useLocalStorage } from "@mantine/hooks";
 import { type RefObject, useCallback, useMemo, useRef, useState } from "react";
@@ -42,7 +42,7 @@ const NO_CANVAS_VIEW: CanvasView = {
   focus: () => {},
 };
 
-/** What only the canvas knows; filled in by it while it is shown. */
+/** Functions that the canvas provides while it is shown. */
 interface CanvasHandle {
   view: CanvasView;
   positions: EditorContext["positions"];
@@ -55,14 +55,14 @@ export interface EditorState {
   readonly adding: AddRequest | null;
   readonly overlay: Overlay | null;
   readonly canvasHandle: RefObject<CanvasHandle>;
-  /** Whether the search in the graph is open. */
+  /** Whether the search within the graph is open. */
   readonly isFindOpen: boolean;
   closeAdd(): void;
   closeOverlay(): void;
   closeFind(): void;
 }
 
-/** What is edited, and whether this person may. */
+/** Return the graph and its document, and what this person may do with it. */
 function useEdited(id: string, { place: past, seen, lookAt }: Past) {
   const { doc, undo } = useRoom();
   const now = useThrottledGraph();
@@ -70,12 +70,11 @@ function useEdited(id: string, { place: past, seen, lookAt }: Past) {
   const role = useMay("edit");
   const { readOnly, seq } = useThrottledLink();
   const { dryRun, begin: beginDryRun } = useDryRun(id, now, seq);
-  // What is typed before the graph is there would be joined to what arrives under it, and an edit
-  // would know nothing of what it replaces.
+  // Nobody may edit before the graph has arrived: an edit would not know what it replaces.
   const arrived = useLinkPart((link) => link.seq > 0);
   const mayGoBack = role && readOnly === undefined && arrived;
   const graph = past === null ? now : (seen?.graph ?? now);
-  // The past is to be looked at: whatever changes the graph is off, as it is for who may only look.
+  // While the past is shown the graph is read-only.
   const mayEdit = mayGoBack && past === null;
   const canUndo = undoable.canUndo && past === null;
   const canRedo = undoable.canRedo && past === null;
@@ -88,7 +87,7 @@ function useEdited(id: string, { place: past, seen, lookAt }: Past) {
   );
 }
 
-/** What is selected, and how the pointer works. */
+/** Return the selection and the tool of the pointer. */
 function useTools() {
   const { presence } = useRoom();
   const [selection, setSelection] = useState(NONE);
@@ -112,7 +111,10 @@ function useTools() {
   );
 }
 
-/** What stands beside the canvas or over it, opened by edit actions. `latest`: their context. */
+/**
+ * Return the state of panels and dialogs, and the functions that open them. `latest`: the current
+ * context.
+ */
 function useDialogs(latest: RefObject<EditorContext | null>, onPanel: (panel: Panel) => void) {
   const [panel, setPanelNow] = useState<Panel>("details");
   const [adding, setAdding] = useState<AddRequest | null>(null);
@@ -120,7 +122,7 @@ function useDialogs(latest: RefObject<EditorContext | null>, onPanel: (panel: Pa
   const [isFindOpen, setFinding] = useState(false);
   const setPanel = useCallback(
     (next: Panel) => {
-      // The lists stand beside the panel of details, which stays as it is.
+      // Lists open at the left; the panel of details at the right stays as it is.
       if (next !== "outline" && next !== "library" && next !== "history") setPanelNow(next);
       onPanel(next);
     },
@@ -152,7 +154,7 @@ function useDialogs(latest: RefObject<EditorContext | null>, onPanel: (panel: Pa
   };
 }
 
-/** The canvas that is there at the moment. */
+/** Return functions that pass calls to the current canvas. */
 function canvasOf(handle: RefObject<CanvasHandle>) {
   const view: CanvasView = {
     fit: () => handle.current.view.fit(),

@@ -1,4 +1,4 @@
-/** Goes to what the address points at, once the graph is there, and again when the address changes. */
+/** Selects and shows what the address points at, once the graph is there and whenever the address changes. */
 import { notifications } from "@mantine/notifications";
 import { useEffect, useRef } from "react";
 import { useSearch } from "wouter";
@@ -8,10 +8,10 @@ import { withPast } from "../edit-actions/past-links";
 import { shownKeys } from "../edit-actions/view";
 import { focusField } from "../ui/focus-field";
 
-const SETTLED = 160; // ms after which the canvas has measured its cards and shown the whole
+const SETTLED = 160; // ms after which the canvas has measured its cards and shown the graph
 
 export function useGraphLink(context: EditorContext, begun: boolean): void {
-  // Steps through the past stand in the address too, and point at nothing else.
+  // Moments of the past are in the address, too, and point at no element.
   const search = withPast(useSearch(), null);
   const now = useRef(context);
   now.current = context;
@@ -29,7 +29,7 @@ export function useGraphLink(context: EditorContext, begun: boolean): void {
       }
       select(selection);
       if (target.problem !== null) setPanel(selection.length > 0 ? "details" : "problems");
-      // The selection is drawn first; then it is known where it stands.
+      // The selection is rendered first; then its place is known.
       requestAnimationFrame(() => {
         const keys = shownKeys(now.current);
         if (keys.length > 0) now.current.view.show(keys);

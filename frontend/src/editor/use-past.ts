@@ -1,4 +1,4 @@
-/** Which moment of the past is shown, also in the address of the page. */
+/** State of the moment of the past that is shown, which the address of the page contains, too. */
 import { useLocalStorage } from "@mantine/hooks";
 import { startTransition, useCallback, useEffect, useState } from "react";
 import type { PastPlace } from "../edit-actions/editor-context";
@@ -6,26 +6,25 @@ import { pastOf, withPast } from "../edit-actions/past-links";
 import type { SeenPast } from "../past/past-bar";
 import { Watched } from "../ui/watched";
 
-const WRITTEN = 300; // ms after the last step: browsers take few changes of the address in a row
+const WRITTEN = 300; // ms after the last step, since browsers limit changes of the address
 
 export interface Past {
-  /** Two moments stand beside each other, instead of over one another. Kept on the device. */
+  /** Two moments are shown side by side instead of one over the other. Kept on this device. */
   readonly side: boolean;
   setSide(side: boolean): void;
-  /** The moment of which the page tells, or the first one that is waited for. */
+  /** The moment that panels show, or the first one while it loads. */
   readonly place: PastPlace | null;
-  /** The graph as it was then, and what differs, once it is there. What stands beside the canvas
-   * follows it, as soon as there is time. */
+  /** The graph of that moment and its differences, once loaded. Panels follow it when there is time. */
   readonly seen: SeenPast | null;
-  /** What the canvas shows, which comes first. */
+  /** The moment that the canvas draws; it is updated first. */
   readonly drawn: Watched<SeenPast | null>;
-  /** The moment that one has asked for last, which is drawn as soon as it is there. */
+  /** The moment asked for last, drawn as soon as it is loaded. */
   readonly wanted: Watched<PastPlace | null>;
   lookAt(place: PastPlace | null): void;
   show(seen: SeenPast, place: PastPlace): void;
 }
 
-/** Where nothing else than the graph as it is can be shown. */
+/** The state of a page that cannot show the past. */
 export const NO_PAST: Past = {
   ...{ place: null, seen: null, side: false },
   ...{ drawn: new Watched(null), wanted: new Watched(null) },

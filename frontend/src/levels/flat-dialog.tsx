@@ -1,4 +1,7 @@
-/** A graph with those inside of it, made into one graph: what that would be, or why it would not do the same. */
+/**
+ * The dialog that flattens a graph with its sub-graphs into one graph, or tells why the result
+ * would behave differently.
+ */
 import { Button, Modal, Skeleton, TextInput } from "@mantine/core";
 import { useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";

@@ -39,11 +39,14 @@ import { type LevelLayout, layoutOf } from "./level-layout";
 
 const NO_PROGRESS: ReadonlyMap<Key, Progress> = new Map();
 
-/** How an engine calls it: `OUTER__INNER__0` (docs/umrf-and-the-engine.md 2.6). */
+/**
+ * Return the name that an engine gives to an inner graph, such as `OUTER__INNER__0` (docs/umrf-and-
+ * the-engine.md 2.6).
+ */
 const calledBy = (outermost: string, { names }: LevelGraph): string =>
   [outermost, ...names.flatMap(({ name, instanceId }) => [name, String(instanceId)])].join("__");
 
-/** From where states are known. */
+/** The sources of states: a dry-run, or a run. */
 export interface StateSource {
   readonly dryRun: Pick<DryRun, "inside"> | null;
   readonly run: RunOnCanvas | null;
@@ -73,8 +76,10 @@ function useLevelProgress(level: LevelGraph): ReadonlyMap<Key, Progress> {
 
 let last: { told: readonly ToldProblem[]; marks: ProblemMarks } | null = null;
 
-/** By the keys of the actions that lead there and of what it is at, joined by "/": each level says what is
- * wrong below it. */
+/**
+ * Return the marks of problems in inner graphs, by the keys of the actions down to each, joined by
+ * "/". Each level shows all problems below it.
+ */
 export function marksInside(told: readonly ToldProblem[]): ProblemMarks {
   if (last?.told === told) return last.marks;
   const each = told.flatMap((one) => {
@@ -100,11 +105,11 @@ const NO_OUTCOMES: readonly Precondition[] = [];
 
 interface LevelLineProps {
   of: LevelLayout["lines"][number];
-  /** How its parent ended. */
+  /** The outcome of its parent. */
   ended: string | undefined;
 }
 
-/** The outcome of the line that came. */
+/** Return the outcome of a line with which its parent ended; null: none of them. */
 const cameOf = ({ bundle }: LevelLineProps["of"], ended: string | undefined): Precondition | null =>
   bundle.outcomes.find((outcome) => outcome === `on_${ended}`) ?? null;
 
@@ -171,7 +176,7 @@ function HeadButton({ label, keys, Sign, onClick }: ButtonProps) {
       title={keys === undefined ? label : `${label}  ${keys}`}
       aria-label={label}
       onClick={(event) => {
-        event.stopPropagation(); // else the card would be chosen
+        event.stopPropagation(); // else the click would select the card
         onClick();
       }}
       onDoubleClick={(event) => event.stopPropagation()}
@@ -196,7 +201,7 @@ interface InnerCardProps {
   box: { readonly x: number; readonly y: number; readonly width: number; readonly height: number };
 }
 
-/** An action inside. It is drawn as its card is, and changed where one goes in. */
+/** The card of an inner action: it looks like a card of the canvas, and is edited in its own graph. */
 const InnerCard = memo(function InnerCard({
   action,
   path,
@@ -340,7 +345,7 @@ function LevelFrame({ level, name, progress }: FrameProps) {
   );
 }
 
-/** On the card of an action of the canvas. */
+/** Draws the expanded graph on the card of an action of the canvas. */
 export function ExpandedCard({ of, progress }: LevelFrameProps) {
   const level = useSyncExternalStore(expansion.subscribe, () => expansion.now().levels.get(of));
   if (!level) return null;

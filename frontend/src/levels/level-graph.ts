@@ -10,22 +10,22 @@ import { Watched } from "../ui/watched";
 
 type LevelAction = Pick<Action, "name" | "instanceId">;
 
-/** The graph that an action stands for, and what is expanded in it. */
+/** The graph for which an action stands, with the graphs that are expanded in it. */
 export interface LevelGraph {
-  /** Of the graph on the server. */
+  /** The id of the graph on the server. */
   readonly id: string;
   /** Keys of the actions that lead here, outermost first, joined by "/". */
   readonly path: string;
-  /** Those actions. */
+  /** Names and numbers of these actions. */
   readonly names: readonly LevelAction[];
-  /** Null while it is not here; else why it cannot be. */
+  /** Null while it is loading; a text tells why it cannot be loaded. */
   readonly graph: Graph | string | null;
   readonly levels: ReadonlyMap<Key, LevelGraph>;
 }
 
-/** What is known of the graphs of the server. */
+/** The graphs of the server, as far as they are loaded. */
 export interface KnownGraphs {
-  /** The id of the graph that an action of this name stands for. */
+  /** Returns the id of the graph for which actions of this name stand. */
   idOf(name: string): string | undefined;
   graphOf(id: string): Graph | string | null;
 }
@@ -41,8 +41,10 @@ const same = (a: LevelGraph, b: LevelGraph): boolean =>
   a.levels.size === b.levels.size &&
   [...a.levels].every(([key, level]) => b.levels.get(key) === level);
 
-/** Below the actions of `graph`, what of `expanded` is there. A name inside of itself is an action, as engines
- * have it, so `above` has the ids of the graphs around. */
+/**
+ * Return the expanded graphs below the actions of `graph`. `above`: ids of the surrounding graphs;
+ * within a graph of its own name, an action stands for no graph, as in engines.
+ */
 export function levelsBelow(
   graph: Graph,
   expanded: ReadonlySet<string>,
@@ -73,7 +75,7 @@ export function levelsBelow(
   return before && unchanged ? before : found;
 }
 
-/** The paths of everything that stands for a graph, `depth` levels down. */
+/** Return the paths of all actions that stand for a graph, down to `depth` levels. */
 export function pathsTo(
   graph: Graph,
   depth: number,
@@ -93,7 +95,7 @@ export function pathsTo(
 }
 
 interface Expansion {
-  /** By the actions of the graph on the canvas. */
+  /** Expanded graphs by the actions of the graph on the canvas. */
   readonly levels: ReadonlyMap<Key, LevelGraph>;
   toggle(path: string): void;
   enter(path: string): void;
@@ -107,13 +109,15 @@ export const expansion = new Watched<Expansion>({
 
 const read = (umrf: unknown): Graph => fromUmrf(umrf);
 
-/** Each as a graph, as words when it cannot be had, or null while it is on its way. What did not change
- * is the same object as before. */
+/**
+ * Load graphs by id: each is a graph, the text of an error, or null while it loads. Unchanged
+ * graphs keep their identity.
+ */
 export function useLevelGraphs(ids: readonly string[]): ReadonlyMap<string, Graph | string | null> {
   const { data: graphs } = useGraphs();
   const found = useQueries({
     queries: ids.map((id) => {
-      // The list tells of every change; without it, it is asked for once.
+      // The list of graphs tells of every change; without it each graph is loaded once.
       const seq = graphs?.find((graph) => graph.id === id)?.seq ?? 0;
       const path = `/api/graphs/${encodeURIComponent(id)}/umrf?identities=true`;
       return {

@@ -1,4 +1,4 @@
-/** Where everything stands in a graph that is drawn inside of an action, and how large that makes it. Pure. */
+/** Computes places and lines within an expanded graph, and the size of its card. Pure. */
 import { type Bundle, bundlesOf, pillSizeOf } from "../canvas/arrows/bundles";
 import { routed } from "../canvas/arrows/routes";
 import { gridOffset, type Scene, type SceneCard } from "../canvas/arrows/scene";
@@ -26,20 +26,20 @@ export interface LevelLayout {
   readonly lines: readonly LevelLine[];
 }
 
-/** Of `level-frame.module.css`, px: its head, and what is kept free round the cards. */
+/** Measures of `level-frame.module.css`, px: the height of the head, and the space around the cards. */
 const HEAD = 38;
 const AIR = { along: 56, across: 26 } as const;
-/** Where an arrow from outside goes on inside, and the other way round: no larger than a dot. */
+/** px; the size of the points at the edge of the frame that stand for entry and exit. */
 const DOT = 8;
-/** Of a graph that is not here, or has nothing in it. */
+/** The size of a graph that is not loaded or has no actions. */
 const EMPTY: Size = { width: 260, height: HEAD + 84 };
 const LEAST_WIDTH = 260;
-/** More are not led round cards: that takes as long as it takes, and the page waits for it. */
+/** More lines than this keep simple ways: the page would wait for the router. */
 const MOST_ROUTED = 200;
 
 const known = new WeakMap<LevelGraph, LevelLayout>();
 
-/** The same for the same: of many levels few change at once. */
+/** Return the layout of an expanded graph. It is cached, since few levels change at once. */
 export function layoutOf(level: LevelGraph): LevelLayout {
   const before = known.get(level);
   if (before) return before;
@@ -52,7 +52,7 @@ export function layoutOf(level: LevelGraph): LevelLayout {
 
 const NOTHING: LevelLayout = { size: EMPTY, direction: "right", cards: [], lines: [] };
 
-/** Where the actions are drawn, and how large they are there. */
+/** Return the cards with their places and sizes, and the graph with its waypoints as they are drawn. */
 function cardsOf(given: Graph, { levels }: LevelGraph) {
   const closed = estimatedSizes(given);
   const rest = positionsOf(given, closed);
@@ -75,7 +75,10 @@ function boundsOf(cards: readonly LevelCard[]) {
   return { left, top, width: right - left, height: bottom - top };
 }
 
-/** Entry and exit are where arrows from outside meet the frame. */
+/**
+ * Return the points at the edge of the frame at which arrows from the entry start and arrows to the
+ * exit end.
+ */
 function endsOf(direction: Direction, { width, height }: Size): SceneCard[] {
   const dot = { width: DOT, height: DOT };
   const [middle, half] = [Math.round((HEAD + height) / 2 - DOT / 2), Math.round((width - DOT) / 2)];

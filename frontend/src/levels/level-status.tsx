@@ -1,4 +1,7 @@
-/** The graphs around this one: the way out, and all that run it inside them, which each edit here changes. */
+/**
+ * Shows the way out of an inner graph, and the graphs that contain this one, which every edit here
+ * changes.
+ */
 import { Menu } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconSitemap, IconStairsUp } from "@tabler/icons-react";
@@ -10,7 +13,7 @@ import { useEditorContext } from "../edit-actions/editor-context";
 import { isolated } from "../words/isolated";
 import style from "./levels.module.css";
 
-/** The graphs with an action that stands for this one, by id. */
+/** Return the ids of the graphs with an action that stands for this one. */
 function useUsedIn(): readonly string[] {
   const { id, graph } = useEditorContext();
   const { data: actions = [] } = useLibrary();
@@ -19,11 +22,11 @@ function useUsedIn(): readonly string[] {
   return stands ? usedIn(actions, { id, name: graph.name }) : [];
 }
 
-const MANY = 2; // graphs around that change with this one
-/** Graphs of which this page has said so. */
+const MANY = 2; // graphs from which on the notice is shown
+/** Ids of the graphs for which this page has shown the notice. */
 const told = new Set<string>();
 
-/** Says it at the first edit: what one changes here changes elsewhere, too. */
+/** Shows at the first edit that it changes several other graphs, too. */
 function useNoticeOfMany(graphs: readonly string[]): void {
   const { id, undo } = useEditorContext();
   const count = graphs.length;
@@ -79,7 +82,7 @@ function UsedIn() {
   );
 }
 
-/** Where the line of levels has no room. */
+/** The button to leave an inner graph; it replaces the line of levels on narrow screens. */
 function Out() {
   const { subscribe, now } = graphsInside;
   const leave = useSyncExternalStore(subscribe, () => now()?.leave);

@@ -31,7 +31,7 @@ function SignButton({ title, label, Sign, onClick }: SignProps) {
       title={title}
       aria-label={label}
       onClick={(event: MouseEvent) => {
-        event.stopPropagation(); // else the card would be chosen
+        event.stopPropagation(); // else the click would select the card
         onClick();
       }}
       onDoubleClick={(event) => event.stopPropagation()}
@@ -76,8 +76,11 @@ function useFlatLink(): void {
 
 const NONE: readonly never[] = [];
 
-/** Graphs by the name of the actions that stand for them: engines look for an action of it first, of several
- * graphs of one name it is the oldest, which is listed first. */
+/**
+ * Return the ids of graphs by the name of the actions that stand for them. Actions of the library
+ * come first, as in engines; of several graphs with one name the oldest counts, which is listed
+ * first.
+ */
 function useGraphsByName() {
   const { data: graphs = NONE } = useGraphsAsActions();
   const { data: actions = NONE } = useLibrary();
@@ -90,7 +93,10 @@ function useGraphsByName() {
   }, [graphs, actions]);
 }
 
-/** No graph stands for an action that is in it. */
+/**
+ * Return the graphs for which actions of this graph can stand. An action with this graph's own name
+ * stands for none.
+ */
 function useGraphsHere(id: string) {
   const { names, all } = useGraphsByName();
   return useMemo(() => {
@@ -102,8 +108,7 @@ function useGraphsHere(id: string) {
   }, [names, all, id]);
 }
 
-/** Somebody may have made a graph just now, and the action that stands for it: who sees a name that nobody
- * knows asks anew. */
+/** Loads the library again when an action has an unknown name: somebody may have just made its graph. */
 function useNewNames(names: readonly string[], byName: ReadonlyMap<string, string>): void {
   const client = useQueryClient();
   const { data: actions } = useLibrary();
@@ -120,8 +125,10 @@ function useNewNames(names: readonly string[], byName: ReadonlyMap<string, strin
 const nameIn = (graph: Pick<Graph, "actions">, action: string): string =>
   graph.actions.find(({ key }) => key === action)?.name ?? "";
 
-/** Goes into what an action stands for; where it stands for nothing, to where it is. `path`: of the action,
- * through those that are expanded. */
+/**
+ * Return a function that opens the graph for which an action stands; if it stands for none, the
+ * graph that contains it. `path`: the expanded actions down to it.
+ */
 function useWayIn(byName: ReadonlyMap<string, string>) {
   const { id, graph } = useEditorContext();
   const [, go] = useLocation();
@@ -149,7 +156,10 @@ function useWayIn(byName: ReadonlyMap<string, string>) {
   });
 }
 
-/** The same by actions that are known by name, whatever is drawn. */
+/**
+ * Return a function that opens an inner graph by the names of the actions that lead to it, whatever
+ * is expanded.
+ */
 function useWayTo(byName: ReadonlyMap<string, string>) {
   const { id } = useEditorContext();
   const [, go] = useLocation();
@@ -159,7 +169,7 @@ function useWayTo(byName: ReadonlyMap<string, string>) {
     const by: Level[] = [];
     for (const { key, name } of steps) {
       const inside = byName.get(name);
-      if (inside === undefined) break; // somebody renamed it meanwhile: as far as the way goes
+      if (inside === undefined) break; // somebody has renamed it meanwhile: open the graph reached so far
       by.push({ graph: here, action: key });
       here = inside;
     }

@@ -1,9 +1,12 @@
-/** Why levels would do otherwise than one graph, each with the way to the action that it is about. */
+/**
+ * Lists reasons why sub-graphs would behave differently in one graph, each with a link to the
+ * action it is about.
+ */
 import type { FlatteningReason } from "../api/documents/inside";
 import type { EditorContext } from "../edit-actions/editor-context";
 import style from "./levels.module.css";
 
-/** Actions and reasons that are listed. */
+/** The number of actions or reasons that are listed. */
 export const MOST = 100;
 
 type LevelWay = NonNullable<FlatteningReason["at"]>;
@@ -12,7 +15,7 @@ export const wayWords = (way: LevelWay): string => way.map(({ action }) => actio
 interface Props {
   context: EditorContext;
   reasons: readonly FlatteningReason[];
-  /** What of the way is told; else all of it. */
+  /** Shortens the way to an action that is shown; by default it is shown whole. */
   told?: (way: LevelWay) => LevelWay;
   label: string;
   onClose: () => void;

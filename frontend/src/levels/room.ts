@@ -6,7 +6,7 @@ import { notesOf } from "../graph/edit/notes";
 import type { Graph, JsonText, Key, Position, Relation } from "../graph/model";
 import { readWaypoints } from "../graph/waypoints";
 
-/** From `from` to `to` there have to be `by` px more. */
+/** A part of an axis, `from` to `to`, that needs `by` px more. */
 interface Stretch {
   readonly from: number;
   readonly to: number;
@@ -14,13 +14,16 @@ interface Stretch {
 }
 
 interface Axis {
-  /** Where on the canvas something is drawn. */
+  /** Returns the place in the drawing of a place in the document. */
   toView(at: number): number;
-  /** Where it stands in the document: the other way round. */
+  /** Returns the place in the document of a place in the drawing. */
   toDocument(at: number): number;
 }
 
-/** The last of ascending numbers that is no greater; -1: there is none. */
+/**
+ * Return the index of the last of ascending numbers that is not greater than a value; -1 if there
+ * is none.
+ */
 function lastUpTo(numbers: readonly number[], value: number): number {
   let [low, high] = [0, numbers.length];
   while (low < high) {
@@ -31,7 +34,10 @@ function lastUpTo(numbers: readonly number[], value: number): number {
   return low - 1;
 }
 
-/** From ascending places to ascending places, evenly in between, and as they are on either side. */
+/**
+ * Return a function that maps ascending places to ascending places: linear between them, constant
+ * offsets outside.
+ */
 function along(from: readonly number[], to: readonly number[]) {
   return (at: number): number => {
     const i = lastUpTo(from, at);
@@ -44,8 +50,9 @@ function along(from: readonly number[], to: readonly number[]) {
 }
 
 /**
- * What stands after a stretch makes way by no more than it has to; two stretches beside each other share
- * the room. No distance ever shrinks, so that what does not overlap in the document does not here.
+ * Return the mapping of an axis with stretches. Everything behind a stretch moves by no more than
+ * it must; stretches at the same place share the room. No distance shrinks, so what does not
+ * overlap in the document does not overlap in the drawing.
  */
 export function axisOf(stretches: readonly Stretch[]): Axis {
   const places = [...new Set(stretches.flatMap(({ from, to }) => [from, to]))].sort(
@@ -73,7 +80,7 @@ function ledThrough(relation: Relation, toView: PlaceMap): Relation {
   return { ...relation, waypoints };
 }
 
-/** Frames are as large as what they stand round. */
+/** Return the notes with frames around the same elements as in the document. */
 function framed(graph: Graph, toView: PlaceMap): Graph["notes"] {
   const frames = new Map(
     notesOf(graph).flatMap((note) => {
@@ -90,17 +97,17 @@ function framed(graph: Graph, toView: PlaceMap): Graph["notes"] {
   });
 }
 
-/** A graph with larger cards in it. */
+/** A graph with room for enlarged cards. */
 interface Roomy {
-  /** With its waypoints and frames as they are drawn. */
+  /** The graph with its waypoints and frames as they are drawn. */
   readonly graph: Graph;
-  /** Of the larger cards. */
+  /** Sizes of the enlarged cards. */
   readonly sizes: Sizes;
   readonly toView: PlaceMap;
   readonly toDocument: PlaceMap;
 }
 
-/** `sizes`: of the cards that are to be larger. Null where none of them is drawn. */
+/** Return a graph with room for enlarged cards of these `sizes`; null if none of them is drawn. */
 export function roomFor(
   graph: Graph,
   rest: Positions,
@@ -133,7 +140,7 @@ export function roomFor(
 export const placesIn = ({ toView }: Roomy, places: Positions): Positions =>
   new Map([...places].map(([key, at]) => [key, toView(at)]));
 
-/** What is folded, as it is drawn. */
+/** Return the folded frames with the places and sizes as they are drawn. */
 function foldedIn(graph: Graph, folding: Folding): Folding {
   const drawn = new Map(notesOf(graph).map((note) => [note.key, note]));
   const blocks = [...folding.blocks].map(([key, note]) => [key, drawn.get(key) ?? note] as const);
@@ -142,7 +149,7 @@ function foldedIn(graph: Graph, folding: Folding): Folding {
 
 const point = ([x, y]: Position) => ({ x, y });
 
-/** The graph on the canvas with room for what is expanded in it. */
+/** Return the graph on the canvas with room for its expanded cards; null if none is drawn. */
 export function spreadOf(
   { graph, rest, folding, flow }: StandingGraph,
   sizes: Sizes,

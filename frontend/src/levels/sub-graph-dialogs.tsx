@@ -33,7 +33,7 @@ import { isolated } from "../words/isolated";
 import style from "./levels.module.css";
 import { ReasonList } from "./reason-list";
 
-/** Keys of actions that come or go with these changes. */
+/** Return the keys of actions that these changes add or remove. */
 function actionsOf(changes: readonly DocumentChange[], fits: (change: DocumentChange) => boolean) {
   const own = changes.filter(({ root, key }) => root === "actions" && splitKey(key).rest === "");
   return own.filter(fits).map(({ key }) => key);
@@ -48,8 +48,10 @@ function middleOf(places: readonly Position[]): Position | null {
   return [mean(xs), mean(ys)];
 }
 
-/** Makes the changes, which one undo takes back, and shows what is new. Everything else stays where it is
- * drawn. */
+/**
+ * Applies the changes as one edit, which one undo reverts, and shows the new actions. Everything
+ * else stays where it is drawn.
+ */
 function makeActionEdit(context: EditorContext, changes: readonly DocumentChange[]): void {
   const { doc, graph } = context;
   const places = context.positions();
@@ -69,7 +71,7 @@ function makeActionEdit(context: EditorContext, changes: readonly DocumentChange
   requestAnimationFrame(() => context.view.show(fresh));
 }
 
-/** A name for a graph of these actions that is nobody's yet, and that a class could have. */
+/** Return a name for the new graph that is not taken and is valid as a C++ class. */
 function subGraphName(first: string, taken: ReadonlySet<string>): string {
   const stem = `${first.replace(/\W/g, "").replace(/^\d+/, "") || "New"}Steps`;
   for (let n = 1; ; n += 1) {
@@ -84,7 +86,7 @@ interface ExtractProps {
   onClose: () => void;
 }
 
-/** What is called something already: a graph, an action of the library or of any graph. */
+/** Return all names that are taken by graphs and by actions of the library or of any graph. */
 function useTakenNames({ graph }: EditorContext): ReadonlySet<string> {
   const { data: known = [] } = useLibrary();
   const { data: graphs = [] } = useGraphsAsActions();
@@ -94,7 +96,7 @@ function useTakenNames({ graph }: EditorContext): ReadonlySet<string> {
   }, [known, graphs, graph]);
 }
 
-/** Of the way to an action: the graph around all of it need not be told. */
+/** Return a function that keeps of a way only the action in this graph. */
 function ofGraph({ graph }: EditorContext) {
   const there = new Set(graph.actions.map(({ key }) => key));
   return (way: NonNullable<FlatteningReason["at"]>) =>
@@ -125,7 +127,10 @@ function Sides({ look: { inputs = {}, outputs = {} } }: { look: ExtractionLook }
   );
 }
 
-/** The new graph on the server, then one edit here, if what was looked at is still what there is. */
+/**
+ * Return a function that makes the new graph on the server and then edits this one, unless it has
+ * changed since the preview. It returns the reason for a failure, else null.
+ */
 function useMaking(context: EditorContext, look: ExtractionLook, again: () => Promise<unknown>) {
   const client = useQueryClient();
   const meanwhile = (changes: ExtractionLook["changes"]) =>
@@ -163,7 +168,7 @@ function Form({ look, again, ...props }: ExtractProps & Looked) {
   const differences = look.differences ?? [];
   const make = useMaking(context, look, again);
   const field = useRef<HTMLInputElement>(null);
-  // It comes when the dialog has the keyboard already.
+  // The field is rendered when the dialog has the focus already.
   useEffect(() => field.current?.select(), []);
   const submit = async () => {
     setBusy(true);
@@ -248,7 +253,7 @@ function Refused({ look, context, onClose }: ExtractProps & { look: ExtractionLo
 
 export function ExtractDialog(props: ExtractProps) {
   const { context, actions, onClose } = props;
-  // A name that nobody has, so that the look is about the actions alone.
+  // An unused name, so that the preview is only about the actions.
   const [passing] = useState(newAid);
   const { data, error, isPending, refetch } = useQuery({
     queryKey: ["graphs", context.id, "extraction", actions],
@@ -277,7 +282,7 @@ function failed(message: string): void {
   notifications.show({ color: "red", title: "Not unpacked", message, autoClose: 12_000 });
 }
 
-/** Makes the edit, unless others have changed something of the action meanwhile. */
+/** Applies the edit, unless others have changed the action meanwhile. */
 function unpack(context: EditorContext, look: UnpackingLook): void {
   const changes = look.changes ?? [];
   const changed = places(context.graph, collisionsOfActions(context.doc, changes));

@@ -1,4 +1,4 @@
-/** Keeps known what is expanded: to the canvas, which makes room, and to what draws it. */
+/** Keeps which graphs are expanded, and tells the canvas, which makes room for them. */
 import { useEffect, useMemo, useRef, useState, useSyncExternalStore } from "react";
 import { spreading } from "../canvas/folding/spread";
 import { expandedGraphs, type PartOnCard } from "../canvas/graphs-inside";
@@ -20,12 +20,12 @@ import {
 import { layoutOf } from "./level-layout";
 import { spreadOf } from "./room";
 
-/** A hierarchy in which each graph has ten of the next is soon more than anybody can look at. */
+/** More graphs than this are not expanded at once: deep hierarchies grow too fast to be looked at. */
 const MOST = 400;
 const NO_LEVELS: ReadonlyMap<Key, LevelGraph> = new Map();
 const NO_IDS: readonly string[] = [];
 
-/** All graphs of all levels, each once. */
+/** Return the ids of all expanded graphs. */
 function idsOf(levels: ReadonlyMap<Key, LevelGraph>, found = new Set<string>()): Set<string> {
   for (const level of levels.values()) {
     found.add(level.id);
@@ -34,7 +34,7 @@ function idsOf(levels: ReadonlyMap<Key, LevelGraph>, found = new Set<string>()):
   return found;
 }
 
-/** Whether the graph of a path is here. */
+/** Return whether the graph of a path is loaded. */
 function isDrawn(levels: ReadonlyMap<Key, LevelGraph>, path: string): boolean {
   const [first = "", ...rest] = path.split("/");
   const level = levels.get(first);
@@ -42,7 +42,7 @@ function isDrawn(levels: ReadonlyMap<Key, LevelGraph>, path: string): boolean {
   return isDrawn(level.levels, rest.join("/"));
 }
 
-/** Until then cards have been drawn in their new places. */
+/** ms after which the cards are rendered at their new places. */
 const SETTLED_MS = 60;
 
 const depthOf = (path: string): number => path.split("/").length;
@@ -51,12 +51,12 @@ interface ExpansionInput {
   readonly id: string;
   readonly graph: Graph;
   readonly idOf: KnownGraphs["idOf"];
-  /** What is drawn cannot be expanded: it is not the graph as it is now. */
+  /** Nothing is expanded, for example while the past is shown. */
   readonly off: boolean;
   enter(path: string): void;
 }
 
-/** The tree of what is expanded. What it needs is known only when it is there, so it grows in steps. */
+/** Return the tree of expanded graphs. It grows level by level, since each graph must be loaded first. */
 function useLevels({ id, graph, idOf, off }: ExpansionInput, expanded: ReadonlySet<string>) {
   const [ids, setIds] = useState(NO_IDS);
   const graphs = useLevelGraphs(ids);
@@ -80,7 +80,7 @@ function useLevels({ id, graph, idOf, off }: ExpansionInput, expanded: ReadonlyS
   return { levels, known };
 }
 
-/** The actions of a level and of all below it, by where they are drawn on the card of the outermost one. */
+/** Return the actions of a level and of all levels below it, with places relative to the outermost card. */
 function partsOf(level: LevelGraph | undefined, source: StateSource): PartOnCard[] {
   if (level === undefined) return [];
   const progress = progressOf(level, source);
@@ -94,7 +94,7 @@ function partsOf(level: LevelGraph | undefined, source: StateSource): PartOnCard
   });
 }
 
-/** From where states are known now: for those who ask once in a while. */
+/** Return a ref to the current sources of states, for callers outside of rendering. */
 function useStateSource() {
   const { dryRun, graph } = useEditorContext();
   const run = useSyncExternalStore(runOnCanvas.subscribe, runOnCanvas.now);
@@ -103,7 +103,7 @@ function useStateSource() {
   return source;
 }
 
-/** The graph on the canvas with graphs inside of its actions; what they say is done with it. */
+/** Manages the expanded graphs of the canvas. Returns the functions that expand and collapse them. */
 export function useExpansion(given: ExpansionInput) {
   const { id, graph, enter } = given;
   const { view } = useEditorContext();
@@ -129,7 +129,7 @@ export function useExpansion(given: ExpansionInput) {
     expandedGraphs.set(none ? null : { sizes, Frame: ExpandedCard, partsOf: known });
     spreading.set(none ? null : (standing) => spreadOf(standing, sizes));
   }, [levels, toggle, enter, source]);
-  // Once it is there and has its room, what was expanded is brought into view.
+  // Once it is loaded and has its room, the expanded graph is brought into view.
   useEffect(() => {
     const [first = ""] = shown.current?.split("/") ?? [];
     if (!levels.has(first) || !isDrawn(levels, shown.current ?? "")) return;
@@ -146,7 +146,7 @@ export function useExpansion(given: ExpansionInput) {
     },
     [],
   );
-  // Graphs further down become known one level after the other.
+  // Inner graphs become known one level after the other.
   useEffect(() => {
     if (goal === 0) return;
     const all = pathsTo(graph, goal, known, { path: "", above: [id] });

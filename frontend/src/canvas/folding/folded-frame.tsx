@@ -1,4 +1,4 @@
-/** A folded frame: one block with its title, how many actions it hides, and how these are. */
+/** A folded frame: one block with its title, the number of actions in it, and their states. */
 import { Handle, type NodeProps, Position } from "@xyflow/react";
 import { memo, use } from "react";
 import { ProblemBadge } from "../marks/problem-marks";
@@ -11,7 +11,7 @@ import { STATE_LETTER } from "../zoom-detail";
 import style from "./folded-frame.module.css";
 import { actionsWord } from "./folding";
 
-/** Arrows need something to hold on to; where they do is for the router to say. */
+/** React Flow attaches arrows to these invisible handles; the router chooses where lines really end. */
 function Ports({ direction }: Pick<FrameBlock, "direction">) {
   const right = direction === "right";
   const [into, out] = right ? [Position.Left, Position.Right] : [Position.Top, Position.Bottom];

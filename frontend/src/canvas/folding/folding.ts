@@ -22,11 +22,11 @@ import type { FoldedNode, FrameBlock, NoteNode, StateCount } from "../notes/note
 import { OUTCOMES } from "../outcome";
 
 export interface Folding {
-  /** Frames that are drawn as one block, by their keys. */
+  /** Frames that are drawn as one block, by key. */
   readonly blocks: ReadonlyMap<string, Note>;
-  /** What is not drawn, and the block that is there instead of it. */
+  /** Hidden elements, each with the block that is drawn instead. */
   readonly blockOf: ReadonlyMap<Key, string>;
-  /** Ends are always drawn: the block on which one lies, if it does. */
+  /** The block on which the entry or the exit lies; these two are never hidden. */
   readonly blockUnder: ReadonlyMap<Key, string>;
 }
 
@@ -35,7 +35,7 @@ const areaOf = ({ size: [width, height] }: Note) => width * height;
 export const framesOf = (graph: Graph): Note[] =>
   notesOf(graph).filter(({ kind }) => kind === "frame");
 
-/** How large everything is, also what has never been drawn: a hidden card was never measured. */
+/** Return the size of every element, also of hidden cards, which were never measured. */
 export function wholeSizes(graph: Graph, measured: Sizes): Sizes {
   const notes = notesOf(graph).map(
     ({ key, size: [width, height] }) => [key, { width, height }] as const,
@@ -44,8 +44,8 @@ export function wholeSizes(graph: Graph, measured: Sizes): Sizes {
 }
 
 /**
- * What is drawn otherwise because of folded frames; null when nothing is. Of a frame in a folded frame
- * nothing is drawn, so it hides nothing itself: the larger ones go first.
+ * Return what folded frames hide; null if none is folded. Larger frames come first: a frame within
+ * a folded frame is hidden, so it hides nothing itself.
  */
 export function foldingOf(
   graph: Graph,
@@ -73,7 +73,7 @@ export function foldingOf(
   return { blocks, blockOf, blockUnder };
 }
 
-/** The folded frames that have to be unfolded so that these are seen. */
+/** Return the folded frames that must be unfolded to show these elements. */
 export function hiding(
   graph: Graph,
   folded: ReadonlySet<string>,
@@ -92,7 +92,7 @@ export function hiding(
   return around.map(({ key }) => key);
 }
 
-/** Whether an arrow lies wholly in one block; an end on it is part of it. */
+/** Return whether an arrow lies within one block. The entry or exit on a block counts as part of it. */
 export function isInside({ blockOf, blockUnder }: Folding, { parent, child }: Ends): boolean {
   const of = (key: Key) => blockOf.get(key) ?? blockUnder.get(key);
   return of(parent) !== undefined && of(parent) === of(child);
@@ -100,7 +100,7 @@ export function isInside({ blockOf, blockUnder }: Folding, { parent, child }: En
 
 type Ends = Pick<Relation, "parent" | "child">;
 
-/** What counts most first: what is not known is not taken for something that goes on or is over. */
+/** Tones from the worst to the least important; `unknown` counts as neither running nor over. */
 const WORST: readonly Tone[] = [
   "error",
   "unknown",
@@ -117,7 +117,10 @@ function wordOf({ tone, word }: Progress): string {
   return word === "waits" ? "waiting" : word;
 }
 
-/** How many are in which state, the worst first; results that differ have no colour in common. */
+/**
+ * Return the number of actions in each state, the worst first. A state whose actions have different
+ * results gets a neutral tone.
+ */
 export function statesOf(progress: readonly Progress[]): StateCount[] {
   const states = new Map<string, StateCount>();
   for (const each of progress) {
@@ -129,7 +132,7 @@ export function statesOf(progress: readonly Progress[]): StateCount[] {
   return [...states.values()].sort((a, b) => WORST.indexOf(a.tone) - WORST.indexOf(b.tone));
 }
 
-/** The marks of several as one; null when nothing is wrong with any. */
+/** Return the sum of several marks; null if there are none. */
 function summed(marks: readonly ProblemMark[]): ProblemMark | null {
   if (marks.length === 0) return null;
   const sum = (kind: "wrong" | "fillIn" | "warnings") =>
@@ -143,7 +146,7 @@ function summed(marks: readonly ProblemMark[]): ProblemMark | null {
   };
 }
 
-/** What the block of a frame says of what it hides. */
+/** Return what the block of a folded frame shows of its contents. */
 function blockOfFrame(
   folding: Folding,
   frame: string,
@@ -178,7 +181,7 @@ export const actionsWord = (count: number) => (count === 1 ? "1 action" : `${cou
 const statesWord = ({ states }: FrameBlock) =>
   states.map(({ count, word }) => `${count} ${word}`).join(" · ");
 
-/** In the middle of its sides, until it is measured: where lines begin and end the router says. */
+/** Return handles in the middle of the sides, which React Flow needs until it has measured the block. */
 function portsOf(width: number, height: number, direction: Direction): NodeHandle[] {
   const right = direction === "right";
   const port = (side: Side, x: number, y: number) => ({
@@ -205,7 +208,7 @@ function foldedNode(node: NoteNode, block: FrameBlock): FoldedNode {
     ...{ id, position, width, height, selected },
     type: "folded",
     ariaLabel: `Frame, ${note.color}, folded: ${isolated(name)}. ${says}${problemMarkWords(block.mark)}`,
-    // Entry and Exit are seen on it also while it is chosen.
+    // below Entry and Exit, also while it is selected
     zIndex: 0,
     connectable: false,
     handles: portsOf(width, height, block.direction),
@@ -214,7 +217,7 @@ function foldedNode(node: NoteNode, block: FrameBlock): FoldedNode {
   };
 }
 
-/** Folded frames as blocks, and nothing of what lies in them. */
+/** Return the nodes with folded frames as blocks and without what lies in them. */
 export function foldedNodes(
   nodes: CanvasNode[],
   folding: Folding | null,
@@ -229,7 +232,7 @@ export function foldedNodes(
   });
 }
 
-/** What leads into a block or out of it ends or begins there; it stays the arrow that it is. */
+/** Lead arrows into and out of a block to the block itself; their ids stay the same. */
 export function foldedArrows(arrows: Arrow[], folding: Folding | null): Arrow[] {
   if (folding === null) return arrows;
   return arrows.flatMap((arrow): Arrow[] => {
@@ -242,7 +245,7 @@ export function foldedArrows(arrows: Arrow[], folding: Folding | null): Arrow[] 
         ...arrow,
         source: from ?? source,
         target: to ?? target,
-        // What is not seen cannot be taken and led elsewhere.
+        // The end at a hidden card cannot be dragged.
         reconnectable: from === undefined ? "source" : to === undefined ? "target" : false,
         data: { ...data, portless: from !== undefined },
       },
@@ -250,7 +253,7 @@ export function foldedArrows(arrows: Arrow[], folding: Folding | null): Arrow[] 
   });
 }
 
-/** Lines run round blocks, and through what these hide. */
+/** Return the scene with blocks as obstacles in place of the cards that they hide. */
 export function foldedScene(scene: Scene, folding: Folding | null, places: Positions): Scene {
   if (folding === null) return scene;
   const { blocks, blockOf } = folding;

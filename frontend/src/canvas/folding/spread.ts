@@ -1,4 +1,4 @@
-/** How a graph is drawn with graphs expanded in it: what is larger than in the document has room. */
+/** Spreads the drawing of a graph so that expanded cards have room, without changing the document. */
 import type { ReactFlowInstance } from "@xyflow/react";
 import { useMemo, useSyncExternalStore } from "react";
 import type { Graph, Position } from "../../graph/model";
@@ -7,37 +7,40 @@ import type { Arrow, CanvasNode } from "../elements";
 import type { Positions, Sizes } from "../geometry/arrange";
 import type { Folding } from "./folding";
 
-/** Where something is that is elsewhere in another drawing. */
+/** Maps a place in the document to its place in the drawing, or back. */
 export type PlaceMap = (at: Position) => Position;
 
 type Flow = ReactFlowInstance<CanvasNode, Arrow>;
 
-/** A graph as the document has it. */
+/** A graph with the places of the document. */
 export interface StandingGraph {
   readonly graph: Graph;
-  /** Where everything stands while nobody drags it. */
+  /** Places as they are while nothing is dragged. */
   readonly rest: Positions;
   readonly folding: Folding | null;
   readonly flow: Flow;
 }
 
-/** The same as it is drawn. The document knows nothing of that. */
+/** The same graph as it is drawn, with room for expanded cards. */
 export interface Spread {
-  /** With its waypoints and frames as they are drawn. */
+  /** The graph with its waypoints and frames as they are drawn. */
   readonly graph: Graph;
   readonly folding: Folding | null;
-  /** Of the cards that are expanded. */
+  /** Sizes of the expanded cards. */
   readonly expanded: Sizes | undefined;
-  /** Says of a place on the screen where it is in the document, and the other way round. */
+  /** A React Flow instance that converts between places on screen and places in the document. */
   readonly flow: Flow;
   readonly toView: PlaceMap;
   readonly toDocument: PlaceMap;
-  /** Where things are drawn that stand here. */
+  /** Returns the drawn places of elements with these places in the document. */
   placesOf(places: Positions): Positions;
   sizesOf(sizes: Sizes): Sizes;
 }
 
-/** One for the page. Null while nothing is expanded; it answers null where nothing is drawn otherwise. */
+/**
+ * The page has one canvas, hence one store. Null while nothing is expanded; the function returns
+ * null if nothing is drawn differently.
+ */
 export const spreading = new Watched<((standing: StandingGraph) => Spread | null) | null>(null);
 
 const same = <T>(as: T): T => as;

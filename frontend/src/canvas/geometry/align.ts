@@ -1,4 +1,4 @@
-/** Aligning and distributing: from where things stand to where they shall. Pure. */
+/** Computes the places of aligned and distributed cards. Pure. */
 import type { Key, Position } from "../../graph/model";
 import type { Positions } from "./arrange";
 
@@ -40,7 +40,7 @@ export function align(blocks: readonly Block[], how: Align): Positions {
   return new Map(blocks.map((block) => [block.key, at(block)]));
 }
 
-/** Equal gaps between neighbours; the outermost stay. */
+/** Return places with equal gaps between neighbours; the outermost cards stay. */
 export function distribute(blocks: readonly Block[], axis: "x" | "y"): Positions {
   const size = (block: Block) => (axis === "x" ? block.width : block.height);
   const middle = (block: Block) => block[axis] + size(block) / 2;

@@ -1,6 +1,6 @@
 /**
- * Where things stand: places from the graph, and others until the layout has been told of what has
- * none. At once and without a library, so that something is drawn; `layout.ts` lays out.
+ * Sizes and places of everything on the canvas. Elements without a place of their own get a simple
+ * one at once; `layout.ts` lays graphs out properly.
  */
 import {
   type Action,
@@ -22,21 +22,21 @@ export type Sizes = ReadonlyMap<Key, Size>;
 export type Positions = Map<Key, Position>;
 
 export const CARD = { width: 208, height: 104 } as const;
-/** The ends, top down: as wide as cards, so that the same x means the same middle. */
+/** Entry and exit of a graph that runs down: as wide as cards, so that equal x means equal middles. */
 const PILL = { width: 208, height: 32 } as const;
-/** The ends, left to right: as wide as they look. */
+/** Entry and exit of a graph that runs right. */
 const SHORT_PILL = { width: 84, height: 32 } as const;
-/** How many parameters a card shows at rest; in a run its state stands in the place of the last. */
+/** The number of parameters that a card shows; in a run, its state replaces the last one. */
 export const CARD_LINES = 3;
 
-/** Of what `action-card.module.css` sets, px: a card without parameters, and what they add. */
+/** Measures of `action-card.module.css`, px: heights without parameters, and what parameters add. */
 const HEIGHT = { plain: 68, low: 58, least: 88, lines: 4, line: 18 } as const;
-/** Kept free between cards that nobody has laid out. */
+/** px kept free between cards that have not been laid out. */
 const GAP = { along: 108, across: 56 } as const;
 
 export const pillSize = (direction: Direction): Size => (direction === "right" ? SHORT_PILL : PILL);
 
-/** Rows of the inputs that were asked for: of a thousand actions few change at once. */
+/** Cached numbers of rows; in a large graph few actions change at once. */
 const rowCounts = new WeakMap<Action["inputs"], number>();
 
 function rowCount(inputs: Action["inputs"]): number {
@@ -45,7 +45,7 @@ function rowCount(inputs: Action["inputs"]): number {
   return known;
 }
 
-/** How large the card of an action is: the same at rest, in a run and when it is selected. */
+/** Return the size of an action's card; it is the same at rest, in a run, and while it is selected. */
 export function cardSize({ inputs }: Pick<Action, "inputs">, direction: Direction): Size {
   const lines = Math.min(CARD_LINES - 1, rowCount(inputs));
   const text = lines === 0 ? 0 : HEIGHT.lines + lines * HEIGHT.line;
@@ -54,7 +54,7 @@ export function cardSize({ inputs }: Pick<Action, "inputs">, direction: Directio
   return { width: CARD.width, height };
 }
 
-/** How large everything will be drawn, before it is. */
+/** Return the sizes of all cards and of entry and exit before they are rendered. */
 export function estimatedSizes({ actions, direction }: Graph): Map<Key, Size> {
   return new Map<Key, Size>([
     [ENTRY, pillSize(direction)],
@@ -67,12 +67,15 @@ function sizeOf(key: Key, sizes: Sizes, direction: Direction): Size {
   return sizes.get(key) ?? (key === ENTRY || key === EXIT ? pillSize(direction) : CARD);
 }
 
-/** Everything that stands somewhere, in the order of the file. */
+/** Return the index of every element in the order of the file, from the entry to the exit. */
 export function orderOf(graph: Graph): Map<Key, number> {
   return new Map([ENTRY, ...graph.actions.map(({ key }) => key), EXIT].map((key, i) => [key, i]));
 }
 
-/** The arrows in an order that does not depend on keys, which are random. */
+/**
+ * Return the relations in the order of the file, without those of an action to itself. It does not
+ * depend on keys, which are random.
+ */
 export function relationsInOrder(graph: Graph, order = orderOf(graph)): Relation[] {
   const at = (key: Key) => order.get(key) ?? 0;
   return graph.relations
@@ -86,7 +89,10 @@ export function relationsInOrder(graph: Graph, order = orderOf(graph)): Relation
     );
 }
 
-/** What follows what, without the arrows that lead back and those into the exit. */
+/**
+ * Return the successors of each element, without arrows that lead back (into an element on the
+ * current path) and arrows to the exit.
+ */
 export function forward(graph: Graph): Map<Key, Key[]> {
   const all = new Map<Key, Key[]>([[ENTRY, []]]);
   for (const { key } of graph.actions) all.set(key, []);
@@ -119,7 +125,7 @@ export function forward(graph: Graph): Map<Key, Key[]> {
   return next;
 }
 
-/** In which rank each thing stands: behind everything that leads to it. */
+/** Return the rank of each element: greater than the ranks of all elements that lead to it. */
 export function ranksOf(graph: Graph): Map<Key, number> {
   const next = forward(graph);
   const waiting = new Map<Key, number>([...next.keys()].map((key) => [key, 0]));
@@ -142,7 +148,10 @@ export function ranksOf(graph: Graph): Map<Key, number> {
   return ranks;
 }
 
-/** Places by rank alone, each rank centred: for miniatures, and until the layout answers. */
+/**
+ * Return simple places: one row or column for each rank, centred. They serve as miniatures and
+ * until the layout is ready.
+ */
 export function arrange(
   graph: Graph,
   sizes: Sizes = estimatedSizes(graph),
@@ -182,14 +191,14 @@ function knownPlaces(graph: Graph): Positions {
   return known;
 }
 
-/** Whether no action stands anywhere: a graph to be laid out. */
+/** Return whether no action has a place, so that the graph should be laid out. */
 export function isUnplaced(graph: Graph): boolean {
   return graph.actions.length > 0 && graph.actions.every(({ position }) => position === null);
 }
 
 /**
- * Where what has no place of its own is drawn. Written down before somebody places one thing by
- * hand, so that the rest does not move. Nothing when every action has a place.
+ * Return the drawn places of elements that have none in the document; empty if every action has
+ * one. They are written before somebody moves one element, so that the others stay where they are.
  */
 export function unplaced(graph: Graph, places: ReadonlyMap<Key, Position>): [Key, Position][] {
   const loose = graph.actions.filter((action) => action.position === null);
@@ -208,9 +217,9 @@ export interface Box extends Size {
   readonly y: number;
 }
 
-const AIR = 32; // px, the least between cards
+const AIR = 32; // px, the least distance between cards
 
-/** The nearest free place from `start`, further and further across the direction. */
+/** Return the nearest free place from `start`, searching across the direction of the graph. */
 export function freeSpot(
   start: Position,
   size: Size,
@@ -233,12 +242,12 @@ export function freeSpot(
   return [Math.round(x), Math.round(y)];
 }
 
-/** The place that follows a box in the direction of the graph. */
+/** Return the place after a box in the direction of the graph. */
 export function placeAfter({ x, y, width, height }: Box, direction: Direction): Position {
   return direction === "right" ? [x + width + GAP.along, y] : [x, y + height + GAP.along];
 }
 
-/** Gives places to actions among others that stand: behind what leads to them, where it is free. */
+/** Add places for actions without one: behind the action that leads to them, where there is room. */
 function placeLoose(graph: Graph, places: Positions, sizes: Sizes): void {
   const { direction } = graph;
   const boxOf = (key: Key): Box | null => {
@@ -263,7 +272,10 @@ function placeLoose(graph: Graph, places: Positions, sizes: Sizes): void {
   }
 }
 
-/** The middle, across the direction, of what an end is tied to; before anything is, of the first. */
+/**
+ * Return the place, across the direction, at which an end is centred on the actions tied to it;
+ * without any, on the first action.
+ */
 function middle(graph: Graph, end: Key, places: Positions, sizes: Sizes): number {
   const { direction } = graph;
   const tied = graph.relations.flatMap((r) =>
@@ -285,7 +297,7 @@ function middle(graph: Graph, end: Key, places: Positions, sizes: Sizes): number
   return Math.round(mean - (direction === "right" ? pill.height : pill.width) / 2);
 }
 
-/** Where everything stands. What has a place keeps it. */
+/** Return the places of all elements; those with a place of their own keep it. */
 export function positionsOf(graph: Graph, sizes: Sizes = estimatedSizes(graph)): Positions {
   const places = knownPlaces(graph);
   if (places.size === 0) return arrange(graph, sizes);

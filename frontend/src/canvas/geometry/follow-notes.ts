@@ -1,11 +1,11 @@
-/** Where notes and frames go when everything else is laid out anew. Pure. */
+/** Moves notes and frames along when a graph is laid out again. Pure. */
 import { inFrame, type Note } from "../../graph/edit/notes";
 import type { Direction, Position } from "../../graph/model";
 import { type Box, CARD, freeSpot, type Sizes } from "./arrange";
 
 type Places = ReadonlyMap<string, Position>;
 
-/** Between a frame and what lies in it, px, at most: what is drawn generously stays so. */
+/** Bounds of the space between a frame and its contents, px; within them each frame keeps its own. */
 const MOST_AIR = 60;
 const LEAST_AIR = 24;
 
@@ -25,7 +25,7 @@ function around(boxes: readonly Box[]): [left: number, top: number, right: numbe
 
 const air = (given: number) => Math.round(Math.max(LEAST_AIR, Math.min(MOST_AIR, given)));
 
-/** A frame round what lay in it. */
+/** Return the place and size of a frame around its former contents. */
 function framed(
   frame: Note,
   inside: readonly string[],
@@ -44,7 +44,7 @@ function framed(
   return { at, size: [end[0] - at[0], end[1] - at[1]] as const };
 }
 
-/** How far the card nearest to a note has moved. */
+/** Return by how much the card nearest to a note has moved. */
 function shiftOf(note: Note, before: Places, after: Places, sizes: Sizes): Position {
   const [mx, my] = [note.at[0] + note.size[0] / 2, note.at[1] + note.size[1] / 2];
   let least = Number.POSITIVE_INFINITY;
@@ -60,7 +60,10 @@ function shiftOf(note: Note, before: Places, after: Places, sizes: Sizes): Posit
   return shift;
 }
 
-/** The new place and size of each: frames go round what lay in them, notes along with what is near. */
+/**
+ * Return the new place and size of each note: frames surround their former contents, and notes move
+ * along with the nearest card.
+ */
 export function notesAfter(
   notes: readonly Note[],
   before: Places,

@@ -1,4 +1,4 @@
-/** A graph as the layout library wants it, and its answer as places. Pure; `layout.ts` runs it. */
+/** Turns a graph into the input of elkjs, and its output into places. Pure; `layout.ts` runs it. */
 import type { ElkExtendedEdge, ElkNode, ElkPort, LayoutOptions } from "elkjs/lib/elk-api";
 import { ENTRY, EXIT, type Graph, type Key } from "../../graph/model";
 import { type Bundle, bundlesOf, pillSizeOf } from "../arrows/bundles";
@@ -16,17 +16,20 @@ import {
   type Sizes,
 } from "./arrange";
 
-/** Between rows; columns are a pill and `LAYERS` apart. */
+/** px between rows; between columns there are LAYERS px and a pill. */
 const ROWS = 44;
 const LAYERS = 40;
-/** Above this many the thorough placement takes too long, and so do lines that only hold the ends. */
+/**
+ * With more actions than this, the thorough placement and the edges that only hold entry and exit
+ * take too long.
+ */
 const THOROUGH = 90;
-/** What would be longer than this, px, is wrapped: five cards in a row are not. */
+/** px; longer graphs are wrapped. Five cards in a row are not longer. */
 const LONGEST = { right: 1_850, down: 1_250 } as const;
-/** As wide as it shall be when it is wrapped, as a part of its height. */
+/** The width of a wrapped graph relative to its height. */
 const ASPECT = 1.5;
 
-/** Between ports, px. */
+/** px between ports. */
 const APART = 4;
 
 const OPTIONS: LayoutOptions = {
@@ -34,7 +37,7 @@ const OPTIONS: LayoutOptions = {
   "elk.edgeRouting": "ORTHOGONAL",
   "elk.separateConnectedComponents": "false",
   "elk.layered.feedbackEdges": "true",
-  // GREEDY turns loops round: what leads back would lead on.
+  // GREEDY reverses loops, so that arrows back would lead forward.
   "elk.layered.cycleBreaking.strategy": "DEPTH_FIRST",
   "elk.layered.considerModelOrder.strategy": "NODES_AND_EDGES",
   "elk.layered.nodePlacement.favorStraightEdges": "true",
@@ -47,7 +50,7 @@ const OPTIONS: LayoutOptions = {
   "elk.spacing.portPort": String(APART),
 };
 
-/** Pairs that hold the entry before everything and the exit behind: nothing is drawn of them. */
+/** Return pairs of elements to connect invisibly, so that the entry comes first and the exit last. */
 function holds(graph: Graph, tied: ReadonlySet<Key>): [Key, Key][] {
   const next = forward(graph);
   const led = new Set([...next.values()].flat());
@@ -61,12 +64,12 @@ function holds(graph: Graph, tied: ReadonlySet<Key>): [Key, Key][] {
 }
 
 /**
- * px before a pill and behind it that its line needs to be free to turn, with what the grid of lines
- * may take away on both sides: less, and pills that have no room beside their cards stand elsewhere.
+ * px before and behind a pill in which its line can turn, plus what the grid of lines may take on
+ * both sides. With less, pills would not fit beside their cards.
  */
 const BESIDE_PILL = 24;
 
-/** The port of a bundle is as large as its pill, so that there is room for that before any bend. */
+/** Return the size of a bundle's port: that of its pill, which then has room before the first bend. */
 function portSize(bundle: Bundle, right: boolean): Size {
   const pill = pillSizeOf(bundle, false);
   if (pill === null) return { width: 1, height: 1 };
@@ -77,8 +80,9 @@ function portSize(bundle: Bundle, right: boolean): Size {
 const POINT: Size = { width: 1, height: 1 };
 
 /**
- * The port at which a line arrives is as wide across as the one that it left, where all have room:
- * both sides of a card are divided alike then, and cards one after the other stand level.
+ * Return a function for the size of the port at which a line arrives. Where there is room it is as
+ * wide as the port that the line left: then both sides of a card are divided alike, and successive
+ * cards stand level.
  */
 function arrivalSizes(lines: readonly Bundle[], sizes: Sizes, right: boolean) {
   const across = (line: Bundle): Size => {
@@ -96,7 +100,7 @@ function arrivalSizes(lines: readonly Bundle[], sizes: Sizes, right: boolean) {
   };
 }
 
-/** About how long it becomes in one piece, px. */
+/** Estimate the length of a graph that is not wrapped, px. */
 function lengthOf(graph: Graph, sizes: Sizes): number {
   const right = graph.direction === "right";
   const deepest: number[] = [];
@@ -123,16 +127,16 @@ function optionsFor(graph: Graph, sizes: Sizes): LayoutOptions {
 
 export interface LayoutRequest {
   readonly root: ElkNode;
-  /** The keys of its nodes, by their ids. */
+  /** Keys of the nodes by their ids. */
   readonly keys: ReadonlyMap<string, Key>;
-  /** What no arrow leads to or from stands in rows of its own below. */
+  /** Elements without arrows, which get rows of their own below. */
   readonly loose: readonly Key[];
-  /** What they need with the pills of lines that lead back to themselves. */
+  /** Sizes of cards including the pills of arrows that lead back to the same card. */
   readonly room: Sizes;
   readonly sizes: Sizes;
 }
 
-/** What the library is asked. Equal graphs ask the same, whatever their keys are. */
+/** Return the input of elkjs. Equal graphs give equal inputs, whatever their keys are. */
 export function layoutRequest(graph: Graph, measured: Sizes): LayoutRequest {
   const sizes = new Map([...estimatedSizes(graph), ...measured]);
   for (const end of [ENTRY, EXIT]) {
@@ -154,7 +158,7 @@ export function layoutRequest(graph: Graph, measured: Sizes): LayoutRequest {
     port(line.target, `i${i}`, arrivals(line), right ? "WEST" : "NORTH");
     return { id: `e${i}`, sources: [`o${i}`], targets: [`i${i}`] };
   });
-  // The library draws no line from a card to itself: it keeps the room for its pills.
+  // elkjs draws no arrow from a card to itself: a port keeps the room for its pill.
   const loops = loopsIn(graph);
   for (const [i, line] of loops.entries())
     port(line.source, `l${i}`, portSize(line, right), right ? "EAST" : "SOUTH");
@@ -197,7 +201,7 @@ export function layoutRequest(graph: Graph, measured: Sizes): LayoutRequest {
 const loopsIn = (graph: Graph): Bundle[] =>
   graph.relations.filter(({ parent, child }) => parent === child).flatMap(bundlesOf);
 
-/** Sizes of cards with the pills of lines that lead from them to themselves. */
+/** Return the sizes of cards including the pills of arrows that lead back to the same card. */
 function withLoops(sizes: Sizes, loops: readonly Bundle[], right: boolean): Sizes {
   const room = new Map(sizes);
   for (const line of loops) {
@@ -211,7 +215,7 @@ function withLoops(sizes: Sizes, loops: readonly Bundle[], right: boolean): Size
   return room;
 }
 
-/** The places in an answer. The entry of a new graph stands at 0, 0 or near it. */
+/** Return the places in the output of elkjs. The entry of a new graph gets a place near 0, 0. */
 export function placesIn({ keys, loose, room }: LayoutRequest, answer: ElkNode): Positions {
   const places: Positions = new Map();
   const boxes = (answer.children ?? []).flatMap(({ id, x = 0, y = 0, width = 0, height = 0 }) => {
@@ -239,7 +243,7 @@ export function placesIn({ keys, loose, room }: LayoutRequest, answer: ElkNode):
   return places;
 }
 
-/** The same in one piece; null when it is. */
+/** Return the input without wrapping; null if it has none. */
 export function withoutWrapping(root: ElkNode): ElkNode | null {
   const { "elk.layered.wrapping.strategy": wrapping, ...layoutOptions } = root.layoutOptions ?? {};
   return wrapping === undefined ? null : { ...root, layoutOptions };

@@ -11,7 +11,7 @@ import {
   type Sizes,
 } from "./arrange";
 
-/** The person did not want to wait for it. */
+/** The layout was cancelled. */
 export class LayoutLeft extends Error {}
 
 interface Running {
@@ -29,7 +29,7 @@ async function begin(): Promise<Running> {
       import("./layout-graph"),
     ]);
   const elk = new Elk({ workerFactory: () => new Worker(url) });
-  /** Of what this library cannot wrap it makes one piece. */
+  /** Lays out without wrapping where elkjs fails to wrap. */
   const askTwice = async (root: ElkNode): Promise<ElkNode> => {
     try {
       return await elk.layout(root);
@@ -48,14 +48,17 @@ async function begin(): Promise<Running> {
   };
 }
 
-/** Fresh places for everything, in the direction of the graph. Rejects with `LayoutLeft` when left. */
+/**
+ * Return new places for everything, in the direction of the graph. Rejects with `LayoutLeft` when
+ * it is cancelled.
+ */
 export async function layOut(graph: Graph, sizes: Sizes, signal?: AbortSignal): Promise<Positions> {
   begun ??= begin();
   const mine = begun;
   let leave = () => {};
   const left = new Promise<never>((_, reject) => {
     leave = () => {
-      // Nothing but its end stops a worker that computes.
+      // A worker that computes can only be stopped by ending it.
       if (begun === mine) begun = null;
       void mine.then((running) => running.end()).catch(() => {});
       reject(new LayoutLeft());
@@ -64,7 +67,7 @@ export async function layOut(graph: Graph, sizes: Sizes, signal?: AbortSignal): 
   });
   if (signal?.aborted) leave();
   const answered = mine.then(({ place }) => place(graph, sizes));
-  // A worker that could not be loaded is asked for again the next time.
+  // A worker that could not be loaded is loaded again the next time.
   mine.catch(() => {
     if (begun === mine) begun = null;
   });
@@ -78,14 +81,17 @@ export async function layOut(graph: Graph, sizes: Sizes, signal?: AbortSignal): 
 interface LaidOut {
   readonly graph: Graph;
   readonly places: Positions;
-  /** Shown until the layout answers. */
+  /** A simple layout, shown until the final one is ready. */
   readonly plain: boolean;
 }
 
-/** Whoever waits longer for the layout sees a plain one meanwhile. */
+/** Time after which a simple layout is shown while the final one is being computed. */
 export const LAYOUT_PATIENCE_MS = 400;
 
-/** Null for a moment, while the layout is being computed. */
+/**
+ * Return the places of a read-only graph: its own, or those of the layout; null while nothing can
+ * be drawn yet.
+ */
 export function useLaidOut(graph: Graph): LaidOut | null {
   const [answer, setAnswer] = useState<LaidOut | null>(null);
   const loose = isUnplaced(graph);

@@ -1,4 +1,4 @@
-/** Viewports of the canvas (offset and zoom) that keep text readable. Pure. */
+/** Computes viewports (offset and zoom) in which text stays readable. Pure. */
 import type { Direction, Position } from "../../graph/model";
 import type { Positions, Sizes } from "./arrange";
 import { CARD } from "./arrange";
@@ -10,14 +10,14 @@ export interface Bounds {
   readonly height: number;
 }
 
-/** The canvas' offset in px, and its zoom. */
+/** The offset of the canvas in px, and its zoom. */
 export interface Viewport {
   readonly x: number;
   readonly y: number;
   readonly zoom: number;
 }
 
-/** What lies over the canvas at its edges, px on screen. */
+/** px on screen that bars and drawers cover at each edge of the canvas. */
 export interface Insets {
   readonly left: number;
   readonly top: number;
@@ -28,18 +28,18 @@ export interface Insets {
 export interface CanvasArea {
   readonly width: number;
   readonly height: number;
-  /** What bars and drawers cover of it; the tools, where nothing is said. */
+  /** The covered edges; without it only the tools at the bottom. */
   readonly covered?: Insets;
 }
 
-/** Kept free round what is shown, px on screen. */
+/** px on screen kept free around what is shown. */
 const AIR = 28;
 const TOOLS: Insets = { left: 0, top: 0, right: 0, bottom: 44 };
-/** From this zoom on all text on cards is at least 11 px on a desktop (9 px of names on a phone). */
+/** The least zoom at which all text on cards has at least 11 px on a desktop, and names 9 px on a phone. */
 export const READABLE = { desktop: 0.9, phone: 0.6 } as const;
 const LEAST = 0.08;
 
-/** What is left for the graph. */
+/** Return the part of the canvas that nothing covers. */
 function freeOf({ width, height, covered = TOOLS }: CanvasArea): Bounds {
   const { left, top, right, bottom } = covered;
   return {
@@ -50,7 +50,7 @@ function freeOf({ width, height, covered = TOOLS }: CanvasArea): Bounds {
   };
 }
 
-/** The box round everything that stands somewhere, and round points; null while nothing stands. */
+/** Return the box around all places and points; null if there are no places. */
 export function boundsOf(
   places: Positions,
   sizes: Sizes,
@@ -80,7 +80,7 @@ function zoomFor(box: Bounds, free: Bounds): number {
   return Math.max(LEAST, Math.min(1, across, down));
 }
 
-/** All of it, however small that is. */
+/** Return the viewport that shows the whole box, however small it becomes. */
 export function wholeViewport(box: Bounds, room: CanvasArea): Viewport {
   const free = freeOf(room);
   const zoom = zoomFor(box, free);
@@ -91,7 +91,7 @@ export function wholeViewport(box: Bounds, room: CanvasArea): Viewport {
   };
 }
 
-/** The offset of one axis: the middle where all fits, else as near to `goal` as the edges allow. */
+/** Return the offset of one axis: centred if everything fits, else as near to `goal` as the edges allow. */
 function offset(
   [from, size]: readonly [number, number],
   [start, length]: readonly [number, number],
@@ -104,8 +104,8 @@ function offset(
 }
 
 /**
- * The view on opening: all of it where it can be read so, else its beginning at the smallest
- * readable zoom, with the entry (its middle) in view.
+ * Return the viewport of a graph that has just opened: all of it if that is readable, else its
+ * start at the least readable zoom with `entry` (the middle of the entry) in view.
  */
 export function firstViewport(
   box: Bounds,
@@ -122,7 +122,7 @@ export function firstViewport(
   return { x, y, zoom: least };
 }
 
-/** The nearest view, at the same zoom, that shows a box; null when it is in view already. */
+/** Return the nearest viewport of the same zoom that shows a box; null if the box is visible already. */
 export function viewportShowing(box: Bounds, room: CanvasArea, now: Viewport): Viewport | null {
   const { left, top, right, bottom } = room.covered ?? TOOLS;
   const across = [left, room.width - right] as const;
@@ -132,7 +132,7 @@ export function viewportShowing(box: Bounds, room: CanvasArea, now: Viewport): V
   return dx === 0 && dy === 0 ? null : { x: now.x + dx, y: now.y + dy, zoom: now.zoom };
 }
 
-/** How far a stretch has to move to lie within another; with some air if it has to at all. */
+/** Return by how much a stretch must move to lie within another; 0 if it does already. */
 function shift(from: number, size: number, [start, end]: readonly [number, number]): number {
   if (from >= start && from + size <= end) return 0;
   const free = Math.max(0, end - start - size);
@@ -140,15 +140,15 @@ function shift(from: number, size: number, [start, end]: readonly [number, numbe
   return (from < start ? start + air : start + free - air) - from;
 }
 
-const AROUND = 44; // px kept round what is brought into view
+const AROUND = 44; // px kept around what is brought into view
 
-/** Whether a box can be shown whole at a zoom. */
+/** Return whether a whole box can be visible at a zoom. */
 export function fitsAt(box: Bounds, room: CanvasArea, zoom: number): boolean {
   const free = freeOf(room);
   return box.width * zoom <= free.width && box.height * zoom <= free.height;
 }
 
-/** The same view, but for what nobody can see. */
+/** Return whether two viewports differ by less than can be seen. */
 export function isSameViewport(a: Viewport, b: Viewport): boolean {
   const near = (x: number, y: number) => Math.abs(x - y) < 2;
   return near(a.x, b.x) && near(a.y, b.y) && Math.abs(a.zoom - b.zoom) < 0.005;

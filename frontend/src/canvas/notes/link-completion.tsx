@@ -1,4 +1,4 @@
-/** Names of actions offered below a field while a link is being written in it: after `[[`. */
+/** Completes links in notes: offers names of actions below the field after `[[` is typed. */
 import { Portal } from "@mantine/core";
 import { type RefObject, use, useEffect, useId, useMemo, useRef, useState } from "react";
 import { linkText, type OpenLink, openLink } from "../../graph/note-links";
@@ -9,15 +9,15 @@ import { NoteLinksContext } from "./note-buttons";
 
 const MOST = 50; // options
 const GAP = 4; // px
-const LOW = 240; // px: with less room below, the list stands above
+const LOW = 240; // px; with less room below the field, the list opens above it
 
-/** What is offered, and which of it is chosen. */
+/** The open list of names, and the index of the selected one. */
 interface Offer extends OpenLink {
   readonly options: ReturnType<typeof matching>;
   readonly chosen: number;
 }
 
-/** Writes the link as if it had been typed, so that the field hears of it. */
+/** Inserts a link as if it had been typed, so that the field gets an input event. */
 function write(field: HTMLTextAreaElement, { at }: OpenLink, name: string): void {
   const caret = field.selectionEnd;
   const link = linkText(field.value, caret, name);
@@ -27,13 +27,13 @@ function write(field: HTMLTextAreaElement, { at }: OpenLink, name: string): void
   field.dispatchEvent(new Event("input", { bubbles: true }));
 }
 
-/** The offer with another option chosen: round at both ends. */
+/** Return the list with the selection moved; it wraps around at both ends. */
 function turned(offer: Offer, by: number): Offer {
   const count = offer.options.length;
   return { ...offer, chosen: (offer.chosen + by + count) % count };
 }
 
-/** Which keys the list takes from its field: Escape closes it alone. */
+/** Handles the keys of the list before the field gets them; Escape closes only the list. */
 function useKeys(
   field: RefObject<HTMLTextAreaElement | null>,
   offer: Offer | null,
@@ -56,14 +56,14 @@ function useKeys(
         take(offer.options[offer.chosen]?.id);
       } else return;
       event.preventDefault();
-      event.stopPropagation(); // the note would be left, the draft thrown away
+      event.stopPropagation(); // the field would end the editing and discard the text
     };
     area.addEventListener("keydown", onKey);
     return () => area.removeEventListener("keydown", onKey);
   }, [field]);
 }
 
-/** What is offered follows what is typed; where the caret goes elsewhere, it ends. */
+/** Opens and closes the list as the text changes; it closes when the caret moves elsewhere. */
 function useOffer(field: RefObject<HTMLTextAreaElement | null>) {
   const links = use(NoteLinksContext);
   const [offer, setOffer] = useState<Offer | null>(null);
@@ -92,7 +92,7 @@ function useOffer(field: RefObject<HTMLTextAreaElement | null>) {
       if (link?.at !== offer.at || link.typed !== offer.typed) setOffer(null);
     };
     const onBlur = () => setOffer(null);
-    if (document.activeElement === area) onInput(); // who writes was quicker than this code came
+    if (document.activeElement === area) onInput(); // the person may have typed before this module was loaded
     area.addEventListener("input", onInput);
     area.addEventListener("blur", onBlur);
     document.addEventListener("selectionchange", onCaret);
@@ -106,8 +106,8 @@ function useOffer(field: RefObject<HTMLTextAreaElement | null>) {
 }
 
 /**
- * A field of several lines cannot have the role of a combobox: it stays a text field, and says by its
- * other attributes what of the list is chosen.
+ * Tells screen readers which name is selected. A field of several lines cannot have the role of a
+ * combobox, so it keeps its role and gets the attributes.
  */
 function useSaid(field: RefObject<HTMLTextAreaElement | null>, id: string, offer: Offer | null) {
   const chosen = offer === null ? null : optionId(id, offer.chosen);
@@ -126,7 +126,7 @@ function useSaid(field: RefObject<HTMLTextAreaElement | null>, id: string, offer
   }, [field, id, chosen]);
 }
 
-/** Below the field, or above it where there is little room below. On screen, px. */
+/** Return the place of the list in px on screen: below the field, or above it where there is more room. */
 function placeAt(field: HTMLTextAreaElement): React.CSSProperties {
   const { left, top, bottom } = field.getBoundingClientRect();
   const height = window.visualViewport?.height ?? window.innerHeight;

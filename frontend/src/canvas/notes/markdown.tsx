@@ -1,8 +1,8 @@
 /**
- * Markdown of notes as elements: never as HTML, so that a text can only become what stands here.
+ * Renders the Markdown of notes as React elements, never as HTML.
  *
- * Loaded when the first note is shown. What a note says comes from whoever wrote the graph: raw HTML is
- * text, pictures are their words, and only addresses of the web and of mail are links.
+ * It is loaded when the first note is shown. Notes may come from strangers: raw HTML stays text,
+ * images become their alternative text, and only web and mail addresses become links.
  */
 import type { Nodes } from "mdast";
 import { fromMarkdown } from "mdast-util-from-markdown";
@@ -11,16 +11,16 @@ import { linkPieces } from "../../graph/note-links";
 import { ActionLink } from "./note-buttons";
 import style from "./note-text.module.css";
 
-/** Where a note was plain text before, spaces at the start of a line are no code. */
+/** Indented lines stay text, since notes were plain text before. */
 const OPTIONS = {
   extensions: [{ disable: { null: ["htmlFlow", "htmlText", "codeIndented", "setextUnderline"] } }],
 };
-/** Nobody writes that, and a thousand lists in each other would take seconds to read. */
+/** Texts with deeper nesting take seconds to parse, and are shown as plain text. */
 const TOO_DEEP = /^[ \t]*(?:(?:>|(?:[-+*]|\d{1,9}[.)])[ \t])[ \t]*){20}/m;
-const DEEPEST = 12; // lists and quotations in each other
+const DEEPEST = 12; // levels of lists and quotations that are rendered
 const ADDRESS = /https?:\/\/[^\s<>"'[\]]*[^\s<>"'[\].,;:!?)]/g;
 
-/** An address that may be opened; null for scripts, files, and what is none. */
+/** Return the normalized address if it may be opened (http, https or mailto), else null. */
 export function safeAddress(address: string): string | null {
   try {
     const { protocol, href } = new URL(address);
@@ -40,7 +40,7 @@ function OutsideLink({ to, children }: { to: string; children: ReactNode }) {
   );
 }
 
-/** Words with the addresses in them. */
+/** Return a text with its web addresses as links. */
 function addressed(text: string): ReactNode[] {
   const parts: ReactNode[] = [];
   let end = 0;
@@ -84,7 +84,7 @@ function Part({ node, around }: { node: Nodes; around: Around }): ReactNode {
     case "paragraph":
       return <p>{all(node.children, around)}</p>;
     case "heading":
-      // Not a heading of the page: those have an order of their own.
+      // no heading element: headings of the page have an order of their own
       return <p data-heading={node.depth}>{all(node.children, around)}</p>;
     case "strong":
       return <strong>{all(node.children, around)}</strong>;

@@ -8,12 +8,12 @@ import type { NoteLink } from "../../graph/note-links";
 import { isolated } from "../../words/isolated";
 import style from "./note-text.module.css";
 
-/** Where links lead. Without it they are words. */
+/** Resolves links in notes; without it links are shown as text. */
 export interface NoteLinks {
-  /** What the action is called now; null when there is none. */
+  /** Returns the action of a link with its current name; null if there is none. */
   target(link: NoteLink): { readonly key: Key; readonly label: string } | null;
   open(key: Key): void;
-  /** The names that a link can have. */
+  /** Returns the names that a link can have. */
   names(): readonly string[];
 }
 
@@ -36,7 +36,7 @@ export function ActionLink({ link }: { link: NoteLink }) {
       className={`${style.link} nodrag`}
       title={`Show ${isolated(target.label)}`}
       onClick={(event) => {
-        event.stopPropagation(); // else the note would be chosen
+        event.stopPropagation(); // else the click would select the note
         links.open(target.key);
       }}
       onDoubleClick={(event) => event.stopPropagation()}
@@ -46,7 +46,7 @@ export function ActionLink({ link }: { link: NoteLink }) {
   );
 }
 
-/** How frames are folded; without it they are shown as they are. */
+/** Folds or unfolds a frame; without it frames have no button for that. */
 type FoldFrame = (key: string, folded: boolean) => void;
 
 export const FoldFrameContext = createContext<FoldFrame | null>(null);
@@ -63,7 +63,7 @@ export function FoldButton({ note, folded }: { note: Note; folded: boolean }) {
       aria-expanded={!folded}
       title={folded ? "Unfold" : "Fold"}
       onClick={(event) => {
-        event.stopPropagation(); // the frame is chosen by what comes of it
+        event.stopPropagation(); // else the click would select the frame
         fold(note.key, !folded);
       }}
       onDoubleClick={(event) => event.stopPropagation()}

@@ -1,4 +1,4 @@
-/** A note or a frame on the canvas: Markdown edited as text, a colour with a name, edges to drag. */
+/** A note or a frame on the canvas, with its text field, colours, and edges to resize it. */
 import { ActionIcon } from "@mantine/core";
 import { IconTrash } from "@tabler/icons-react";
 import { type NodeProps, NodeResizer, NodeToolbar, Position } from "@xyflow/react";
@@ -14,16 +14,16 @@ import type { NoteNode } from "./note-nodes";
 import { noteColor } from "./note-nodes";
 import { LinkNames, NoteText } from "./note-text";
 
-/** How notes are changed; without one they are only shown. */
+/** Functions that change notes; without them notes are read-only. */
 export interface NoteEditing {
-  /** The note whose text is being written. */
+  /** The key of the note whose text is being edited. */
   readonly editing: string | null;
-  /** The only thing that is chosen. */
+  /** The key of the only selected element. */
   readonly alone: string | null;
   edit(key: string | null): void;
-  /** Returns false when the note is gone. */
+  /** Changes a note. Returns false if it no longer exists. */
   change(key: string, change: Partial<NewNote>): boolean;
-  /** While its edges are dragged, and `null` when that ends. */
+  /** Called while the edges of a note are dragged, and with null when that ends. */
   resizing(note: Note | null): void;
   remove(key: string): void;
 }
@@ -76,7 +76,7 @@ export function NoteField({ note, notes }: { note: Note; notes: NoteEditing }) {
 interface ToolsProps {
   note: Note;
   notes: NoteEditing;
-  /** What stands above it and shall not be covered, px. */
+  /** px above the note that its tools must not cover. */
   above?: number;
 }
 

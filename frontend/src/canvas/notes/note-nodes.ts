@@ -19,19 +19,19 @@ export const noteColor: Readonly<Record<NoteColor, string>> = {
 
 export type NoteNode = Node<{ note: Note }, "note">;
 
-/** How many actions are in a state. */
+/** The number of actions in one state. */
 export interface StateCount {
   readonly word: string;
   readonly tone: Tone;
   readonly count: number;
 }
 
-/** What a folded frame says of what lies in it. */
+/** What the block of a folded frame shows of the frame's contents. */
 export interface FrameBlock {
   readonly actions: number;
-  /** The worst first; empty where nothing runs or ran. */
+  /** The worst state first; empty if nothing has run. */
   readonly states: readonly StateCount[];
-  /** That of the worst state. */
+  /** The tone of the worst state. */
   readonly tone: Tone | null;
   readonly mark: (ProblemCounts & { readonly reasons: string }) | null;
   readonly direction: Direction;
@@ -59,7 +59,8 @@ function nodeOf(given: Note, { places, selected, measured, resized }: Options): 
     width: note.size[0],
     height: note.size[1],
     selected: selected.has(note.key),
-    // A frame lies behind cards. Only its title takes the pointer, also where an arrow runs below it.
+    // A frame lies behind cards. Only its title receives the pointer, also where an arrow runs
+    // below it.
     zIndex: !frame && selected.has(note.key) ? 1 : 0,
     ...(frame ? { dragHandle: "[data-title]", style: { pointerEvents: "none" } } : {}),
     connectable: false,
@@ -68,7 +69,10 @@ function nodeOf(given: Note, { places, selected, measured, resized }: Options): 
   };
 }
 
-/** Frames go before everything else and notes after it, so that Tab comes to them in that order. */
+/**
+ * Return the nodes of frames and notes. Frames come before all other nodes and notes after them,
+ * which is the order of the Tab key.
+ */
 export function noteNodes(graph: Graph, options: Options) {
   const nodes = notesOf(graph).map((note) => nodeOf(note, options));
   return {

@@ -10,7 +10,7 @@ const PLAIN = /^[^*_`#[\]<>\\~|&!\n-]*$/;
 const LISTED = /^\s*(?:[-+*]|\d{1,9}[.)])\s/m;
 const ADDRESSED = /https?:/;
 
-/** Whether there is anything in it but words: most notes are a line or two. */
+/** Return whether a text may contain Markdown; most notes are a line or two of plain words. */
 export function isMarkedUp(text: string): boolean {
   return !PLAIN.test(text) || LISTED.test(text) || ADDRESSED.test(text);
 }

@@ -1,4 +1,4 @@
-/** The canvas on which a graph is drawn. */
+/** The canvas on which a graph is edited. */
 import { Button } from "@mantine/core";
 import { useMediaQuery } from "@mantine/hooks";
 import {
@@ -47,7 +47,7 @@ import { usePinch, ZOOM } from "./use-pinch";
 
 const GraphMap = lazyPart(() => import("./graph-map").then((part) => part.GraphMap));
 
-// What React Flow gets anew, it hands on to all that is drawn.
+// Constants, since React Flow renders everything again when it gets a new object.
 const SNAP_GRID: [number, number] = [GRID, GRID];
 const OTHER_BUTTONS = [1, 2];
 const MORE_KEYS = ["Shift", "Meta", "Control"];
@@ -59,17 +59,17 @@ interface Props {
   context: EditorContext;
   canvas: ReturnType<typeof useCanvasElements>;
   me: string;
-  /** There is room for a map. */
+  /** Whether there is room for a map. */
   map: boolean;
-  /** The person has moved the view. */
+  /** Called when the person has moved the view. */
   onPanned: () => void;
-  /** Where the pointer rests, for those who want to know. */
+  /** The place of the pointer on screen; null outside of the canvas. */
   pointer: RefObject<Position | null>;
-  /** The note whose text is being written. */
+  /** The key of the note whose text is being edited. */
   writing: string | null;
 }
 
-/** What to do next after an outcome was tapped. */
+/** Tells what to tap next after an outcome was tapped. */
 function PendingHint({
   context,
   pending,
@@ -95,7 +95,10 @@ function PendingHint({
   );
 }
 
-/** The box of a note in the document that is drawn as this one. */
+/**
+ * Return the place and size in the document of a note that is drawn at a place; empty if the change
+ * has none.
+ */
 function boxIn({ at, size }: Parameters<NoteEditing["change"]>[1], toDocument: PlaceMap) {
   if (!at || !size) return {};
   const [from, to] = [toDocument(at), toDocument([at[0] + size[0], at[1] + size[1]])];
@@ -103,7 +106,7 @@ function boxIn({ at, size }: Parameters<NoteEditing["change"]>[1], toDocument: P
   return { at: whole(from), size: whole([to[0] - from[0], to[1] - from[1]]) };
 }
 
-/** How notes are changed from the canvas itself. */
+/** Return the functions that edit notes on the canvas; null if the person may not edit. */
 function useNoteEditing(
   context: EditorContext,
   writing: string | null,
@@ -134,7 +137,10 @@ function useNoteEditing(
   }, [doc, change, open, select, mayEdit, writing, alone, setResized]);
 }
 
-/** What hands do on the canvas: functions that stay the same, since each card and arrow has them. */
+/**
+ * Return the event handlers of the canvas. They keep their identity, since every card and arrow
+ * gets them.
+ */
 function useHands(
   { context, canvas, onPanned }: Pick<Props, "context" | "canvas" | "onPanned">,
   connecting: ReturnType<typeof useConnecting>,
@@ -171,14 +177,14 @@ function useHands(
     onPaneClick: useStableCallback((event: MouseEvent) => {
       if (!connecting.onClick(event)) context.select([]);
     }),
-    // A move without an event is the page's own.
+    // A move without an event was made by the page.
     onMoveStart: useStableCallback((event: Event | null) => {
       if (event !== null) onPanned();
     }),
   };
 }
 
-/** What is carried from a list can be dropped on the canvas, also into an arrow. */
+/** Adds an action that is dropped from a list, also into the arrow below the pointer. */
 function useDroppedActions(
   context: EditorContext,
   { flow, setOver }: Props["canvas"],
@@ -202,7 +208,7 @@ function useDroppedActions(
       }),
     [flow, context, frame],
   );
-  // What is carried over an arrow goes into it.
+  // Highlights the arrow into which the dragged action would be inserted.
   useEffect(
     () =>
       actionDrag.subscribe(() => {
@@ -213,7 +219,7 @@ function useDroppedActions(
   );
 }
 
-/** What is drawn, and how it answers to hands. */
+/** Renders the graph with React Flow. */
 function Drawing({
   context,
   canvas,
@@ -221,7 +227,7 @@ function Drawing({
   map,
   hands,
 }: Pick<Props, "context" | "canvas" | "me" | "map"> & { hands: ReturnType<typeof useHands> }) {
-  // A finger has one button: it moves the view or draws a marquee.
+  // On touch screens one finger either moves the view or draws a marquee.
   const coarse = useMediaQuery("(pointer: coarse)") ?? false;
   return (
     <ReactFlow<CanvasNode, Arrow>
@@ -321,7 +327,8 @@ export function EditableCanvas({ context, canvas, me, map, onPanned, pointer, wr
       onPointerDownCapture={(event) => {
         press.onPointerDownCapture(event);
         pinch.down(event);
-        // Under fingers there is no Shift: in the select mode each tap adds or takes away.
+        // Touch has no Shift key: with the tool Select, each tap adds to the selection or removes
+        // from it.
         if (event.pointerType !== "mouse" && context.tool === "select")
           store.setState({ multiSelectionActive: true });
       }}

@@ -12,15 +12,16 @@ import type { Progress } from "../../status/progress";
 
 const css = ({ x, y, zoom }: Viewport) => `translate(${x}px, ${y}px) scale(${zoom})`;
 
-/** What is seen of an element now, in the middle of a glide, too. */
+/** Return the offset and zoom at which an element is seen now, also during an animation. */
 function visibleTransform(element: Element): Viewport {
   const { a, e, f } = new DOMMatrixReadOnly(getComputedStyle(element).transform);
   return { x: e, y: f, zoom: a };
 }
 
 /**
- * Shows `next`, at the zoom of now, by a glide of so many ms; at once for 0. Whoever takes hold of
- * the canvas meanwhile, by a press or a wheel, holds what is under the pointer.
+ * Moves the view to `next`, at the same zoom, by an animation of `ms`; 0 moves at once. A press or
+ * a wheel event during the animation stops it where it is. The browser plays it alone, without the
+ * page.
  */
 function glideTo(
   flow: ReactFlowInstance<CanvasNode, Arrow>,
@@ -37,7 +38,8 @@ function glideTo(
   void flow.setViewport(next);
   const timing = { duration: ms, easing: "ease-in-out" };
   const moves = [sheet.animate([{ transform: css(before) }, { transform: css(next) }], timing)];
-  // The dots are alike: less than one step of them looks like all of the way.
+  // All dots of the background look alike: moving by less than one grid step looks like the whole
+  // way.
   const dots = room.querySelector(".react-flow__background");
   const rest = (way: number) => way % (GRID * next.zoom);
   const from = `translate(${rest(before.x - next.x)}px, ${rest(before.y - next.y)}px)`;
@@ -59,15 +61,18 @@ interface FrameRoom {
   readonly height: number;
 }
 
-/** Of the frame: what runs within is left where it is. */
+/** Margins, as part of the frame; what runs within them is left where it is. */
 const CALM = 0.12;
-/** Where what runs comes to stand: graphs go on to the right and down, and the view shall rest there. */
+/**
+ * The place of the running action in the frame after a move: graphs continue to the right and down,
+ * so the view rests longer there.
+ */
 const AIM = { x: 0.26, y: 0.36 };
 const GLIDE = 400; // ms
-/** What counts as standing at an edge: the view that was aimed at may be off by a rounding. */
+/** Tolerance for the edges: a viewport may be off by rounding. */
 const SLACK = 0.5; // px
 
-/** The actions that run, the latest first; what lies in a folded frame is where its block is. */
+/** Return the running actions, the latest first. Actions in a folded frame are replaced by its block. */
 export function runningKeys(
   progress: ReadonlyMap<Key, Progress>,
   blockOf?: ReadonlyMap<Key, string>,
@@ -84,7 +89,10 @@ interface DrawnPlaces {
   readonly sizes: Sizes;
 }
 
-/** What runs on a card with a graph in it is followed there, as if it stood on the canvas itself. */
+/**
+ * Replace running actions with expanded graphs by the actions that run inside, with their places on
+ * the canvas.
+ */
 export function runningInside(keys: readonly Key[], { places, sizes }: DrawnPlaces) {
   const found = { keys: [] as Key[], places: new Map(places), sizes: new Map(sizes) };
   for (const key of keys) {
@@ -100,7 +108,7 @@ export function runningInside(keys: readonly Key[], { places, sizes }: DrawnPlac
   return found;
 }
 
-/** Where to look so that a box is seen with room around it; null while it is. The zoom stays. */
+/** Return the viewport that shows a box with margins, at the same zoom; null if it is visible already. */
 export function followingViewport(box: Bounds, frame: FrameRoom, view: Viewport): Viewport | null {
   const { zoom } = view;
   const [width, height] = [box.width * zoom, box.height * zoom];
@@ -124,7 +132,10 @@ export function followingViewport(box: Bounds, frame: FrameRoom, view: Viewport)
   };
 }
 
-/** All that run where they fit in the frame together; else the one that began last. */
+/**
+ * Return the box around all running actions if it fits the frame, else around the one that started
+ * last; null without any.
+ */
 export function followedBox(
   running: readonly Key[],
   places: Positions,
@@ -148,10 +159,10 @@ export function followedBox(
   return fits ? all : some(running.slice(0, 1));
 }
 
-const HANDS_REST = 4_000; // ms after which somebody who did something on the canvas is followed again
+const HANDS_REST = 4_000; // ms without input on the canvas after which the view follows again
 const TYPING = "input, textarea, [contenteditable=true], [role=dialog] *";
 
-/** Whether the person is at work: the view is theirs then. */
+/** Tracks whether the person is using the canvas or typing; the view does not move then. */
 function useHandsOn(frame: RefObject<HTMLElement | null>) {
   const last = useRef(Number.NEGATIVE_INFINITY);
   useEffect(() => {
@@ -179,18 +190,18 @@ function useHandsOn(frame: RefObject<HTMLElement | null>) {
 interface Followed {
   flow: ReactFlowInstance<CanvasNode, Arrow>;
   frame: RefObject<HTMLDivElement | null>;
-  /** Where everything stands now. */
+  /** Current places and sizes of all elements. */
   now: RefObject<DrawnPlaces>;
-  /** The run that goes, if one does. */
+  /** The id of the current run; null without one. */
   run: string | null;
   progress: ReadonlyMap<Key, Progress>;
-  /** The folded frames that are drawn instead of what lies in them. */
+  /** The folded frame that hides each hidden element. */
   blockOf: ReadonlyMap<Key, string> | undefined;
-  /** How long a motion of so many ms may take: people may want none. */
+  /** Returns the allowed duration of an animation; 0 if the person prefers no motion. */
   glide: (ms: number) => { duration: number };
 }
 
-/** Keeps what runs in view until the person moves the view; each run begins anew. */
+/** Keeps running actions in view until the person moves the view; each run starts anew. */
 export function useFollowRun({ flow, frame, now, run, progress, blockOf, glide }: Followed) {
   const [left, setLeft] = useState<string | null>(null);
   const lost = run !== null && left === run;
@@ -211,7 +222,7 @@ export function useFollowRun({ flow, frame, now, run, progress, blockOf, glide }
     if (next) glideTo(flow, room, next, glide(GLIDE).duration);
   }, [run, lost, key]);
   return {
-    /** A run goes, and the view no longer follows it. */
+    /** True while a run goes on that the view no longer follows. */
     lost,
     onPanned: useCallback(() => setLeft(run), [run]),
     onFollow: useCallback(() => {

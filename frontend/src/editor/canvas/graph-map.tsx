@@ -24,7 +24,7 @@ import { runOnCanvas } from "../../status/progress-inside";
 import { toneColor } from "../../status/state-label";
 import { colorOfName } from "../../ui/name-colors";
 
-/** In px of the graph. */
+/** A rectangle in px of the graph. */
 interface MapArea {
   readonly x: number;
   readonly y: number;
@@ -33,14 +33,14 @@ interface MapArea {
 }
 
 interface MapMarks {
-  /** Colour and path, the lowest first. */
+  /** Pairs of colour and SVG path, in drawing order. */
   readonly paths: readonly (readonly [color: string, path: string])[];
-  /** Null while nothing has a size. */
+  /** The box around everything; null while nothing has a size. */
   readonly area: MapArea | null;
 }
 
 const MAP_SIZE = { width: 132, height: 92 };
-/** Of a card on which others are seen. */
+/** The colour of a card with actions drawn on it. */
 const BEHIND = "color-mix(in srgb, var(--line2) 40%, transparent)";
 const ROUND = 10; // px of the graph
 const EDGE = 5; // px of the map
@@ -84,7 +84,10 @@ const partColor = ({ progress, action: { actor } }: PartOnCard): string =>
       ? "var(--line2)"
       : colorOfName(actor);
 
-/** What nothing is known of the size of is left out. `partsOf`: what is drawn on a card that is expanded. */
+/**
+ * Return the paths of all nodes by colour; nodes without a size are left out. `partsOf`: returns
+ * the actions drawn on an expanded card.
+ */
 export function mapMarks(
   nodes: readonly CanvasNode[],
   partsOf: (key: Key) => readonly PartOnCard[] = () => [],
@@ -105,13 +108,13 @@ export function mapMarks(
   return { paths: [...paths], area };
 }
 
-/** What is seen of the graph. */
+/** Return the visible part of the graph. */
 export function seenArea(view: Viewport, size: { width: number; height: number }): MapArea {
   const { x, y, zoom } = view;
   return { x: -x / zoom, y: -y / zoom, width: size.width / zoom, height: size.height / zoom };
 }
 
-/** Whether all of an area is seen. */
+/** Return whether all of an area is visible. */
 export function isWithin(area: MapArea, seen: MapArea): boolean {
   return (
     area.x >= seen.x &&
@@ -122,11 +125,11 @@ export function isWithin(area: MapArea, seen: MapArea): boolean {
 }
 
 interface MapFrame extends MapArea {
-  /** Px of the graph in one of the map. */
+  /** Length in px of the graph that one px of the map stands for. */
   readonly scale: number;
 }
 
-/** All of the graph and what is seen, in the middle of the map. */
+/** Return the part of the graph that the map shows: everything, and what is visible, centred. */
 export function mapFrame(marks: MapArea | null, seen: MapArea): MapFrame {
   const all = union(marks, seen);
   const scale = Math.max(all.width / MAP_SIZE.width, all.height / MAP_SIZE.height);
@@ -136,17 +139,20 @@ export function mapFrame(marks: MapArea | null, seen: MapArea): MapFrame {
   return { x, y, width, height, scale };
 }
 
-const REST = 500; // ms between two drawings of what is on the map
+const REST = 500; // ms between two updates of the map
 const LINE = 25; // px
-const PER_PX = 0.002; // doublings
-/** With Ctrl is what a pinch on a trackpad sends, in smaller steps. */
+const PER_PX = 0.002; // zoom steps of factor 2 per px
+/** On a Mac, a pinch on a trackpad sends wheel events with Ctrl in smaller steps. */
 const PINCH = 10;
 
 const Marks = memo(function Marks({ paths }: Pick<ReturnType<typeof mapMarks>, "paths">) {
   return paths.map(([color, path]) => <path key={color} d={path} style={{ fill: color }} />);
 });
 
-/** Not by React, whose listeners may not keep the page from scrolling. */
+/**
+ * Zooms the canvas by the wheel. React's listeners are passive, hence could not stop the page from
+ * scrolling.
+ */
 function useWheelZoom(
   map: RefObject<SVGSVGElement | null>,
   flow: ReactFlowInstance<CanvasNode, Arrow>,
@@ -164,7 +170,7 @@ function useWheelZoom(
   }, [map, flow]);
 }
 
-/** Hands on the map: what is seen follows the pointer. */
+/** Return the event handlers that move the view along with the pointer. */
 function useDragging(flow: ReactFlowInstance<CanvasNode, Arrow>, scale: number) {
   const from = useRef<readonly [x: number, y: number] | null>(null);
   const end = () => {
@@ -199,7 +205,7 @@ interface Props {
 
 export function GraphMap({ nodes, flow }: Props) {
   const map = useRef<SVGSVGElement>(null);
-  // Each change of anything makes all paths again, and has them painted.
+  // Each update computes and paints all paths again.
   const shown = useThrottledValue(nodes, REST);
   const run = useThrottledValue(useSyncExternalStore(runOnCanvas.subscribe, runOnCanvas.now), REST);
   const expanded = useSyncExternalStore(expandedGraphs.subscribe, expandedGraphs.now);
@@ -214,7 +220,7 @@ export function GraphMap({ nodes, flow }: Props) {
   const frame = mapFrame(area, seen);
   useWheelZoom(map, flow);
   const hands = useDragging(flow, frame.scale);
-  // Where all is seen it tells nothing, and would lie on what it tells of.
+  // The map is hidden while everything is visible: it would only cover the graph.
   const visibility = area === null || isWithin(area, seen) ? "hidden" : undefined;
   return (
     <Panel position="top-right" className="react-flow__minimap" style={{ ...MAP_SIZE, visibility }}>

@@ -1,4 +1,4 @@
-/** What lies under a point of the screen. */
+/** Finds what lies at a point on the screen. */
 import type { Position } from "../../graph/model";
 
 type Pointed = { clientX: number; clientY: number } | { changedTouches: TouchList };
@@ -15,15 +15,18 @@ function hits([x, y]: Position): readonly Element[] {
   return document.elementsFromPoint(x, y);
 }
 
-/** The key of the card, end or note under a point. */
+/** Return the key of the topmost card, end or note at a point; null if there is none. */
 export function nodeAt(at: Position): string | null {
   const [hit] = hits(at);
   return hit?.closest<HTMLElement>(".react-flow__node")?.dataset.id ?? null;
 }
 
-const REACH = 14; // px round the point: an arrow is thin, a dropped card is not
+const REACH = 14; // px around the point, since an arrow is thin
 
-/** The id of the relation whose arrow or label lies at a point, also below a card. */
+/**
+ * Return the id of the relation whose arrow or pill lies at a point, also below a card; null if
+ * there is none.
+ */
 export function arrowAt([x, y]: Position): string | null {
   for (const [dx, dy] of [
     [0, 0],

@@ -1,4 +1,7 @@
-/** Search at the cursor: type a name, Enter places the action, tied to the outcome it came from. */
+/**
+ * A search field on the canvas: Enter adds the action and connects it to the outcome from which it
+ * was opened.
+ */
 import { Kbd, TextInput } from "@mantine/core";
 import { IconPlus, IconSearch } from "@tabler/icons-react";
 import { useEffect, useId, useMemo, useRef, useState } from "react";
@@ -26,8 +29,9 @@ interface Props {
 const MOST = 8;
 
 /**
- * Known actions that fit, best first, and a new one of that name when none has it; then graphs that are
- * called like it: who types the name of an action means one.
+ * Return the known actions that match, best first, then a new action of that name if there is none,
+ * then graphs whose names contain the text, and last actions that only have it in their
+ * description.
  */
 export function candidates(known: readonly NewAction[], search: string): NewAction[] {
   const wanted = search.trim().toLowerCase();
@@ -44,14 +48,14 @@ export function candidates(known: readonly NewAction[], search: string): NewActi
   const exact = fitting.some(({ action }) => isExact(action));
   const fresh = wanted === "" || exact ? [] : [{ name: search.trim() }];
   const isFirst = (action: NewAction) => action.ofGraph === undefined || isExact(action);
-  // What is only described so comes after what was typed.
+  // actions that match only by their description come last
   const named = fitting.filter(({ rank: r }) => r < 2).map(({ action }) => action);
   const described = fitting.filter(({ rank: r }) => r === 2).map(({ action }) => action);
   const graphs = named.filter((action) => !isFirst(action));
   return [...named.filter(isFirst), ...fresh, ...graphs, ...described];
 }
 
-/** The upper left corner: what an arrow was drawn to is its input. */
+/** Return the upper left corner of the new card; an arrow leads to the middle of its input. */
 function cornerOf({ graph }: EditorContext, { at: [x, y], from }: AddRequest): Position {
   return from !== null && graph.direction === "right"
     ? [x, y - Math.round(CARD.height / 2)]

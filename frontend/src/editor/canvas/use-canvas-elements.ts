@@ -1,4 +1,7 @@
-/** The graph as what the canvas draws: places, drags of oneself and of others, sizes, selection. */
+/**
+ * Computes what the canvas draws: elements, places, sizes, drags of this person and of others, and
+ * the selection.
+ */
 import {
   type EdgeChange,
   type NodeChange,
@@ -55,7 +58,7 @@ export interface MeasuredSize {
   readonly height: number;
 }
 
-/** What was drawn last: what is the same again keeps its identity. */
+/** The elements of the last drawing, whose unchanged parts keep their identity. */
 interface Drawn {
   readonly nodes: CanvasNode[];
   readonly edges: Arrow[];
@@ -68,17 +71,17 @@ interface CanvasElementsInput {
   select: (ids: Iterable<string>) => void;
   progress: ReadonlyMap<Key, Progress>;
   marks: ProblemMarks;
-  /** Where what has no place stands meanwhile. */
+  /** Places for elements without one, while the graph is being laid out. */
   laidOut: Positions | null;
-  /** Keys of the frames that are folded. */
+  /** Keys of the folded frames. */
   folded: ReadonlySet<string>;
-  /** What others drag and choose is not seen: they do it to the graph as it is now. */
+  /** Drags and selections of others are not shown: they belong to the graph of now, not to the past. */
   alone: boolean;
 }
 
 const NOBODY: readonly Participant[] = [];
 
-/** Where everything stands while people drag it. */
+/** Return the places of all elements, including the drags of others and of this person (`own`). */
 export function dragged(
   places: Positions,
   people: readonly Participant[],
@@ -99,7 +102,7 @@ export function dragged(
 
 const round = (n: number) => Math.round(n);
 
-/** The selection after React Flow's changes. Arrows of one relation are selected together. */
+/** Return the selection after React Flow's changes. Arrows of one relation are selected together. */
 export function selectionAfter(
   before: ReadonlySet<string>,
   changes: readonly (NodeChange | EdgeChange)[],
@@ -117,7 +120,7 @@ export function selectionAfter(
   return same ? before : next;
 }
 
-/** What others have chosen, in their colours. */
+/** Return the colours of the people who have selected elements, by key. */
 function useChosenByOthers(people: readonly Participant[]): ReadonlyMap<string, string> {
   return useMemo(
     () =>
@@ -130,7 +133,7 @@ function useChosenByOthers(people: readonly Participant[]): ReadonlyMap<string, 
   );
 }
 
-/** Cards and arrows; what is drawn as before keeps its identity. */
+/** Return nodes and edges; unchanged elements keep their identity. */
 function useDrawn(graph: Graph, options: Parameters<typeof nodesOf>[1], folding: Folding | null) {
   const { selected, progress, marks } = options;
   const drawn = useRef<Drawn>({ nodes: [], edges: [], around: null });
@@ -150,7 +153,7 @@ function useDrawn(graph: Graph, options: Parameters<typeof nodesOf>[1], folding:
   return { nodes, edges };
 }
 
-/** The lines of the arrows, kept in step with what stands where. */
+/** Keep the lines of the arrows up to date with everything that stands on the canvas. */
 function useLines(
   graph: Graph,
   { places, measured, marks, rest }: Parameters<typeof sceneOf>[1],
@@ -165,7 +168,7 @@ function useLines(
   return lines;
 }
 
-/** Keeps the selection in step with what React Flow says of it. */
+/** Return a function that applies React Flow's changes to the selection. */
 function useSelectionChanges(
   selection: ReadonlySet<string>,
   select: CanvasElementsInput["select"],
@@ -186,21 +189,21 @@ function useSelectionChanges(
 
 interface Placed {
   readonly graph: Graph;
-  /** Where everything stands while nobody drags it. */
+  /** Places as they are while nothing is dragged. */
   readonly rest: Positions;
   readonly sizes: ReadonlyMap<Key, MeasuredSize>;
   readonly folding: Folding | null;
-  /** Where something stands that is drawn there. */
+  /** Maps a place in the drawing to its place in the document. */
   readonly toDocument: PlaceMap;
 }
 
-/** Where a card stands, on whole pixels, that React Flow has drawn there. */
+/** Return the place in the document, in whole px, of a card that React Flow has drawn at a place. */
 function standing({ toDocument }: Pick<Placed, "toDocument">, at: { x: number; y: number }) {
   const [x, y] = toDocument([at.x, at.y]);
   return [round(x), round(y)] as const;
 }
 
-/** Where things stand after they were dragged; frames take along what lies in them. */
+/** Return the places after elements were dragged; frames take their contents along. */
 function afterMoves(
   before: Positions | null,
   moves: readonly NodeChange<CanvasNode>[],
@@ -222,7 +225,7 @@ function afterMoves(
   return next;
 }
 
-/** What is expanded is as large as it was: that is how it stands in the document. */
+/** Return the measured sizes; an expanded card keeps its former size, which it has in the document. */
 function afterSizes(before: Placed["sizes"], sized: readonly NodeChange<CanvasNode>[]) {
   const expanded = expandedGraphs.now()?.sizes;
   const next = new Map(before);
@@ -232,7 +235,7 @@ function afterSizes(before: Placed["sizes"], sized: readonly NodeChange<CanvasNo
   return next;
 }
 
-/** Takes what React Flow says of cards: sizes, moves, selection. */
+/** Return a function that takes React Flow's changes of sizes, places and selection. */
 function useNodeChanges(
   placed: Placed,
   setSizes: Dispatch<SetStateAction<ReadonlyMap<Key, MeasuredSize>>>,
@@ -242,7 +245,7 @@ function useNodeChanges(
   const store = useStoreApi();
   const now = useRef(placed);
   now.current = placed;
-  // Drawing a marquee within a frame is about what lies in it, unless it is folded.
+  // A marquee within a frame selects its contents, not the frame, unless the frame is folded.
   const isNoFrame = useCallback((change: NodeChange<CanvasNode>) => {
     if (change.type !== "select" || !change.selected) return true;
     if (now.current.folding?.blocks.has(change.id)) return true;
@@ -265,7 +268,7 @@ function useNodeChanges(
   );
 }
 
-/** What happens while cards are dragged, and when they are dropped. */
+/** Return the handlers that tell others about a drag, and that write the new places when it ends. */
 function useDragging(
   placed: Placed,
   over: string | null,
@@ -308,7 +311,10 @@ function useDragging(
   return { onDrag, onDragStop };
 }
 
-/** What is folded, and how large everything is then. What is dragged over a block is seen until it is dropped. */
+/**
+ * Return what folded frames hide, and the sizes of all elements. Something dragged over a block
+ * stays visible until it is dropped.
+ */
 function useFolding(
   graph: Graph,
   folded: ReadonlySet<string>,
@@ -347,7 +353,7 @@ export function useCanvasElements(given: CanvasElementsInput) {
   const measured = useMemo(() => spread.sizesOf(sizes), [spread, sizes]);
   const { flow, toDocument, expanded } = spread;
   const others = useChosenByOthers(people);
-  // The arrow that would take in what is dragged looks as if it were chosen.
+  // The arrow that would take in the dragged action looks selected.
   const selected = useMemo(
     () => (over === null ? selection : new Set([...selection, over])),
     [selection, over],
@@ -367,7 +373,7 @@ export function useCanvasElements(given: CanvasElementsInput) {
   return { flow, lines, ...drawn, ...stands, view, setResized, setOver, ...hands };
 }
 
-/** One action that nothing leads to or from can be dropped into an arrow. */
+/** Return whether the dragged elements are one action without arrows, which can be inserted into an arrow. */
 function insertable(graph: Graph, dragged: readonly CanvasNode[]): boolean {
   const [only, ...others] = dragged;
   if (only?.type !== "action" || others.length > 0) return false;

@@ -1,4 +1,7 @@
-/** Drawing arrows by hand: drag from an outcome, tap an outcome and then what follows, lead elsewhere. */
+/**
+ * Draws arrows by hand: by dragging from an outcome, by tapping an outcome and then a card, or by
+ * moving an end of an arrow.
+ */
 import type { Connection, FinalConnectionState, OnConnectEnd } from "@xyflow/react";
 import { type MouseEvent, useCallback, useEffect, useRef, useState } from "react";
 import type { Arrow } from "../../canvas/elements";
@@ -20,7 +23,7 @@ export function outcomeOf(handle: string | null | undefined): Precondition {
     : "on_true";
 }
 
-/** The outcome whose mark was hit; null when it was something else. */
+/** Return the outcome whose handle was hit; null if something else was. */
 function outcomeHit(target: EventTarget): Pending | null {
   if (!(target instanceof Element)) return null;
   const handle = target.closest<HTMLElement>(".react-flow__handle.source");
@@ -35,7 +38,7 @@ export function useConnecting(context: EditorContext, openAddAt: AddAt) {
   const [pending, setPending] = useState<Pending | null>(null);
   const draw = useCallback(
     (parent: Key, child: Key, outcome: Precondition) => {
-      setPending(null); // an outcome that was tapped before has been thought better of
+      setPending(null); // drawing an arrow cancels an outcome that was tapped before
       const relation = mayEdit ? connect(doc, parent, child, outcome) : null;
       if (relation !== null) select([relation]);
     },
@@ -50,7 +53,7 @@ export function useConnecting(context: EditorContext, openAddAt: AddAt) {
     return () => window.removeEventListener("keydown", onKey, { capture: true });
   }, [pending]);
 
-  // An end that is led elsewhere is told as a connection too, which must not draw a second arrow.
+  // React Flow reports a moved end as a connection, too; it must not draw a second arrow.
   const leading = useRef(false);
   const onConnectEnd: OnConnectEnd = (event, state) => {
     if (leading.current) return;
@@ -65,7 +68,7 @@ export function useConnecting(context: EditorContext, openAddAt: AddAt) {
     } else if (target !== from.nodeId) draw(from.nodeId, target, outcome);
   };
 
-  /** Whether the click was about an arrow, and nothing else shall come of it. */
+  /** Handles a click; returns true if it belonged to drawing an arrow. */
   const onClick = (event: MouseEvent): boolean => {
     if (!mayEdit) return false;
     const hit = outcomeHit(event.target);
@@ -83,14 +86,15 @@ export function useConnecting(context: EditorContext, openAddAt: AddAt) {
     return true;
   };
 
-  // The arrows of one relation end together and are led together; they begin each for itself.
+  // The arrows of one relation share their end, so moving it moves all of them; each has a start of
+  // its own.
   const lead = ({ data }: Arrow, to: Parameters<typeof retarget>[3]) => {
     if (!data || !mayEdit) return;
     const whole = to.child === undefined ? null : moveRelation(doc, data.relation, to);
     const moved = whole ?? retarget(doc, data.relation, data.outcome, to);
     if (moved !== null) select([moved]);
   };
-  /** Dropped on the mark of an outcome, or on an input. */
+  /** Handles an end that was dropped on the handle of an outcome or an input. */
   const onReconnect = (edge: Arrow, to: Connection) =>
     lead(
       edge,
@@ -104,7 +108,10 @@ export function useConnecting(context: EditorContext, openAddAt: AddAt) {
   const onReconnectStart = () => {
     leading.current = true;
   };
-  /** Dropped anywhere else: on a card it means that card, on nothing the arrow stays. */
+  /**
+   * Handles an end that was dropped elsewhere: a card counts as its input; on empty canvas the
+   * arrow stays.
+   */
   const onReconnectEnd = (
     event: globalThis.MouseEvent | TouchEvent,
     edge: Arrow,

@@ -1,4 +1,4 @@
-/** Menus where one presses: the right button of a mouse, or a finger that rests. */
+/** Opens the context menu at the place of a right click or of a long press. */
 import { type PointerEvent, useEffect, useMemo, useRef } from "react";
 import type { EditorContext } from "../../edit-actions/editor-context";
 import type { Position } from "../../graph/model";
@@ -7,7 +7,7 @@ import { arrowAt, nodeAt } from "./hit-test";
 const REST = 500; // ms
 const STILL = 8; // px that a resting finger may move
 
-/** Opens the menu for what lies under a point, which becomes the selection if it is not in it. */
+/** Opens the menu for the element at a point, and selects the element unless it is part of the selection. */
 function openMenuAt(context: EditorContext, screen: Position): void {
   const target = nodeAt(screen) ?? arrowAt(screen);
   if (target === null) context.select([]);
@@ -48,7 +48,7 @@ export function useContextMenu(context: EditorContext) {
       onPointerCancelCapture: end,
       onContextMenu(event: React.MouseEvent) {
         event.preventDefault();
-        // A finger has its own way, and dragging with the right button moves the view.
+        // Touch opens the menu by its own timer, and dragging with the right button moves the view.
         const touch =
           "pointerType" in event.nativeEvent && event.nativeEvent.pointerType === "touch";
         const [x, y] = start.current;
@@ -59,7 +59,7 @@ export function useContextMenu(context: EditorContext) {
   }, []);
 }
 
-/** What a finger leaves behind when the menu is open already: its tap would close the menu. */
+/** Suppresses the click that follows a long press, since it would close the menu. */
 function swallowClick(): void {
   const kinds = ["mousedown", "mouseup", "click"] as const;
   const swallow = (event: Event) => {

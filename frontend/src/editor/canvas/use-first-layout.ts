@@ -1,4 +1,4 @@
-/** Lays out a graph in which nothing stands anywhere yet, and writes that down as one edit. */
+/** Lays out a graph without any places, and writes them as one edit. */
 import { useEffect, useLayoutEffect, useRef, useState } from "react";
 import { arrange, isUnplaced, type Positions } from "../../canvas/geometry/arrange";
 import { LAYOUT_PATIENCE_MS } from "../../canvas/geometry/layout";
@@ -7,24 +7,27 @@ import { freshPlaces } from "../../edit-actions/layout";
 import { placeFirst } from "../../graph/edit";
 import { usePeople } from "../../sync/use-room";
 
-/** Of several pages that open it at once the others wait for one; their places would be the same. */
+/**
+ * Of several pages that open the graph at once, one writes first; each later one waits this much
+ * longer. All would write the same places.
+ */
 const TURN_MS = 800;
 
 interface FirstLayout {
-  /** For as long as nobody has written any; null before, and where they are not needed. */
+  /** The computed places until somebody has written them; null before, and where they are not needed. */
   readonly places: Positions | null;
   readonly pending: boolean;
   readonly busy: boolean;
 }
 
-/** `onPlacing`: told whether the edit that writes the places is still to come. */
+/** Lays out an unplaced graph once. `onPlacing`: called with whether the edit is still to come. */
 export function useFirstLayout(
   context: EditorContext,
   arrived: boolean,
   onPlacing: (placing: boolean) => void,
 ): FirstLayout {
   const unplaced = arrived && isUnplaced(context.graph);
-  // Somebody has undone the layout: doing it again would leave them no way back.
+  // If somebody has undone the layout, laying out again would leave them no way back.
   const stood = useRef(false);
   if (arrived && !unplaced && context.graph.actions.length > 0) stood.current = true;
   const loose = unplaced && !stood.current;
@@ -74,7 +77,7 @@ export function useFirstLayout(
   const pending = loose && places === null;
   const busy = pending || (loose && places === plain.current);
   const placing = loose && context.mayEdit && !failed && context.graph.actions.length > 0;
-  // Before anything is drawn: a Start that can be pressed for a moment only would be called off.
+  // Before the first paint: Start must not be enabled for a moment only.
   useLayoutEffect(() => {
     onPlacing(placing);
     return () => onPlacing(false);

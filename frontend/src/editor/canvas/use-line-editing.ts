@@ -12,7 +12,10 @@ import { endName } from "../../graph/relation-words";
 import { useStableCallback } from "../../ui/hooks/use-stable-callback";
 import { nodeAt } from "./hit-test";
 
-/** `outcome`: the one that goes alone; null: all that the arrow says goes together. */
+/**
+ * Leads an arrow from or to another action, and says so if that is impossible. `outcome`: moves
+ * only this one; null: all of them.
+ */
 export function leadElsewhere(
   { doc, select }: Pick<EditorContext, "doc" | "select">,
   relation: string,
@@ -30,7 +33,10 @@ export function leadElsewhere(
   }
 }
 
-/** `toDocument`: where something stands that is drawn there. */
+/**
+ * Return the functions that bend lines and move outcomes; null if the person may not edit.
+ * `toDocument`: maps drawn places to places in the document.
+ */
 export function useLineEditing(context: EditorContext, toDocument: PlaceMap): LineEditing | null {
   const { mayEdit } = context;
   const bend = useStableCallback<Parameters<LineEditing["bend"]>, void>((bundle, via, byKey) => {
@@ -44,7 +50,7 @@ export function useLineEditing(context: EditorContext, toDocument: PlaceMap): Li
     const word = pillWord(bundle);
     return `${from} → ${to}${word === "" ? "" : ` (${word})`}`;
   });
-  // As where a new arrow is drawn: on nothing, or on the cards it ties already, it stays.
+  // An outcome dropped on empty canvas, or on a card that its arrow connects already, stays.
   const drop = useStableCallback<Parameters<LineEditing["drop"]>, void>((bundle, outcome, at) => {
     const card = nodeAt(at);
     if (card === null || card === bundle.source || card === bundle.target) return;

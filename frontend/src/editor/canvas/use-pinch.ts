@@ -1,4 +1,4 @@
-/** Two fingers move and zoom the view also while one finger selects. */
+/** Moves and zooms the view with two fingers while the tool Select is active. */
 import { useReactFlow, useStoreApi } from "@xyflow/react";
 import { type PointerEvent, useMemo, useRef } from "react";
 import type { EditorContext } from "../../edit-actions/editor-context";
@@ -7,9 +7,9 @@ import type { Position } from "../../graph/model";
 export const ZOOM = { least: 0.08, most: 2.2 } as const;
 
 interface Pair {
-  /** Between the fingers, on the screen. */
+  /** The point between the fingers, on screen. */
   readonly middle: Position;
-  /** From one to the other, px. */
+  /** The distance between the fingers, px. */
   readonly apart: number;
 }
 
@@ -19,7 +19,10 @@ interface PinchedView {
   readonly zoom: number;
 }
 
-/** The view that keeps under two fingers what was under them; `corner`: of the canvas on screen. */
+/**
+ * Return the viewport that keeps the same part of the canvas under both fingers. `corner`: the
+ * upper left corner of the canvas on screen.
+ */
 export function pinched(view: PinchedView, from: Pair, to: Pair, corner: Position): PinchedView {
   const wanted = (view.zoom * to.apart) / Math.max(1, from.apart);
   const zoom = Math.min(ZOOM.most, Math.max(ZOOM.least, wanted));
@@ -56,7 +59,7 @@ export function usePinch(context: EditorContext, onPanned: () => void) {
         fingers.current.set(event.pointerId, at(event));
         const box = store.getState().domNode?.getBoundingClientRect();
         if (fingers.current.size !== 2 || box === undefined) return;
-        // What the first finger had begun to frame is forgotten.
+        // The marquee and selection that the first finger started are undone.
         store.setState({ userSelectionRect: null, userSelectionActive: false });
         now.current.bench.select(chosen.current);
         const pair = pairOf(fingers.current);

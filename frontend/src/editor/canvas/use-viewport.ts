@@ -31,7 +31,10 @@ interface FoldedCanvas {
   readonly sizes: Sizes;
 }
 
-/** Unfolds the frames that hide any of these. */
+/**
+ * Return a function that unfolds all frames that hide given elements. A selected element that is
+ * moved or added into a folded frame unfolds it, too.
+ */
 export function useUnfolding(context: EditorContext, canvas: FoldedCanvas) {
   const { graph, folded, fold, selection } = context;
   const { folding, places, sizes } = canvas;
@@ -40,7 +43,7 @@ export function useUnfolding(context: EditorContext, canvas: FoldedCanvas) {
     const frames = hiding(graph, folded, keys, places, sizes);
     if (frames.length > 0) fold(frames, false);
   });
-  // What a person has chosen and adds or moves into a block would be gone from under their hands.
+  // Else the selected element would vanish under the person's hands.
   const before = useRef({ folded, folding });
   useEffect(() => {
     const was = before.current;
@@ -55,28 +58,31 @@ export function useUnfolding(context: EditorContext, canvas: FoldedCanvas) {
 interface ViewportInput {
   flow: ReactFlowInstance<CanvasNode, Arrow>;
   frame: RefObject<HTMLDivElement | null>;
-  /** Where everything is drawn. */
+  /** Places as they are drawn. */
   places: Positions;
   sizes: Sizes;
   lines: LineStore;
-  /** Where something is drawn that stands here. */
+  /** Maps a place in the document to its place in the drawing. */
   toView: PlaceMap;
-  /** The folded frames that are drawn instead of what lies in them. */
+  /** The folded frame that hides each hidden element. */
   blockOf: ReadonlyMap<Key, string> | undefined;
-  /** Unfolds what hides these. */
+  /** Unfolds the frames that hide these elements. */
   unfoldRound: (keys: readonly Key[]) => void;
   direction: Direction;
   phone: boolean;
-  /** What there is to see: nothing before the graph has been heard of. */
+  /** The contents of the canvas: nothing before the graph has arrived, then only its two ends, or cards. */
   opens: "nothing" | "ends" | "cards";
   progress: ReadonlyMap<Key, Progress>;
-  /** The run that goes, if one does. */
+  /** The id of the current run; null without one. */
   run: string | null;
-  /** Where the pointer rests over the canvas, on screen. */
+  /** The place of the pointer over the canvas, on screen. */
   pointer: RefObject<Position | null>;
 }
 
-/** The canvas, and what bars and drawers (`data-covers`: at which side) lie over it. */
+/**
+ * Return the size of the canvas, and what bars and drawers cover at each side (`data-covers` names
+ * the side).
+ */
 function roomOf(element: HTMLElement): CanvasArea {
   const box = element.getBoundingClientRect();
   const covered = { left: 0, top: 0, right: 0, bottom: 0 };
@@ -96,22 +102,25 @@ function roomOf(element: HTMLElement): CanvasArea {
   return { width: element.clientWidth, height: element.clientHeight, covered };
 }
 
-/** How the view glides, in `ms`; not at all for people who want no motion. */
+/** Return the options of an animation of `ms`; it has no duration if the person prefers no motion. */
 function glide(ms: number): { duration: number; interpolate: "linear" } {
   const still = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
-  // Straight there: a flight that goes farther away in between shows other cards on its way.
+  // A straight way: a flight that zooms out in between would show other cards.
   return { duration: still ? 0 : ms, interpolate: "linear" };
 }
 
-/** Where people write, decide, or walk by keys. */
+/** Elements in which people type, decide, or navigate by keys. */
 const BUSY =
   "input, textarea, select, [contenteditable=true], [role=dialog] *, [role=treegrid], [role=treegrid] *";
 
-/** Focuses a card, which may be drawn some frames later only; not once the person is busy elsewhere. */
+/**
+ * Focuses a card that may be rendered some frames later; gives up if the person focuses something
+ * else meanwhile.
+ */
 export function focusCard(room: HTMLElement, key: Key, tries: number): void {
   const before = document.activeElement;
   const look = (left: number) => {
-    // What has the focus from before may be about to close: the search that the card came from.
+    // The element that has the focus now, such as the search field, may be about to close.
     const now = document.activeElement;
     if (now !== before && now?.matches(BUSY)) return;
     const card = room.querySelector<HTMLElement>(`.react-flow__node[data-id="${CSS.escape(key)}"]`);
@@ -129,7 +138,7 @@ export function useViewport(given: ViewportInput) {
   now.current = { places, sizes, direction };
   const least = phone ? READABLE.phone : READABLE.desktop;
 
-  // What was fitted stays fitted while the canvas changes its size, until somebody moves the view.
+  // A fitted view is fitted again when the canvas changes its size, until somebody moves the view.
   const fitted = useRef<{ view: Viewport; goal: "first" | "whole" } | null>(null);
   const showAll = useCallback(
     (goal: "first" | "whole", duration: number) => {
@@ -151,8 +160,8 @@ export function useViewport(given: ViewportInput) {
     [flow, frame, lines, least],
   );
 
-  // The graph arrives after the canvas, and its sizes after that. Who asks for all of it meanwhile
-  // shall see that.
+  // The graph arrives after the canvas, and its sizes later still; a Fit that was pressed meanwhile
+  // is remembered.
   const opened = useRef(false);
   const asked = useRef<"first" | "whole">("first");
   useEffect(() => {
@@ -163,13 +172,14 @@ export function useViewport(given: ViewportInput) {
     }, 60);
     return () => clearTimeout(timer);
   }, [begun, showAll]);
-  // Else they would begin under the bar. The first card is what the graph opens with.
+  // The two ends of an empty graph would else start below the bar. The first card opens the graph
+  // as usual.
   useEffect(() => {
     if (!empty || opened.current) return;
     const timer = setTimeout(() => {
       showAll("first", 0);
       const { view } = fitted.current ?? { view: flow.getViewport() };
-      // Over what is said in the middle of an empty graph.
+      // The ends stand above the hint in the middle of an empty graph.
       void flow.setViewport({ ...view, y: view.y - (frame.current?.clientHeight ?? 0) / 4 });
       fitted.current = null;
     }, 60);
@@ -185,7 +195,7 @@ export function useViewport(given: ViewportInput) {
       const last = fitted.current;
       const same = before === details();
       before = details();
-      // Details that come with what is pressed leave it under the pointer.
+      // When the details open by a click, the canvas stays as it is under the pointer.
       if (!same) return;
       if (last && isSameViewport(last.view, flow.getViewport())) showAll(last.goal, 0);
     });
@@ -254,7 +264,7 @@ export function useViewport(given: ViewportInput) {
       },
       middle: (): Position => {
         const box = frame.current?.getBoundingClientRect();
-        // Room for what follows is kept at the right, or below.
+        // Leaves room for what follows at the right, or below.
         const [along, down] = now.current.direction === "right" ? [0.3, 0.4] : [0.5, 1 / 3];
         const [x, y] = box ? [box.left + box.width * along, box.top + box.height * down] : [0, 0];
         const at = flow.screenToFlowPosition({ x, y });

@@ -29,7 +29,7 @@ import { stopwatch } from "../../ui/times";
 import { isolated } from "../../words/isolated";
 import style from "./dry-run-bar.module.css";
 
-const MOST = 12; // lines of each list
+const MOST = 12; // lines of each list that are shown
 
 function Doubt({ doubt: { node, text } }: { doubt: SeedDoubt }) {
   return (
@@ -89,7 +89,7 @@ function SeedNote({ run }: { run: DryRun }) {
   );
 }
 
-/** How what is decided next ended in the run. */
+/** Shows how this action ended in the run from which the dry-run started. */
 function SeedEnd({ run, node }: { run: DryRun; node: string }) {
   const { seed } = run;
   const end = seed?.ends.get(node);
@@ -140,7 +140,7 @@ function time(ms: number): string {
   return `${minutes}:${String(Math.floor(seconds % 60)).padStart(2, "0")} min`;
 }
 
-/** The action whose end is to be chosen: the selected one if it runs. */
+/** Return the running action whose end is to be chosen: the selected one, else the first. */
 function asked(context: EditorContext, run: DryRun): RunningAction | undefined {
   return (
     run.sighting.running.find(({ key }) => context.selection.has(key)) ?? run.sighting.running[0]

@@ -1,4 +1,4 @@
-/** The moment of a run from which a dry-run is asked for, as the record has it. */
+/** Loads the moment of a run from which a dry-run shall start. */
 import { notifications } from "@mantine/notifications";
 import { useEffect, useRef, useState } from "react";
 import { errorText } from "../../api/http";
@@ -7,13 +7,13 @@ import type { DryRunSeed } from "../../dry-run/seed";
 import type { Graph } from "../../graph/model";
 import type { seedOfMoment } from "./record-reader";
 
-/** Of a run, `t` ms after its start. */
+/** A run, and the time `t` in ms after its start. */
 interface Asked {
   run: string;
   t: number;
 }
 
-/** What reads records is loaded for those who ask. */
+/** Loads the module that reads records, when a moment is asked for. */
 function useRecordReader(asked: boolean): typeof seedOfMoment | null {
   const [loaded, setLoaded] = useState<{ seedOfMoment: typeof seedOfMoment } | null>(null);
   useEffect(() => {
@@ -26,7 +26,10 @@ function useRecordReader(asked: boolean): typeof seedOfMoment | null {
   return loaded?.seedOfMoment ?? null;
 }
 
-/** Made once for each moment that is asked for: the graph as it was when the record arrived. */
+/**
+ * Return the state at the asked moment; null until it is there. It is computed once for each
+ * moment, with the graph as it was when the record arrived.
+ */
 export function useSeed(
   runner: string | undefined,
   asked: Asked | null,

@@ -24,7 +24,10 @@ import { candidates } from "../canvas/quick-add";
 import { leadElsewhere } from "../canvas/use-line-editing";
 import style from "./arrow-dialog.module.css";
 
-/** Everything an arrow can lead from or to, those that are near first. */
+/**
+ * Return all actions, and entry or exit, from or to which an arrow can lead; those near an action
+ * come first.
+ */
 function ends(context: EditorContext, end: typeof ENTRY | typeof EXIT, near: Key | null): Option[] {
   const places = context.positions();
   const [x0, y0] = (near === null ? null : places.get(near)) ?? context.view.middle();
@@ -61,7 +64,7 @@ const LETTERS: Readonly<Record<string, Precondition>> = {
 
 const STEPS: Record<string, number> = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 };
 
-/** How an outcome looks on a button, with the digit that chooses it. */
+/** Return the content and style of an outcome's button, with the digit that chooses it. */
 const faceOf = (outcome: Precondition, i: number) => ({
   leftSection: <OutcomeSign outcome={outcome} />,
   rightSection: <span className={style.digit}>{i + 1}</span>,
@@ -81,7 +84,7 @@ function OutcomePicker({ onPick }: { onPick: (outcome: Precondition) => void }) 
     else if (step) setAt((at + step + OUTCOMES.length) % OUTCOMES.length);
     return Boolean(chosen || step);
   };
-  // Heard at once, also before the dialog has the focus: people type faster than it opens.
+  // Listens on the window: people may type before the dialog has the focus.
   useEffect(() => {
     const onKey = (event: KeyboardEvent) => {
       if (event.ctrlKey || event.metaKey || event.altKey || !press.current(event)) return;
@@ -98,7 +101,7 @@ function OutcomePicker({ onPick }: { onPick: (outcome: Precondition) => void }) 
       {OUTCOMES.map((outcome, i) => (
         <Button
           key={outcome}
-          // Where the dialog puts the focus once it has opened.
+          // the dialog focuses this button once it has opened
           data-autofocus={i === at || undefined}
           onFocus={() => setAt(i)}
           onClick={() => onPick(outcome)}
@@ -109,7 +112,7 @@ function OutcomePicker({ onPick }: { onPick: (outcome: Precondition) => void }) 
   );
 }
 
-/** Which outcome, while the keyboard stays in the field in which what follows is named. */
+/** Shows the chosen outcome while the focus stays in the field for the next action. */
 function OutcomeRow({
   value,
   onPick,
@@ -148,7 +151,10 @@ function stepped(outcome: Precondition, key: string): Precondition | null {
   return OUTCOMES[(OUTCOMES.indexOf(outcome) + step + OUTCOMES.length) % OUTCOMES.length] ?? null;
 }
 
-/** In the empty field these choose the outcome: a name begins with none of them. */
+/**
+ * Return the outcome that a digit or arrow key chooses while the field is empty: no name begins
+ * with these; null for other keys.
+ */
 function outcomeByKey(now: Precondition, event: React.KeyboardEvent): Precondition | null {
   const key = keyOf(event);
   if (key >= "1" && key <= "4") return OUTCOMES[Number(key) - 1] ?? null;
@@ -156,8 +162,8 @@ function outcomeByKey(now: Precondition, event: React.KeyboardEvent): Preconditi
 }
 
 /**
- * Letters that are typed before the dialog stands: people type faster than it opens, and on the
- * canvas the same keys do other things.
+ * Return a function for the letters typed before the dialog has opened: people type faster than it
+ * opens, and on the canvas the same keys are shortcuts.
  */
 function useEarlyKeys(onOutcome: (outcome: Precondition) => void): () => string {
   const early = useRef("");
@@ -170,7 +176,7 @@ function useEarlyKeys(onOutcome: (outcome: Precondition) => void): () => string 
       if (inField || event.ctrlKey || event.metaKey || event.altKey || typed === "") return;
       const field = document.querySelector<HTMLElement>("[role=dialog] [role=combobox]");
       event.stopPropagation();
-      // What is focused now is what the key writes into.
+      // The key writes into the element that has the focus now.
       if (field !== null) field.focus();
       else {
         event.preventDefault();
@@ -187,7 +193,7 @@ function useEarlyKeys(onOutcome: (outcome: Precondition) => void): () => string 
 
 interface ArrowDialogProps {
   context: EditorContext;
-  /** Actions of other graphs, found by their names as where one is added. */
+  /** Actions of the library and of other graphs, which can be added as the next action. */
   known: readonly NewAction[];
   from: Key | null;
   to: Key | null;
@@ -196,7 +202,7 @@ interface ArrowDialogProps {
 
 const FRESH = "new ";
 
-/** What follows may be on the canvas, in the library, or nowhere yet. */
+/** Return matching targets: on the canvas, in the library, or an action that is new. */
 export function targetsOf(
   here: readonly Option[],
   known: readonly NewAction[],
@@ -218,7 +224,7 @@ export function targetsOf(
   return [...found, ...fresh];
 }
 
-/** What the dialog draws, as far as it is known. */
+/** Shows in words the arrow that will be drawn, as far as it is chosen. */
 function Sentence({ context, from, outcome, to }: SentenceProps) {
   const name = from === null ? "…" : endName(context.graph, from);
   return (
@@ -249,7 +255,7 @@ interface SentenceProps {
   to: Key | null;
 }
 
-/** Draws it, also to an action that is made for it, and selects it. */
+/** Draws the arrow, with a new action if the target is not on the canvas, and selects it. */
 function draw(
   { context, known, onClose }: Pick<ArrowDialogProps, "context" | "known" | "onClose">,
   parent: Key,
@@ -335,12 +341,12 @@ type RelationEnd = "parent" | "child";
 interface RetargetProps {
   context: EditorContext;
   relation: string;
-  /** The one that is led alone; all of them go together without it. */
+  /** The only outcome to move; without it all of them move together. */
   outcome?: Precondition;
   onClose: () => void;
 }
 
-/** Whether all outcomes of an arrow go together, or one alone. */
+/** Asks whether all outcomes of an arrow move or one of them. */
 function OutcomeChoice({ of, value, onPick }: OutcomeChoiceProps) {
   return (
     // biome-ignore lint/a11y/useSemanticElements: a fieldset cannot be laid out as a row everywhere
@@ -374,7 +380,7 @@ interface OutcomeChoiceProps {
   onPick: (outcome: Precondition | null) => void;
 }
 
-/** Which of its two ends is led elsewhere. */
+/** Asks which end of the arrow moves. */
 function EndChoice({ context, relation: { parent, child }, end, onPick }: EndChoiceProps) {
   const button = (which: RelationEnd, label: string) => (
     <Button
@@ -401,7 +407,7 @@ interface EndChoiceProps {
   onPick: (end: RelationEnd) => void;
 }
 
-/** Where that end can be led. */
+/** Return the actions to which this end can move. */
 function placesFor(context: EditorContext, relation: Relation, end: RelationEnd): Option[] {
   const now = relation[end];
   return ends(context, end === "child" ? EXIT : ENTRY, now).filter(

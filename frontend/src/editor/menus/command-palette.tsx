@@ -1,4 +1,4 @@
-/** The command palette: every edit action with its shortcut, and every place to go to. */
+/** The command palette: all edit actions with their shortcuts, the actions of this graph, and all graphs. */
 import { IconRouteSquare2, IconSquareRounded } from "@tabler/icons-react";
 import { type KeyboardEvent, useLayoutEffect, useMemo, useRef } from "react";
 import { createPortal } from "react-dom";
@@ -14,7 +14,7 @@ import { matching, type Option, PickList } from "../../ui/pick-list";
 import style from "./command-palette.module.css";
 
 const MOST = 60;
-/** Names of edit actions that were done from here, the last first. */
+/** Names of recently used edit actions, the latest first. */
 let recent: readonly string[] = [];
 
 function commandOptions(context: EditorContext): Option[] {
@@ -62,10 +62,10 @@ export function CommandPalette({
   useLayoutEffect(() => {
     const dialog = shown.current;
     dialog?.show();
-    return () => dialog?.close(); // gives the focus back
+    return () => dialog?.close(); // returns the focus
   }, []);
   const graphs = useGraphs().data;
-  // Counted once: the order shall not change under the person's hands.
+  // Computed once: the order must not change while the person chooses.
   const first = useRef(context);
   const options = useMemo<Option[]>(
     () => [
@@ -86,7 +86,7 @@ export function CommandPalette({
   );
   const onPick = (id: string) => {
     const [kind = "", key = ""] = id.split(" ");
-    shown.current?.close(); // else nothing outside of it could take the focus
+    shown.current?.close(); // an open dialog would keep the focus
     onClose();
     if (kind === "graph") go(`/graphs/${encodeURIComponent(key)}`);
     else if (kind === "action") {
@@ -95,19 +95,19 @@ export function CommandPalette({
       context.view.focus(key);
     } else {
       recent = [key, ...recent.filter((name) => name !== key)].slice(0, 5);
-      // After the palette has given the focus back.
+      // After the palette has returned the focus.
       setTimeout(() => EDIT_ACTIONS.find(({ name }) => name === key)?.run(context), 0);
     }
   };
   const onKeyDown = (event: KeyboardEvent) => {
     const key = keyOf(event);
     if (key === "Escape") onClose();
-    else if (key !== "Tab") return; // there is one field, and the keyboard stays in it
+    else if (key !== "Tab") return; // the field is the only element that can have the focus
     event.preventDefault();
     event.stopPropagation();
   };
-  // The browser's own dialog: one types at once, so it cannot wait for a library. Never a modal one: that
-  // would let nobody press what is outside of it, and STOP is.
+  // A dialog element of the browser opens at once, before any library is loaded. It is not modal: a
+  // modal dialog would block STOP.
   return createPortal(
     <>
       <div className={style.backdrop} onPointerDown={onClose} />

@@ -1,4 +1,4 @@
-/** The menu of what was pressed, at the place where it was pressed. */
+/** The context menu of the canvas. */
 import { Menu } from "@mantine/core";
 import { Fragment, useEffect, useRef } from "react";
 import * as editActions from "../../edit-actions/all";
@@ -12,7 +12,7 @@ import {
 import { FirstShortcut } from "../../edit-actions/keys/shortcut-keys";
 import style from "./context-menu.module.css";
 
-/** What can be done with the selection, in groups. */
+/** Return the groups of edit actions that fit the selection. */
 function offered(context: EditorContext): readonly (readonly EditAction[])[] {
   const actions = selectedActions(context).length;
   const notes = selectedNotes(context).length;
@@ -101,7 +101,7 @@ export function ContextMenu({ context, screen, onClose }: Props) {
     .filter((group) => group.length > 0);
   const box = useRef<HTMLDivElement>(null);
   useEffect(() => {
-    // The menu is placed first; then its first line has the keys.
+    // The menu is placed first, then its first item gets the focus.
     const timer = setTimeout(() => box.current?.querySelector("button")?.focus(), 80);
     return () => clearTimeout(timer);
   }, []);
@@ -140,7 +140,7 @@ export function ContextMenu({ context, screen, onClose }: Props) {
               return (
                 <Menu.Item
                   key={editAction.name}
-                  // It would close what has been opened meanwhile in its stead.
+                  // else it would close the dialog that the item has just opened
                   closeMenuOnClick={false}
                   leftSection={<Sign size={16} aria-hidden />}
                   rightSection={<FirstShortcut editAction={editAction} />}

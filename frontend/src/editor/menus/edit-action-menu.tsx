@@ -1,4 +1,4 @@
-/** The menu of every edit action. */
+/** The menu with all edit actions. */
 import { Menu } from "@mantine/core";
 import { Fragment, type ReactElement } from "react";
 import { EDIT_ACTIONS } from "../../edit-actions/all";
@@ -9,10 +9,10 @@ import { useOpening } from "../../ui/floating/late-opening";
 import style from "./toolbar.module.css";
 
 const GROUPS: readonly EditActionGroup[] = ["Draw", "Arrange", "Look", "Graph", "Dry-run"];
-/** Walking and nudging would be eight lines that nobody clicks. */
+/** Actions for navigation and nudging, which are useful as keys only. */
 const KEYS_ONLY = /^(nudge|walk)-/;
 
-/** Rendered while the menu is open only: what is enabled depends on everything. */
+/** Renders only while the menu is open, since everything may change which items are enabled. */
 function ActionItems() {
   const context = useEditorContext();
   return GROUPS.map((group) => (

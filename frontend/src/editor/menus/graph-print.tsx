@@ -15,24 +15,24 @@ interface PageView {
   readonly height: number;
 }
 
-/** What is free on a page of A4 beside its margins and the header, px of 1/96 inch. */
+/** Free space on an A4 page below the header, px of 1/96 inch. */
 const ACROSS = { width: 1040, height: 600 };
 const UPRIGHT = { width: 700, height: 900 };
-/** Names are 13 px in the picture: smaller than 5.4 pt on paper nobody reads them. */
+/** Least scale: names have 13 px in the picture and must not be smaller than 5.4 pt on paper. */
 const SMALLEST = 0.55;
-const OVERLAP = 60; // px of the picture that neighbours share
+const OVERLAP = 60; // px of the picture that neighbouring pages share
 const MOST_PAGES = 40;
 
 interface PrintPages {
-  /** Row by row. */
+  /** Parts of the picture, row by row. */
   readonly pages: readonly PageView[];
-  /** The same on all. */
+  /** The common scale of all pages. */
   readonly scale: number;
-  /** Whether the paper lies across: upright only where that shows the picture larger. */
+  /** Whether the paper is in landscape format; portrait is chosen only if it shows the picture larger. */
   readonly across: boolean;
 }
 
-/** The parts of a picture, page by page. */
+/** Divide a picture into pages: one if its names stay readable, else several. */
 export function pagesOf(width: number, height: number): PrintPages {
   const scaleOn = (paper: typeof ACROSS) => Math.min(1, paper.width / width, paper.height / height);
   const across = scaleOn(ACROSS) >= scaleOn(UPRIGHT);
@@ -54,17 +54,17 @@ export function pagesOf(width: number, height: number): PrintPages {
   }
 }
 
-/** How many pages of a length cover another one, each with a piece of that before. */
+/** Return the number of overlapping pages that cover a length. */
 function count(length: number, page: number): number {
   return Math.max(1, Math.ceil((length - OVERLAP) / (page - OVERLAP)));
 }
 
 const WHITE = new Set(["--canvas", "--raised", "--panel", "--bg"]);
-/** Outcomes are told by their signs and words, robots by their names. */
+/** Outcomes are shown by signs and words, robots by names, so that no colour is needed. */
 const ink = (token: string) =>
   WHITE.has(token) ? "#ffffff" : token === "--line2" ? "#444444" : "#000000";
 
-/** The picture as elements: an image of its own would come too late, and without the fonts of the page. */
+/** Renders the picture as SVG elements of the page: an image would load too late, and lack the fonts. */
 function Picture({ svg, pages }: { svg: string; pages: PrintPages }) {
   return pages.pages.map(({ x, y, width, height }, i) => (
     <figure

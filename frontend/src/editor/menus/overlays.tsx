@@ -1,4 +1,4 @@
-/** What opens over the editor, one at a time: menus, the palette, dialogs of single edit actions. */
+/** Opens menus, the command palette and dialogs over the editor, one at a time. */
 
 import { useEffect } from "react";
 import { graphsInside } from "../../canvas/graphs-inside";
@@ -40,13 +40,13 @@ interface Props {
 }
 
 export function Overlays(props: Props) {
-  // What is typed right after their key shall find them: they do not wait until the page rests.
+  // Loaded early: people may type right after the shortcut that opens them.
   useEffect(() => {
     for (const part of [ArrowDialog, CommandPalette, ContextMenu]) void part.preload();
   }, []);
   return (
     <>
-      {/* Nothing is seen of it before somebody prints: then the browser prints the page as it is. */}
+      {/* Invisible until somebody prints: the browser prints the page as it is. */}
       <PartBoundary frame={() => null}>
         <GraphPrint context={props.context} />
       </PartBoundary>
@@ -94,6 +94,6 @@ function Opened({ context, known, overlay, onClose }: Props) {
     case "keys":
       return <ShortcutSheet onClose={onClose} />;
     case "note":
-      return null; // written on the canvas
+      return null; // edited on the canvas itself
   }
 }

@@ -23,19 +23,19 @@ import { isolated } from "../../words/isolated";
 import style from "./shortcut-sheet.module.css";
 
 interface Props {
-  /** As it comes, without what was changed on this device. */
+  /** The edit action with its default shortcuts. */
   editAction: EditAction;
   own: OwnShortcuts;
-  /** Keys are being asked for, of this one. */
+  /** Keys for this action are being recorded. */
   changing: boolean;
   setChanging: (name: string | null) => void;
 }
 
 interface Wish {
   readonly keys: string;
-  /** Why not at once. */
+  /** The reason why the keys cannot be assigned at once. */
   readonly problem: string;
-  /** Whether others would give the keys up. */
+  /** Whether the other actions that have these keys can lose them. */
   readonly others: boolean;
 }
 
@@ -49,7 +49,7 @@ function wishFor(editAction: EditAction, own: OwnShortcuts, keys: string): Wish 
   return { keys, problem: `${printed} is taken by ${names}.`, others: others.every(isChangeable) };
 }
 
-/** Waits for keys. STOP's go past it, wherever the focus is. */
+/** Records the keys that are pressed next. The keys of STOP are never recorded and always work. */
 function KeysWanted({ editAction, own, setChanging }: Omit<Props, "changing">) {
   const [wish, setWish] = useState<Wish | null>(null);
   const give = (shortcuts: readonly string[]) => {
@@ -58,7 +58,7 @@ function KeysWanted({ editAction, own, setChanging }: Omit<Props, "changing">) {
   };
   const onKeyDown = (event: React.KeyboardEvent) => {
     const key = keyOf(event);
-    if (key === "Tab" && !event.ctrlKey && !event.altKey) return; // to the buttons
+    if (key === "Tab" && !event.ctrlKey && !event.altKey) return; // moves the focus to the buttons
     event.preventDefault();
     event.stopPropagation();
     if (key === "Escape") return setChanging(null);
@@ -128,7 +128,7 @@ function ShortcutRow({ changing, ...props }: Props) {
 
 const GROUPS: readonly EditActionGroup[] = ["Draw", "Arrange", "Look", "Graph", "Dry-run"];
 
-/** What is the same for everybody. */
+/** Shortcuts that cannot be changed. */
 const FIXED: readonly (readonly [label: string, ...shortcuts: string[]])[] = [
   ["Stop everything that runs, from anywhere", "Mod+."],
   ["Next and previous action or arrow", "Tab", "Shift+Tab"],

@@ -1,4 +1,4 @@
-/** Tools on the canvas, and the way to the menu of every edit action. */
+/** The toolbar of the canvas, with the button for the menu of all edit actions. */
 import { ActionIcon } from "@mantine/core";
 import { IconDots } from "@tabler/icons-react";
 import { memo } from "react";
@@ -50,7 +50,7 @@ interface ToolButtonProps {
   run: () => void;
 }
 
-/** Drawn again only when it looks different, which edits seldom make it. */
+/** Memoized: most edits do not change how a tool looks. */
 const ToolButton = memo(function ToolButton(props: ToolButtonProps) {
   const { editAction, label, disabled, pressed, run } = props;
   const Sign = editAction.icon;

@@ -20,7 +20,7 @@ import { Segments } from "../../ui/segments";
 import style from "./layouts.module.css";
 import type { Pane, Panels } from "./use-panels";
 
-/** `stacked`: its sign over its word, where there is little room. */
+/** Starts or closes the dry-run. `stacked`: its icon stands above its word. */
 export function DryRunButton({ stacked = false }: { stacked?: boolean }) {
   const context = useEditorContext();
   const Sign = dryRun.icon;
@@ -69,7 +69,7 @@ interface Parts {
 }
 
 interface PhoneParts extends Parts {
-  /** A dry-run is open, or the past is shown: both are on the canvas. */
+  /** A dry-run is open or the past is shown; both need the canvas. */
   onCanvas: boolean;
   start: () => ReactNode;
 }
@@ -102,7 +102,7 @@ export function PhoneLayout(props: PhoneParts) {
           </div>
         )}
       </div>
-      {/* Start is at the left, STOP at the right, and Dry-run keeps thumbs from meeting both. */}
+      {/* Start is at the left and STOP at the right; Dry-run keeps them apart. */}
       <div className={style.reach} role="toolbar" aria-label="Run">
         {start()}
         <DryRunButton stacked />
@@ -111,7 +111,7 @@ export function PhoneLayout(props: PhoneParts) {
   );
 }
 
-/** On a narrow screen the panels lie over the canvas, one at a time. */
+/** Opens the lists over the canvas on a narrow screen, and closes the details. */
 function ListButton({ panels: { left, setLeft, setRight } }: { panels: Panels }) {
   return (
     <ActionIcon
@@ -148,7 +148,7 @@ function DetailsButton({ panels: { right, setLeft, setRight } }: { panels: Panel
   );
 }
 
-/** Folds the list to a rail, where it stands beside the canvas. */
+/** Folds the lists beside the canvas into a rail. */
 function FoldButton({ fold }: { fold: Panels["fold"] }) {
   return (
     <Tooltip label="Fold the list">
@@ -173,7 +173,7 @@ interface DesktopParts extends Parts {
   list: () => ReactNode;
 }
 
-/** Which of the lists is shown; actions are for who may place them. */
+/** Chooses the list to show; actions only for people who may edit. */
 function SideTabs({ panels: { side, setSide } }: { panels: Panels }) {
   const { mayEdit } = useEditorContext();
   const [tab, setTab] = useListTab();
@@ -194,7 +194,7 @@ function SideTabs({ panels: { side, setSide } }: { panels: Panels }) {
   );
 }
 
-/** The lists: beside the canvas, or over it where there is no room or a rail in their place. */
+/** Shows the lists beside the canvas, or over it on a narrow screen or beside a rail. */
 function ListSide({ wide, panels, told, outline, history, list }: DesktopParts) {
   const { left, side, folded, fold } = panels;
   const carrying = useSyncExternalStore(actionDrag.subscribe, actionDrag.now) !== null;
@@ -209,7 +209,7 @@ function ListSide({ wide, panels, told, outline, history, list }: DesktopParts) 
       )}
       <aside
         className={style.left}
-        // What glides away covers nothing any more.
+        // A drawer that closes covers nothing any more.
         data-covers={open ? "left" : undefined}
         data-list
         data-beside={beside || undefined}
@@ -229,7 +229,7 @@ function ListSide({ wide, panels, told, outline, history, list }: DesktopParts) 
   );
 }
 
-/** When the details take room at the right, what was chosen is not left under their edge. */
+/** Keeps the selected action in view when the details open at the right. */
 function useSelectedInView(open: boolean): void {
   const context = useEditorContext();
   const now = useRef(context);
@@ -240,7 +240,7 @@ function useSelectedInView(open: boolean): void {
       const { selection, positions, view } = now.current;
       const [only, ...others] = selection;
       const at = only === undefined || others.length > 0 ? undefined : positions().get(only);
-      // What is being dragged stays under the pointer.
+      // A card that is being dragged stays under the pointer.
       if (at && document.querySelector(".react-flow__node.dragging") === null) view.reveal(at);
     });
     return () => cancelAnimationFrame(frame);
@@ -248,8 +248,8 @@ function useSelectedInView(open: boolean): void {
 }
 
 /**
- * Whether the details are there. Beside a rail, where the canvas has the room, only while something
- * is chosen or they were asked for; what was asked for ends with what was chosen.
+ * Return whether the details are open, and whether their button is shown. Beside a rail they open
+ * with a selection or by their button, and close when the selection ends.
  */
 function useDetails(wide: boolean, { folded, right, setRight }: Panels) {
   const { selection } = useEditorContext();

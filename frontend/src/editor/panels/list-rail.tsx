@@ -1,4 +1,4 @@
-/** The list at the left folded to a rail: what is in it opens over the canvas, and is put away again. */
+/** The rail to which the lists are folded; each of its buttons opens a list over the canvas. */
 import { ActionIcon } from "@mantine/core";
 import {
   IconAlertTriangle,
@@ -50,7 +50,7 @@ const PARTS = [
 
 type Part = (typeof PARTS)[number];
 
-/** Escape and the canvas put away what lies over it. `opener`: gets the focus back. */
+/** Closes an open list by Escape or a press on the canvas. `opener`: the element that gets the focus back. */
 function usePutAway(open: boolean, putAway: () => void, opener: () => HTMLElement | null) {
   const now = useRef({ putAway, opener });
   now.current = { putAway, opener };
@@ -79,9 +79,9 @@ function usePutAway(open: boolean, putAway: () => void, opener: () => HTMLElemen
 interface RailButtonProps {
   name: string;
   icon: ReactNode;
-  /** Undefined: it opens nothing that it could put away. */
+  /** Whether its list is open; undefined for a button that opens no list. */
   open?: boolean;
-  /** What is said besides its name. */
+  /** Text after the name, such as counts. */
   more?: string;
   onPress: (event: MouseEvent) => void;
 }
@@ -163,7 +163,7 @@ export function ListRail({ panels, told }: Props) {
           name={part.name}
           icon={<part.icon size={19} aria-hidden />}
           open={left && shown === part.name}
-          // A press of a key has no place.
+          // a click by key has a click count of 0
           onPress={(event) => press(part, event.detail === 0)}
         />
       ))}
@@ -185,7 +185,7 @@ export function ListRail({ panels, told }: Props) {
   );
 }
 
-/** What is open: of the lists the one whose tab is chosen, there or here. */
+/** Return the name of the open list. */
 function sideName(side: EditorSidePanel, tab: ListTab): Part["name"] {
   if (side === "outline") return "Outline";
   if (side === "history") return "History";

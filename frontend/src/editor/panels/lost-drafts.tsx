@@ -1,4 +1,7 @@
-/** Says that what somebody was typing in, or had just renamed, was deleted, and offers what they wrote. */
+/**
+ * Tells when others delete something that this person is typing in or has just renamed, and offers
+ * the text back.
+ */
 import { Button, Group } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { useEffect, useMemo, useRef } from "react";
@@ -51,7 +54,7 @@ function Offer({ id, text, deleted, onRestore }: OfferProps) {
   );
 }
 
-/** `name`: of what was deleted, before the words. */
+/** Shows the notification. `name`: the deleted element, before the words. */
 function offer(name: string, words: string, props: Omit<OfferProps, "id">): void {
   const id = `lost-${props.deleted?.key ?? "draft"}-${props.text ?? ""}`;
   notifications.hide(id);
@@ -72,10 +75,10 @@ function offer(name: string, words: string, props: Omit<OfferProps, "id">): void
 const WORDS = {
   gone: "What you typed in was deleted",
   unfit: "Not written: it did not fit its field",
-  written: null, // and it is still there
+  written: null, // it was written and still exists
 } as const;
 
-/** Follows what others delete, for as long as the graph is open. */
+/** Watches deletions of others while the graph is open. */
 export function LostDrafts() {
   const { doc, mayEdit, id: graph } = useEditorContext();
   const { person } = usePerson();

@@ -1,4 +1,4 @@
-/** Which panels beside the canvas are open; on a phone, which pane is shown. */
+/** State of the panels beside the canvas; on a phone, of the visible pane. */
 import { useLocalStorage } from "@mantine/hooks";
 import { useCallback, useState } from "react";
 import type { Panel } from "../../edit-actions/editor-context";
@@ -8,13 +8,13 @@ export type Pane = "canvas" | "outline" | "history" | "details" | "run";
 
 export type EditorSidePanel = "library" | "outline" | "history";
 
-/** The row of the outline that Tab would come to. */
+/** Selector of the outline's row that Tab reaches. */
 export const ROW = '[role="treegrid"] [data-row][tabindex="0"]';
 
-/** The newest entry of the history. */
+/** Selector of the newest entry of the history. */
 export const ENTRY_BUTTON = "[data-history] [data-entry]";
 
-/** Whether the list at the left is a rail where there is room for all of it: on this device. */
+/** Keeps on this device whether the lists are folded to a rail. */
 function useFoldedList() {
   const [folded, setFolded] = useLocalStorage({
     key: "aa.list-folded",
