@@ -227,6 +227,7 @@ test("no dialog lies under STOP, however tall it is, on a phone held either way"
     await page.goto(product.url);
     await page.getByRole("button", { name: "Ada" }).tap();
     await page.getByRole("button", { name: /^Share/ }).tap();
+    await expect(page.getByRole("dialog")).toHaveCount(1); // the menu of Ada has closed
   };
   const deleted = async () => {
     // More than the screen is tall.

@@ -52,10 +52,11 @@ async function arrive(
   proxy: ProxyServer,
   link = `/#t=${TOKEN}`,
   options: Parameters<Browser["newContext"]>[0] = {},
+  prepare: (page: Page) => Promise<void> = async () => {},
 ): Promise<Person & { refused: string[] }> {
   const context = await browser.newContext({ ignoreHTTPSErrors: true, ...options });
   const page = await context.newPage();
-  await page.clock.install(); // it goes on as usual until a test moves it
+  await prepare(page);
   const failures: string[] = [];
   const refused: string[] = [];
   page.on("pageerror", (error) => failures.push(error.message));
@@ -320,7 +321,13 @@ test.describe("where the proxy is not as it should be", () => {
   }) => {
     const unnamed = await behind("nginx", "", false);
     try {
-      const { page, context, failures, refused } = await arrive(browser, unnamed.proxy);
+      const { page, context, failures, refused } = await arrive(
+        browser,
+        unnamed.proxy,
+        undefined,
+        {},
+        ({ clock }) => clock.install(),
+      );
       await expect(alert(page)).toContainText(`--public-url ${unnamed.proxy.url}/`);
       await pictures(page, "no-public-url");
       const before = refused.length;

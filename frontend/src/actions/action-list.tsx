@@ -199,7 +199,7 @@ export function ActionList({ actions, robots, current, onNew, onImport, foot }: 
   const [filter, setFilter] = useState<ActionFilter>("all");
   // Filtering is deferred, so that typing is never delayed.
   const wanted = useDeferredValue(search);
-  const shown = useMemo(() => foundActions(actions, filter, wanted), [actions, filter, wanted]);
+  const found = useMemo(() => foundActions(actions, filter, wanted), [actions, filter, wanted]);
   // A new action is offered for the text that the list was filtered by.
   const fresh = wanted.trim();
   const exact = actions.some(({ name }) => name === fresh);
@@ -220,11 +220,11 @@ export function ActionList({ actions, robots, current, onNew, onImport, foot }: 
       />
       <Filters robots={robots} filter={filter} onFilter={setFilter} />
       <p className="visually-hidden" role="status">
-        {shown.length === 1 ? "1 action" : `${shown.length} actions`}
+        {found.length === 1 ? "1 action" : `${found.length} actions`}
       </p>
       <nav aria-label="Actions" className={style.scroll} aria-busy={wanted !== search}>
-        <ActionRows actions={shown} current={current} />
-        {shown.length === 0 && (
+        <ActionRows actions={found} current={current} />
+        {found.length === 0 && (
           <p className={style.hint}>
             {actions.length === 0 ? "No action yet." : "No action is found."}
           </p>

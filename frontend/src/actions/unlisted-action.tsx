@@ -18,7 +18,7 @@ interface Props {
 }
 
 /** Return the parts of an action: those in graphs, else those of the first robot. */
-function shownOf({ action, robots: [first] }: ListedAction) {
+function partsOf({ action, robots: [first] }: ListedAction) {
   const template = first && robotTemplate(first.action);
   return {
     description: action?.description ?? "",
@@ -66,7 +66,7 @@ export function UnlistedAction({ listed, knowledge, busy, onAdd, onTake }: Props
             ? "The library does not have it, and no graph uses it."
             : "Only graphs use it: each says for itself what it takes. In the library it is described once."}
         </p>
-        <ActionOverview {...shownOf(listed)}>
+        <ActionOverview {...partsOf(listed)}>
           {action && <UsedIn usedIn={action.used_in} differs={[]} />}
           <OnRobots name={name} knowledge={knowledge} own={action} offer={takeOver} />
         </ActionOverview>

@@ -56,7 +56,7 @@ function useTicks(id: string) {
   const possible = possibleRenames(uses, suggested);
   const all = [...suggested, ...possible];
   const renames = renamesOf(ticked, all);
-  const shown = (each: SuggestedRename) => ({
+  const described = (each: SuggestedRename) => ({
     ...each,
     key: keyOfRename(each),
     ticked: ticked.has(keyOfRename(each)),
@@ -64,8 +64,8 @@ function useTicks(id: string) {
   });
   return {
     renames,
-    suggested: suggested.map(shown),
-    possible: possible.map(shown),
+    suggested: suggested.map(described),
+    possible: possible.map(described),
     tick: (key: string) => setTicked((now) => toggled(now, key)),
     /** Choose one of several renames that exclude each other, or none. */
     choose: (others: readonly string[], key: string) =>

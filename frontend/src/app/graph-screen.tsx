@@ -11,7 +11,7 @@ import { useMay, usePerson } from "../api/use-person";
 import { levelsOf } from "../canvas/level-path";
 import { serverNow } from "../clock/server-clock";
 import { useSeed } from "../editor/dry-run/use-seed";
-import { Editor, type Shown } from "../editor/editor";
+import { Editor, type EditorSummary } from "../editor/editor";
 import { templatesOf, useKnownActions, usePlaceable } from "../library/known-actions";
 import { Sidebar } from "../library/sidebar";
 import { useReplay } from "../review/replay/use-replay";
@@ -166,55 +166,55 @@ function Inside({ id }: { id: string }) {
       run={live?.ended_at === null ? live.id : null}
       bar={(parts) => <TitledBar id={id} {...parts} />}
       list={(place) => <Lists id={id} create={create} choose={choose} place={place} />}
-      status={(shown: Shown) => (
+      status={(summary: EditorSummary) => (
         <PartBoundary waiting={null}>
           <DraftStatus
             run={inside === null ? live : null}
             label={label}
-            graph={shown.graph}
-            seq={shown.seq}
+            graph={summary.graph}
+            seq={summary.seq}
             settle={settle}
-            obstacle={shown.obstacle}
+            obstacle={summary.obstacle}
           />
         </PartBoundary>
       )}
-      start={(shown: Shown) =>
+      start={(summary: EditorSummary) =>
         mayStart && (
           <StartControl
             graph={id}
-            name={shown.graph.name || "untitled"}
-            seq={shown.seq}
+            name={summary.graph.name || "untitled"}
+            seq={summary.seq}
             settle={settle}
-            obstacle={shown.obstacle}
-            compact={shown.compact}
-            thumb={shown.phone}
+            obstacle={summary.obstacle}
+            compact={summary.compact}
+            thumb={summary.phone}
           />
         )
       }
-      record={(shown, script, onStarted) =>
+      record={(summary, script, onStarted) =>
         mayStart && (
           <RecordDryRun
             graph={id}
-            seq={shown.seq}
-            obstacle={shown.obstacle}
+            seq={summary.seq}
+            obstacle={summary.obstacle}
             script={script}
             onStarted={onStarted}
           />
         )
       }
-      strip={(shown: Shown) => (
+      strip={(summary: EditorSummary) => (
         <RunDrawer
           run={run}
           cursor={replay.at}
           onSeek={seek}
           going={going}
           onChoose={chooseRun}
-          graph={shown.graph}
+          graph={summary.graph}
           versionLabel={label}
-          selected={shown.selected}
-          onPick={shown.pick}
-          folded={shown.folded}
-          onFold={shown.fold}
+          selected={summary.selected}
+          onPick={summary.pick}
+          folded={summary.folded}
+          onFold={summary.fold}
         />
       )}
       seed={seed}

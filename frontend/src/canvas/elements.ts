@@ -211,7 +211,7 @@ const FARTHEST = 1e7; // px; a file may place a card anywhere
 const END_WIDTH = 84; // px of the entry and exit that are visible, in the middle of their box
 
 /** Return the waypoints of a bundle; they move along while both of its ends are dragged by the same way. */
-function viaOf(bundle: Bundle, moved: Positions): readonly Position[] {
+function waypointsOf(bundle: Bundle, moved: Positions): readonly Position[] {
   const { waypoints, source: parent, target: child } = bundle;
   const by = waypoints.length > 0 ? movedTogether({ parent, child }, moved) : null;
   return by ? shifted(waypoints, by) : waypoints;
@@ -245,7 +245,13 @@ export function sceneOf(graph: Graph, options: SceneOptions, offset: number | nu
     bundlesOf(relation).map((bundle, i) => {
       const marked = i === 0 && options.marks.has(bundle.relation);
       const { id, source, target } = bundle;
-      return { id, source, target, pill: pillSizeOf(bundle, marked), via: viaOf(bundle, moved) };
+      return {
+        id,
+        source,
+        target,
+        pill: pillSizeOf(bundle, marked),
+        waypoints: waypointsOf(bundle, moved),
+      };
     }),
   );
   return { direction, offset: gridOffset(cards, direction, offset), cards, lines };
@@ -298,19 +304,19 @@ function alikeMaps<T>(a: ReadonlyMap<Key, T>, b: ReadonlyMap<Key, T>): boolean {
 function arrowsOf(relation: Relation, options: ArrowOptions, { names }: CardSurroundings): Arrow[] {
   const id = relationId(relation);
   const outcomes = spokenOutcomes(relation.conditions);
-  const shown: Precondition[] = outcomes.length > 0 ? outcomes : ["on_true"];
+  const drawn: Precondition[] = outcomes.length > 0 ? outcomes : ["on_true"];
   const entry = relation.parent === ENTRY;
   const mark = options.marks.get(id) ?? null;
   const selected = options.selected.has(id);
   const bundles = bundlesOf(relation);
-  const led = new Set<string>();
+  const drawnBundles = new Set<string>();
   const ended = `on_${options.progress.get(relation.parent)?.tone}`;
-  return shown.flatMap((outcome, i) => {
+  return drawn.flatMap((outcome, i) => {
     const response = relation.conditions[outcome];
     const bundle = bundles.find((each) => each.response === response);
     if (!bundle) return [];
-    const lead = !led.has(bundle.id);
-    led.add(bundle.id);
+    const lead = !drawnBundles.has(bundle.id);
+    drawnBundles.add(bundle.id);
     const came = entry ? null : (bundle.outcomes.find((each) => each === ended) ?? null);
     const over = !entry && OUTCOMES.some((each) => each === ended);
     return {

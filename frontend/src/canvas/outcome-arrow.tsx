@@ -64,7 +64,7 @@ function stub(line: RoutedLine, x: number, y: number, pill: Point): Point[] {
 }
 
 /** Draws nothing where the error notice of a failed part would be; it has no place within SVG. */
-const nowhere = () => null;
+const noNotice = () => null;
 
 export const OutcomeArrow = memo(function OutcomeArrow(props: EdgeProps<Arrow>) {
   const { id, data, selected, sourceX, sourceY, targetX, targetY } = props;
@@ -98,7 +98,7 @@ export const OutcomeArrow = memo(function OutcomeArrow(props: EdgeProps<Arrow>) 
       )}
       {data.lead && pill && <Pill {...{ id, data, line, pill }} selected={selected === true} />}
       {data.lead && selected && (
-        <PartBoundary waiting={null} frame={nowhere}>
+        <PartBoundary waiting={null} frame={noNotice}>
           <BendHandles arrow={id} bundle={data.bundle} line={line} />
         </PartBoundary>
       )}

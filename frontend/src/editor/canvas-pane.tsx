@@ -218,10 +218,10 @@ const NOTHING_RUNS = { progress: NOTHING, marks: NO_PROBLEM_MARKS, run: null };
  * at once; panels beside it follow later.
  */
 function useDrawnContext(seen: SeenPast | null): EditorContext {
-  const calm = useEditorContext();
+  const context = useEditorContext();
   const now = useGraph();
-  const graph = calm.past === null ? now : (seen?.drawn ?? calm.graph);
-  return useMemo<EditorContext>(() => ({ ...calm, graph }), [calm, graph]);
+  const graph = context.past === null ? now : (seen?.drawn ?? context.graph);
+  return useMemo<EditorContext>(() => ({ ...context, graph }), [context, graph]);
 }
 
 /** Shows the bar above the canvas of a draft, which leads to its origin. */

@@ -156,7 +156,7 @@ const PastDetails = lazyPart(() => import("../past/past-details").then((part) =>
 const Outline = lazyPart(() => import("../outline/outline").then((part) => part.Outline));
 
 /** State of the editor for the parts that the page provides. */
-export interface Shown {
+export interface EditorSummary {
   graph: Graph;
   seq: number;
   /** The reason why this moment cannot be started; null if it can. */
@@ -187,11 +187,11 @@ interface Props {
   run: string | null;
   bar: (parts: EditorBarParts) => ReactNode;
   list: (place: (template: NewAction) => void) => ReactNode;
-  strip: (shown: Shown) => ReactNode;
-  start: (shown: Shown) => ReactNode;
-  status: (shown: Shown) => ReactNode;
+  strip: (summary: EditorSummary) => ReactNode;
+  start: (summary: EditorSummary) => ReactNode;
+  status: (summary: EditorSummary) => ReactNode;
   /** Returns the button that turns the open dry-run into a run. */
-  record: (shown: Shown, script: Script, onStarted: () => void) => ReactNode;
+  record: (summary: EditorSummary, script: Script, onStarted: () => void) => ReactNode;
   corner: ReactNode;
   /** The moment of a run at which a dry-run shall start; null without one. */
   seed: DryRunSeed | null;
@@ -213,11 +213,11 @@ function obstacleOf(context: EditorContext, link: RoomLink, checked: Checked, pl
   return blocks === "" ? null : blocks;
 }
 
-function useShown(
+function useSummary(
   context: EditorContext,
   link: RoomLink,
   checked: Checked,
-): Shown & { onPlacing: (placing: boolean) => void } {
+): EditorSummary & { onPlacing: (placing: boolean) => void } {
   const [placing, setPlacing] = useState(false);
   const wide = useIsWide();
   const phone = useIsPhone();
@@ -320,7 +320,7 @@ function withDryRun(start: ReactNode): ReactNode {
 function barParts(
   { me, status, start }: Props,
   context: EditorContext,
-  shown: Shown,
+  summary: EditorSummary,
   told: readonly ToldProblem[],
   search: string,
   rename: (name: string) => boolean,
@@ -334,11 +334,11 @@ function barParts(
         </PartBoundary>
         <SaveStatus />
         <ProblemCount told={told} />
-        {!shown.compact && status(shown)}
+        {!summary.compact && status(summary)}
       </>
     ),
     actions: <StillPeople me={me} />,
-    start: shown.phone ? null : withDryRun(start(shown)),
+    start: summary.phone ? null : withDryRun(start(summary)),
   };
 }
 
@@ -352,8 +352,12 @@ function useSeededDryRun({ beginDryRun }: EditorContext, seed: DryRunSeed | null
 const NOTHING_TOLD: readonly never[] = [];
 
 /** Return the button that turns the open dry-run into a run; null without one. */
-function recordOf({ dryRun }: EditorContext, shown: Shown, record: Props["record"]): ReactNode {
-  return dryRun && record(shown, scriptOf(dryRun.decided), dryRun.close);
+function recordOf(
+  { dryRun }: EditorContext,
+  summary: EditorSummary,
+  record: Props["record"],
+): ReactNode {
+  return dryRun && record(summary, scriptOf(dryRun.decided), dryRun.close);
 }
 
 /** Memoized, so that the events of a run do not render the side panels again. */
@@ -396,8 +400,8 @@ export function Editor(props: Props) {
   const place = (template: NewAction) => {
     if (placeAction(context, template)) panels.setLeft(false);
   };
-  const shown = useShown(context, link, { seq: problems?.seq, told });
-  const { compact, phone } = shown;
+  const summary = useSummary(context, link, { seq: problems?.seq, told });
+  const { compact, phone } = summary;
   const stage = (
     <CanvasPane
       me={props.me}
@@ -407,17 +411,17 @@ export function Editor(props: Props) {
       compact={compact}
       phone={phone}
       run={props.run}
-      record={recordOf(context, shown, props.record)}
+      record={recordOf(context, summary, props.record)}
       writing={overlay?.kind === "note" ? overlay.key : null}
       corner={phone ? null : props.corner}
-      onPlacing={shown.onPlacing}
+      onPlacing={summary.onPlacing}
       past={past}
     />
   );
   // A dry-run or the past hides the strip of runs that are over; a current run always stays
   // visible.
-  const aside = context.dryRun !== null || context.past !== null;
-  const strip = aside && props.run === null ? null : props.strip(shown);
+  const isDryOrPast = context.dryRun !== null || context.past !== null;
+  const strip = isDryOrPast && props.run === null ? null : props.strip(summary);
   const parts = {
     panels,
     stage,
@@ -441,13 +445,13 @@ export function Editor(props: Props) {
         </PartBoundary>
       </DetailsPane>
     ),
-    status: () => props.status(shown),
+    status: () => props.status(summary),
   };
   return (
     <EditorContextProvider context={context}>
-      {props.bar(barParts(props, context, shown, told, search, rename))}
+      {props.bar(barParts(props, context, summary, told, search, rename))}
       {phone ? (
-        <PhoneLayout {...parts} onCanvas={aside} start={() => props.start(shown)} />
+        <PhoneLayout {...parts} onCanvas={isDryOrPast} start={() => props.start(summary)} />
       ) : (
         <DesktopLayout {...parts} wide={!compact} told={told} list={() => props.list(place)} />
       )}

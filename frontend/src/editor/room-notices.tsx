@@ -52,26 +52,26 @@ function ReadOnly() {
 function Others() {
   const waiting = useOthersWaiting();
   const graph = useGraphPart(({ name }) => name);
-  const [shown, setShown] = useState<boolean | null>(null);
+  const [opened, setOpened] = useState<boolean | null>(null);
   const said = otherPeopleWait(waiting.others);
   if (said === null) return null;
   return (
     <Say
       icon={<IconUsers size={16} />}
       action={
-        <Button size="compact-sm" onClick={() => setShown(true)}>
+        <Button size="compact-sm" onClick={() => setOpened(true)}>
           Look
         </Button>
       }
     >
       {said}
       <OverlayBoundary>
-        {shown !== null && (
+        {opened !== null && (
           <OthersDialog
             graph={graph}
             waiting={waiting}
-            opened={shown}
-            onClose={() => setShown(false)}
+            opened={opened}
+            onClose={() => setOpened(false)}
           />
         )}
       </OverlayBoundary>

@@ -150,7 +150,7 @@ function useDialogs(latest: RefObject<EditorContext | null>, onPanel: (panel: Pa
   );
   return {
     openers,
-    shown: { panel, adding, overlay, isFindOpen, closeAdd, closeOverlay, closeFind },
+    opened: { panel, adding, overlay, isFindOpen, closeAdd, closeOverlay, closeFind },
   };
 }
 
@@ -185,7 +185,7 @@ export function useEditor(
   const edited = useEdited(id, past);
   const tools = useTools();
   const { keys: folded, put: fold } = useKeptKeys("aa.folded", id);
-  const { openers, shown } = useDialogs(latest, onPanel);
+  const { openers, opened } = useDialogs(latest, onPanel);
   const canvasHandle = useRef<CanvasHandle>({
     view: NO_CANVAS_VIEW,
     positions: () => new Map(),
@@ -199,5 +199,5 @@ export function useEditor(
     [edited, tools, folded, fold, openers, download],
   );
   latest.current = context;
-  return { context, canvasHandle, ...shown };
+  return { context, canvasHandle, ...opened };
 }

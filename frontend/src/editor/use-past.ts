@@ -31,13 +31,13 @@ export const NO_PAST: Past = {
   ...{ lookAt: () => {}, show: () => {}, setSide: () => {} },
 };
 
-interface ShownPast {
+interface PastState {
   readonly place: PastPlace | null;
   readonly seen: SeenPast | null;
 }
 
 export function usePast(): Past {
-  const [{ place, seen }, setShown] = useState<ShownPast>(() => ({
+  const [{ place, seen }, setState] = useState<PastState>(() => ({
     place: pastOf(window.location.search),
     seen: null,
   }));
@@ -52,9 +52,9 @@ export function usePast(): Past {
     (next: PastPlace | null) => {
       wanted.set(next);
       if (next === null) {
-        setShown({ place: null, seen: null });
+        setState({ place: null, seen: null });
         drawn.set(null);
-      } else setShown((now) => (now.seen === null ? { place: next, seen: null } : now));
+      } else setState((now) => (now.seen === null ? { place: next, seen: null } : now));
     },
     [wanted, drawn],
   );
@@ -62,7 +62,7 @@ export function usePast(): Past {
     (found: SeenPast, at: PastPlace) => {
       drawn.set(found);
       startTransition(() =>
-        setShown((now) => (now.place === null ? now : { place: at, seen: found })),
+        setState((now) => (now.place === null ? now : { place: at, seen: found })),
       );
     },
     [drawn],

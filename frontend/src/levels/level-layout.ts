@@ -113,9 +113,9 @@ function linesOf(
     offset: gridOffset(boxes, direction, null),
     cards: boxes,
     lines: bundles.map((bundle) => {
-      const { id, source, target, waypoints } = bundle;
-      const via = waypoints.map(([x, y]) => [x + moved[0], y + moved[1]] as const);
-      return { id, source, target, pill: pillSizeOf(bundle, false), via };
+      const { id, source, target } = bundle;
+      const waypoints = bundle.waypoints.map(([x, y]) => [x + moved[0], y + moved[1]] as const);
+      return { id, source, target, pill: pillSizeOf(bundle, false), waypoints };
     }),
   };
   const lines: LineMap = bundles.length > MOST_ROUTED ? simpleLines(scene) : routed(scene).lines;

@@ -110,14 +110,14 @@ export function useExpansion(given: ExpansionInput) {
   const { keys: expanded, put } = useKeptKeys("aa.expanded", id);
   const { levels, known } = useLevels(given, expanded);
   const [goal, setGoal] = useState(0);
-  const shown = useRef<string | null>(null);
+  const toReveal = useRef<string | null>(null);
   const toggle = useStableCallback((path: string) => {
     setGoal(0);
     const isOpen = expanded.has(path);
     const below = [...expanded].filter((each) => each === path || each.startsWith(`${path}/`));
     if (isOpen) put(below, false);
     else put([path], true);
-    shown.current = isOpen ? null : path;
+    toReveal.current = isOpen ? null : path;
     announcer.say(isOpen ? "Collapsed" : "Expanded");
   });
   const source = useStateSource();
@@ -131,10 +131,10 @@ export function useExpansion(given: ExpansionInput) {
   }, [levels, toggle, enter, source]);
   // Once it is loaded and has its room, the expanded graph is brought into view.
   useEffect(() => {
-    const [first = ""] = shown.current?.split("/") ?? [];
-    if (!levels.has(first) || !isDrawn(levels, shown.current ?? "")) return;
+    const [first = ""] = toReveal.current?.split("/") ?? [];
+    if (!levels.has(first) || !isDrawn(levels, toReveal.current ?? "")) return;
     const timer = setTimeout(() => {
-      shown.current = null;
+      toReveal.current = null;
       view.show([first]);
     }, SETTLED_MS);
     return () => clearTimeout(timer);

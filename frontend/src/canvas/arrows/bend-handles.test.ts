@@ -2,9 +2,13 @@ import { expect, test } from "vitest";
 import { middlesOf } from "./bend-handles";
 import type { Point } from "./scene";
 
-const line = (points: readonly Point[], via: readonly Point[] = [], pill: Point | null = null) => ({
+const line = (
+  points: readonly Point[],
+  waypoints: readonly Point[] = [],
+  pill: Point | null = null,
+) => ({
   ...{ id: "l", direction: "right" as const, ends: "", docked: pill !== null, simple: false },
-  ...{ points, via, pill },
+  ...{ points, waypoints, pill },
 });
 
 test("each longer piece can be bent in its middle, in the order of the waypoints", () => {
@@ -36,7 +40,7 @@ test("what a pill covers is not taken, nor a piece that is short, unless it is a
   );
   expect(middlesOf(straight, 48)).toEqual([{ index: 0, at: [127, 0] }]);
   expect(middlesOf(straight, 200)).toEqual([{ index: 0, at: [127, 0] }]);
-  expect(middlesOf({ ...straight, via: [[100, 0]] }, 200)).toEqual([]);
+  expect(middlesOf({ ...straight, waypoints: [[100, 0]] }, 200)).toEqual([]);
 });
 
 test("a waypoint that the line leaves out parts nothing", () => {

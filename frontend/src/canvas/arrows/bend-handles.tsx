@@ -59,12 +59,12 @@ function placeOn(
  * Return the middles of the pieces between corners, waypoints and the pill that are at least
  * `least` px long.
  */
-export function middlesOf({ points, via, pill }: RoutedLine, least: number): PieceMiddle[] {
+export function middlesOf({ points, waypoints, pill }: RoutedLine, least: number): PieceMiddle[] {
   const lengths = lengthsOf(points);
   const [start] = points;
   const first = start && pill ? (placeOn(points, lengths, pill, 0) ?? -PILL) + PILL : 0;
   let passed = first;
-  const stops = via.flatMap((place, i) => {
+  const stops = waypoints.flatMap((place, i) => {
     const at = placeOn(points, lengths, place, passed);
     if (at === null) return [];
     passed = at;
@@ -76,7 +76,7 @@ export function middlesOf({ points, via, pill }: RoutedLine, least: number): Pie
   const pieces = cuts.slice(1).map((end, i) => ({ begin: cuts[i] ?? end, end }));
   const longest = Math.max(...pieces.map(({ begin, end }) => end - begin));
   // A line without waypoints has at least one handle, however short it is.
-  const enough = via.length > 0 ? least : Math.min(least, longest);
+  const enough = waypoints.length > 0 ? least : Math.min(least, longest);
   return pieces.flatMap(({ begin, end }) => {
     if (end - begin < enough) return [];
     const index = stops.filter(({ at }) => at <= begin).at(-1)?.index ?? 0;
@@ -107,16 +107,16 @@ interface BendHandle {
 const STILL = 3; // px on screen that a press may move without being a drag
 
 /** Return the waypoints with this one added or moved to a place. */
-const withBend = (via: readonly Point[], { kind, index }: BendHandle, at: Point): Point[] => [
-  ...via.slice(0, index),
+const withBend = (waypoints: readonly Point[], { kind, index }: BendHandle, at: Point): Point[] => [
+  ...waypoints.slice(0, index),
   at,
-  ...via.slice(kind === "bend" ? index + 1 : index),
+  ...waypoints.slice(kind === "bend" ? index + 1 : index),
 ];
 
 function useBendDrag(
   bundle: string,
-  via: readonly Point[],
-  done: (via: Point[], handle: BendHandle) => void,
+  waypoints: readonly Point[],
+  done: (waypoints: Point[], handle: BendHandle) => void,
 ) {
   const lines = useContext(LineContext);
   const { screenToFlowPosition } = useReactFlow();
@@ -134,14 +134,14 @@ function useBendDrag(
     const to = screenToFlowPosition({ x, y }, { snapToGrid: false });
     const at = lines.snapped([to.x, to.y]);
     setDragged({ ...handle, at });
-    lines.lead(bundle, withBend(via, handle, at));
+    lines.dragLine(bundle, withBend(waypoints, handle, at));
   };
   const end = (keep: boolean) => {
     press.current = null;
     if (dragged === null) return;
     setDragged(null);
-    if (keep) done(withBend(via, dragged, dragged.at), dragged);
-    lines.settle(keep);
+    if (keep) done(withBend(waypoints, dragged, dragged.at), dragged);
+    lines.endDrag(keep);
   };
   return { dragged, start, move, end };
 }
@@ -169,7 +169,7 @@ export function BendHandles(props: BendHandlesProps) {
 
 /** Return the handles of the waypoints in their order, then those of the pieces. */
 function handlesOf(line: RoutedLine, zoom: number): BendHandle[] {
-  const bends = line.via.map(
+  const bends = line.waypoints.map(
     (at, index): BendHandle => ({ id: `b${index}`, kind: "bend", index, at }),
   );
   if (bends.length >= MOST_WAYPOINTS) return bends;
@@ -198,11 +198,11 @@ function useFocusAfter(count: number, arrow: string) {
 function Handles({ arrow, bundle, line, editing }: BendHandlesProps & { editing: LineEditing }) {
   const lines = useContext(LineContext);
   const zoom = useStore(({ transform }) => transform[2]);
-  const { buttons, wanted } = useFocusAfter(line.via.length, arrow);
+  const { buttons, wanted } = useFocusAfter(line.waypoints.length, arrow);
   // During a drag the line follows the pointer, while the other handles stay where they were.
   const before = useRef<readonly BendHandle[]>([]);
-  const via = before.current.flatMap(({ kind, at }) => (kind === "bend" ? [at] : []));
-  const drag = useBendDrag(bundle.id, via, (next, { index }) => {
+  const waypoints = before.current.flatMap(({ kind, at }) => (kind === "bend" ? [at] : []));
+  const drag = useBendDrag(bundle.id, waypoints, (next, { index }) => {
     wanted.current = index;
     editing.bend(bundle, next);
   });
@@ -213,10 +213,10 @@ function Handles({ arrow, bundle, line, editing }: BendHandlesProps & { editing:
     editing.bend(bundle, next, byKey);
   };
   const remove = ({ index }: BendHandle) =>
-    change(line.via.toSpliced(index, 1), Math.min(index, line.via.length - 2), false);
+    change(line.waypoints.toSpliced(index, 1), Math.min(index, line.waypoints.length - 2), false);
   const add = (handle: BendHandle, [dx, dy]: Point = [0, 0]) => {
     const at = lines.snapped([handle.at[0] + dx * STEP, handle.at[1] + dy * STEP]);
-    change(withBend(line.via, handle, at), handle.index, dx !== 0 || dy !== 0);
+    change(withBend(line.waypoints, handle, at), handle.index, dx !== 0 || dy !== 0);
   };
   const onKeyDown = (event: KeyboardEvent, handle: BendHandle) => {
     const key = keyOf(event);
@@ -230,14 +230,14 @@ function Handles({ arrow, bundle, line, editing }: BendHandlesProps & { editing:
     event.preventDefault();
     event.stopPropagation();
   };
-  const shown = before.current.flatMap((handle) => {
+  const visible = before.current.flatMap((handle) => {
     if (handle.id === dragged?.id) return [dragged];
     return dragged === null || handle.kind === "bend" ? [handle] : [];
   });
-  const names = namesOf(shown, editing.nameOf(bundle));
+  const names = namesOf(visible, editing.nameOf(bundle));
   return (
     <EdgeLabelRenderer>
-      {shown.map((handle, i) => (
+      {visible.map((handle, i) => (
         <button
           key={handle.id}
           ref={(button) => {

@@ -120,7 +120,7 @@ test("while both ends of a line are dragged its bends go along in the scene", ()
   ]);
   const via = (places: Positions) =>
     sceneOf(graph, { places, rest, measured: new Map(), marks: NO_PROBLEM_MARKS }, null).lines[0]
-      ?.via;
+      ?.waypoints;
   const dragged: Positions = new Map([...rest, ["a", [5, 7]]]);
   expect(via(dragged)).toEqual([[9, 9]]);
   expect(via(new Map([...dragged, ["b", [405, 7]]]))).toEqual([[14, 16]]);

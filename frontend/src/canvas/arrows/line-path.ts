@@ -53,8 +53,8 @@ export function lineNow(known: RoutedLine | undefined, simple: RoutedLine): Rout
       ? known
       : { ...known, pill };
   const points = stretched(old, first, last, known.direction === "right" ? 0 : 1);
-  const { ends, docked, via } = simple;
-  return points ? { ...known, ends, points, pill, docked, via } : simple;
+  const { ends, docked, waypoints } = simple;
+  return points ? { ...known, ends, points, pill, docked, waypoints } : simple;
 }
 
 const equal = (a: Point, b: Point) => a[0] === b[0] && a[1] === b[1];

@@ -98,18 +98,21 @@ test("a canvas that is gone leaves no worker behind", () => {
 test("a line goes where somebody drags it, and stays there until the graph says so, too", () => {
   const store = new LineStore();
   store.show(scene);
-  const via = () => store.lineOf(id)?.via;
+  const waypoints = () => store.lineOf(id)?.waypoints;
   const at = store.snapped([301, 205]);
-  store.lead(id, [at]);
-  expect(via()).toEqual([at]);
-  store.settle(true);
-  expect(via()).toEqual([at]);
-  store.show({ ...scene, lines: scene.lines.map((l) => (l.id === id ? { ...l, via: [at] } : l)) });
-  expect(via()).toEqual([at]);
+  store.dragLine(id, [at]);
+  expect(waypoints()).toEqual([at]);
+  store.endDrag(true);
+  expect(waypoints()).toEqual([at]);
+  store.show({
+    ...scene,
+    lines: scene.lines.map((l) => (l.id === id ? { ...l, waypoints: [at] } : l)),
+  });
+  expect(waypoints()).toEqual([at]);
   // What is left is as it was, at once.
-  store.lead(id, [[0, 0]]);
-  store.settle(false);
-  expect(via()).toEqual([at]);
+  store.dragLine(id, [[0, 0]]);
+  store.endDrag(false);
+  expect(waypoints()).toEqual([at]);
 });
 
 test("many lines that move again and again rest in between, and end where the cards are", async () => {

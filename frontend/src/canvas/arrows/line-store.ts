@@ -26,7 +26,7 @@ export class LineStore {
   /** The scene without the line that is being dragged. */
   private given: Scene | null = null;
   /** The waypoints of a line while it is dragged. `settled`: the next scene has them already. */
-  private led: { id: string; via: readonly Point[]; settled: boolean } | null = null;
+  private dragged: { id: string; waypoints: readonly Point[]; settled: boolean } | null = null;
   private opened: string | null = null;
   private worker: Worker | null = null;
   private busy = false;
@@ -37,7 +37,7 @@ export class LineStore {
 
   /** Takes the current scene and draws its lines, now or when their share of the time allows it. */
   show(given: Scene): void {
-    if (this.led?.settled) this.led = null;
+    if (this.dragged?.settled) this.dragged = null;
     this.given = given;
     const rest = Math.max(0, this.restsUntil - tick());
     // With many lines the cards come first; the first drawing comes at once.
@@ -50,7 +50,7 @@ export class LineStore {
     clearTimeout(this.resting);
     this.resting = undefined;
     if (!this.given) return;
-    const scene = this.asLed(this.given);
+    const scene = this.withDragged(this.given);
     if (this.scene && sameScene(this.scene, scene)) return;
     const began = tick();
     this.scene = scene;
@@ -62,15 +62,15 @@ export class LineStore {
   }
 
   /** Draws a line through other waypoints while they are dragged. */
-  lead(id: string, via: readonly Point[]): void {
-    this.led = { id, via, settled: false };
+  dragLine(id: string, waypoints: readonly Point[]): void {
+    this.dragged = { id, waypoints, settled: false };
     if (this.given) this.show(this.given);
   }
 
   /** Ends a drag. If the waypoints are `kept`, the next scene has them. */
-  settle(kept: boolean): void {
-    if (!this.led) return;
-    this.led = kept ? { ...this.led, settled: true } : null;
+  endDrag(kept: boolean): void {
+    if (!this.dragged) return;
+    this.dragged = kept ? { ...this.dragged, settled: true } : null;
     if (!kept && this.given) this.show(this.given);
   }
 
@@ -82,11 +82,11 @@ export class LineStore {
     return [near(x, column), near(y, row)];
   }
 
-  private asLed(scene: Scene): Scene {
-    const { led } = this;
-    if (!led) return scene;
+  private withDragged(scene: Scene): Scene {
+    const { dragged } = this;
+    if (!dragged) return scene;
     const lines = scene.lines.map((line) =>
-      line.id === led.id ? { ...line, via: led.via } : line,
+      line.id === dragged.id ? { ...line, waypoints: dragged.waypoints } : line,
     );
     return { ...scene, lines };
   }
@@ -136,7 +136,7 @@ export class LineStore {
     this.waiting = null;
     this.scene = null;
     this.given = null;
-    this.led = null;
+    this.dragged = null;
   }
 
   private tell(id: string): void {
@@ -207,7 +207,10 @@ function sameScene(a: Scene, b: Scene): boolean {
     lines.every((line, i) => {
       const other = b.lines[i];
       const same = other?.id === line.id && other.pill?.width === line.pill?.width;
-      return same && (other.via === line.via || String(other.via) === String(line.via));
+      return (
+        same &&
+        (other.waypoints === line.waypoints || String(other.waypoints) === String(line.waypoints))
+      );
     })
   );
 }
@@ -231,7 +234,7 @@ export function useIsOpen(id: string): boolean {
 /** Functions that change lines by hand; without them lines are read-only. */
 export interface LineEditing {
   /** Leads a line through these places. `byKey`: repeated key presses are one step of undo. */
-  bend(bundle: Bundle, via: readonly Point[], byKey?: boolean): void;
+  bend(bundle: Bundle, waypoints: readonly Point[], byKey?: boolean): void;
   /** Leads one outcome to the card at a place on screen. */
   drop(bundle: Bundle, outcome: Precondition, at: Position): void;
   /** Asks to which card one outcome shall lead. */

@@ -62,17 +62,17 @@ export class Raster {
   }
 
   /**
-   * Return the raster of a scene; null if it would be too large. `via`: waypoints, which may lie
+   * Return the raster of a scene; null if it would be too large. `waypoints`: boxes that may lie
    * outside of all cards.
    */
   static of(
     cards: readonly FlowBox[],
     pills: readonly FlowBox[],
     offset: number,
-    via: readonly FlowBox[] = [],
+    waypoints: readonly FlowBox[] = [],
   ): Raster | null {
     const bounds = boundsOf([...cards, ...pills]);
-    const wide = boundsOf([bounds, ...via.filter((point) => isNear(point, bounds))]);
+    const wide = boundsOf([bounds, ...waypoints.filter((point) => isNear(point, bounds))]);
     if (!fits(bounds)) return null;
     const raster = new Raster(fits(wide) ? wide : bounds, offset);
     for (const card of cards) {

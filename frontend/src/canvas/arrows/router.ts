@@ -260,16 +260,17 @@ interface LedWay {
 export function routeThrough(
   router: Router,
   [start, end]: readonly [number, number],
-  via: readonly number[],
+  waypoints: readonly number[],
 ): LedWay {
   const { raster } = router;
-  if (via.length === 0) return { cells: router.route(start, end), missed: false };
+  if (waypoints.length === 0) return { cells: router.route(start, end), missed: false };
   const legs: number[][] = [];
   let [at, way, missed] = [start, ALONG, false];
-  for (const [i, cell] of [...via, end].entries()) {
-    if (cell === at && i < via.length) continue;
-    const following = [...via.slice(i + 1), end][0] ?? end;
-    const next = i < via.length ? { cell: following, last: i === via.length - 1 } : null;
+  for (const [i, cell] of [...waypoints, end].entries()) {
+    if (cell === at && i < waypoints.length) continue;
+    const following = [...waypoints.slice(i + 1), end][0] ?? end;
+    const next =
+      i < waypoints.length ? { cell: following, last: i === waypoints.length - 1 } : null;
     const leg = router.route(at, cell, { way, inner: at !== start, next });
     if (leg === null) {
       missed = true;

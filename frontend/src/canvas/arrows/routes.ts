@@ -4,16 +4,16 @@ import { BLOCKED, FREE, NEAR, Raster } from "./raster";
 import { freeCells, Router, routeThrough, straightened } from "./router";
 import { BoxIndex, boxOf, type FlowBox, type Point, type Scene, STEP } from "./scene";
 import {
-  arriving,
-  at,
+  arrival,
+  canvasPoint,
+  canvasPoints,
+  departure,
   endsOf,
-  leaving,
   middleOf,
   type RoutedLine,
-  shown,
   simpleLines,
-  straight,
-  viaOf,
+  simplified,
+  waypointsOf,
 } from "./simple-lines";
 
 /** A routed way in columns and rows of the grid, so that it outlives the raster. */
@@ -46,7 +46,7 @@ interface Task {
   readonly start: number;
   readonly end: number;
   /** Raster points of the waypoints that are free. */
-  readonly via: readonly number[];
+  readonly waypoints: readonly number[];
   /** The corners of its way; null if there is none. */
   cells: readonly number[] | null;
   /** A waypoint could not be reached and is left out; such a line is searched again each time. */
@@ -79,17 +79,17 @@ class Routing {
     this.plan = new DockPlan(scene);
     this.cards = scene.cards.map((card) => boxOf(card, scene.direction));
     const pills = this.plan.docks.flatMap(({ pill, link }) => [pill, link].flatMap((b) => b ?? []));
-    const led = scene.lines.flatMap(({ via = [] }) =>
-      via.map(([x, y]) => boxOf({ x, y, width: 0, height: 0 }, scene.direction)),
+    const waypointBoxes = scene.lines.flatMap(({ waypoints = [] }) =>
+      waypoints.map(([x, y]) => boxOf({ x, y, width: 0, height: 0 }, scene.direction)),
     );
-    const raster = Raster.of(this.cards, pills, scene.offset, led);
+    const raster = Raster.of(this.cards, pills, scene.offset, waypointBoxes);
     this.raster = raster;
     this.tasks = this.plan.docks.map((dock) => ({
       dock,
       ends: endsOf(dock, scene),
       start: raster?.cellAt(dock.start.column, dock.start.row) ?? -1,
       end: raster?.cellAt(dock.end.column, dock.end.row) ?? -1,
-      via: raster ? freeCells(raster, viaOf(dock, scene)) : [],
+      waypoints: raster ? freeCells(raster, waypointsOf(dock, scene)) : [],
       cells: null,
       missed: false,
       way: null,
@@ -112,8 +112,8 @@ class Routing {
     const between = (start: number, end: number) =>
       Math.abs((start % raster.width) - (end % raster.width)) +
       Math.abs(Math.floor(start / raster.width) - Math.floor(end / raster.width));
-    const length = ({ start, end, via }: Task) =>
-      [...via, end].reduce((sum, to, i) => sum + between(via[i - 1] ?? start, to), 0);
+    const length = ({ start, end, waypoints }: Task) =>
+      [...waypoints, end].reduce((sum, to, i) => sum + between(waypoints[i - 1] ?? start, to), 0);
     // Short ones first: they have the fewest ways to choose from.
     const order = fresh
       .map((task, i) => ({ task, i, length: length(task) }))
@@ -196,10 +196,10 @@ class Routing {
   }
 
   /** Return an identification of its ends and of the waypoints that it can visit. */
-  private endsNow({ ends, via }: Task): string {
+  private endsNow({ ends, waypoints }: Task): string {
     const { raster } = this;
-    if (via.length === 0 || !raster) return ends;
-    return `${ends} by ${via.map((cell) => [raster.columnOf(cell), raster.rowOf(cell)]).join(" ")}`;
+    if (waypoints.length === 0 || !raster) return ends;
+    return `${ends} by ${waypoints.map((cell) => [raster.columnOf(cell), raster.rowOf(cell)]).join(" ")}`;
   }
 
   /** Return how near a way is to cards; infinite if a card blocks it. */
@@ -225,7 +225,7 @@ class Routing {
     const kin = this.kinOf(task);
     for (const other of kin) this.mark(other, -1);
     task.cells = null;
-    const { cells, missed } = routeThrough(router, [task.start, task.end], task.via);
+    const { cells, missed } = routeThrough(router, [task.start, task.end], task.waypoints);
     task.missed = missed;
     this.put(task, cells, null);
     for (const other of kin) if (other !== task) this.mark(other, 1);
@@ -275,16 +275,16 @@ class Routing {
       const corners = cells.map((cell) => [raster.columnOf(cell), raster.rowOf(cell)] as const);
       const near = task.way?.near ?? this.nearness(cells);
       if (!task.missed) ways.set(id, task.way ?? { ends: this.endsNow(task), corners, near });
-      const points = straight([
-        ...leaving(dock, plan, scene.direction),
-        ...corners.map(([column, row]) => at(plan, scene.direction, column, row)),
-        arriving(dock, scene.direction),
+      const points = simplified([
+        ...departure(dock, plan, scene.direction),
+        ...corners.map(([column, row]) => canvasPoint(plan, scene.direction, column, row)),
+        arrival(dock, scene.direction),
       ]);
       const docked = dock.pill !== null;
       const pill = dock.pill && middleOf(dock.pill, scene.direction);
-      const via = shown(viaOf(dock, scene), plan, scene);
+      const waypoints = canvasPoints(waypointsOf(dock, scene), plan, scene);
       const { direction } = scene;
-      lines.set(id, { id, direction, ends, points, pill, docked, via, simple: false });
+      lines.set(id, { id, direction, ends, points, pill, docked, waypoints, simple: false });
       if (!docked && dock.line.pill) loose.push({ task, points });
     }
     this.placeLoose(loose, lines, raster);

@@ -25,7 +25,7 @@ export interface SceneLine {
   /** The size of its pill; null if it has none. */
   readonly pill: PillSize | null;
   /** Places through which people have led it. */
-  readonly via?: readonly Point[];
+  readonly waypoints?: readonly Point[];
 }
 
 /** Everything in it can be sent to a worker. */

@@ -27,7 +27,7 @@ export interface RoutedLine {
   /** The pill stands beside the card that the line leaves, and can move away from it a little. */
   readonly docked: boolean;
   /** Its waypoints on the grid; the line leaves out those that are blocked. */
-  readonly via: readonly Point[];
+  readonly waypoints: readonly Point[];
   /** It was not routed: its cards stand too close or too far apart. */
   readonly simple: boolean;
 }
@@ -36,15 +36,15 @@ export type LineMap = ReadonlyMap<string, RoutedLine>;
 
 export function endsOf({ start, end, line }: Dock, scene: Scene): string {
   const from = `${start.column},${start.row}`;
-  const via = (line.via ?? []).map((point) => ` ${point}`).join("");
-  return `${scene.direction} ${scene.offset} ${from} ${end.column},${end.row}${via}`;
+  const waypoints = (line.waypoints ?? []).map((point) => ` ${point}`).join("");
+  return `${scene.direction} ${scene.offset} ${from} ${end.column},${end.row}${waypoints}`;
 }
 
-export const viaOf = ({ line }: Dock, scene: Scene): GridPoint[] =>
-  (line.via ?? []).map((point) => gridPoint(point, scene));
+export const waypointsOf = ({ line }: Dock, scene: Scene): GridPoint[] =>
+  (line.waypoints ?? []).map((point) => gridPoint(point, scene));
 
-export const shown = (points: readonly GridPoint[], plan: DockPlan, scene: Scene): Point[] =>
-  points.map(({ column, row }) => at(plan, scene.direction, column, row));
+export const canvasPoints = (points: readonly GridPoint[], plan: DockPlan, scene: Scene): Point[] =>
+  points.map(({ column, row }) => canvasPoint(plan, scene.direction, column, row));
 
 /**
  * Return a line for each dock that ignores what lies between its ends; they are drawn until the
@@ -54,16 +54,18 @@ export function simpleLines(scene: Scene): Map<string, RoutedLine> {
   const plan = new DockPlan(scene);
   return new Map(
     plan.docks.map((dock) => {
-      const via = viaOf(dock, scene);
-      const way = via.length > 0 ? simplyThrough(dock, via) : simpleWay(dock);
-      const points = [...way].map(([column, row]) => at(plan, scene.direction, column, row));
+      const waypoints = waypointsOf(dock, scene);
+      const way = waypoints.length > 0 ? simplyThrough(dock, waypoints) : simpleWay(dock);
+      const points = [...way].map(([column, row]) =>
+        canvasPoint(plan, scene.direction, column, row),
+      );
       const ends = endsOf(dock, scene);
       const docked = dock.pill !== null;
       const pill = dock.pill ? middleOf(dock.pill, scene.direction) : null;
       const whole = [
-        ...leaving(dock, plan, scene.direction),
+        ...departure(dock, plan, scene.direction),
         ...points,
-        arriving(dock, scene.direction),
+        arrival(dock, scene.direction),
       ];
       const { id } = dock.line;
       return [
@@ -72,10 +74,10 @@ export function simpleLines(scene: Scene): Map<string, RoutedLine> {
           id,
           direction: scene.direction,
           ends,
-          points: straight(whole),
+          points: simplified(whole),
           pill,
           docked,
-          via: shown(via, plan, scene),
+          waypoints: canvasPoints(waypoints, plan, scene),
           simple: true,
         },
       ];
@@ -99,11 +101,11 @@ function* simpleWay({ start, end }: Dock): Generator<readonly [number, number]> 
 /** Yield a way with one turn between waypoints; it arrives from before the card where it can. */
 function* simplyThrough(
   { start, end }: Dock,
-  via: readonly GridPoint[],
+  waypoints: readonly GridPoint[],
 ): Generator<readonly [number, number]> {
   let last: GridPoint = start;
   yield [start.column, start.row];
-  for (const point of [...via, end]) {
+  for (const point of [...waypoints, end]) {
     const along = point !== end || last.column <= end.column;
     yield along && last !== start ? [last.column, point.row] : [point.column, last.row];
     yield [point.column, point.row];
@@ -111,14 +113,14 @@ function* simplyThrough(
   }
 }
 
-export const at = (plan: DockPlan, direction: Direction, column: number, row: number) =>
+export const canvasPoint = (plan: DockPlan, direction: Direction, column: number, row: number) =>
   pointOf(column * STEP, plan.v(row), direction);
 
 export function middleOf({ u0, u1, v0, v1 }: FlowBox, direction: Direction): Point {
   return pointOf((u0 + u1) / 2, (v0 + v1) / 2, direction);
 }
 
-export function leaving({ from, start }: Dock, plan: DockPlan, direction: Direction): Point[] {
+export function departure({ from, start }: Dock, plan: DockPlan, direction: Direction): Point[] {
   const v = plan.v(start.row);
   const first = pointOf(from.u, from.v, direction);
   // A pill beyond the corner of its card: the line leads along the card to it.
@@ -127,11 +129,11 @@ export function leaving({ from, start }: Dock, plan: DockPlan, direction: Direct
     : [first, pointOf(from.u + LINK, from.v, direction), pointOf(from.u + LINK, v, direction)];
 }
 
-export const arriving = ({ to }: Dock, direction: Direction): Point =>
+export const arrival = ({ to }: Dock, direction: Direction): Point =>
   pointOf(to.u, to.v, direction);
 
 /** Return the points without those at which nothing turns. */
-export function straight(points: readonly Point[]): Point[] {
+export function simplified(points: readonly Point[]): Point[] {
   const kept: Point[] = [];
   for (const point of points) {
     const [a, b] = [kept.at(-2), kept.at(-1)];

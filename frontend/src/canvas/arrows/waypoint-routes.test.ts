@@ -23,16 +23,16 @@ function bent(scene: Scene, random: Random): Scene {
   };
   const lines = scene.lines.map((line) => {
     if (random() > 0.4) return line;
-    const via = Array.from({ length: 1 + Math.floor(random() * 3) }, place);
-    return { ...line, via: via.flatMap((at) => (at ? [at] : [])) };
+    const waypoints = Array.from({ length: 1 + Math.floor(random() * 3) }, place);
+    return { ...line, waypoints: waypoints.flatMap((at) => (at ? [at] : [])) };
   });
   return { ...scene, lines };
 }
 
 /** How much of a line is passed before each of the places; null where it does not come by. */
-function passed(points: readonly Point[], via: readonly Point[]): (number | null)[] {
+function passed(points: readonly Point[], waypoints: readonly Point[]): (number | null)[] {
   let [from, gone] = [0, 0];
-  return via.map(([x, y]) => {
+  return waypoints.map(([x, y]) => {
     let length = 0;
     for (let i = 1; i < points.length; i += 1) {
       const [[ax, ay], [bx, by]] = [points[i - 1] ?? [0, 0], points[i] ?? [0, 0]];
@@ -64,14 +64,14 @@ test("a bent line passes its waypoints in their order, level or upright, and no 
       expect(lines.size).toBe(given.lines.length);
       expect(faultsOf(given, lines)).toMatchObject({ behind: 0, slanted: 0, onCards: 0 });
       const blocked = new Set<string>();
-      for (const { id, points, via } of lines.values()) {
+      for (const { id, points, waypoints } of lines.values()) {
         // Where a pill stands, none of its own or another line's waypoints can be visited.
-        if (passed(points, via).includes(null)) blocked.add(id);
+        if (passed(points, waypoints).includes(null)) blocked.add(id);
       }
       const pills = [...lines.values()].flatMap(({ pill }) => (pill ? [pill] : []));
       for (const id of blocked) {
-        const { via = [] } = lines.get(id) ?? {};
-        const near = via.some(([x, y]) =>
+        const { waypoints = [] } = lines.get(id) ?? {};
+        const near = waypoints.some(([x, y]) =>
           pills.some(([px, py]) => Math.abs(px - x) < 60 && Math.abs(py - y) < 30),
         );
         expect([id, near]).toEqual([id, true]);
@@ -107,11 +107,11 @@ test("the same bent lines are found again, and kept while nothing moves", () => 
 });
 
 const card = (key: string, x: number, y: number) => ({ key, x, y, width: 160, height: 72 });
-const scene = (cards: Scene["cards"], via: readonly Point[]): Scene => ({
+const scene = (cards: Scene["cards"], waypoints: readonly Point[]): Scene => ({
   direction: "right",
   offset: gridOffset(cards, "right", null),
   cards,
-  lines: [{ id: "a>b", source: "a", target: "b", pill: { width: 26, height: 20 }, via }],
+  lines: [{ id: "a>b", source: "a", target: "b", pill: { width: 26, height: 20 }, waypoints }],
 });
 const lineOf = (given: Scene) => routed(given).lines.get("a>b");
 
@@ -121,14 +121,14 @@ test("a waypoint bends a line that would be straight, and its pill stays where i
   expect(straight?.points.length).toBe(2);
   expect(line?.points.length).toBe(6);
   expect(line?.pill).toEqual(straight?.pill);
-  expect(line?.points.some(([, y]) => y === line.via[0]?.[1])).toBe(true);
+  expect(line?.points.some(([, y]) => y === line.waypoints[0]?.[1])).toBe(true);
 });
 
 test("a line goes back where its waypoint is behind it, and arrives from before its card", () => {
   const cards = [card("a", 0, 0), card("b", 480, 0)];
   const line = lineOf(scene(cards, [[-96, 144]]));
   expect(line?.simple).toBe(false);
-  expect(passed(line?.points ?? [], line?.via ?? [])).not.toContain(null);
+  expect(passed(line?.points ?? [], line?.waypoints ?? [])).not.toContain(null);
   expect(line?.points.at(-1)?.[0]).toBe(480);
 });
 
@@ -139,7 +139,7 @@ test("a waypoint on which a card stands now is left out until the card is gone",
   expect(faultsOf(there, first.lines).behind).toBe(0);
   const gone = scene([...cards, card("c", 280, 400)], [[360, 176]]);
   const line = routed(gone, first.ways).lines.get("a>b");
-  expect(passed(line?.points ?? [], line?.via ?? [])).not.toContain(null);
+  expect(passed(line?.points ?? [], line?.waypoints ?? [])).not.toContain(null);
 });
 
 test("a waypoint worlds apart leaves all other lines routed", () => {

@@ -53,12 +53,12 @@ const OPTIONS: LayoutOptions = {
 /** Return pairs of elements to connect invisibly, so that the entry comes first and the exit last. */
 function holds(graph: Graph, tied: ReadonlySet<Key>): [Key, Key][] {
   const next = forward(graph);
-  const led = new Set([...next.values()].flat());
+  const reached = new Set([...next.values()].flat());
   const ending = new Set(graph.relations.flatMap((r) => (r.child === EXIT ? [r.parent] : [])));
   return graph.actions
     .filter(({ key }) => tied.has(key))
     .flatMap(({ key }): [Key, Key][] => [
-      ...(led.has(key) ? [] : [[ENTRY, key] as [Key, Key]]),
+      ...(reached.has(key) ? [] : [[ENTRY, key] as [Key, Key]]),
       ...(next.get(key)?.length || ending.has(key) ? [] : [[key, EXIT] as [Key, Key]]),
     ]);
 }

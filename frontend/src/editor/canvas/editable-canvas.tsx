@@ -141,7 +141,7 @@ function useNoteEditing(
  * Return the event handlers of the canvas. They keep their identity, since every card and arrow
  * gets them.
  */
-function useHands(
+function useHandlers(
   { context, canvas, onPanned }: Pick<Props, "context" | "canvas" | "onPanned">,
   connecting: ReturnType<typeof useConnecting>,
 ) {
@@ -225,8 +225,10 @@ function Drawing({
   canvas,
   me,
   map,
-  hands,
-}: Pick<Props, "context" | "canvas" | "me" | "map"> & { hands: ReturnType<typeof useHands> }) {
+  handlers,
+}: Pick<Props, "context" | "canvas" | "me" | "map"> & {
+  handlers: ReturnType<typeof useHandlers>;
+}) {
   // On touch screens one finger either moves the view or draws a marquee.
   const coarse = useMediaQuery("(pointer: coarse)") ?? false;
   return (
@@ -237,7 +239,7 @@ function Drawing({
       edgeTypes={edgeTypes}
       onNodesChange={canvas.onNodesChange}
       onEdgesChange={canvas.onEdgesChange}
-      {...hands}
+      {...handlers}
       connectOnClick={false}
       edgesReconnectable={context.mayEdit}
       reconnectRadius={12}
@@ -297,7 +299,7 @@ export function EditableCanvas({ context, canvas, me, map, onPanned, pointer, wr
     context.openAdd({ screen, at: [Math.round(at.x), Math.round(at.y)], from });
   };
   const connecting = useConnecting(context, openAddAt);
-  const hands = useHands({ context, canvas, onPanned }, connecting);
+  const handlers = useHandlers({ context, canvas, onPanned }, connecting);
   const press = useContextMenu(context);
   const pinch = usePinch(context, onPanned);
   const noteEditing = useNoteEditing(context, writing, canvas.setResized, canvas.view.toDocument);
@@ -358,7 +360,7 @@ export function EditableCanvas({ context, canvas, me, map, onPanned, pointer, wr
       <LineContext value={canvas.lines}>
         <NoteEditingContext value={noteEditing}>
           <LineEditingContext value={lineEditing}>
-            <Drawing context={context} canvas={canvas} me={me} map={map} hands={hands} />
+            <Drawing context={context} canvas={canvas} me={me} map={map} handlers={handlers} />
           </LineEditingContext>
         </NoteEditingContext>
       </LineContext>

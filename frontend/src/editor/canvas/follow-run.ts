@@ -62,7 +62,7 @@ interface FrameRoom {
 }
 
 /** Margins, as part of the frame; what runs within them is left where it is. */
-const CALM = 0.12;
+const MARGIN = 0.12;
 /**
  * The place of the running action in the frame after a move: graphs continue to the right and down,
  * so the view rests longer there.
@@ -113,21 +113,21 @@ export function followingViewport(box: Bounds, frame: FrameRoom, view: Viewport)
   const { zoom } = view;
   const [width, height] = [box.width * zoom, box.height * zoom];
   const [left, top] = [box.x * zoom + view.x, box.y * zoom + view.y];
-  const calm = { x: frame.width * CALM, y: frame.height * CALM };
-  const within = (from: number, size: number, calm: number, room: number) => {
-    const edge = Math.min(calm, (room - size) / 2) - SLACK;
+  const margin = { x: frame.width * MARGIN, y: frame.height * MARGIN };
+  const within = (from: number, size: number, margin: number, room: number) => {
+    const edge = Math.min(margin, (room - size) / 2) - SLACK;
     return from >= edge && from + size <= room - edge;
   };
   const seen =
-    within(left, width, calm.x, frame.width) && within(top, height, calm.y, frame.height);
+    within(left, width, margin.x, frame.width) && within(top, height, margin.y, frame.height);
   if (seen) return null;
-  const aim = (size: number, room: number, share: number, calm: number) => {
-    const edge = Math.min(calm, (room - size) / 2);
+  const aim = (size: number, room: number, share: number, margin: number) => {
+    const edge = Math.min(margin, (room - size) / 2);
     return Math.max(edge, Math.min(room - size - edge, room * share - size / 2));
   };
   return {
-    x: aim(width, frame.width, AIM.x, calm.x) - box.x * zoom,
-    y: aim(height, frame.height, AIM.y, calm.y) - box.y * zoom,
+    x: aim(width, frame.width, AIM.x, margin.x) - box.x * zoom,
+    y: aim(height, frame.height, AIM.y, margin.y) - box.y * zoom,
     zoom,
   };
 }
@@ -205,19 +205,19 @@ interface Followed {
 export function useFollowRun({ flow, frame, now, run, progress, blockOf, glide }: Followed) {
   const [left, setLeft] = useState<string | null>(null);
   const lost = run !== null && left === run;
-  const { keys: going, ...standing } = runningInside(
+  const { keys: running, ...drawn } = runningInside(
     run === null || lost ? [] : runningKeys(progress, blockOf),
     now.current,
   );
-  const key = going.join(" ");
+  const key = running.join(" ");
   const { isBusy, release } = useHandsOn(frame);
   // biome-ignore lint/correctness/useExhaustiveDependencies: only when other actions run
   useEffect(() => {
     const room = frame.current;
-    if (run === null || lost || going.length === 0 || room === null || isBusy()) return;
+    if (run === null || lost || running.length === 0 || room === null || isBusy()) return;
     const size = { width: room.clientWidth, height: room.clientHeight };
     const here = flow.getViewport();
-    const box = followedBox(going, standing.places, standing.sizes, size, here.zoom);
+    const box = followedBox(running, drawn.places, drawn.sizes, size, here.zoom);
     const next = box && followingViewport(box, size, here);
     if (next) glideTo(flow, room, next, glide(GLIDE).duration);
   }, [run, lost, key]);

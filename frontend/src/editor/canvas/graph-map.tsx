@@ -206,11 +206,14 @@ interface Props {
 export function GraphMap({ nodes, flow }: Props) {
   const map = useRef<SVGSVGElement>(null);
   // Each update computes and paints all paths again.
-  const shown = useThrottledValue(nodes, REST);
+  const throttled = useThrottledValue(nodes, REST);
   const run = useThrottledValue(useSyncExternalStore(runOnCanvas.subscribe, runOnCanvas.now), REST);
   const expanded = useSyncExternalStore(expandedGraphs.subscribe, expandedGraphs.now);
   // biome-ignore lint/correctness/useExhaustiveDependencies: with each change of the run there are other states
-  const { paths, area } = useMemo(() => mapMarks(shown, expanded?.partsOf), [shown, expanded, run]);
+  const { paths, area } = useMemo(
+    () => mapMarks(throttled, expanded?.partsOf),
+    [throttled, expanded, run],
+  );
   const [x, y, zoom] = useStore((state) => state.transform);
   const size = {
     width: useStore((state) => state.width),

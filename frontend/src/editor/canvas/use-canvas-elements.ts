@@ -367,10 +367,10 @@ export function useCanvasElements(given: CanvasElementsInput) {
   const placed = { graph, rest, sizes: known, folding, toDocument };
   const onEdgesChange = useSelectionChanges(selection, select);
   const onNodesChange = useNodeChanges(placed, setSizes, setDrag, onEdgesChange);
-  const hands = { onNodesChange, onEdgesChange, ...useDragging(placed, over, setOver, setDrag) };
+  const handlers = { onNodesChange, onEdgesChange, ...useDragging(placed, over, setOver, setDrag) };
   const view = { ...spread, places: drawnPlaces, sizes: spread.sizesOf(known) };
   const stands = { folding, places, sizes: known };
-  return { flow, lines, ...drawn, ...stands, view, setResized, setOver, ...hands };
+  return { flow, lines, ...drawn, ...stands, view, setResized, setOver, ...handlers };
 }
 
 /** Return whether the dragged elements are one action without arrows, which can be inserted into an arrow. */

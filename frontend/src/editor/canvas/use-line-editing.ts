@@ -39,12 +39,16 @@ export function leadElsewhere(
  */
 export function useLineEditing(context: EditorContext, toDocument: PlaceMap): LineEditing | null {
   const { mayEdit } = context;
-  const bend = useStableCallback<Parameters<LineEditing["bend"]>, void>((bundle, via, byKey) => {
-    const places = via.map(toDocument).map(([x, y]) => [Math.round(x), Math.round(y)] as const);
-    const write = () => setWaypoints(context.doc, bundle.id, places);
-    if (byKey) nudging(context, `bends ${bundle.id}`, write);
-    else write();
-  });
+  const bend = useStableCallback<Parameters<LineEditing["bend"]>, void>(
+    (bundle, waypoints, byKey) => {
+      const places = waypoints
+        .map(toDocument)
+        .map(([x, y]) => [Math.round(x), Math.round(y)] as const);
+      const write = () => setWaypoints(context.doc, bundle.id, places);
+      if (byKey) nudging(context, `bends ${bundle.id}`, write);
+      else write();
+    },
+  );
   const nameOf = useStableCallback<Parameters<LineEditing["nameOf"]>, string>((bundle) => {
     const [from, to] = [bundle.source, bundle.target].map((key) => endName(context.graph, key));
     const word = pillWord(bundle);

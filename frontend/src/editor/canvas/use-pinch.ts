@@ -42,8 +42,8 @@ function pairOf(fingers: ReadonlyMap<number, Position>): Pair {
 export function usePinch(context: EditorContext, onPanned: () => void) {
   const flow = useReactFlow();
   const store = useStoreApi();
-  const now = useRef({ bench: context, onPanned });
-  now.current = { bench: context, onPanned };
+  const now = useRef({ context, onPanned });
+  now.current = { context, onPanned };
   const fingers = useRef(new Map<number, Position>());
   const chosen = useRef<ReadonlySet<string>>(new Set());
   const begun = useRef<{ pair: Pair; view: PinchedView; corner: Position } | null>(null);
@@ -51,17 +51,17 @@ export function usePinch(context: EditorContext, onPanned: () => void) {
     const at = (event: PointerEvent): Position => [event.clientX, event.clientY];
     return {
       down(event: PointerEvent) {
-        if (event.pointerType !== "touch" || now.current.bench.tool !== "select") return;
+        if (event.pointerType !== "touch" || now.current.context.tool !== "select") return;
         if (event.isPrimary) {
           fingers.current.clear();
-          chosen.current = now.current.bench.selection;
+          chosen.current = now.current.context.selection;
         }
         fingers.current.set(event.pointerId, at(event));
         const box = store.getState().domNode?.getBoundingClientRect();
         if (fingers.current.size !== 2 || box === undefined) return;
         // The marquee and selection that the first finger started are undone.
         store.setState({ userSelectionRect: null, userSelectionActive: false });
-        now.current.bench.select(chosen.current);
+        now.current.context.select(chosen.current);
         const pair = pairOf(fingers.current);
         begun.current = { pair, view: flow.getViewport(), corner: [box.left, box.top] };
         now.current.onPanned();

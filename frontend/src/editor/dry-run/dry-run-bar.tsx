@@ -141,22 +141,22 @@ function time(ms: number): string {
 }
 
 /** Return the running action whose end is to be chosen: the selected one, else the first. */
-function asked(context: EditorContext, run: DryRun): RunningAction | undefined {
+function askedAction(context: EditorContext, run: DryRun): RunningAction | undefined {
   return (
     run.sighting.running.find(({ key }) => context.selection.has(key)) ?? run.sighting.running[0]
   );
 }
 
 function Choices({ context, run }: { context: EditorContext; run: DryRun }) {
-  const going = asked(context, run);
-  if (!going) return null;
+  const action = askedAction(context, run);
+  if (!action) return null;
   const others = run.sighting.running.length > 1;
   return (
     // biome-ignore lint/a11y/useSemanticElements: a fieldset cannot be laid out as a row everywhere
     <div
       className={style.choices}
       role="group"
-      aria-label={`How does ${isolated(endName(context.graph, going.key))} end?`}
+      aria-label={`How does ${isolated(endName(context.graph, action.key))} end?`}
     >
       {others ? (
         <Select
@@ -167,11 +167,11 @@ function Choices({ context, run }: { context: EditorContext; run: DryRun }) {
             value: key,
             label: endName(context.graph, key),
           }))}
-          value={going.key}
+          value={action.key}
           onChange={(key) => key && context.select([key])}
         />
       ) : (
-        <b>{endName(context.graph, going.key)}</b>
+        <b>{endName(context.graph, action.key)}</b>
       )}
       <span className={style.how}>ends</span>
       {CHOICES.map((outcome, i) => (
@@ -183,12 +183,12 @@ function Choices({ context, run }: { context: EditorContext; run: DryRun }) {
           leftSection={<OutcomeSign outcome={outcome} />}
           rightSection={<span className={style.digit}>{i + 1}</span>}
           style={{ color: outcomeColor[outcome] }}
-          onClick={() => run.choose(outcome, going.key)}
+          onClick={() => run.choose(outcome, action.key)}
         >
           {outcomeWord[outcome]}
         </Button>
       ))}
-      <SeedEnd run={run} node={going.node} />
+      <SeedEnd run={run} node={action.node} />
     </div>
   );
 }
@@ -203,7 +203,7 @@ const OF_ACTIONS = [
 function Faults({ context, run }: { context: EditorContext; run: DryRun }) {
   const { fault } = run.decided;
   const [first] = selectedActions(context);
-  const node = (first && fullName(first)) ?? asked(context, run)?.node;
+  const node = (first && fullName(first)) ?? askedAction(context, run)?.node;
   const at = run.moments[run.index]?.at ?? 0;
   const said =
     fault === null

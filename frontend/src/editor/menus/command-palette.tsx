@@ -58,9 +58,9 @@ export function CommandPalette({
   onClose: () => void;
 }) {
   const [, go] = useLocation();
-  const shown = useRef<HTMLDialogElement>(null);
+  const palette = useRef<HTMLDialogElement>(null);
   useLayoutEffect(() => {
-    const dialog = shown.current;
+    const dialog = palette.current;
     dialog?.show();
     return () => dialog?.close(); // returns the focus
   }, []);
@@ -86,7 +86,7 @@ export function CommandPalette({
   );
   const onPick = (id: string) => {
     const [kind = "", key = ""] = id.split(" ");
-    shown.current?.close(); // an open dialog would keep the focus
+    palette.current?.close(); // an open dialog would keep the focus
     onClose();
     if (kind === "graph") go(`/graphs/${encodeURIComponent(key)}`);
     else if (kind === "action") {
@@ -112,7 +112,7 @@ export function CommandPalette({
     <>
       <div className={style.backdrop} onPointerDown={onClose} />
       <dialog
-        ref={shown}
+        ref={palette}
         className={style.palette}
         aria-label="Commands"
         aria-modal

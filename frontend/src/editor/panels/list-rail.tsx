@@ -139,14 +139,14 @@ export function ListRail({ panels, told }: Props) {
   const { mayEdit } = useEditorContext();
   const rail = useRef<HTMLElement>(null);
   const [tab, setTab] = useListTab();
-  const shown = sideName(side, mayEdit ? tab : "graphs");
+  const current = sideName(side, mayEdit ? tab : "graphs");
   usePutAway(
     left,
     () => setLeft(false),
-    () => rail.current?.querySelector<HTMLElement>(`[data-part="${shown}"]`) ?? null,
+    () => rail.current?.querySelector<HTMLElement>(`[data-part="${current}"]`) ?? null,
   );
   const press = (part: Part, byKey: boolean) => {
-    if (left && shown === part.name) {
+    if (left && current === part.name) {
       setLeft(false);
       return;
     }
@@ -162,7 +162,7 @@ export function ListRail({ panels, told }: Props) {
           key={part.name}
           name={part.name}
           icon={<part.icon size={19} aria-hidden />}
-          open={left && shown === part.name}
+          open={left && current === part.name}
           // a click by key has a click count of 0
           onPress={(event) => press(part, event.detail === 0)}
         />
