@@ -1,7 +1,7 @@
-"""The runner process: its journal, its service, its routes.
+"""The runner process: its journal, its services, its routes.
 
-What a Stop needs is imported here and by what is imported here, never at its first use: a Stop may be
-the first thing that is asked of a runner.
+What a Stop needs is imported here and by these imports, never at its first use: a Stop may be the
+first request to a runner.
 """
 
 import logging
@@ -51,9 +51,9 @@ from action_assistant.web.network.addresses import addresses_of
 from action_assistant.web.network.connection_limits import ConnectionLimits
 from action_assistant.web.server.application import application
 
-#: For so long (seconds) a thread may keep the interpreter to itself while the loop waits for it.
 log: Final = logging.getLogger(__name__)
 
+#: Seconds after which a thread gives up the interpreter, for which the event loop may be waiting.
 _SWITCH_S: Final = 0.0005
 
 
@@ -61,7 +61,7 @@ _SWITCH_S: Final = 0.0005
 async def open_services(
     settings: RunnerSettings, services: RunnerServices | None = None
 ) -> AsyncIterator[RunnerServices]:
-    """Everything the routes need, working. Raises CannotStart."""
+    """Open all services of the routes, and close them afterwards. Raises CannotStart."""
     services = services or RunnerServices()
     if settings.behaviours is not None:
         services.behaviours = BehaviourFolder.opened(settings.behaviours)
@@ -70,11 +70,11 @@ async def open_services(
     journal = await Journal.open(_database(settings), branch="runner", fold=projection.fold)
     try:
         keep = _keep(settings)
-        on_disk = anyio.to_thread.run_sync  # threads wait for disks; what computes goes to workers
+        on_disk = anyio.to_thread.run_sync  # threads wait for disks; workers compute
         recordings = Recordings(_folders(settings)["recordings"], on_disk, prunes=keep.raw is None)
         archive_store = ArchiveStore(journal, keep.folder, on_disk)
-        place = StoragePaths(_file(settings), keep.folder)
-        async with _executing(services, archive_store, recordings, place) as control:
+        storage = StoragePaths(_file(settings), keep.folder)
+        async with _executing(services, archive_store, recordings, storage) as control:
             services.connection_limits = ConnectionLimits(limits=settings.limits, keeps_one=True)
             services.journal = journal
             services.review_service = ReviewService(
@@ -103,16 +103,19 @@ async def _executing(
     services: RunnerServices,
     archive_store: ArchiveStore,
     recordings: Recordings,
-    place: StoragePaths,
+    storage: StoragePaths,
 ) -> AsyncIterator[ExecutionService]:
-    """Workers, robots, and what drives runs on them."""
-    async with RunnerWorkers.opened() as workers, _asking(workers, place, archive_store) as asking:
-        asked, ours = asking
+    """Open workers, robots and the service that drives runs on them."""
+    async with (
+        RunnerWorkers.opened() as workers,
+        _asking(workers, storage, archive_store) as queries,
+    ):
+        for_people, own = queries
         services.run_in_worker = workers.looks
         services.lanes = (workers.starts, workers.ours, workers.looks)
         reach = ros2_reach(utc_us)
         async with (
-            _kept(reach),
+            _closing(reach),
             ExecutionService.opened(
                 archive_store,
                 Robots(reach=reach, recordings=recordings, indexing=services.index_folders),
@@ -121,15 +124,15 @@ async def _executing(
                 simulator=Simulators(),
                 sources=StartSources(
                     services.behaviours,
-                    lambda *of: asked.value(ReviewService.checked_courses, *of),
+                    lambda *args: for_people.value(ReviewService.checked_courses, *args),
                     services.index_folders,
                 ),
-                # What moves again is read whole.
-                past=lambda run, whole: (ours if whole else asked).past(run, whole),
+                # A run that moves again is read with all its visits, and waits behind no question.
+                past=lambda run, is_whole: (own if is_whole else for_people).past(run, is_whole),
             ) as control,
         ):
-            asked.opened = ours.opened = control.open
-            services.worker_queries, services.control = asked, control
+            for_people.opened = own.opened = control.open
+            services.worker_queries, services.control = for_people, control
             services.hub = Hub(control, utc_us)
             services.index_writer = IndexWriter(
                 control.robots,
@@ -143,21 +146,21 @@ async def _executing(
 
 @asynccontextmanager
 async def _asking(
-    workers: RunnerWorkers, place: StoragePaths, archive_store: ArchiveStore
+    workers: RunnerWorkers, storage: StoragePaths, archive_store: ArchiveStore
 ) -> AsyncIterator[tuple[WorkerQueries, WorkerQueries]]:
-    """What asks for people, and what asks for ourselves and waits behind nobody's questions."""
+    """Yield the queries of people, and those of the runner itself, which wait behind no others."""
     async with anyio.create_task_group() as tasks:
         background = BackgroundTasks(tasks)
         yield (
-            WorkerQueries(workers.looks, place, archive_store, background),
-            WorkerQueries(workers.ours, place, archive_store, background),
+            WorkerQueries(workers.looks, storage, archive_store, background),
+            WorkerQueries(workers.ours, storage, archive_store, background),
         )
         tasks.cancel_scope.cancel()
 
 
 @asynccontextmanager
-async def _kept(reach: Reach | str) -> AsyncIterator[None]:
-    """What reaches robots is let go of last."""
+async def _closing(reach: Reach | str) -> AsyncIterator[None]:
+    """Close what reaches robots after everything else."""
     try:
         yield
     finally:
@@ -174,7 +177,7 @@ def _keep(settings: RunnerSettings) -> Keep:
 
 
 def _folders(settings: RunnerSettings) -> dict[str, Path]:
-    """What is kept beside the database."""
+    """Return the folders that are kept beside the database, by their use."""
     return {"archive": _keep(settings).folder, "recordings": settings.data / "recordings"}
 
 
@@ -183,11 +186,13 @@ def _database(settings: RunnerSettings) -> str:
 
 
 def create_app(settings: RunnerSettings) -> ASGIApp:
-    """The runner as an ASGI application. Raises CannotStart."""
+    """Return the runner as an ASGI application. Raises CannotStart."""
     if settings.behaviours is not None:
         BehaviourFolder.opened(settings.behaviours)
     for robot, folder in settings.index_folders.items():
-        if why := folder_trouble(robot, folder):  # that robot's alone: it may come later
+        if why := folder_trouble(
+            robot, folder
+        ):  # concerns this robot only: the folder may appear later
             log.warning("%s Graphs cannot be written there until it can be read.", why)
     Journal.prepare(_database(settings), "runner", copies=settings.data / before_upgrade.FOLDER)
     revoked = Revocations(settings.data)

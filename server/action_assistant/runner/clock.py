@@ -7,5 +7,5 @@ ClockUs = Callable[[], int]
 
 
 def utc_us() -> int:
-    """Microseconds UTC."""
+    """Return the time of the computer in microseconds UTC."""
     return time.time_ns() // 1000

@@ -1,4 +1,4 @@
-"""The tables of the runner: a fold of the events, written in their transactions."""
+"""The tables of the runner: a fold of the events, written in the transactions that store them."""
 
 from collections.abc import Sequence
 
@@ -28,7 +28,7 @@ from action_assistant.schema.runner_tables import review, robot, run
 
 
 def fold(event: Event) -> Sequence[Executable]:
-    """What an event means for the tables."""
+    """Return the statements that an event means for the tables."""
     if event.kind == RobotRegistered.kind:
         return (_robot(msgspec.json.decode(event.body, type=RobotRegistered)),)
     if annotations.is_about(event.stream):
@@ -85,7 +85,7 @@ def _run_changes(id_: str, event: RunEvent) -> Sequence[Executable]:
 
 
 def _open_again(id_: str, moves: MovesAgain) -> Sequence[Executable]:
-    """A run that was over is not; its sum is made anew at its next end."""
+    """Reopen a run that was over; it is summed up again at its next end."""
     text = msgspec.json.encode({"code": "moves_again", "at": moves.at, "text": moves.text})
     more = func.json_insert(run.c.summary, "$.alarms[#]", func.json(text.decode()))
     summary = func.json_remove(more, "$.proof_at", "$.unknown_since", "$.detail", "$.at_rest")

@@ -1,4 +1,5 @@
-"""The runner's workers: whatever may take long happens in them, so that the runner is free for Stop."""
+"""The runner's worker processes: they compute whatever takes long, so that the event loop stays
+free for Stop."""
 
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
@@ -14,20 +15,20 @@ if TYPE_CHECKING:  # not on Windows
 
 __all__ = ["Crashed", "Lane", "RunnerWorkers", "child"]
 
-#: What the server process has imported before it forks anybody.
+#: Modules that the fork server imports before it makes workers.
 _PRELOADED: Final = (
     "action_assistant.runner.execution.start_pipeline",
     "action_assistant.runner.links.simulated",
     "action_assistant.runner.review.worker_queries",
 )
-_NICE: Final = 5  # somebody waits for a start
+_NICE: Final = 5  # nice values: of lanes that a person waits for, and of others
 _NICER: Final = 10
 
 
 class RunnerWorkers:
-    """The lanes of a runner. `starts`: what stands between a person and a start, and what goes on
-    with runs. `looks`: everything that is looked back on, which may take long. `ours`: what the runner
-    itself has to know, behind nobody."""
+    """The lanes of a runner. `starts`: the stages of starts, and the work of open runs. `looks`:
+    questions about stored runs, which may take long. `ours`: questions of the runner itself, which
+    wait behind no others."""
 
     def __init__(self) -> None:
         threads = CapacityLimiter(8)
@@ -38,13 +39,14 @@ class RunnerWorkers:
     @classmethod
     @asynccontextmanager
     async def opened(cls) -> "AsyncIterator[RunnerWorkers]":
-        """Workers, as long as you are inside. The first ones are made soon after."""
+        """Keep workers running while the context is open. The first processes are made soon after
+        it is entered."""
         lanes = cls()
         async with kept_warm(lanes.starts, lanes.looks, lanes.ours):
             yield lanes
 
 
 def child(work: Callable[..., None], *args: Any, name: str, nice: int) -> "ForkServerProcess":
-    """A process of low priority that ends with this one, in which `work(*args)` runs. Waits for it
-    to exist. Raises OSError, EOFError."""
+    """Start a process of low priority that runs `work(*args)` and ends with this one; return when
+    it exists. Raises OSError, EOFError."""
     return workers.child(work, *args, name=name, nice=nice, preloaded=_PRELOADED)

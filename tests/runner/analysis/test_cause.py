@@ -7,7 +7,7 @@ import pytest
 
 from action_assistant.journal.events import Draft
 from action_assistant.paths import examples
-from action_assistant.runner.analysis.cause_texts import words
+from action_assistant.runner.analysis.cause_texts import cause_sentence
 from action_assistant.runner.analysis.causes import Cause, causes
 from action_assistant.runner.archives import examples as recorded_runs
 from action_assistant.runner.links.observations import GraphState, NodeResult, NodeState
@@ -63,7 +63,7 @@ def test_the_examples_are_what_the_runner_records_today() -> None:
 def test_the_cause_of_each_example_comes_first_and_has_its_evidence(name: str) -> None:
     run, sent, told = example(name)
     first = causes(run, sent)[0]
-    assert words(first, run) == EXAMPLES[name]
+    assert cause_sentence(first, run) == EXAMPLES[name]
     assert run.requested_at <= first.at <= max(getattr(each, "at", 0) for each in told)
     assert first.action is None or first.action in run.actions
 
@@ -92,7 +92,7 @@ def begun(task: Graph) -> Requested:
 def found(task: Graph, *told: RunEvent) -> list[str]:
     run = replay([begun(task), Published(2), *told])
     assert run is not None
-    return [words(each, run) for each in causes(run, task)]
+    return [cause_sentence(each, run) for each in causes(run, task)]
 
 
 def state(at: int, node: str, name: str) -> NodeState:
@@ -141,7 +141,7 @@ def test_a_stop_before_anything_ran_says_so() -> None:
         [begun(LINE), stop, Ended(2, "stopped", None, "Stopped before anything was sent.")]
     )
     assert run is not None
-    assert words(causes(run, LINE)[0], run) == "Ann pressed Stop before anything was sent."
+    assert cause_sentence(causes(run, LINE)[0], run) == "Ann pressed Stop before anything was sent."
     assert found(LINE, stop, Ended(3, "stopped")) == [
         "Ann pressed Stop before any action was seen to run."
     ]
@@ -229,7 +229,7 @@ def test_an_alarm_that_later_events_contradict_is_no_cause() -> None:
 def test_what_was_never_sent_is_not_said_to_be_refused_by_the_robot() -> None:
     run = replay([begun(LINE), Ended(3, "refused", None, "Its turn did not come.")])
     assert run is not None
-    assert [words(each, run) for each in causes(run, LINE)] == [
+    assert [cause_sentence(each, run) for each in causes(run, LINE)] == [
         "Nothing was started: Its turn did not come."
     ]
 

@@ -7,7 +7,7 @@ from typing import Any
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from action_assistant.runner.analysis.cause_texts import words
+from action_assistant.runner.analysis.cause_texts import cause_sentence
 from action_assistant.runner.analysis.causes import OPERATOR, causes
 from action_assistant.runner.links.observations import NodeResult, NodeState, Snapshot
 from action_assistant.runner.runs.events import (
@@ -156,7 +156,7 @@ def test_no_cause_contradicts_an_event_and_what_a_person_did_comes_first(
     run = replay(told)
     assert run is not None
     named = causes(run, FORK)
-    texts = [words(each, run) for each in named]
+    texts = [cause_sentence(each, run) for each in named]
     seen = Evidence(told)
     kinds = [isinstance(each, OPERATOR) for each in named]
     assert kinds == sorted(kinds, reverse=True), texts

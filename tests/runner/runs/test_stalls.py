@@ -7,7 +7,7 @@ import anyio
 import msgspec
 import pytest
 
-from action_assistant.runner.analysis.cause_texts import words
+from action_assistant.runner.analysis.cause_texts import cause_sentence
 from action_assistant.runner.analysis.causes import causes
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.runs.events import Override
@@ -89,10 +89,10 @@ async def test_what_a_run_in_which_nothing_moves_waits_for_is_said_once_and_is_i
         assert await ended(control, run) == "stopped"
     found = scene.harness.journal.history(run)
     stop, *named = causes(found, graph)
-    assert words(stop, found) == "Ben pressed Stop while no action was seen running."
+    assert cause_sentence(stop, found) == "Ben pressed Stop while no action was seen running."
     assert [each.action for each in named] == ["Work_1"], named
     assert named[0].at == found.alarms[0].at
-    assert words(named[0], found) in alarm.text
+    assert cause_sentence(named[0], found) in alarm.text
 
 
 @virtual
@@ -164,8 +164,8 @@ async def test_a_sub_graph_in_which_nothing_moves_is_named_and_stays_the_cause_a
         assert await ended(control, run) == "stopped"
     found = scene.harness.journal.history(run)
     stop, second, *_ = causes(found, graph)
-    assert words(stop, found).startswith("Ben pressed Stop while Sub ran")
-    assert (second.action, words(second, found)) == ("Sub_0", f"{told}.")
+    assert cause_sentence(stop, found).startswith("Ben pressed Stop while Sub ran")
+    assert (second.action, cause_sentence(second, found)) == ("Sub_0", f"{told}.")
 
 
 def test_an_entry_that_lacks_a_value_is_named_before_anything_ran() -> None:

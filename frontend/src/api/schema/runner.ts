@@ -13,8 +13,8 @@ export interface RunnerApi {
     };
     /**
      * ActionFrame
-     * @description What became of an action. From the visit number `first` on (counted from 0, over all its
-     *     visits) they are now `visits`; `messages` are new.
+     * @description The change of an action. Its visits from number `first` on (counted from 0, over all its
+     *     visits) are now `visits`; `messages` are new.
      */
     ActionFrame: {
         state: string;
@@ -43,11 +43,11 @@ export interface RunnerApi {
     };
     /**
      * ActionStatistics
-     * @description One action over all these runs. `levels`: the actions that it is inside of, outermost first, and
-     *     `name` its own there; `action` as the engine of its newest run told it. Durations are seconds over `timed` visits, those that have ended,
-     *     and stand where they are known exactly; `spans` has all of them between their bounds. `unknown`
-     *     counts visits whose result is not known. `at_least`: there may have been more `visits`, which nobody
-     *     saw.
+     * @description One action over all these runs. `levels`: the actions that it is inside of, outermost first,
+     *     and `name` its own there; `action`: the name by which the engine of its newest run told it.
+     *     Durations are seconds over the `timed` visits that have ended, null where they are not known
+     *     exactly; `spans` has all of them between bounds. `unknown` counts visits of unknown result.
+     *     `at_least`: there may have been more `visits`, which nobody saw.
      */
     ActionStatistics: {
         action: string;
@@ -153,8 +153,8 @@ export interface RunnerApi {
     };
     /**
      * ArrowProposal
-     * @description What a search for an arrow came to. `verdict`: `reached` (with a `script`), `unreachable` (all
-     *     `states` were looked at) or `undecided` (and `why`).
+     * @description The result of a search for an arrow. `verdict`: `reached` (with a `script`), `unreachable`
+     *     (after all `states`) or `undecided` (with `why`).
      */
     ArrowProposal: {
         verdict: string;
@@ -295,18 +295,9 @@ export interface RunnerApi {
         quote: string;
     };
     /**
-     * Chapter
-     * @description Where a page of the replay begins: after `after` events, at `at`.
-     */
-    Chapter: {
-        after: number;
-        /** Format: date-time */
-        at: string;
-    };
-    /**
      * CheckRequest
-     * @description Which expected courses, those of `graph`, and the graph as it is now with the graphs inside; where
-     *     none are sent along, those of the expectation count.
+     * @description A check of the expected courses of `graph`, against a text of it and the graphs inside. Where
+     *     no graphs inside are sent, those of the expectation count.
      */
     CheckRequest: {
         /** @description The UMRF graph itself, as approved, or a string that holds its JSON text */
@@ -319,8 +310,8 @@ export interface RunnerApi {
     };
     /**
      * CheckedCourse
-     * @description One expected course against the graph. `same` is null where it was not looked at; `why`: where
-     *     it parts. `run` is empty of one that was made of a dry-run.
+     * @description One expected course, checked. `same` is null where there was no time for it; `why`: where the
+     *     courses part. `run` is "" for a course of a dry-run.
      */
     CheckedCourse: {
         name: string;
@@ -336,7 +327,7 @@ export interface RunnerApi {
     };
     /**
      * CheckedCourses
-     * @description All expected courses of a graph, by name, and what those cover together that it still takes.
+     * @description All expected courses of a graph, by name, and the coverage by those that it still takes.
      */
     CheckedCourses: {
         courses: RunnerApi["CheckedCourse"][];
@@ -344,9 +335,10 @@ export interface RunnerApi {
     };
     /**
      * ComparedVisit
-     * @description The `visit`-th visit (from 1) of an action in both runs. `levels`: the actions that it is inside
-     *     of, outermost first, and `name` its own there; `action` as its engine told it. `slower` names the
-     *     run in which it took notably longer, whatever of its bounds is true.
+     * @description The `visit`-th visit (from 1) of an action in both runs. `levels`: the actions that it is
+     *     inside of, outermost first, and `name` its own there; `action`: the name by which its engine
+     *     told it. `slower` names the run in which it took notably longer, whichever values within its
+     *     bounds are true.
      */
     ComparedVisit: {
         action: string;
@@ -375,7 +367,7 @@ export interface RunnerApi {
     };
     /**
      * Doubt
-     * @description Something that the run does not tell, so that the script had to choose.
+     * @description A fact that the run does not show, so that the script had to guess it.
      */
     Doubt: {
         action: string;
@@ -401,8 +393,8 @@ export interface RunnerApi {
     };
     /**
      * Expect
-     * @description What shall be expected from now on, under a name: the course of a `run`, or that of a graph in
-     *     a dry-run, in which actions do what the script says. `subgraphs`: the graphs inside of that one.
+     * @description A request to expect a course under a name: that of a `run`, or that of a graph in a dry-run
+     *     with this script. `subgraphs`: the graphs inside of that graph.
      */
     Expect: {
         name: string;
@@ -420,7 +412,7 @@ export interface RunnerApi {
     };
     /**
      * Expectation
-     * @description A run that shall go the same for ever, with all that simulating it again takes.
+     * @description A saved expectation, with everything that simulating it again takes.
      */
     Expectation: {
         name: string;
@@ -715,7 +707,7 @@ export interface RunnerApi {
     };
     /**
      * MarkShown
-     * @description Something that happened around the actions; `since`: from when on nothing was known.
+     * @description An event that is no observation of the engine; `since`: from when on nothing was known.
      */
     MarkShown: {
         seq: number;
@@ -730,7 +722,7 @@ export interface RunnerApi {
     };
     /**
      * Marks
-     * @description What a person changes about a run: only what is given.
+     * @description The marks of a run that a person changes; a field that is left out stays as it was.
      */
     Marks: {
         /** @default null */
@@ -768,8 +760,8 @@ export interface RunnerApi {
     };
     /**
      * NeverTaken
-     * @description An arrow whose parent ran, and is known never to have ended as the arrow waits for
-     *     (`outcomes`).
+     * @description An arrow whose parent ran, and is known never to have ended with one of the arrow's
+     *     `outcomes`.
      */
     NeverTaken: {
         parent: string;
@@ -822,7 +814,8 @@ export interface RunnerApi {
     PageMessage: RunnerApi["StopMessage"];
     /**
      * Parting
-     * @description The earliest step in which the runs differ, in a sentence, with what the action said.
+     * @description The earliest visit in which the runs differ, in a sentence, with the messages of the
+     *     action.
      */
     Parting: {
         step: RunnerApi["ComparedVisit"];
@@ -832,8 +825,8 @@ export interface RunnerApi {
     };
     /**
      * PartingCause
-     * @description Something that happened in one of the runs and explains where they part: what a person did, an
-     *     alarm, or what the simulator was told to do. `run`: the number of that run.
+     * @description An event of one of the runs that explains why they differ: a command of a person, an alarm,
+     *     or the script of the simulator. `run`: the number of that run.
      */
     PartingCause: {
         kind: string;
@@ -939,7 +932,7 @@ export interface RunnerApi {
     };
     /**
      * ProposalRequest
-     * @description A graph, and the outcome of an arrow that a test of it shall take.
+     * @description A graph, and the outcome of an arrow that a test is to take.
      */
     ProposalRequest: {
         /** @description The UMRF graph itself, as approved, or a string that holds its JSON text */
@@ -997,7 +990,7 @@ export interface RunnerApi {
     };
     /**
      * Recorded
-     * @description A run as a script (`behaviours`, docs/contracts.md 5.2), and what in it is a guess.
+     * @description A run as a script (`behaviours`, docs/contracts.md 5.2), and the guesses in it.
      */
     Recorded: {
         behaviours: {
@@ -1066,7 +1059,8 @@ export interface RunnerApi {
     };
     /**
      * ReplayFrame
-     * @description One event: `head` has the fields of the run that changed, `actions` those that did.
+     * @description The changes by one event: `head` has the fields of the run that changed, `actions` the
+     *     actions that did.
      */
     ReplayFrame: {
         seq: number;
@@ -1085,6 +1079,15 @@ export interface RunnerApi {
         };
         /** @default [] */
         alarms?: RunnerApi["AlarmShown"][];
+    };
+    /**
+     * ReplayPageStart
+     * @description The beginning of a page of the replay: after `after` events, at `at`.
+     */
+    ReplayPageStart: {
+        after: number;
+        /** Format: date-time */
+        at: string;
     };
     /**
      * RestRequest
@@ -1205,10 +1208,10 @@ export interface RunnerApi {
     };
     /**
      * RunComparison
-     * @description Run `a` against run `b`. `graph` is the difference of what was sent; `parameters` those of its
-     *     changes that touch the values of actions; `subgraphs` names the graphs inside that were sent along
-     *     and were not the same. `because`: what happened on the way that explains the parting, before any
-     *     difference of the graphs; null where nothing is known that does.
+     * @description Run `a` compared with run `b`. `graph` is the difference of the graphs that were sent;
+     *     `parameters` those of its changes that touch values of actions; `subgraphs` names the graphs
+     *     inside that differ. `because`: an event of a run that explains the parting, before any
+     *     difference of the graphs; null where none is known.
      */
     RunComparison: {
         a: RunnerApi["RunSummary"];
@@ -1226,7 +1229,7 @@ export interface RunnerApi {
     };
     /**
      * RunMarks
-     * @description What people noted about a run.
+     * @description The marks that people gave a run.
      */
     RunMarks: {
         pinned: boolean;
@@ -1244,8 +1247,8 @@ export interface RunnerApi {
     };
     /**
      * RunPoint
-     * @description One run in a row of runs. `took` in seconds where that is known exactly; `span` is between which
-     *     bounds, null where nothing is known.
+     * @description One run of the statistics. `took` in seconds where it is known exactly; `span`: its bounds,
+     *     null where nothing is known.
      */
     RunPoint: {
         id: string;
@@ -1258,8 +1261,8 @@ export interface RunnerApi {
     };
     /**
      * RunReplay
-     * @description A page of a run's replay. `base` is the run after `after` events, null at the very beginning;
-     *     `newest` is the last event there is.
+     * @description A page of a run's replay. `base` is the run after `after` events, null at the beginning;
+     *     `newest` is the seq of the last event; `chapters`: the beginnings of all pages.
      */
     RunReplay: {
         run: string;
@@ -1267,7 +1270,7 @@ export interface RunnerApi {
         newest: number;
         base: RunnerApi["RunShown"] | null;
         frames: RunnerApi["ReplayFrame"][];
-        chapters: RunnerApi["Chapter"][];
+        chapters: RunnerApi["ReplayPageStart"][];
         marks: RunnerApi["MarkShown"][];
     };
     /**
@@ -1471,7 +1474,7 @@ export interface RunnerApi {
     };
     /**
      * Spans
-     * @description Durations of an action, each between its bounds.
+     * @description Percentiles of the durations of an action, each between bounds.
      */
     Spans: {
         p50: RunnerApi["DurationBounds"] | null;
@@ -1524,10 +1527,10 @@ export interface RunnerApi {
     };
     /**
      * Statistics
-     * @description What the newest `runs` of a graph have in common. `judged` are those whose result is known, and
-     *     says something about the graph (neither refused, lost nor stopped); `succeeded` are those of them
-     *     that finished true. `unknown` have finished, and nobody knows with which result: robots do not tell.
-     *     Of `untold` arrows it is not known whether they were ever taken.
+     * @description Statistics of the newest `runs` of a graph. `judged`: runs whose result is known and says
+     *     something about the graph (neither refused, lost nor stopped); `succeeded`: those of them that
+     *     finished true. `unknown`: finished runs of unknown result, since robots do not tell it.
+     *     `untold`: the number of arrows of which it is not known whether they were ever taken.
      */
     Statistics: {
         runs: RunnerApi["RunPoint"][];

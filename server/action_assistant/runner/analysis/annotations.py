@@ -1,7 +1,7 @@
-"""Annotations of a run besides its own events: marks of people, and its sums after the end.
+"""Annotations of a run besides its own events: marks of people, sums after its end, its archive.
 
-It has a stream of its own, `about/RUN`: whatever people write down never mixes with what a robot
-did. The tables here are folds of these streams.
+They have a stream of their own, `about/RUN`, apart from what a robot did. The tables here are folds
+of these streams.
 """
 
 import itertools
@@ -13,7 +13,7 @@ from sqlalchemy import Executable, delete, func, insert, update
 from sqlalchemy.dialects.sqlite import insert as upsert
 
 from action_assistant.journal.events import Draft, Event
-from action_assistant.runner.analysis.cause_texts import words
+from action_assistant.runner.analysis.cause_texts import cause_sentence
 from action_assistant.runner.analysis.causes import causes
 from action_assistant.runner.runs.counts import VisitCount, visit_counts
 from action_assistant.runner.runs.durations import DurationBounds, duration_bounds, of_run, of_visit
@@ -27,10 +27,10 @@ from action_assistant.schema.runner_tables import run as runs
 from action_assistant.umrf.model import Graph
 
 _PREFIX: Final = "about/"
-_WORDS: Final = 20_000  # characters of what was said that a search looks through
-#: Raise it when a run adds up to something else than before: older sums are made again.
+_WORDS: Final = 20_000  # characters of a run that are searched
+#: Raise it when the sum of a run changes: older sums are made again then.
 FIGURES: Final = 5
-#: Beside the results of an action in the table: its visits are a lower bound.
+#: Key beside the results of an action in the table: its number of visits is a lower bound.
 AT_LEAST: Final = "at_least"
 _TOOK: Final = 100  # durations kept per action and run
 
@@ -38,7 +38,7 @@ Label = Annotated[str, msgspec.Meta(min_length=1, max_length=60, pattern=r"^\S(.
 
 
 class Marks(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """What a person changes about a run: only what is given."""
+    """The marks of a run that a person changes; a field that is left out stays as it was."""
 
     pinned: bool | None = None
     note: Annotated[str, msgspec.Meta(max_length=4_000)] | None = None
@@ -46,7 +46,7 @@ class Marks(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaul
 
 
 class Marked(msgspec.Struct, frozen=True, omit_defaults=True):
-    """Somebody pinned a run, wrote a note or chose its labels."""
+    """A person pinned a run, wrote a note or chose its labels."""
 
     kind: ClassVar[str] = "run.marked.v1"
 
@@ -56,10 +56,10 @@ class Marked(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class ActionSum(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """One action of a run that is over. It was visited `visits` times; `at_least`: or more often.
-    `results` counts results that are known; `inferred` the visits that nobody saw; `spans` has how long
-    visits took that have ended, the newest hundred at most. `took` is of older versions: microseconds
-    that they took at least."""
+    """The sum of one action of a run that is over. It was visited `visits` times, with `at_least`
+    perhaps more often. `results` counts results that are known; `inferred` the visits that nobody
+    saw; `spans` has the durations of visits that have ended, the newest hundred at most. `took` is
+    of older versions: lower bounds in microseconds."""
 
     aid: str | None = None
     visits: int = 0
@@ -71,8 +71,8 @@ class ActionSum(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
 
 
 class SummedUp(msgspec.Struct, frozen=True, omit_defaults=True):
-    """A run that is over, as lists and statistics need it: they must not read every run again.
-    `figures`: `FIGURES` when it was summed up; what is older is summed up again."""
+    """The sum of a run that is over, so that lists and statistics need not read its events.
+    `figures` is `FIGURES` as of the sum; a run with an older value is summed up again."""
 
     kind: ClassVar[str] = "run.summed_up.v1"
 
@@ -88,8 +88,9 @@ class SummedUp(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class RunArchived(msgspec.Struct, frozen=True):
-    """The events of a run were put into an archive and taken out of the journal. `file` lies in the
-    folder of archives; `by` is the number of the removal; `row` is the run as lists show it."""
+    """The events of a run were put into an archive and taken out of the journal. `file` is a path
+    in the folder of archives; `by` is the number of the removal; `row` is the run's row as it
+    was."""
 
     kind: ClassVar[str] = "run.archived.v1"
 
@@ -101,25 +102,26 @@ class RunArchived(msgspec.Struct, frozen=True):
 
 
 def stream_about(run: str) -> str:
-    """The stream of what is told about a run."""
+    """Return the stream of annotations of a run."""
     return f"{_PREFIX}{run}"
 
 
 def is_about(stream: str) -> bool:
-    """Whether this stream is one of those."""
+    """Return whether a stream has annotations of a run."""
     return stream.startswith(_PREFIX)
 
 
 def draft(event: Marked | SummedUp | RunArchived) -> Draft:
-    """The event before it has a place."""
+    """Encode an annotation for the journal."""
     author = event.author.id if isinstance(event, Marked) else ""
     return Draft(event.kind, author, msgspec.json.encode(event))
 
 
 def sum_of(run: Run, graph: Graph | None, at: int, said: Iterable[str] = ()) -> SummedUp:
-    """What a run of a graph adds up to. `said`: the texts of its events."""
+    """Sum up a run. `graph`: as it was sent, None where it cannot be read; `at`: microseconds UTC
+    of the sum; `said`: the texts of its events."""
     found = causes(run, graph)[:1]
-    cause = words(found[0], run) if found else ""
+    cause = cause_sentence(found[0], run) if found else ""
     texts = itertools.chain(
         [cause, run.detail],
         (alarm.text for alarm in run.alarms),
@@ -127,10 +129,10 @@ def sum_of(run: Run, graph: Graph | None, at: int, said: Iterable[str] = ()) -> 
         said,
         run.actions,
     )
-    told = "\n".join(dict.fromkeys(text for text in texts if text))[:_WORDS]
+    searched = "\n".join(dict.fromkeys(text for text in texts if text))[:_WORDS]
     counts = visit_counts(run)
     actions = {name: _sum(each, counts[name]) for name, each in run.actions.items()}
-    return SummedUp(at, actions, told, cause, of_run(run), FIGURES)
+    return SummedUp(at, actions, searched, cause, of_run(run), FIGURES)
 
 
 def _sum(action: ActionRun, count: VisitCount) -> ActionSum:
@@ -150,7 +152,7 @@ def _sum(action: ActionRun, count: VisitCount) -> ActionSum:
 
 
 def fold(event: Event) -> Sequence[Executable]:
-    """What an event means for the tables."""
+    """Return the statements that an annotation means for the tables."""
     run = event.stream.removeprefix(_PREFIX)
     match event.kind:
         case Marked.kind:
@@ -158,7 +160,7 @@ def fold(event: Event) -> Sequence[Executable]:
         case SummedUp.kind:
             return _put_sum(run, msgspec.json.decode(event.body, type=SummedUp))
         case RunArchived.kind:
-            return _put_away(run, msgspec.json.decode(event.body, type=RunArchived))
+            return _archive(run, msgspec.json.decode(event.body, type=RunArchived))
         case _:
             return ()
 
@@ -193,15 +195,20 @@ def _put_sum(run: str, summed: SummedUp) -> Sequence[Executable]:
     return [
         _review(run, {"words": summed.words, "summed": True}),
         *holds(run, summed.words),
-        *_told(run, summed),
+        *_summary_changes(run, summed),
         delete(action_sum).where(action_sum.c.run == run),
         *(insert(action_sum).values(rows[i : i + 100]) for i in range(0, len(rows), 100)),
     ]
 
 
-def _put_away(run_id: str, put: RunArchived) -> Sequence[Executable]:
-    """The row stays, also when it is made again without the events."""
-    row: Mapping[str, Any] = {**put.row, "archived_at": put.at, "archived_as": put.file}
+def _archive(run_id: str, archived: RunArchived) -> Sequence[Executable]:
+    """Update the row of a run, or restore it where the tables are rebuilt without the run's
+    events."""
+    row: Mapping[str, Any] = {
+        **archived.row,
+        "archived_at": archived.at,
+        "archived_as": archived.file,
+    }
     statement = upsert(runs).values(id=run_id, **row)
     return (
         will_be_indexed(run_id, row["number"]),
@@ -215,17 +222,17 @@ def _review(run: str, fields: Mapping[str, object]) -> Executable:
     return statement.on_conflict_do_update(index_elements=["run"], set_=dict(fields))
 
 
-def _told(run: str, summed: SummedUp) -> Sequence[Executable]:
-    """The sentence that the list shows, and how long it took."""
-    told: list[object] = ["$.figures", summed.figures] if summed.figures else []
+def _summary_changes(run: str, summed: SummedUp) -> Sequence[Executable]:
+    """Store cause and duration of a run for the list."""
+    changes: list[object] = ["$.figures", summed.figures] if summed.figures else []
     if summed.cause:
-        told += ["$.cause", summed.cause]
+        changes += ["$.cause", summed.cause]
     if summed.took is not None:
-        told += ["$.took", func.json(msgspec.json.encode(summed.took).decode())]
-    if not told:
+        changes += ["$.took", func.json(msgspec.json.encode(summed.took).decode())]
+    if not changes:
         return ()
     change = update(runs).where(runs.c.id == run)
-    return (change.values(summary=func.json_set(runs.c.summary, *told)),)
+    return (change.values(summary=func.json_set(runs.c.summary, *changes)),)
 
 
 def _spans(action: ActionSum) -> Sequence[DurationBounds]:

@@ -1,4 +1,4 @@
-"""Causes in plain sentences, for the page and for the list of runs. Pure."""
+"""Words causes as sentences, for the page and for the list of runs. Pure."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -12,8 +12,8 @@ from action_assistant.runner.analysis.causes import (
     OperatorChange,
     OperatorPause,
     OperatorStop,
-    RanThen,
     RefusalCause,
+    RunningAction,
     Silence,
     Stalled,
     UnknownAction,
@@ -27,16 +27,17 @@ from action_assistant.safe_text import sentence
 
 _NAMED: Final = 3  # actions in one sentence
 _TENTH_US: Final = 100_000
-_SAME_S: Final = 0.101  # bounds that differ by no more say one figure
+_SAME_S: Final = 0.101  # bounds that are no further apart are told as one figure
 
 
-def words(cause: Cause, run: Run) -> str:
-    """Return a cause in one plain sentence, whose order no name turns. The moment stands beside it."""
+def cause_sentence(cause: Cause, run: Run) -> str:
+    """Return a cause as one sentence without its moment. Names of right-to-left scripts are
+    isolated."""
     return sentence(_in_words(cause, run))
 
 
 def _in_words(cause: Cause, run: Run) -> str:
-    who = called(run, cause.action) if cause.action is not None else ""
+    who = short_name(run, cause.action) if cause.action is not None else ""
     match cause:
         case OperatorStop():
             return _stop_in_words(cause, run)
@@ -91,7 +92,7 @@ def _stop_in_words(cause: OperatorStop, run: Run) -> str:
         case "lost":
             return f"{lead} after {run.engine} had stopped showing the run{until_then}."
         case "paused":
-            held = [called(run, each.action) for each in cause.ran[:_NAMED]]
+            held = [short_name(run, each.action) for each in cause.ran[:_NAMED]]
             where = f", in {_listed(held, len(cause.ran))}" if held else ""
             return f"{lead} while the run was paused{where}."
         case _ if cause.ran:
@@ -100,26 +101,26 @@ def _stop_in_words(cause: OperatorStop, run: Run) -> str:
             return f"{lead} while no action was seen running."
 
 
-def _while_in_words(ran: Sequence[RanThen], run: Run, lead: str = " while ") -> str:
-    """Which actions ran at that moment, and for how long they had."""
+def _while_in_words(ran: Sequence[RunningAction], run: Run, lead: str = " while ") -> str:
+    """Return which actions ran at that moment, and for how long they had run by then."""
     if not ran:
         return ""
-    told = [f"{called(run, each.action)} ({_lasted(each)})" for each in ran[:_NAMED]]
-    who = f"{_listed(told, len(ran))} ran"
+    names = [f"{short_name(run, each.action)} ({_lasted(each)})" for each in ran[:_NAMED]]
+    who = f"{_listed(names, len(ran))} ran"
     if len(ran) == 1:
-        who = f"{called(run, ran[0].action)} ran ({_lasted(ran[0])})"
+        who = f"{short_name(run, ran[0].action)} ran ({_lasted(ran[0])})"
     doubt = "" if all(each.proven for each in ran) else ", as far as was seen"
     return f"{lead}{who}{doubt}"
 
 
-def _listed(told: Sequence[str], count: int) -> str:
-    if count > len(told):
-        return f"{', '.join(told)} and {count - len(told)} more"
-    return told[0] if count == 1 else f"{', '.join(told[:-1])} and {told[-1]}"
+def _listed(names: Sequence[str], count: int) -> str:
+    if count > len(names):
+        return f"{', '.join(names)} and {count - len(names)} more"
+    return names[0] if count == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
-def _lasted(ran: RanThen) -> str:
-    """How long it had run, between its bounds, in seconds."""
+def _lasted(ran: RunningAction) -> str:
+    """Return how long an action had run, as one figure or as bounds, in seconds."""
     least, most = math.floor(ran.least / _TENTH_US) / 10, math.ceil(ran.most / _TENTH_US) / 10
     if most - least <= _SAME_S:
         return f"{round(ran.most / 1e6, 1)} s"
@@ -139,7 +140,7 @@ def _refusal_in_words(engine: str, quote: str, *, sent: bool) -> str:
 
 
 def _waits_in_words(cause: Waiting, run: Run, child: str) -> str:
-    parent = called(run, cause.parent)
+    parent = short_name(run, cause.parent)
     if cause.ended:
         return (
             f"{child} waited for {parent}, which ended {cause.ended}: its arrow passes that over."
@@ -161,9 +162,9 @@ def _command_in_words(cause: ForeignCause) -> str:
     return f"Somebody else {did}" + ("; this run was ended by it." if cause.ended else ".")
 
 
-def called(run: Run, full_name: str) -> str:
-    """An action as people call it: by the way into its level, each name without its number where it is
-    the only one of its name there."""
+def short_name(run: Run, full_name: str) -> str:
+    """Return an action as people call it: with the actions around it, and each name without its
+    number where no other action of its level has the name."""
     found = places_of(run)
     place = found.get(full_name)
     if place is None:

@@ -1,8 +1,8 @@
 """The causes of a run's bad end, as far as its own events prove them.
 
-Pure. A cause is named only with its evidence: a moment, and the action that it shows at. What nothing
-proves is not named; no cause is an answer, too. What a person at this runner did comes first, and no
-cause says what a later event of the run contradicts.
+Pure. A cause is named only with its evidence: a moment, and the action that it shows at. A cause
+without proof is not named; having none is an answer, too. What a person at this runner did comes
+first, and no cause contradicts a later event of the run.
 """
 
 import re
@@ -24,16 +24,17 @@ _REFUSAL: Final = "origin [in start"
 _TYPES: Final = re.compile(r"is an? (\w+) here and an? (\w+) in the action")
 _LONGEST: Final = 80  # characters of a value in a sentence
 _PROBLEMS: Final = frozenset({"unknown-action", "signature"})
-#: Alarms of the runner that are causes of their own kind, or of none.
 #: A visit that has ended: the moment (microseconds UTC), the full name of its action, the visit.
 EndedVisit: TypeAlias = tuple[int, str, Visit]
 
+#: Alarms of the runner that are causes of their own kind, or of none.
 RESTARTED: Final = "engine_restarted"
 UNCONFIRMED: Final = "stop_unconfirmed"
 
 
 class _Evidence(msgspec.Struct, frozen=True, kw_only=True):
-    """Where it shows: a moment (microseconds UTC), an action (full name), and what was said there."""
+    """The evidence of a cause: a moment (microseconds UTC), an action (full name), and the words
+    that were said there."""
 
     at: int
     action: str | None = None
@@ -41,7 +42,7 @@ class _Evidence(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class WrongParameter(_Evidence, frozen=True, tag="wrong_parameter", tag_field="kind"):
-    """An action failed that was given a value of another type than the robot's action takes."""
+    """An action failed whose parameter has another type than the robot's action takes."""
 
     parameter: str
     value: str
@@ -55,9 +56,9 @@ class UnknownAction(_Evidence, frozen=True, tag="unknown_action", tag_field="kin
     why: str
 
 
-class RanThen(msgspec.Struct, frozen=True, kw_only=True):
-    """An action that ran when a person did something. `proven`: events show that it ran at that very
-    moment; else it was seen running before, and no end of it had been seen. It had begun between
+class RunningAction(msgspec.Struct, frozen=True, kw_only=True):
+    """An action that ran when a person did something. `proven`: events show that it ran at that
+    very moment; else it was seen running before, and its end was not seen. It had begun between
     `least` and `most` microseconds before."""
 
     action: str
@@ -67,51 +68,51 @@ class RanThen(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class OperatorStop(_Evidence, frozen=True, tag="operator_stop", tag_field="kind"):
-    """A person pressed Stop. `program`: by a program. `state`: what the run was then, as far as was
-    known; `ran`: which actions ran; `begun`: whether any had begun. `restarted`: its engine had been
-    restarted before."""
+    """A person pressed Stop. `program`: by a program. `state`: of the run then, as far as was
+    known; `ran`: the actions that ran; `begun`: any action had begun. `restarted`: the engine had
+    been restarted before."""
 
     by: str
     program: bool
     state: State
-    ran: tuple[RanThen, ...] = ()
+    ran: tuple[RunningAction, ...] = ()
     begun: bool = True
     restarted: bool = False
 
 
 class OperatorPause(_Evidence, frozen=True, tag="operator_pause", tag_field="kind"):
-    """A person paused the run and nobody let it go on. `seen`: the engine showed it paused."""
+    """A person paused the run and nobody resumed it. `seen`: the engine showed it paused."""
 
     by: str
-    ran: tuple[RanThen, ...] = ()
+    ran: tuple[RunningAction, ...] = ()
     seen: bool = False
 
 
 class OperatorChange(_Evidence, frozen=True, tag="operator_change", tag_field="kind"):
-    """A person gave the run another version of its graph while it went on."""
+    """A person gave the run another version of its graph while it was running."""
 
     by: str
 
 
 class Waiting(_Evidence, frozen=True, tag="waiting", tag_field="kind"):
-    """`action` never ran, since it waited for `parent`: that had begun at `at` and had not been seen
-    to end when the run was given up, or it had ended as `ended` says, which the arrow between them
-    passes over."""
+    """`action` never ran, since it waited for `parent`: that had begun at `at` and was not seen to
+    end until the run was given up, or it had ended as `ended` says, which the arrow between them
+    ignores."""
 
     parent: str
     ended: str = ""
 
 
 class Stalled(_Evidence, frozen=True, tag="stalled", tag_field="kind"):
-    """The graph ran and nothing in it did; `quote` says what `action` waited for."""
+    """The graph ran and no action in it did; `quote` says what `action` waited for."""
 
 
 class EngineRestarted(_Evidence, frozen=True, tag="engine_restarted", tag_field="kind"):
-    """Another engine stands where the one before was."""
+    """Another process of the engine took the place of the one before."""
 
 
 class ForeignCause(_Evidence, frozen=True, tag="foreign", tag_field="kind"):
-    """Somebody else told the robot something. `ended`: the run was over then, without a Stop from
+    """A command of somebody else to the robot. `ended`: the run was over then, without a Stop from
     here."""
 
     command: str
@@ -128,21 +129,20 @@ class ActionFailed(_Evidence, frozen=True, tag="action_failed", tag_field="kind"
 
 
 class RefusalCause(_Evidence, frozen=True, tag="refused", tag_field="kind"):
-    """Nothing was begun. `sent`: the start had been sent, so that it was the engine that said no; else
-    it never left this computer."""
+    """The start was refused. `sent`: by the engine; else it never left this computer."""
 
     sent: bool = True
 
 
 class Silence(_Evidence, frozen=True, tag="silence", tag_field="kind"):
-    """The engine does not answer, or does not show the run; nothing is known since `at`."""
+    """The engine does not answer, or does not show the run; since `at` nothing is known."""
 
 
 class Warned(_Evidence, frozen=True, tag="warned", tag_field="kind"):
-    """Another alarm: the engine did something that it should not."""
+    """Another alarm of the run."""
 
 
-#: What people at this runner did.
+#: Causes that are commands of people at this runner.
 OPERATOR: Final = (OperatorStop, OperatorPause, OperatorChange)
 
 Cause: TypeAlias = (
@@ -163,8 +163,8 @@ Cause: TypeAlias = (
 
 
 def causes(run: Run, graph: Graph | None) -> tuple[Cause, ...]:
-    """What is proven to be behind the end of a run, or behind its trouble so far, the weightiest
-    first; nothing for a run that went well. `graph`: as it was sent."""
+    """Return the proven causes of a run's end, or of its trouble so far, the weightiest first;
+    empty for a run that went well. `graph`: as it was sent, None where it is not known."""
     if run.end == "finished" and (run.result == "on_true" or _nothing_failed(run)):
         return ()
     found = list(_found(run, graph))
@@ -172,13 +172,14 @@ def causes(run: Run, graph: Graph | None) -> tuple[Cause, ...]:
 
 
 def _nothing_failed(run: Run) -> bool:
-    """Robots do not tell the result of a graph; an action in error says enough."""
+    """Return whether a finished run of unknown result went well: no action ended in error. Robots
+    do not tell results of graphs."""
     return run.result is None and all(_failed(each) is None for each in run.actions.values())
 
 
 def _found(run: Run, graph: Graph | None) -> Iterator[Cause]:
     if run.reshaped:
-        graph = None  # something else ran than what was sent, so that its arrows prove nothing
+        graph = None  # another graph than the sent one ran: its arrows prove nothing
     yield from operator(run)
     yield from _restarts(run)
     yield from _commands(run)
@@ -198,7 +199,7 @@ def _found(run: Run, graph: Graph | None) -> Iterator[Cause]:
 
 
 def operator(run: Run) -> tuple[OperatorStop | OperatorPause | OperatorChange, ...]:
-    """What people at this runner did to a run, a Stop first."""
+    """Return what people at this runner did to a run, a Stop first."""
     found: list[OperatorStop | OperatorPause | OperatorChange] = []
     asked = run.interventions
     found += [_stop(run, each) for each in asked if each.kind == "stop"]
@@ -237,22 +238,22 @@ def _stop(run: Run, asked: Intervention) -> OperatorStop:
     )
 
 
-def _ran(run: Run, asked: Intervention) -> tuple[RanThen, ...]:
-    """The inmost actions that ran at that moment, those of which that is proven first."""
-    found: list[RanThen] = []
+def _ran(run: Run, asked: Intervention) -> tuple[RunningAction, ...]:
+    """Return the innermost actions that ran at that moment, proven ones first."""
+    found: list[RunningAction] = []
     for name in asked.active:
         visit = _at(run.actions.get(name, ActionRun()), asked.at)
         if visit is not None:
             proven = _surely_ran(run, name, visit, asked)
             least, most = max(0, asked.at - visit.start), max(0, asked.at - visit.not_before)
-            found.append(RanThen(action=name, proven=proven, least=least, most=most))
+            found.append(RunningAction(action=name, proven=proven, least=least, most=most))
     around = _around(run, {each.action for each in found})
     inmost = [each for each in found if each.action not in around]
     return tuple(sorted(inmost, key=lambda each: (not each.proven, each.most, each.action)))
 
 
 def _at(action: ActionRun, moment: int) -> Visit | None:
-    """The visit that may have gone on at that moment."""
+    """Return the visit that may have been going on at that moment."""
     for visit in reversed(action.visits):
         if visit.not_before <= moment:
             ended = visit.not_after is not None and visit.not_after < moment
@@ -261,8 +262,8 @@ def _at(action: ActionRun, moment: int) -> Visit | None:
 
 
 def _surely_ran(run: Run, name: str, visit: Visit, asked: Intervention) -> bool:
-    """Whether events show that it ran at that moment. One that a Stop has stopped ran then, where nothing
-    else can have stopped it."""
+    """Return whether events show that a visit was going on at that moment. A visit that ended
+    *stopped* was, where nothing but this Stop can have stopped it."""
     if visit.start > asked.at:
         return False
     if visit.until is not None and visit.until >= asked.at:
@@ -292,7 +293,7 @@ def _commands(run: Run) -> Iterator[Cause]:
             )
 
 
-#: How a run ends that somebody else stops, or starts anew.
+#: The ends of a run that a foreign command can cause.
 _ENDS: Final[dict[str, frozenset[str]]] = {
     "stop": frozenset({"stopped"}),
     "start": frozenset({"stopped", "lost"}),
@@ -300,8 +301,8 @@ _ENDS: Final[dict[str, frozenset[str]]] = {
 
 
 def _ended_by(run: Run, command: str, alarm: Alarm) -> bool:
-    """Whether a command that ends runs came before an end of just that kind, which nobody here asked
-    for, and before anything else that ends a run."""
+    """Return whether a foreign command ended the run: it can end runs in this way, came before the
+    end, nobody here asked for one, and nothing else ended it."""
     others = [
         each for each in run.alarms if each.code == RESTARTED and each.at <= (run.ended_at or 0)
     ]
@@ -316,7 +317,8 @@ def _ended_by(run: Run, command: str, alarm: Alarm) -> bool:
 
 
 def _refusals(run: Run, graph: Graph | None) -> Iterator[Cause]:
-    """What the engine's own log says of the start, together with what it was known to lack."""
+    """Yield the refusal of a start by the engine's own log, with the actions that it is known to
+    lack."""
     said = (each for each in run.log if each.text.startswith(_REFUSAL))
     line = next(said, None) if run.end == "refused" or not _shown(run) else None
     lacking = [each for each in run.despite if each.code in _PROBLEMS]
@@ -339,7 +341,7 @@ def _refusals(run: Run, graph: Graph | None) -> Iterator[Cause]:
 
 
 def _shown(run: Run) -> bool:
-    """Whether the engine ever showed the run."""
+    """Return whether the engine ever showed the run."""
     return run.graph_state is not None
 
 
@@ -364,7 +366,7 @@ def _parameters(run: Run, graph: Graph) -> Iterator[Cause]:
 
 
 def _given(action: Action, problem: Overridden) -> tuple[str, str]:
-    """A parameter's name and its value as it was sent."""
+    """Return the name of a problem's parameter and its value as it was sent."""
     path = problem.path.rpartition("_parameters/")[2]
     leaf = next((parse_small(each.text) for each in action.inputs if each.path == path), None)
     value = leaf.get("pvf_value") if isinstance(leaf, dict) else None
@@ -373,13 +375,14 @@ def _given(action: Action, problem: Overridden) -> tuple[str, str]:
 
 
 def _was_given(visit: Visit, parameter: str, value: str) -> bool:
-    """Whether the engine reported no other value for this visit: a parent may have handed one over."""
+    """Return whether a visit may have had this value: a parent may have given another one, which
+    the engine would have reported."""
     reported = (visit.inputs or {}).get(parameter.replace("/", "::"))
     return reported is None or reported[:_LONGEST] == value
 
 
 def _failures(run: Run) -> Iterator[Cause]:
-    """The visit that it goes back to, however deep inside."""
+    """Yield the action whose failure ended the run, however deep inside."""
     failing = _failing_visit(run)
     if failing is not None:
         at, name, visit = failing
@@ -393,8 +396,9 @@ def _failures(run: Run) -> Iterator[Cause]:
 
 
 def _failing_visit(run: Run) -> EndedVisit | None:
-    """The first that ended in error; of a run that ended false, the last that did. What went wrong
-    inside of an action that ended true all the same was made good there: it is the last to be thought of."""
+    """Return the visit that the bad end goes back to: the first that ended in error; in a run that
+    ended false, the last of the top level that did. An error inside of an action that ended true
+    comes last, since that action recovered from it."""
     found = places_of(run)
     ended = _ended_visits(run, found, run.actions)
     errors = [each for each in ended if each[2].result == "error"]
@@ -410,7 +414,8 @@ def _failing_visit(run: Run) -> EndedVisit | None:
 def _ended_visits(
     run: Run, found: Mapping[str, LevelPlace], names: Iterable[str]
 ) -> list[EndedVisit]:
-    """Visits that have ended, in that order; of what ended at one moment, the inner ones first."""
+    """Return the visits that have ended, in the order of their ends; at the same moment, inner ones
+    first."""
     visits = [
         (visit.not_after or visit.start, name, visit)
         for name in names
@@ -434,7 +439,7 @@ def _made_good(
 
 
 def _inmost(run: Run, found: dict[str, LevelPlace], wrong: EndedVisit) -> EndedVisit:
-    """The visit inside of it that ended in the same way, and so on down."""
+    """Return the visit inside of this one that ended in the same way, and so on down."""
     _, name, around = wrong
     inside = [
         each
@@ -447,13 +452,13 @@ def _inmost(run: Run, found: dict[str, LevelPlace], wrong: EndedVisit) -> EndedV
 
 
 def _holds(around: Visit, visit: Visit) -> bool:
-    """Whether one visit can have gone on within another."""
+    """Return whether one visit can have been going on within another."""
     ended = around.not_after
     return visit.start >= around.not_before and (ended is None or visit.not_before <= ended)
 
 
 def _stalls(run: Run, graph: Graph | None) -> Iterator[Stalled]:
-    """What it waited for when nothing moved in it any more, if that was so to its end."""
+    """Yield what a run waited for that stood still until its end."""
     alarm = next((each for each in reversed(run.alarms) if each.code == stall.STALLED), None)
     visits = (visit for action in run.actions.values() for visit in action.visits)
     if alarm is None or any(visit.start > alarm.at for visit in visits):
@@ -466,7 +471,7 @@ def _stalls(run: Run, graph: Graph | None) -> Iterator[Stalled]:
 
 
 def _waits(run: Run, graph: Graph) -> Iterator[Cause]:
-    """Joins that one of their parents kept waiting, when the run was given up."""
+    """Yield the joins that one of their parents kept waiting when the run was given up."""
     if run.end in {"finished", "error", "refused"}:
         return
     moment = _given_up(run)
@@ -480,14 +485,14 @@ def _waits(run: Run, graph: Graph) -> Iterator[Cause]:
 
 
 def _around(run: Run, going: set[str]) -> set[str]:
-    """Of these actions those that go on because one inside of them does."""
+    """Return those of these actions that only run because another one inside of them does."""
     found = places_of(run)
     levels = {found[name].levels for name in going}
     return {name for name in going if found[name].way in levels}
 
 
 def _given_up(run: Run) -> int | None:
-    """From which moment on the actions tell nothing more."""
+    """Return the moment after which the actions prove nothing more."""
     if run.stop_requested_at is not None:
         return run.stop_requested_at
     return run.unknown_since if run.unknown_since is not None else run.ended_at
@@ -496,7 +501,7 @@ def _given_up(run: Run) -> int | None:
 def _waiting(
     run: Run, names: dict[str, str], child: str, arrows: list[Relation], moment: int
 ) -> Iterator[Waiting]:
-    """A join has several parents, of which one has reported and another one has not."""
+    """Yield the parents that a join waited for, when at least one other parent had ended."""
     parents = [(names[arrow.parent], arrow) for arrow in arrows if arrow.parent in names]
     if not any(_over(run.actions.get(name), moment) for name, _ in parents) or len(parents) < 2:
         return
@@ -515,7 +520,7 @@ def _waiting(
 
 
 def _going(action: ActionRun, moment: int) -> Visit | None:
-    """The visit of which no end had been reported by that moment."""
+    """Return the visit whose end had not been reported by that moment."""
     last = action.visits[-1] if action.visits else None
     if last is None or last.start > moment:
         return None
@@ -524,7 +529,7 @@ def _going(action: ActionRun, moment: int) -> Visit | None:
 
 
 def _over(action: ActionRun | None, moment: int) -> Visit | None:
-    """The last visit, when its end had been reported by then."""
+    """Return the last visit if its end had been reported by that moment."""
     if action is None or not action.visits or _going(action, moment) is not None:
         return None
     last = action.visits[-1]
@@ -553,17 +558,17 @@ def _silence(run: Run) -> Iterator[Cause]:
         yield Silence(at=run.ended_at or run.requested_at, quote=run.detail)
 
 
-def _alarms(run: Run, told: set[str]) -> Iterator[Cause]:
-    """Other alarms, except those that what came after them contradicts."""
+def _alarms(run: Run, named: set[str]) -> Iterator[Cause]:
+    """Yield other alarms, except those that later events contradict."""
     for alarm in run.alarms:
-        if alarm.code in told or alarm.code in {RESTARTED, stall.STALLED}:
+        if alarm.code in named or alarm.code in {RESTARTED, stall.STALLED}:
             continue
         if not alarm.code.startswith("foreign_") and not _was_settled(run, alarm):
             yield Warned(at=alarm.at, quote=alarm.text)
 
 
 def _was_settled(run: Run, alarm: Alarm) -> bool:
-    """Whether rest was proven, or seen, after an alarm that says that it is not."""
+    """Return whether rest was proven, or seen, after an alarm that a Stop is unconfirmed."""
     if alarm.code != UNCONFIRMED:
         return False
     rested = [run.proof_at, run.at_rest.at if run.at_rest is not None else None]
@@ -575,7 +580,7 @@ def _failed(action: ActionRun) -> Visit | None:
 
 
 def _said(action: ActionRun, visit: Visit) -> str:
-    """The last thing that an action said in a visit."""
+    """Return the last message of an action in a visit."""
     until = visit.not_after
     said = [
         each.text

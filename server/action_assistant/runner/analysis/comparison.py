@@ -1,4 +1,4 @@
-"""Two runs side by side: what was sent, where they ran, and the first visit in which they part."""
+"""Compares two runs: what was sent, where they ran, and the first visit in which they differ."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Final, Literal, TypeAlias
@@ -6,7 +6,7 @@ from typing import Final, Literal, TypeAlias
 import msgspec
 from msgspec.structs import replace
 
-from action_assistant.runner.analysis.cause_texts import words
+from action_assistant.runner.analysis.cause_texts import cause_sentence
 from action_assistant.runner.analysis.causes import OPERATOR, Cause, Silence, causes, operator
 from action_assistant.runner.analysis.levels import INTO, LevelPlace, places_of
 from action_assistant.runner.runs import views
@@ -23,15 +23,16 @@ _MOST: Final = 2_000  # steps in an answer
 _SLOWER: Final = 1.5  # times as long
 _NOTABLE_US: Final = 500_000  # and this much longer
 
-#: How the two visits of one step relate. `unknown`: a result is not known, or the other visit may have
-#: been missed. `end`: one has ended, and of the other no end was seen.
+#: The relation of the visits of one action in both runs. `unknown`: a result is not known, or the other visit
+#: may have been missed. `end`: one has ended, and of the other no end was seen.
 Relation: TypeAlias = Literal["same", "result", "only_a", "only_b", "unknown", "end"]
 
 
 class ComparedVisit(msgspec.Struct, frozen=True, kw_only=True):
-    """The `visit`-th visit (from 1) of an action in both runs. `levels`: the actions that it is inside
-    of, outermost first, and `name` its own there; `action` as its engine told it. `slower` names the
-    run in which it took notably longer, whatever of its bounds is true."""
+    """The `visit`-th visit (from 1) of an action in both runs. `levels`: the actions that it is
+    inside of, outermost first, and `name` its own there; `action`: the name by which its engine
+    told it. `slower` names the run in which it took notably longer, whichever values within its
+    bounds are true."""
 
     action: str
     levels: tuple[str, ...]
@@ -45,7 +46,8 @@ class ComparedVisit(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Parting(msgspec.Struct, frozen=True, kw_only=True):
-    """The earliest step in which the runs differ, in a sentence, with what the action said."""
+    """The earliest visit in which the runs differ, in a sentence, with the messages of the
+    action."""
 
     step: ComparedVisit
     text: str
@@ -57,8 +59,8 @@ class Parting(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class PartingCause(msgspec.Struct, frozen=True, kw_only=True):
-    """Something that happened in one of the runs and explains where they part: what a person did, an
-    alarm, or what the simulator was told to do. `run`: the number of that run."""
+    """An event of one of the runs that explains why they differ: a command of a person, an alarm,
+    or the script of the simulator. `run`: the number of that run."""
 
     kind: str
     run: int
@@ -69,10 +71,10 @@ class PartingCause(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class RunComparison(msgspec.Struct, frozen=True, kw_only=True):
-    """Run `a` against run `b`. `graph` is the difference of what was sent; `parameters` those of its
-    changes that touch the values of actions; `subgraphs` names the graphs inside that were sent along
-    and were not the same. `because`: what happened on the way that explains the parting, before any
-    difference of the graphs; null where nothing is known that does."""
+    """Run `a` compared with run `b`. `graph` is the difference of the graphs that were sent;
+    `parameters` those of its changes that touch values of actions; `subgraphs` names the graphs
+    inside that differ. `because`: an event of a run that explains the parting, before any
+    difference of the graphs; null where none is known."""
 
     a: views.RunSummary
     b: views.RunSummary
@@ -92,7 +94,7 @@ class RunComparison(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class SentTree(msgspec.Struct, frozen=True):
-    """What was sent: a graph, the digests of those inside of it by their names, and the script of a
+    """A graph as it was sent, the digests of the graphs inside by their names, and the script of a
     simulated run."""
 
     umrf: str
@@ -101,16 +103,18 @@ class SentTree(msgspec.Struct, frozen=True):
 
 
 def compare(a: Run, b: Run, sent_a: SentTree, sent_b: SentTree) -> RunComparison:
-    """Compare two runs that may be of different graphs. Total."""
+    """Compare two runs, which may be of different graphs. Raises nothing."""
     graph_b = _graph(sent_b.umrf)
     graph_a, identities = aligned(_graph(sent_a.umrf), graph_b)
     graph = difference((0, graph_a), (0, graph_b))
-    twins = _pairs(a, b, identities)
-    begun = sorted(_steps(a, b, twins, Missed(a, b)), key=lambda step: _begun(step, a, b))
+    action_pairs = _pairs(a, b, identities)
+    begun = sorted(
+        _steps(a, b, action_pairs, MissedVisits(a, b)), key=lambda step: _begun(step, a, b)
+    )
     steps = _own_first(_inner_first(begun))
     parts = (step for step in steps if _parts(step))
-    parting = next((_parting(step, a, b, twins) for step in parts), None)
-    because = _because(parting, (a, sent_a), (b, sent_b), twins)
+    parting = next((_parting(step, a, b, action_pairs) for step in parts), None)
+    because = _because(parting, (a, sent_a), (b, sent_b), action_pairs)
     return RunComparison(
         a=views.summary(a),
         b=views.summary(b),
@@ -130,17 +134,18 @@ def compare(a: Run, b: Run, sent_a: SentTree, sent_b: SentTree) -> RunComparison
 def _graph(umrf: str) -> Graph:
     try:
         return codec.read(umrf.encode()).graph
-    except (
-        codec.Unreadable
-    ):  # a run of ours was readable when it began; an import may not have been
+    except codec.Unreadable:  # only an imported run: those started here were readable
         return Graph(name="")
 
 
 def aligned(a: Graph, b: Graph) -> tuple[Graph, dict[Key, Key]]:
-    """Graph `a` with the identities of `b` for each action that is the same in both, and which those
-    are. An action is the same by its identity; else by its full name; else by its name, type and
-    parameters, where only one on each side has these. Identities change where somebody takes actions
-    out of a graph and puts them back, or imports a file again."""
+    """Return graph `a` with the keys of `b` for each action that is the same in both, and these
+    keys by those of `a` that changed.
+
+    An action is the same by its key; else by its full name; else by its name, type and parameters,
+    where each side has only one such action. Keys change when actions are removed from a graph and
+    put back, or when a file is imported again.
+    """
     same = {each.key: each.key for each in b.actions if each.key in {one.key for one in a.actions}}
     for says in (_called, _described):
         left_a = _alone_by(says, (each for each in a.actions if each.key not in same))
@@ -173,7 +178,7 @@ def _described(action: Action) -> tuple[object, ...]:
 def _alone_by(
     says: Callable[[Action], tuple[object, ...]], actions: Iterable[Action]
 ) -> dict[tuple[object, ...], Key]:
-    """Identities by what actions say of themselves, where only one says so."""
+    """Return keys of actions by a description, where only one action has it."""
     found: dict[tuple[object, ...], list[Key]] = {}
     for each in actions:
         found.setdefault(says(each), []).append(each.key)
@@ -181,22 +186,22 @@ def _alone_by(
 
 
 def _changed_inside(a: Mapping[str, str], b: Mapping[str, str]) -> list[str]:
-    """Graphs inside that are not the same in both, or not in both. Runs of before, and of other
-    programs, have none with them, of which nothing is said."""
+    """Return the names of graphs inside that differ, or that one side lacks. Empty where a run was
+    stored without its graphs inside, as older ones were."""
     if not a or not b:
         return []
     return sorted(name for name in a.keys() | b.keys() if a.get(name) != b.get(name))
 
 
-class Missed:
-    """Of which actions of either run visits may have been missed: then nobody knows which visits of
-    theirs belong together, and one that is not seen may have been there."""
+class MissedVisits:
+    """Knows of which actions of either run visits may have been missed. Then it is not known which
+    visits belong together, and a visit that was not seen may have happened."""
 
     def __init__(self, a: Run, b: Run) -> None:
-        self._a, self._b = _MissedIn(a), _MissedIn(b)
+        self._a, self._b = _MissedVisitsOfRun(a), _MissedVisitsOfRun(b)
 
-    def relation(self, pair: "_Twins", seen: Relation) -> Relation:
-        """How two visits relate, as far as that is known."""
+    def relation(self, pair: "_ActionPair", seen: Relation) -> Relation:
+        """Return the relation of two visits, or "unknown" where missed visits may explain it."""
         in_a = self._a.may_miss(pair.a, pair.place)
         in_b = self._b.may_miss(pair.b, pair.place)
         unsure = (
@@ -207,18 +212,21 @@ class Missed:
         return "unknown" if unsure else seen
 
 
-class _MissedIn:
+class _MissedVisitsOfRun:
     def __init__(self, run: Run) -> None:
         self._names = {name for name, count in visit_counts(run).items() if count.at_least}
         self._by_looks = any(each.by for each in run.actions.values())
 
     def may_miss(self, name: str | None, place: LevelPlace) -> bool:
-        """Whether visits of it may be missing; the whole of a graph inside may have been missed."""
+        """Return whether visits of this action may have been missed; without a name, whether the
+        whole graph around it may have been."""
         return name in self._names if name is not None else bool(place.levels) and self._by_looks
 
 
-def _steps(a: Run, b: Run, twins: Sequence["_Twins"], missed: Missed) -> Iterator[ComparedVisit]:
-    for pair in twins:
+def _steps(
+    a: Run, b: Run, action_pairs: Sequence["_ActionPair"], missed: MissedVisits
+) -> Iterator[ComparedVisit]:
+    for pair in action_pairs:
         left, right = pair.of(a, b)
         visits_a, visits_b = _visits(left), _visits(right)
         for number in sorted(visits_a.keys() | visits_b.keys()):
@@ -236,8 +244,9 @@ def _steps(a: Run, b: Run, twins: Sequence["_Twins"], missed: Missed) -> Iterato
             )
 
 
-class _Twins(msgspec.Struct, frozen=True):
-    """One action by its name in either run, and its place in the second where it is there."""
+class _ActionPair(msgspec.Struct, frozen=True):
+    """One action by its name in either run (None where the run lacks it), and its place, in the
+    second run if it is there."""
 
     a: str | None
     b: str | None
@@ -251,10 +260,10 @@ class _Twins(msgspec.Struct, frozen=True):
         return a.actions.get(self.a or ""), b.actions.get(self.b or "")
 
 
-def _pairs(a: Run, b: Run, identities: Mapping[Key, Key]) -> list[_Twins]:
-    """Actions of both runs, by identity where they have one, so that a renamed action is the same.
-    Those inside have none: their names count below the action that they are inside of. `identities`:
-    those of `b` by those of `a` that are the same action."""
+def _pairs(a: Run, b: Run, identities: Mapping[Key, Key]) -> list[_ActionPair]:
+    """Pair the actions of both runs: by key where they have one, so that a renamed action is the
+    same; inside of others by their names below the outermost action. `identities`: keys of `b` by
+    keys of `a` of the same actions."""
     in_a, in_b = places_of(a), places_of(b)
     same = {_identity(a, name, place, identities): name for name, place in in_a.items()}
     found = {name: same.get(_identity(b, name, place, {})) for name, place in in_b.items()}
@@ -263,15 +272,15 @@ def _pairs(a: Run, b: Run, identities: Mapping[Key, Key]) -> list[_Twins]:
     found |= {name: named.get(in_b[name].way) for name, twin in found.items() if twin is None}
     taken = set(found.values())
     return [
-        *(_Twins(twin, name, in_b[name]) for name, twin in found.items()),
-        *(_Twins(name, None, place) for name, place in in_a.items() if name not in taken),
+        *(_ActionPair(twin, name, in_b[name]) for name, twin in found.items()),
+        *(_ActionPair(name, None, place) for name, place in in_a.items() if name not in taken),
     ]
 
 
 def _identity(
     run: Run, name: str, place: LevelPlace, identities: Mapping[Key, Key]
 ) -> tuple[str, ...]:
-    """The same in all runs: the identity of the outermost action, and the names below it."""
+    """Return the key of the outermost action and the names below it; it is equal in all runs."""
     first, *below = place.way
     outermost = run.actions.get(first if below else name)
     aid = outermost.aid if outermost is not None else None
@@ -308,7 +317,8 @@ def _longer(one: Visit, other: Visit) -> bool:
 
 
 def _begun(step: ComparedVisit, a: Run, b: Run) -> tuple[float, str, int]:
-    """When a step had begun, counted from the start of its run; the earlier of the two."""
+    """Return the sort key of a visit: seconds from the start of its run until it began, the earlier
+    of the two."""
     moments = [
         (shown.start - views.time(run.started_at or run.requested_at)).total_seconds()
         for shown, run in ((step.a, a), (step.b, b))
@@ -322,7 +332,7 @@ def _parts(step: ComparedVisit) -> bool:
 
 
 def _inner_first(steps: list[ComparedVisit]) -> list[ComparedVisit]:
-    """An action that ended otherwise because something inside of it did comes after that."""
+    """Put an action with another result behind the visit inside of it that explains the result."""
     within: dict[tuple[str, ...], list[ComparedVisit]] = {}
     for step in filter(_parts, steps):
         for depth in range(len(step.levels)):
@@ -343,7 +353,7 @@ def _inner_first(steps: list[ComparedVisit]) -> list[ComparedVisit]:
 
 
 def _is_inside(step: ComparedVisit, other: ComparedVisit) -> bool:
-    """Whether it can have been in just this visit of what is around it."""
+    """Return whether the first visit can have been going on within the second one."""
     way = (*other.levels, other.name)
     pairs = ((step.a, other.a), (step.b, other.b))
     return step.levels[: len(way)] == way and any(
@@ -356,8 +366,8 @@ def _is_inside(step: ComparedVisit, other: ComparedVisit) -> bool:
 
 
 def _own_first(steps: list[ComparedVisit]) -> list[ComparedVisit]:
-    """Where each run went on by an action that the other lacks, that of this run, `b`, comes first:
-    which of them began earlier is chance, and only its own stand in its graph."""
+    """Put the first visit of run `b` before that of run `a`, where each run went on with an action
+    that the other lacks: which one began earlier is chance, and the page shows the graph of `b`."""
     first = next((at for at, step in enumerate(steps) if _parts(step)), None)
     if first is None or steps[first].relation != "only_a":
         return steps
@@ -369,10 +379,10 @@ def _own_first(steps: list[ComparedVisit]) -> list[ComparedVisit]:
     return steps
 
 
-def _parting(step: ComparedVisit, a: Run, b: Run, twins: Sequence[_Twins]) -> Parting:
-    one, other = next(pair for pair in twins if pair.action == step.action).of(a, b)
+def _parting(step: ComparedVisit, a: Run, b: Run, action_pairs: Sequence[_ActionPair]) -> Parting:
+    one, other = next(pair for pair in action_pairs if pair.action == step.action).of(a, b)
     said_a, said_b = _said(one, step.a), _said(other, step.b)
-    text = f"{_named(step)}: {_did(step.a, a)}, {_did(step.b, b)}."
+    text = f"{_named(step)}: {_outcome_text(step.a, a)}, {_outcome_text(step.b, b)}."
     return Parting(step=step, text=text, messages_a=said_a, messages_b=said_b)
 
 
@@ -387,11 +397,11 @@ def _because(
     parting: Parting | None,
     a: tuple[Run, SentTree],
     b: tuple[Run, SentTree],
-    twins: Sequence[_Twins],
+    action_pairs: Sequence[_ActionPair],
 ) -> PartingCause | None:
-    """What happened in one of the runs and explains where they part: first what a person did in either,
-    then alarms, then what the simulator was told. Of runs that part nowhere and yet ended otherwise:
-    what is behind that."""
+    """Return the event that explains why the runs differ: commands of people in either run first,
+    then alarms, then scripts of the simulator. For runs without a different visit but with
+    different ends: what explains the end."""
     step = parting.step if parting is not None else None
     if step is None and a[0].end == b[0].end:
         return None
@@ -400,14 +410,16 @@ def _because(
         for run, shown in sides:
             for cause in found(run):
                 if _explains(cause.at, run, shown):
-                    return _happened(str(cause.__struct_config__.tag), run, words(cause, run))
+                    return _happened(
+                        str(cause.__struct_config__.tag), run, cause_sentence(cause, run)
+                    )
     if step is None or step.levels:
         return None
-    pair = next(pair for pair in twins if pair.action == step.action)
-    told = [_told(sent, name) for (_, sent), name in ((a, pair.a), (b, pair.b))]
-    if told[0] == told[1]:
+    pair = next(pair for pair in action_pairs if pair.action == step.action)
+    scripted = [_scripted(sent, name) for (_, sent), name in ((a, pair.a), (b, pair.b))]
+    if scripted[0] == scripted[1]:
         return None
-    run = b[0] if told[1] is not None else a[0]
+    run = b[0] if scripted[1] is not None else a[0]
     return _happened("script", run, f"The script of the simulator says what {step.name} did.")
 
 
@@ -416,7 +428,8 @@ def _operators(run: Run) -> Iterator[Cause]:
 
 
 def _troubles(run: Run) -> Iterator[Cause]:
-    """Alarms and silence, as the causes of a run name them: what later events contradict is left out."""
+    """Yield the causes of a run that are alarms or silence; what later events contradict is no
+    cause."""
     moments = {each.at for each in run.alarms if each.code in _ALARMS}
     for cause in causes(run, None):
         if isinstance(cause, Silence) or (not isinstance(cause, OPERATOR) and cause.at in moments):
@@ -424,8 +437,8 @@ def _troubles(run: Run) -> Iterator[Cause]:
 
 
 def _explains(at: int, run: Run, shown: views.VisitShown | None) -> bool:
-    """Whether what happened then can be behind the visit of that run, or behind there being none: an
-    action that told its result was done with by itself."""
+    """Return whether an event at this moment can explain a visit of that run, or that there is
+    none. A visit with a result of its own ended by itself."""
     if shown is None:
         return run.ended_at is None or at <= run.ended_at
     if shown.result in {"true", "false"}:
@@ -440,8 +453,9 @@ def _happened(kind: str, run: Run, text: str) -> PartingCause:
     return PartingCause(kind=kind, run=run.number, text=f"in run {run.number} {said}")
 
 
-def _told(sent: SentTree, name: str | None) -> object:
-    """What the script of a simulated run says of an action; None of one that has none."""
+def _scripted(sent: SentTree, name: str | None) -> object:
+    """Return what the script of a simulated run says about an action; None where it says
+    nothing."""
     script = parse_small(sent.script) if sent.script else None
     says = script.get("behaviours") if isinstance(script, dict) else None
     if not isinstance(says, dict) or name is None:
@@ -455,7 +469,7 @@ def _named(step: ComparedVisit) -> str:
     return action if step.visit == 1 else f"visit {step.visit} of {action}"
 
 
-def _did(shown: views.VisitShown | None, run: Run) -> str:
+def _outcome_text(shown: views.VisitShown | None, run: Run) -> str:
     where = f"in run {run.number}"
     if shown is None:
         return f"never run {where}"
@@ -474,7 +488,7 @@ def _did(shown: views.VisitShown | None, run: Run) -> str:
 
 
 def _said(action: ActionRun | None, shown: views.VisitShown | None) -> list[str]:
-    """What the action said during that visit, or right after it."""
+    """Return the messages of an action during a visit, or right after it."""
     if action is None or shown is None:
         return []
     until = shown.not_after

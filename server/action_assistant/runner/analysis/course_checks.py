@@ -1,4 +1,5 @@
-"""Expected courses against a graph as it is now: which it still takes, and what they cover. For workers."""
+"""Checks expected courses against a graph as it is now: which it still takes, and which arrows they
+cover. For workers."""
 
 import time
 from collections.abc import Iterable, Sequence
@@ -32,13 +33,13 @@ from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics import script_from
 from action_assistant.umrf.semantics.script import script_json
 
-#: Of this process's time, for all courses of a graph.
+#: Seconds of processor time for all courses of a graph.
 BUDGET_S: Final = 10.0
 
 
 class CheckRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Which expected courses, those of `graph`, and the graph as it is now with the graphs inside; where
-    none are sent along, those of the expectation count."""
+    """A check of the expected courses of `graph`, against a text of it and the graphs inside. Where
+    no graphs inside are sent, those of the expectation count."""
 
     umrf: SentGraph
     graph: str
@@ -46,7 +47,7 @@ class CheckRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class ProposalRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A graph, and the outcome of an arrow that a test of it shall take."""
+    """A graph, and the outcome of an arrow that a test is to take."""
 
     umrf: SentGraph
     arrow: OutcomeArrow
@@ -54,8 +55,8 @@ class ProposalRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class CheckedCourse(msgspec.Struct, frozen=True, kw_only=True):
-    """One expected course against the graph. `same` is null where it was not looked at; `why`: where
-    it parts. `run` is empty of one that was made of a dry-run."""
+    """One expected course, checked. `same` is null where there was no time for it; `why`: where the
+    courses part. `run` is "" for a course of a dry-run."""
 
     name: str
     run: str
@@ -71,15 +72,15 @@ class CheckedCourse(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class CheckedCourses(msgspec.Struct, frozen=True):
-    """All expected courses of a graph, by name, and what those cover together that it still takes."""
+    """All expected courses of a graph, by name, and the coverage by those that it still takes."""
 
     courses: list[CheckedCourse]
     coverage: ArrowCoverage
 
 
 class ArrowProposal(msgspec.Struct, frozen=True, kw_only=True):
-    """What a search for an arrow came to. `verdict`: `reached` (with a `script`), `unreachable` (all
-    `states` were looked at) or `undecided` (and `why`)."""
+    """The result of a search for an arrow. `verdict`: `reached` (with a `script`), `unreachable`
+    (after all `states`) or `undecided` (with `why`)."""
 
     verdict: str
     script: JsonObject | None = None
@@ -96,7 +97,8 @@ def check_courses(
     budget_s: float = BUDGET_S,
     subgraphs: Sequence[SentSubgraph] = (),
 ) -> CheckedCourses:
-    """Simulate the expected courses with this graph. Raises BadInput, NotUmrf, TooLarge."""
+    """Simulate the expected courses with this graph, for at most `budget_s` seconds of processor
+    time. Raises BadInput, NotUmrf, TooLarge."""
     _, reading = read_sent(umrf)
     _, inside = read_inside(subgraphs, "", None, approved=False)
     until = time.thread_time() + budget_s
@@ -113,8 +115,8 @@ def check_courses(
 def _checked(
     saved: Expected, now: Graph, inside: Inner, *, looks: bool
 ) -> tuple[CheckedCourse, TakenArrows | None]:
-    """One of them, and what it took if that is what was expected."""
-    told = CheckedCourse(
+    """Check one course; return the arrows that it took if it is the expected one."""
+    unchecked = CheckedCourse(
         name=saved.name,
         run=saved.run,
         author=saved.author,
@@ -123,14 +125,14 @@ def _checked(
         script=msgspec.Raw(saved.script.encode()),
     )
     if not looks:
-        return told, None
+        return unchecked, None
     was = codec.read(saved.umrf.encode()).graph
     script = script_from(msgspec.json.decode(saved.script))
     check = check_expected(was, saved.course, script, now, inside or graphs_in(saved.subgraphs))
     same = check.apart is None
     arrows = tuple(sorted(check.taken.arrows))
-    told = msgspec.structs.replace(told, same=same, why=check.why, taken=arrows)
-    return told, check.taken if same else None
+    course = msgspec.structs.replace(unchecked, same=same, why=check.why, taken=arrows)
+    return course, check.taken if same else None
 
 
 def propose(

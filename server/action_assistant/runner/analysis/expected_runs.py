@@ -1,8 +1,9 @@
-"""Expected courses: a run as a script for the simulator, and the steps it has to repeat.
+"""Expected courses: runs as scripts for the simulator, and the course that a script has to take
+again.
 
 A recorded run becomes a script in which every action does what it was seen to do. An expectation is
-a graph, such a script and the course they took; simulating them later, with a newer graph or a newer
-product, must take the same course.
+a graph, such a script and the course that they took; simulating it later, with a newer graph or a
+newer product, must take the same course.
 """
 
 from collections.abc import Iterable, Sequence
@@ -41,8 +42,8 @@ Fault: TypeAlias = Literal["error", "false", "hang", "init_error"]
 
 
 class Expect(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What shall be expected from now on, under a name: the course of a `run`, or that of a graph in
-    a dry-run, in which actions do what the script says. `subgraphs`: the graphs inside of that one."""
+    """A request to expect a course under a name: that of a `run`, or that of a graph in a dry-run
+    with this script. `subgraphs`: the graphs inside of that graph."""
 
     name: str
     run: str = ""
@@ -53,7 +54,7 @@ class Expect(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
 
 class Expectation(msgspec.Struct, frozen=True, kw_only=True):
-    """A run that shall go the same for ever, with all that simulating it again takes."""
+    """A saved expectation, with everything that simulating it again takes."""
 
     name: str
     run: str
@@ -66,7 +67,7 @@ class Expectation(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Doubt(msgspec.Struct, frozen=True):
-    """Something that the run does not tell, so that the script had to choose."""
+    """A fact that the run does not show, so that the script had to guess it."""
 
     action: str
     text: str
@@ -76,14 +77,14 @@ class Doubt(msgspec.Struct, frozen=True):
 
 
 class Recorded(msgspec.Struct, frozen=True):
-    """A run as a script (`behaviours`, docs/contracts.md 5.2), and what in it is a guess."""
+    """A run as a script (`behaviours`, docs/contracts.md 5.2), and the guesses in it."""
 
     behaviours: dict[str, list[dict[str, Any]]]
     doubts: list[Doubt]
 
 
 class Expected(msgspec.Struct, frozen=True, kw_only=True):
-    """Somebody expects a graph under a script to take this course for ever."""
+    """The event of an expectation: a graph with this script is to take this course from now on."""
 
     kind: ClassVar[str] = "expectation.saved.v1"
 
@@ -100,7 +101,7 @@ class Expected(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Retired(msgspec.Struct, frozen=True):
-    """Nobody expects this any more."""
+    """The event that ends an expectation."""
 
     kind: ClassVar[str] = "expectation.retired.v1"
 
@@ -110,8 +111,8 @@ class Retired(msgspec.Struct, frozen=True):
 
 
 def recorded(run: Run, fault: tuple[str, Fault] | None = None) -> Recorded:
-    """What the actions of a run did, as a script. `fault` makes one action (full name) fail at its
-    last visit instead."""
+    """Return a run as a script. `fault` makes one action (full name) fail at its last visit
+    instead."""
     behaviours: dict[str, list[dict[str, Any]]] = {}
     doubts: list[Doubt] = []
     for name, action in run.actions.items():
@@ -130,8 +131,8 @@ def recorded(run: Run, fault: tuple[str, Fault] | None = None) -> Recorded:
 
 
 def fitted(found: Recorded, run: Run, graph: Graph) -> Recorded:
-    """The same script for another version of the graph: an action keeps what it did under a new
-    name. Actions that the run did not have, or never came to, do what the simulator takes for usual."""
+    """Return the script for another version of the graph: an action that was renamed keeps what it
+    did. An action that the run did not have, or never ran, gets the simulator's default."""
     by_aid = {action.aid: name for name, action in run.actions.items() if action.aid is not None}
     behaviours: dict[str, list[dict[str, Any]]] = {}
     used: set[str] = set()
@@ -154,7 +155,8 @@ def fitted(found: Recorded, run: Run, graph: Graph) -> Recorded:
 
 
 def _spread(action: ActionRun) -> Iterable[str]:
-    """Messages by visit: an action says one thing per visit at most that a script can repeat."""
+    """Yield one message for each visit of an action, "" without one: a script can repeat one per
+    visit."""
     for visit in action.visits:
         until = visit.not_after
         yield next(
@@ -178,10 +180,10 @@ def _behaviour(name: str, visit: Visit, said: str, doubts: list[Doubt]) -> dict[
     if visit.result is None:
         doubts.append(Doubt(name, "Its result was not seen; the script says true."))
     if span.exact is None:
-        told = (
+        text = (
             f"It took between {span.least:.1f} and {span.most:.1f} s; the script says {took:.1f} s."
         )
-        doubts.append(Doubt(name, told))
+        doubts.append(Doubt(name, text))
     found: dict[str, Any] = {"after_s": took, "result": f"on_{visit.result or 'true'}"}
     return found | ({"message": said} if said else {})
 
@@ -197,7 +199,7 @@ def _failing(how: Fault) -> dict[str, Any]:
 
 
 def fold(event: Event) -> Sequence[Executable]:
-    """What an event of the stream of expectations means for the table."""
+    """Return the statements that an event of the stream of expectations means for the table."""
     match event.kind:
         case Expected.kind:
             saved = msgspec.json.decode(event.body, type=Expected)
@@ -218,7 +220,7 @@ def fold(event: Event) -> Sequence[Executable]:
 
 
 def name_of(given: str) -> str:
-    """The name of an expectation as it is kept. Raises BadInput."""
+    """Return the name of an expectation with single spaces. Raises BadInput."""
     name = " ".join(given.split())
     if not 1 <= len(name) <= 100:
         raise BadInput("A name has 1 to 100 characters.", where={"path": "/name"})
@@ -233,7 +235,8 @@ def of_run(
     now: int,
     subgraphs: tuple[RunSubgraph, ...] = (),
 ) -> Expected:
-    """The course of a run that is over. Raises Conflict where the simulator does not repeat it."""
+    """Return an expectation of the course of a run that is over. Raises Conflict where the
+    simulator does not repeat it."""
     script = {"behaviours": recorded(found).behaviours}
     graph, inside = codec.read(umrf.encode()).graph, graphs_in(subgraphs)
     course = steps.course(graph, script_from(script), inside=inside)
@@ -253,7 +256,8 @@ def of_run(
 
 
 def of_dry_run(wanted: Expect, name: str, author: Author, now: int) -> Expected:
-    """The course that a graph takes in the simulator. Raises BadInput, NotUmrf, TooLarge."""
+    """Return an expectation of the course that a graph takes in the simulator. Raises BadInput,
+    NotUmrf, TooLarge."""
     if wanted.graph == "":
         raise BadInput("Of which graph?", where={"path": "/graph"})
     text, reading = read_sent(bytes(wanted.umrf))
@@ -280,7 +284,7 @@ def of_dry_run(wanted: Expect, name: str, author: Author, now: int) -> Expected:
 
 
 def shown(saved: Expected) -> Expectation:
-    """An expectation as programs see it."""
+    """Return an expectation as programs see it."""
     return Expectation(
         name=saved.name,
         run=saved.run,
@@ -294,8 +298,8 @@ def shown(saved: Expected) -> Expectation:
 
 
 def check_alike(found: Run, course: tuple[ExpectedStep, ...]) -> None:
-    """A run that the simulator cannot repeat is no expectation: it would fail by itself. Raises
-    Conflict."""
+    """Refuse a run that the simulator does not repeat: its expectation would fail without any
+    change. Raises Conflict."""
     simulated: dict[str, list[str]] = {}
     for step in course:
         if step.what == "result":
@@ -304,10 +308,10 @@ def check_alike(found: Run, course: tuple[ExpectedStep, ...]) -> None:
             simulated.setdefault(name, []).append(step.how.removeprefix("on_"))
     for name, action in found.actions.items():
         seen = [visit.result for visit in action.visits if visit.result not in {None, "stopped"}]
-        again_ = [each for each in simulated.get(name, []) if each != "stopped"]
-        if len(seen) == len(action.visits) and seen != again_:
+        simulated_results = [each for each in simulated.get(name, []) if each != "stopped"]
+        if len(seen) == len(action.visits) and seen != simulated_results:
             raise Conflict(
-                f"The simulator does not repeat this run: {name} ended {', '.join(again_) or 'never'} "
+                f"The simulator does not repeat this run: {name} ended {', '.join(simulated_results) or 'never'} "
                 f"there, and {', '.join(map(str, seen)) or 'never'} in the run. Its arrows may "
                 "depend on something that was not recorded.",
                 where={"path": "/run", "action": name},

@@ -1,4 +1,4 @@
-"""Runs as files for other programs: JSON lines, CSV of intervals, and MCAP for Foxglove."""
+"""Exports runs as files for other programs: JSON lines, CSV of intervals, and MCAP for Foxglove."""
 
 import csv
 import io
@@ -18,7 +18,7 @@ from action_assistant.runner.runs.events import Observed
 from action_assistant.runner.runs.run import Run
 from action_assistant.version import VERSION
 
-#: A cell that begins so would be a formula to a spreadsheet.
+#: A spreadsheet takes a cell that begins with one of these for a formula.
 _FORMULA: Final = ("=", "+", "-", "@", "\t", "\r")
 _COLUMNS: Final = (
     "action",
@@ -35,7 +35,7 @@ _COLUMNS: Final = (
     "missed",
 )
 _ANY: Final = b'{"type":"object"}'
-#: Of foxglove.Log, so that its panel shows what actions and engines say.
+#: The schema of foxglove.Log, so that Foxglove's panel shows messages of actions and engines.
 _LOG: Final = msgspec.json.encode(
     {
         "type": "object",
@@ -54,7 +54,7 @@ _INFO, _ERROR = 2, 4  # levels of foxglove.Log
 
 
 class EventLine(msgspec.Struct, frozen=True):
-    """One stored event on a line of its own."""
+    """A stored event as one line of JSON."""
 
     run: str
     seq: int
@@ -65,7 +65,7 @@ class EventLine(msgspec.Struct, frozen=True):
 
 
 def lines(run: str, events: Iterable[Event]) -> Iterator[bytes]:
-    """JSON lines: every event as it is stored."""
+    """Yield each event as a line of JSON, as it is stored."""
     for each in events:
         at = views.time(each.at).isoformat().replace("+00:00", "Z")
         line = EventLine(run, each.seq, each.kind, each.author, at, msgspec.Raw(each.body))
@@ -73,9 +73,9 @@ def lines(run: str, events: Iterable[Event]) -> Iterator[bytes]:
 
 
 def intervals(run: Run) -> bytes:
-    """CSV: a line per visit, in the order they began. Empty where nothing is known, so is `seconds`
-    where only its bounds are, which follow at the end. `missed` says of the visits of an action that
-    have no line: none, or how many there were at least ("0 or more")."""
+    """Return CSV with a line per visit, in the order of their begins. Cells of unknown values are
+    empty, also `seconds` where only bounds are known; these follow in columns of their own.
+    `missed` tells how many visits of the action have no line: "none", or "N or more"."""
     text = io.StringIO()
     sheet = csv.writer(text)
     sheet.writerow(_COLUMNS)
@@ -92,8 +92,8 @@ def intervals(run: Run) -> bytes:
         )
         moments = (visit.start, visit.until, visit.not_before, visit.not_after)
         shown = ("" if each is None else views.time(each).isoformat() for each in moments)
-        told = [_cell(name), number, *shown, _figure(seconds), visit.result or "", visit.how]
-        sheet.writerow([*told, *map(_figure, bounds), missed[name]])
+        cells = [_cell(name), number, *shown, _figure(seconds), visit.result or "", visit.how]
+        sheet.writerow([*cells, *map(_figure, bounds), missed[name]])
     return text.getvalue().encode()
 
 
@@ -110,9 +110,9 @@ def _cell(text: str) -> str:
 
 
 def mcap(events: Iterable[Event]) -> bytes:
-    """MCAP with JSON messages: `/run` (state), `/actions/NAME` (state and result, when they were shown),
-    `/visits/NAME` (a visit that has ended, between its bounds, when that was known; `at_least`: others may have been
-    missed, so that `visit` is a lower bound), `/log`."""
+    """Return MCAP with JSON messages: `/run` (state), `/actions/NAME` (state and result, when they
+    were shown), `/visits/NAME` (a visit that has ended, when that was known; with `at_least` others
+    may have been missed, so that `visit` is a lower bound), `/log`."""
     out = io.BytesIO()
     writer = Writer(out, compression=CompressionType.NONE)
     writer.start(profile="", library=f"temoto-action-assistant {VERSION}")
@@ -124,7 +124,7 @@ def mcap(events: Iterable[Event]) -> bytes:
 
 
 class _Track:
-    """Writes what every event showed, at the time when it was shown."""
+    """Writes what every event showed, with the time at which it was shown."""
 
     def __init__(self, writer: Writer) -> None:
         self._writer = writer
@@ -138,7 +138,7 @@ class _Track:
         self._count = 0
 
     def see(self, event: Event, told: Any, before: Run | None, after: Run) -> None:
-        """One event."""
+        """Write the messages of one event; `told` is its decoded body."""
         at = getattr(told, "at", event.at)
         if before is None or before.state != after.state or before.desired != after.desired:
             body = {"state": after.state, "desired": after.desired, "result": after.result}

@@ -1,7 +1,7 @@
-"""Keyframes of a run: its fold at every so many events, and the marks between them.
+"""Keyframes of a run: its fold after every so many events, and the marks between them.
 
-Folding a long run anew for every question would cost seconds, so the fold is kept at every
-`APART`th event. Keyframes are a cache in the journal: they may vanish at any time.
+Folding a long run anew for every question would take seconds, so the fold after each `APART`-th
+event is kept. Keyframes are a cache in the journal: they may be missing at any time.
 """
 
 import asyncio
@@ -38,17 +38,17 @@ from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.runner.runs.run import Run
 from action_assistant.web.workers.lanes import RunInWorker
 
-#: Raise it when `runs.follow` tells something else of the same events: older keyframes are void then.
+#: Raise it when `runs.fold` gives another run for the same events: older keyframes are not used then.
 FOLD: Final = 4
 #: Events between two keyframes, and in one page of a replay.
 APART: Final = 2_000
 _READ: Final = 5 * APART  # events that are read at once
-#: Marks that are kept of one run.
+#: Marks that keyframes of one run keep.
 MARKS: Final = 2_000
-#: Shorter runs are folded anew; that takes less time than looking for keyframes.
+#: Events up to which a run is folded anew, which is quicker than reading keyframes.
 _WORTH: Final = 500
 _AT: Final[Callable[[object], int]] = attrgetter("at")
-_KEPT: Final = 8  # runs whose keyframes stay in memory
+_CACHED: Final = 8  # runs whose keyframes stay in memory
 
 
 class Keyframe(msgspec.Struct, frozen=True):
@@ -60,8 +60,8 @@ class Keyframe(msgspec.Struct, frozen=True):
 
 
 class ReplayMark(msgspec.Struct, frozen=True):
-    """An event that shows nothing of the engine: a wish, a message sent, a silence, a proof, an
-    alarm. `at` and `since` are microseconds UTC; `by` is a person's name."""
+    """An event that is no observation of the engine: a command of a person, a message sent, a
+    silence, a proof, an alarm. `at` and `since` are microseconds UTC; `by` is a person's name."""
 
     seq: int
     at: int
@@ -72,59 +72,60 @@ class ReplayMark(msgspec.Struct, frozen=True):
 
 
 class RunKeyframes(msgspec.Struct, frozen=True):
-    """Keyframes in order; the last one is the newest that was folded. `marks`: the first
-    `MARKS` of the run."""
+    """Keyframes in order; the last one is the run after its newest event. `marks`: the first
+    `MARKS` of the run. `fold`: the value of `FOLD` with which they were made."""
 
     fold: int
     keys: tuple[Keyframe, ...]
     marks: tuple[ReplayMark, ...] = ()
 
     def before(self, seq: int) -> Keyframe | None:
-        """The last keyframe at or before `seq`."""
+        """Return the last keyframe at or before `seq`."""
         place = bisect.bisect_right(self.keys, seq, key=lambda key: key.seq)
         return self.keys[place - 1] if place else None
 
     def until(self, at: int) -> Keyframe | None:
-        """The last keyframe of what had happened by `at`."""
+        """Return the last keyframe whose events had all happened by `at` (microseconds UTC)."""
         place = bisect.bisect_right(self.keys, at, key=lambda key: key.at)
         return self.keys[place - 1] if place else None
 
 
 class SnapshotJournal(RunnerJournal, Protocol):
-    """A journal that also keeps what a stream adds up to."""
+    """A journal that also stores snapshots of streams."""
 
     async def bare(self, stream: str, usual: str, *, after: int, upto: int) -> list[BareEvent]:
-        """Events with `after < seq <= upto`, in order; fewer when some are missing."""
+        """Return events with `after < seq <= upto`, in order and as (body, kind, at); kind is None
+        where it is `usual`. There are fewer when some are missing."""
         ...
 
     async def snapshot(self, stream: str) -> StreamSnapshot | None:
-        """What was kept, if it still fits the stream."""
+        """Return the stored snapshot of a stream; None where there is none that still fits it."""
         ...
 
     async def keep_snapshot(self, stream: str, seq: int, state: bytes) -> None:
-        """Keep what a stream adds up to at `seq`. Raises Unavailable."""
+        """Store the snapshot of a stream at `seq`. Raises Unavailable."""
         ...
 
 
 class KeyframeStore:
-    """The keyframes of all runs."""
+    """Makes, caches and stores the keyframes of runs."""
 
     def __init__(self, journal: SnapshotJournal, run_in_worker: RunInWorker) -> None:
         self.run_in_worker = run_in_worker
         self._journal = journal
-        self._known: OrderedDict[str, RunKeyframes] = OrderedDict()
-        self._asking: dict[str, asyncio.Lock] = {}
+        self._cache: OrderedDict[str, RunKeyframes] = OrderedDict()
+        self._locks: dict[str, asyncio.Lock] = {}
 
     async def keyframes(self, run: str) -> RunKeyframes:
-        """The keyframes of a run, up to its newest event. Raises NotFound, Unavailable."""
-        lock = self._asking.setdefault(run, asyncio.Lock())
+        """Return the keyframes of a run, up to its newest event. Raises NotFound, Unavailable."""
+        lock = self._locks.setdefault(run, asyncio.Lock())
         async with lock:
             found = await self._up_to_date(run)
-        self._asking.pop(run, None)
+        self._locks.pop(run, None)
         return found
 
     async def at(self, run: str, seq: int) -> Run:
-        """The run as its first `seq` events tell it. Raises NotFound, BadInput."""
+        """Return the run after its first `seq` events. Raises NotFound, BadInput."""
         if seq < 1:
             raise BadInput("A run begins with its first event.", where={"path": "/seq"})
         key = (await self.keyframes(run)).before(seq)
@@ -134,7 +135,8 @@ class KeyframeStore:
         return (await self.run_in_worker(lambda: _next(key, _whole(events)))).run
 
     async def seq_at(self, run: str, at: int) -> int:
-        """The first event by which this moment had come. Raises NotFound, Unavailable."""
+        """Return the seq of the first event that happened at this moment (microseconds UTC) or
+        later, else of the last event. Raises NotFound, Unavailable."""
         key = (await self.keyframes(run)).until(at - 1)
         events = await self.page(run, key.seq if key else 0)
 
@@ -147,7 +149,7 @@ class KeyframeStore:
         return await self.run_in_worker(found)
 
     async def page(self, run: str, after: int) -> Sequence[Event]:
-        """Events of one page, those with `seq > after`."""
+        """Return the events of one page, those with `seq > after`."""
         return await self._journal.read(stream_of(run), after=after, limit=APART)
 
     async def _up_to_date(self, run: str) -> RunKeyframes:
@@ -155,14 +157,14 @@ class KeyframeStore:
         newest = await self._journal.newest(stream)
         if not newest:
             raise NotFound("There is no such run.")
-        keyframes = self._known.get(run) or await self._kept(stream)
+        keyframes = self._cache.get(run) or await self._stored(stream)
         keys = list(keyframes.keys) if keyframes is not None else []
         marks = list(keyframes.marks) if keyframes is not None else []
         had = keys[-1].seq if keys else 0
         while not keys or keys[-1].seq < newest:
             last = keys[-1] if keys else None
             after = last.seq if last else 0
-            room = APART - after % APART  # keyframes stand at whole multiples, and at the end
+            room = APART - after % APART  # keyframes stand at multiples of APART, and at the end
             read = await self._part(stream, after, min(newest, after + room + _READ - APART))
             if not read.events:
                 break
@@ -175,9 +177,9 @@ class KeyframeStore:
         if not keys:
             raise NotFound("There is no such run.")
         found = RunKeyframes(FOLD, tuple(keys), tuple(marks[:MARKS]))
-        self._remember(run, found)
+        self._put_into_cache(run, found)
         if _worth_keeping(keys[-1], had):
-            await self._keep(stream, found)
+            await self._store(stream, found)
         return found
 
     async def _part(self, stream: str, after: int, upto: int) -> "_Part":
@@ -186,7 +188,7 @@ class KeyframeStore:
             return _Part(range(after + 1, upto + 1), events)
         return _whole(await self._journal.read(stream, after=after, upto=upto))
 
-    async def _kept(self, stream: str) -> RunKeyframes | None:
+    async def _stored(self, stream: str) -> RunKeyframes | None:
         kept = await self._journal.snapshot(stream)
         if kept is None:
             return None
@@ -198,22 +200,23 @@ class KeyframeStore:
             return None
         return keyframes if keyframes.fold == FOLD and keyframes.keys else None
 
-    async def _keep(self, stream: str, keyframes: RunKeyframes) -> None:
+    async def _store(self, stream: str, keyframes: RunKeyframes) -> None:
         state = await self.run_in_worker(lambda: msgspec.msgpack.encode(keyframes))
         try:
             await self._journal.keep_snapshot(stream, keyframes.keys[-1].seq, state)
         except Refused:
             return  # a cache: it is made again when the journal can be written
 
-    def _remember(self, run: str, keyframes: RunKeyframes) -> None:
-        self._known[run] = keyframes
-        self._known.move_to_end(run)
-        while len(self._known) > _KEPT:
-            self._known.popitem(last=False)
+    def _put_into_cache(self, run: str, keyframes: RunKeyframes) -> None:
+        self._cache[run] = keyframes
+        self._cache.move_to_end(run)
+        while len(self._cache) > _CACHED:
+            self._cache.popitem(last=False)
 
 
 def _worth_keeping(newest: Keyframe, had: int) -> bool:
-    """Beside keyframes up to `had`: what is over, and each whole multiple of what goes on."""
+    """Return whether to store new keyframes, when those up to `had` are stored: at the end of a
+    run, and at each multiple of `APART` of one that goes on."""
     if newest.run.end is None:
         return newest.seq // APART > had // APART
     return newest.seq > max(had, _WORTH)
@@ -224,7 +227,8 @@ def fold(
     events: Sequence[Event],
     see: "Callable[[Event, RunEvent, Run | None, Run], None]",
 ) -> Run | None:
-    """Go on from `run`; `see` is shown every step: event, what it says, the run before and after."""
+    """Fold events, going on from `run`; call `see` after each with the event, its decoded body, and
+    the run before and after it."""
     for event in events:
         told = decode(event.kind, event.body)
         before = run
@@ -238,14 +242,14 @@ def fold(
 
 
 class _Part(NamedTuple):
-    """A part of a stream: the seq of each event, and the event."""
+    """A part of a stream: the seq of each event, and the events."""
 
     seqs: Sequence[int]
     events: Sequence[BareEvent]
 
 
 def _whole(events: Sequence[Event]) -> _Part:
-    """Also where some are missing."""
+    """Return stored events as a part; some may be missing between them."""
     return _Part([each.seq for each in events], [(e.body, e.kind, e.at) for e in events])
 
 
@@ -256,14 +260,14 @@ def _marks_of(part: _Part) -> list[ReplayMark]:
         if kind is None or kind == Observed.kind:
             continue
         told = decode(kind, body)
-        by, text = words(told)
+        by, text = author_and_text(told)
         since = told.since if isinstance(told, Silent) else None
         marks.append(ReplayMark(seq, getattr(told, "at", at or 0), kind, by, text, since))
     return marks
 
 
-def words(told: RunEvent) -> tuple[str, str]:
-    """Who, and what an event says beside its effect."""
+def author_and_text(told: RunEvent) -> tuple[str, str]:
+    """Return the name of the person behind an event, and its text, "" where there is none."""
     match told:
         case Requested():
             return told.author.name, told.override.reason if told.override else ""
@@ -282,7 +286,8 @@ def words(told: RunEvent) -> tuple[str, str]:
 
 
 def _following(last: Keyframe | None, part: _Part, room: int) -> list[Keyframe]:
-    """Those after `last`: the first one after `room` events."""
+    """Return the keyframes of a part after `last`: the first one after `room` events, then after
+    every `APART`."""
     keys: list[Keyframe] = []
     for start in (0, *range(room, len(part.events), APART)):
         end = start + APART if start else room
@@ -298,7 +303,7 @@ def _next(last: Keyframe | None, part: _Part) -> Keyframe:
         raise NotFound("There is no such run.")
     try:
         at = max(map(_AT, told))
-    except AttributeError:  # one of a kind that a newer version knows
+    except AttributeError:  # an event of a kind that this version does not know
         stored = (each[2] or 0 for each in part.events)
         at = max(getattr(one, "at", own) for one, own in zip(told, stored, strict=True))
     return Keyframe(part.seqs[-1], max(at, last.at) if last is not None else at, run)

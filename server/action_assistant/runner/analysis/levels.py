@@ -1,7 +1,8 @@
-"""Where each fact of a run belongs: an engine tells what runs inside as `OUTER__NAME__ID/ACTION`. Pure.
+"""Finds the place of each action of a run among its levels: an engine names actions inside
+`OUTER__NAME__ID/ACTION`. Pure.
 
-See docs/umrf-and-the-engine.md 2.6 and docs/decisions/073-a-run-by-its-levels.md. The page places by the same
-rule (`frontend/src/status/level-places.ts`), and both are held to tests/vectors/levels.json.
+See docs/umrf-and-the-engine.md 2.6 and docs/decisions/073-a-run-by-its-levels.md. The page follows
+the same rule (`frontend/src/status/level-places.ts`), and tests/vectors/levels.json tests both.
 """
 
 from collections import defaultdict, deque
@@ -12,13 +13,14 @@ import msgspec
 
 from action_assistant.runner.runs.run import Run
 
-#: Between the levels, as people read them.
+#: Separator of levels in texts for people.
 INTO: Final = " › "
 
 
 class LevelPlace(msgspec.Struct, frozen=True):
-    """Of an action in a run. `levels`: the actions that it is inside of, outermost first, by their full
-    names; `name`: its own. `known`: false where its name fits nowhere; then it stands at the top."""
+    """The place of an action in a run. `levels`: the actions that it is inside of, outermost first,
+    by their full names; `name`: its own. `known`: false where its name fits no level; then it
+    stands at the top."""
 
     levels: tuple[str, ...]
     name: str
@@ -26,19 +28,20 @@ class LevelPlace(msgspec.Struct, frozen=True):
 
     @property
     def way(self) -> tuple[str, ...]:
-        """From the outermost action down to itself."""
+        """The names from the outermost action down to this one."""
         return (*self.levels, self.name)
 
 
 def part_of(graph: str, action: str) -> str:
-    """How an engine calls the graph that an action of `graph` stands for."""
+    """Return the running name of the sub-graph that an action of `graph` stands for."""
     name, _, number = action.rpartition("_")
     return f"{graph}__{name}__{number}"
 
 
 def places(graph: str, own: Collection[str], names: Iterable[str]) -> dict[str, LevelPlace]:
-    """The place of each of these names in a run of `graph`, whose own actions are `own`. Level by level
-    from the top, so that marks inside of names mean nothing; nothing is left out."""
+    """Return the place of each of these names in a run of `graph`, whose own actions are `own`.
+    Names are matched level by level from the top, so that marks inside of names do not mislead;
+    every name gets a place."""
     found = {name: LevelPlace((), name, name in own or "/" not in name) for name in names}
     parts = _by_part(graph, (name for name, place in found.items() if not place.known))
     held = [place for place in found.values() if place.known]
@@ -56,19 +59,20 @@ def places(graph: str, own: Collection[str], names: Iterable[str]) -> dict[str, 
 
 
 def places_of(run: Run) -> dict[str, LevelPlace]:
-    """Those of all actions of a run."""
+    """Return the places of all actions of a run."""
     own = {name for name, action in run.actions.items() if action.aid is not None}
     return places(run.graph_name, own, run.actions)
 
 
 def within(found: dict[str, LevelPlace], action: str) -> list[str]:
-    """The actions right inside of one, by the names of `found`."""
+    """Return the actions directly inside of one, by the names of `found`."""
     way = found[action].way
     return [name for name, place in found.items() if place.levels == way]
 
 
 def _by_part(graph: str, names: Iterable[str]) -> dict[str, list[str]]:
-    """Names by all that may be the graph in front of the action: both may have the mark inside."""
+    """Return names by every prefix that may be their sub-graph: both it and the action may contain
+    the mark."""
     parts: dict[str, list[str]] = defaultdict(list)
     for name in names:
         at = name.find("/", len(graph)) if name.startswith(f"{graph}__") else -1

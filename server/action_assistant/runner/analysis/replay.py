@@ -1,7 +1,7 @@
-"""The replay of a run: what every event changed in what was known, page by page.
+"""The replay of a run: what every event changed in the state of the run, page by page.
 
-A frame carries only what differs from the one before, so the page shows at every moment exactly
-what the live view showed then: later knowledge never leaks into the past.
+A frame has only the differences to the one before it. So the page shows at every moment exactly
+what the live view showed then, without later knowledge.
 """
 
 from collections.abc import Sequence
@@ -11,7 +11,13 @@ from typing import Any, Final
 import msgspec
 
 from action_assistant.journal.events import Event
-from action_assistant.runner.analysis.keyframes import APART, KeyframeStore, ReplayMark, fold, words
+from action_assistant.runner.analysis.keyframes import (
+    APART,
+    KeyframeStore,
+    ReplayMark,
+    author_and_text,
+    fold,
+)
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.events import RunEvent
 from action_assistant.runner.runs.run import Run
@@ -31,8 +37,8 @@ _HEAD: Final = (
 
 
 class ActionFrame(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """What became of an action. From the visit number `first` on (counted from 0, over all its
-    visits) they are now `visits`; `messages` are new."""
+    """The change of an action. Its visits from number `first` on (counted from 0, over all its
+    visits) are now `visits`; `messages` are new."""
 
     state: str
     first: int
@@ -42,7 +48,8 @@ class ActionFrame(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True)
 
 
 class ReplayFrame(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """One event: `head` has the fields of the run that changed, `actions` those that did."""
+    """The changes by one event: `head` has the fields of the run that changed, `actions` the
+    actions that did."""
 
     seq: int
     at: datetime
@@ -54,15 +61,15 @@ class ReplayFrame(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True)
     alarms: list[views.AlarmShown] = []
 
 
-class Chapter(msgspec.Struct, frozen=True):
-    """Where a page of the replay begins: after `after` events, at `at`."""
+class ReplayPageStart(msgspec.Struct, frozen=True):
+    """The beginning of a page of the replay: after `after` events, at `at`."""
 
     after: int
     at: datetime
 
 
 class MarkShown(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """Something that happened around the actions; `since`: from when on nothing was known."""
+    """An event that is no observation of the engine; `since`: from when on nothing was known."""
 
     seq: int
     at: datetime
@@ -73,20 +80,20 @@ class MarkShown(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
 
 
 class RunReplay(msgspec.Struct, frozen=True, kw_only=True):
-    """A page of a run's replay. `base` is the run after `after` events, null at the very beginning;
-    `newest` is the last event there is."""
+    """A page of a run's replay. `base` is the run after `after` events, null at the beginning;
+    `newest` is the seq of the last event; `chapters`: the beginnings of all pages."""
 
     run: str
     after: int
     newest: int
     base: views.RunShown | None
     frames: list[ReplayFrame]
-    chapters: list[Chapter]
+    chapters: list[ReplayPageStart]
     marks: list[MarkShown]
 
 
 async def run_replay(keyframe_store: KeyframeStore, run: str, *, after: int) -> RunReplay:
-    """The page that begins after `after` events, which is rounded down to a keyframe of the run.
+    """Return the page of events after `after`, which is rounded down to a keyframe.
 
     Raises NotFound, Unavailable.
     """
@@ -95,8 +102,8 @@ async def run_replay(keyframe_store: KeyframeStore, run: str, *, after: int) -> 
     base = keyframes.before(start) if start else None
     events = await keyframe_store.page(run, base.seq if base else 0)
     frames = await keyframe_store.run_in_worker(lambda: _frames(base.run if base else None, events))
-    chapters = [Chapter(0, views.time(keyframes.keys[0].run.requested_at))]
-    chapters += [Chapter(key.seq, views.time(key.at)) for key in keyframes.keys[:-1]]
+    chapters = [ReplayPageStart(0, views.time(keyframes.keys[0].run.requested_at))]
+    chapters += [ReplayPageStart(key.seq, views.time(key.at)) for key in keyframes.keys[:-1]]
     return RunReplay(
         run=run,
         after=base.seq if base else 0,
@@ -125,7 +132,9 @@ def _frames(run: Run | None, events: Sequence[Event]) -> list[ReplayFrame]:
 
     def see(event: Event, told: RunEvent, before: Run | None, after: Run) -> None:
         nonlocal at
-        at = max(at, getattr(told, "at", event.at))  # clocks may be set back; replay never is
+        at = max(
+            at, getattr(told, "at", event.at)
+        )  # a clock may be set back, but the times of a replay do not go back
         frames.append(frame(event, told, before, after, at))
 
     fold(run, events, see)
@@ -133,8 +142,8 @@ def _frames(run: Run | None, events: Sequence[Event]) -> list[ReplayFrame]:
 
 
 def frame(event: Event, told: RunEvent, before: Run | None, after: Run, at: int) -> ReplayFrame:
-    """What one event changed."""
-    by, text = words(told)
+    """Return the changes by one event. `told` is its decoded body."""
+    by, text = author_and_text(told)
     old = before.alarms if before is not None else ()
     return ReplayFrame(
         seq=event.seq,
@@ -173,7 +182,8 @@ def _actions(before: Run | None, after: Run) -> dict[str, ActionFrame]:
 
 
 def _looks_new(before: ActionRun | None, after: ActionRun) -> bool:
-    """Whether anybody would see a difference; when it was seen last nobody does."""
+    """Return whether people would see a difference of an action; the time at which it was last seen
+    is none."""
     if before is None:
         return True
     return before is not after and (
@@ -185,7 +195,8 @@ def _looks_new(before: ActionRun | None, after: ActionRun) -> bool:
 
 
 def _changed(before: ActionRun | None, after: ActionRun) -> ActionFrame:
-    """Visits change at their end only: the first that differs is looked for from there."""
+    """Return the change of an action. Visits change at their end only, so the first one that
+    differs is searched from there."""
     total = after.older + len(after.visits)
     known = before.older + len(before.visits) if before is not None else 0
     first = total

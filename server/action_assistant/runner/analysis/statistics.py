@@ -1,4 +1,5 @@
-"""Many runs of one graph at once: how often it succeeds, how long actions take, what never happens."""
+"""Statistics of many runs of one graph: how often it succeeds, how long actions take, which arrows
+are never taken."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
@@ -17,8 +18,8 @@ _OUTCOMES: Final = ("true", "false", "error", "stopped")
 
 
 class RunPoint(msgspec.Struct, frozen=True):
-    """One run in a row of runs. `took` in seconds where that is known exactly; `span` is between which
-    bounds, None where nothing is known."""
+    """One run of the statistics. `took` in seconds where it is known exactly; `span`: its bounds,
+    null where nothing is known."""
 
     id: str
     number: int
@@ -29,7 +30,7 @@ class RunPoint(msgspec.Struct, frozen=True):
 
 
 class Spans(msgspec.Struct, frozen=True, kw_only=True):
-    """Durations of an action, each between its bounds."""
+    """Percentiles of the durations of an action, each between bounds."""
 
     p50: DurationBounds | None
     p90: DurationBounds | None
@@ -38,11 +39,11 @@ class Spans(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class ActionStatistics(msgspec.Struct, frozen=True, kw_only=True):
-    """One action over all these runs. `levels`: the actions that it is inside of, outermost first, and
-    `name` its own there; `action` as the engine of its newest run told it. Durations are seconds over `timed` visits, those that have ended,
-    and stand where they are known exactly; `spans` has all of them between their bounds. `unknown`
-    counts visits whose result is not known. `at_least`: there may have been more `visits`, which nobody
-    saw."""
+    """One action over all these runs. `levels`: the actions that it is inside of, outermost first,
+    and `name` its own there; `action`: the name by which the engine of its newest run told it.
+    Durations are seconds over the `timed` visits that have ended, null where they are not known
+    exactly; `spans` has all of them between bounds. `unknown` counts visits of unknown result.
+    `at_least`: there may have been more `visits`, which nobody saw."""
 
     action: str
     levels: tuple[str, ...]
@@ -63,8 +64,8 @@ class ActionStatistics(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class NeverTaken(msgspec.Struct, frozen=True):
-    """An arrow whose parent ran, and is known never to have ended as the arrow waits for
-    (`outcomes`)."""
+    """An arrow whose parent ran, and is known never to have ended with one of the arrow's
+    `outcomes`."""
 
     parent: str
     child: str
@@ -72,10 +73,10 @@ class NeverTaken(msgspec.Struct, frozen=True):
 
 
 class Statistics(msgspec.Struct, frozen=True, kw_only=True):
-    """What the newest `runs` of a graph have in common. `judged` are those whose result is known, and
-    says something about the graph (neither refused, lost nor stopped); `succeeded` are those of them
-    that finished true. `unknown` have finished, and nobody knows with which result: robots do not tell.
-    Of `untold` arrows it is not known whether they were ever taken."""
+    """Statistics of the newest `runs` of a graph. `judged`: runs whose result is known and says
+    something about the graph (neither refused, lost nor stopped); `succeeded`: those of them that
+    finished true. `unknown`: finished runs of unknown result, since robots do not tell it.
+    `untold`: the number of arrows of which it is not known whether they were ever taken."""
 
     runs: list[RunPoint]
     judged: int
@@ -87,7 +88,7 @@ class Statistics(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def runs_of(graph: str, engine: str | None, last: int) -> Select[Any]:
-    """The newest runs of a graph (id or name) that are over."""
+    """Select the newest runs of a graph (id or name) that are over, at most `last`."""
     newest = [
         select(run.c.id)
         .where(column == graph, run.c.ended_at.is_not(None))
@@ -106,14 +107,15 @@ def runs_of(graph: str, engine: str | None, last: int) -> Select[Any]:
 
 
 def sums_of(runs: Sequence[str]) -> Select[Any]:
-    """The sums of these runs' actions."""
+    """Select the sums of the actions of these runs."""
     return select(action_sum).where(action_sum.c.run.in_(runs))
 
 
 def statistics(
     runs: Sequence[Row[Any]], sums: Iterable[Row[Any]], newest: Graph | None
 ) -> Statistics:
-    """Put it together. `newest` is the graph of the newest run, for its arrows."""
+    """Compute the statistics from rows of `runs_of` and `sums_of`. `newest` is the graph of the
+    newest run."""
     ended = [row for row in runs if row.state in {"finished", "error", "halted"}]
     judged = [row for row in ended if row.state != "finished" or row.result is not None]
     by_place = _by_place(runs, sums)
@@ -140,8 +142,8 @@ def _point(row: Row[Any]) -> RunPoint:
 def _by_place(
     runs: Sequence[Row[Any]], sums: Iterable[Row[Any]]
 ) -> dict[LevelPlace, list[Row[Any]]]:
-    """What an action adds up to in each run, the newest first: by its way from the top, since a graph
-    that was renamed since is in all names of what ran inside."""
+    """Return the sums of each action by its place, the newest run first. Places and not names,
+    since the name of the graph is a part of the names of actions inside."""
     by_run: dict[str, list[Row[Any]]] = {}
     for row in sums:
         by_run.setdefault(row.run, []).append(row)
@@ -190,7 +192,8 @@ def _action(place: LevelPlace, rows: Sequence[Row[Any]]) -> ActionStatistics:
 
 
 def _took(kept: Any) -> DurationBounds:
-    """Rows of older versions have the microseconds that it took at least."""
+    """Return the bounds of a stored duration. Older versions stored a lower bound in
+    microseconds."""
     if isinstance(kept, list):
         return DurationBounds(least=kept[0], most=kept[1])
     return duration_bounds(kept, None)
@@ -203,7 +206,8 @@ def _exact(span: DurationBounds | None) -> float | None:
 def _never_taken(
     graph: Graph | None, actions: Mapping[str, ActionStatistics]
 ) -> tuple[list[NeverTaken], int]:
-    """Those that are known never to have been taken, and of how many others nothing is known."""
+    """Return the arrows that are known never to have been taken, and the number of those of which
+    it is not known."""
     if graph is None:
         return [], 0
     names = {each.key: each.full_name for each in graph.actions} | {EXIT: EXIT}
@@ -229,6 +233,7 @@ def _outcomes(arrow: Relation) -> list[str]:
 
 
 def _must_have_been(arrow: Relation, graph: Graph, child: ActionStatistics | None) -> bool:
-    """Whether its child has run, and nothing else leads there."""
+    """Return whether an arrow must have been taken: its child has run, and no other arrow leads
+    there."""
     ways = [each for each in graph.relations if each.child == arrow.child and _outcomes(each)]
     return child is not None and child.visits > 0 and len(ways) == 1

@@ -1,4 +1,5 @@
-"""Work on stored runs that goes on in the background: sums, keyframes, and words of older runs."""
+"""Loops that work on stored runs in the background: sums of ended runs, keyframes of long ones,
+words of older ones."""
 
 import logging
 from collections import Counter
@@ -31,7 +32,8 @@ _PAUSE_S: Final = 0.05  # between two such transactions
 
 
 class SumUpLoop:
-    """Goes on until cancelled. `summed` gives the sum of a run; it may be asked of a worker."""
+    """Sums up ended runs until cancelled. `summed` computes the sum of a run, possibly in a
+    worker."""
 
     def __init__(
         self,
@@ -44,19 +46,21 @@ class SumUpLoop:
         self._clock_us = clock_us
         self._summed = summed
         self._ended = anyio.Event()
-        self._summed_up: int | None = None  # all runs that had ended by then are summed up
-        self._tried: Counter[str] = Counter()  # runs whose sums took a worker's life
+        self._summed_up: int | None = (
+            None  # microseconds UTC: all runs that had ended by then are summed up
+        )
+        self._tried: Counter[str] = Counter()  # how often the sum of a run ended its worker
         ongoing.watch(self._saw)
 
     def begin_again(self) -> None:
-        """Look at all runs anew, at once."""
+        """Examine all runs again, at once."""
         self._summed_up = None
         self._ended.set()
 
     def _saw(self, opened: OngoingRun) -> None:
         if opened.run.end is not None:
             if not opened.recorder.recorded:
-                self._summed_up = None  # it may be stored long after it ended
+                self._summed_up = None  # its end may be stored much later
             self._ended.set()
 
     async def run(self) -> None:
@@ -71,13 +75,13 @@ class SumUpLoop:
                 continue
             if left:
                 continue
-            if ended.is_set():  # its last events may still be on their way to the journal
+            if ended.is_set():  # its last events may not be stored yet
                 await anyio.sleep(0.2)
                 continue
             await self._ended.wait()
 
     async def _some(self) -> bool:
-        """Sum up the newest runs that are over and are not yet. Whether any was."""
+        """Sum up the newest of the ended runs that have no sum; return whether there were any."""
         before, since = self._clock_us(), self._summed_up
         figures = func.coalesce(func.json_extract(run.c.summary, "$.figures"), 0)
         done = select(review.c.run).where(
@@ -102,54 +106,56 @@ class SumUpLoop:
         except Refused as refused:
             self._tried[run_id] += 1
             if self._tried[run_id] < _TRIES or not isinstance(refused, Crashed | TooLarge):
-                raise  # it will be, later
+                raise  # it is tried again later
             log.error("run %s is left out of sums: %s", run_id, refused.detail)
             summed = annotations.SummedUp(self._clock_us(), {})
-        except Exception:  # whatever a run of long ago holds, those that go on are not ended by it
+        except Exception:  # a damaged run must not end the runner
             log.exception("run %s cannot be read; it is left out of sums", run_id)
             summed = annotations.SummedUp(self._clock_us(), {}, figures=annotations.FIGURES)
         await self._journal.append(annotations.stream_about(run_id), [annotations.draft(summed)])
 
 
 def due_after(kept: int) -> int:
-    """How many keyframes there have to be until they are kept again. All are written each time, so the
-    longer a run the more is waited for: 100,000 events write some 70 MB in all, not 200."""
+    """Return how many keyframes a run has to have until they are stored again, after `kept` of
+    them. All are written each time, so the longer a run, the later the next time: 100,000 events
+    write some 70 MB in all, not 200."""
     return kept + max(1, kept // _UNKEPT_PART)
 
 
 class KeyframeLoop:
-    """Goes on until cancelled. `make` makes and keeps the keyframes of a run; it may be asked of a
-    worker."""
+    """Stores keyframes of long runs while they go on, until cancelled, so that they need not be
+    folded from the start after a crash. `make` makes and stores the keyframes of a run, possibly in
+    a worker."""
 
     def __init__(self, ongoing: OngoingRuns, make: Callable[[str], Awaitable[object]]) -> None:
         self._make = make
-        self._kept: dict[str, int] = {}  # keyframes of runs that go on
+        self._kept: dict[str, int] = {}  # by open run: how many of its keyframes are stored
         self._due: set[str] = set()
-        self._more = anyio.Event()
+        self._wake = anyio.Event()
         ongoing.watch(self._saw)
 
     def _saw(self, opened: OngoingRun) -> None:
-        run, there = opened.run.id, opened.recorder.seq // APART
-        if opened.run.end is not None:  # it will be summed up
+        run, count = opened.run.id, opened.recorder.seq // APART
+        if opened.run.end is not None:  # its sum makes its keyframes
             self._kept.pop(run, None)
             self._due.discard(run)
-        elif there >= due_after(self._kept.get(run, 0)):
-            self._kept[run] = there
+        elif count >= due_after(self._kept.get(run, 0)):
+            self._kept[run] = count
             self._due.add(run)
-            self._more.set()
+            self._wake.set()
 
     async def run(self) -> None:
-        """Keep keyframes of runs that go on, until cancelled."""
+        """Store keyframes that are due, until cancelled."""
         while True:
-            await self._more.wait()
-            self._more = anyio.Event()
+            await self._wake.wait()
+            self._wake = anyio.Event()
             while self._due:
                 run = self._due.pop()
                 try:
                     await self._make(run)
-                except Refused as refused:  # the next ones are made with these
+                except Refused as refused:  # they are made together with the next ones
                     log.warning("no keyframes of run %s were kept: %s", run, refused.detail)
-                except Exception:  # a cache: what goes on does not end for it
+                except Exception:  # keyframes are a cache: without them the runner goes on
                     log.exception("no keyframes of run %s were kept", run)
 
 
@@ -157,12 +163,14 @@ class Deriving(Protocol):
     """A journal whose tables may be added to."""
 
     async def derive(self, work: Callable[[Connection], Any]) -> Any:
-        """Write to tables that follow from events. Raises Unavailable."""
+        """Run `work` with a connection that may write tables which follow from events. Raises
+        Unavailable."""
         ...
 
 
 async def index_words(journal: Deriving) -> None:
-    """Until the words of all runs are in the index. Raises nothing: the process goes on without."""
+    """Index the words of runs of earlier versions, some at a time, until all are indexed. Raises
+    nothing: a search reads runs that are not in the index."""
     while True:
         try:
             if not await journal.derive(partial(index_some, most=_INDEXED_AT_ONCE)):
@@ -171,6 +179,8 @@ async def index_words(journal: Deriving) -> None:
             log.warning("the words of runs cannot be stored now: %s", refused.detail)
             await anyio.sleep(_RETRY_S)
         except Exception:  # such as a damaged row; a search reads what is not in the index
-            log.exception("the words of earlier runs are not looked for until the next start")
+            log.exception(
+                "the words of earlier runs are not indexed until the next start of the runner"
+            )
             return
         await anyio.sleep(_PAUSE_S)

@@ -1,4 +1,4 @@
-"""The list of runs and the events of one, page by page. For workers."""
+"""The list of runs and the stored events of one, page by page. For workers."""
 
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from datetime import datetime
@@ -28,15 +28,16 @@ async def listed(
     review_service: ReviewService,
     wanted: queries.Filter,
     limit: int,
-    going: Mapping[str, views.RunSummary],
+    open_runs: Mapping[str, views.RunSummary],
 ) -> list[views.Listed]:
-    """Runs, newest first; those that are `going` are as they are there."""
+    """Return runs, newest first. `open_runs`: summaries of open runs by id, which the tables do not
+    have."""
     among = None if wanted.text is None else await numbers_with(wanted.text, review_service.rows)
     rows = await review_service.rows(queries.listed(wanted, limit, among))
     labels = await _labels(review_service, rows)
     shown = (
         views.list_entry(
-            going.get(row.id) or views.summary_of_row(row), row, labels.get(row.id, [])
+            open_runs.get(row.id) or views.summary_of_row(row), row, labels.get(row.id, [])
         )
         for row in rows
     )
@@ -46,13 +47,14 @@ async def listed(
 async def numbers_with(
     text: str, rows: Callable[[Select[Any]], Awaitable[Sequence[Row[Any]]]]
 ) -> set[int] | None:
-    """The numbers of all runs in which a text may be found; None where that may be very many."""
+    """Return the numbers of all runs in which a text may be found; None where these may be very
+    many."""
     pieces = word_index.pieces(text)
     late = await rows(word_index.unindexed()) if pieces else []
     for piece in pieces if len(late) <= word_index.MOST else []:
         found = await rows(word_index.holding(piece))
         if len(found) <= word_index.MOST:
-            # a number is found, too, as a whole
+            # a run is also found by its whole number
             own = {int(text)} if text.isascii() and text.isdecimal() and len(text) < 19 else set()
             return {row.number for row in (*found, *late)} | own
     return None
@@ -67,15 +69,16 @@ async def _labels(review_service: ReviewService, rows: Sequence[Row[Any]]) -> di
 
 
 async def streamed(review_service: ReviewService, run: str, after: int) -> tuple[int, bytes]:
-    """A page of stored events as an event stream has them, and the seq of the last one."""
+    """Return a page of stored events in the format of an event stream, and the seq of the last
+    one."""
     events = await review_service.events(run, after, _PAGE)
     lines = [
-        b"id: %d\nevent: %b\ndata: %b\n\n" % (each.seq, each.kind.encode(), _told(each))
+        b"id: %d\nevent: %b\ndata: %b\n\n" % (each.seq, each.kind.encode(), _event_json(each))
         for each in events
     ]
     return events[-1].seq if events else after, b"".join(lines)
 
 
-def _told(event: Event) -> bytes:
+def _event_json(event: Event) -> bytes:
     at, body = views.time(event.at), msgspec.Raw(event.body)
     return msgspec.json.encode(HistoryEvent(event.seq, event.kind, event.author, at, body))

@@ -1,4 +1,4 @@
-"""What looking back needs of what goes on: open runs, and how others are read."""
+"""The open runs, as the review needs them."""
 
 from collections.abc import Callable, Mapping
 from typing import Final, Protocol
@@ -9,36 +9,36 @@ from action_assistant.runner.runs.history import RunHistory
 from action_assistant.runner.runs.recorder import RunRecorder
 from action_assistant.runner.runs.run import Run
 
-_SETTLED_S: Final = 2.0  # then what is stored is told
+_SETTLED_S: Final = 2.0  # after which a question is answered from what is stored
 
 
 class OngoingRun(Protocol):
-    """A run that goes on."""
+    """An open run, and the recorder of its events."""
 
     run: Run
     recorder: RunRecorder
 
 
 class OngoingRuns(Protocol):
-    """What goes on, as far as looking back needs it: open runs, and how others are read."""
+    """The part of `ExecutionService` that the review uses: open runs, and reading stored ones."""
 
     history: RunHistory
 
     @property
     def open(self) -> Mapping[str, OngoingRun]:
-        """The runs that are not over."""
+        """The open runs by id."""
         ...
 
     def next_number(self) -> int:
-        """The number of a run that is taken in."""
+        """Return the number of one more run."""
         ...
 
     def watch(self, watcher: Callable[[OngoingRun], None]) -> None:
-        """Be told, at once, of every run that has changed."""
+        """Call `watcher` with every run that has changed, at once."""
         ...
 
 
 async def settled(opened: OngoingRun) -> None:
-    """Wait until what was shown of a run is stored; not for ever, when the journal is away."""
+    """Wait until the events of a run that were shown are stored, for two seconds at most."""
     with anyio.move_on_after(_SETTLED_S):
         await opened.recorder.flushed()

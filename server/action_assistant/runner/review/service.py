@@ -1,4 +1,4 @@
-"""The review service: sums up ended runs, keeps marks, compares, exports, checks expectations."""
+"""The review of stored runs: sums, marks, comparisons, exports, expected courses."""
 
 import logging
 from collections.abc import Awaitable, Callable, Sequence
@@ -12,7 +12,7 @@ from sqlalchemy import ColumnElement, Row, Select, select
 from action_assistant.errors import BadInput, Conflict, NotFound
 from action_assistant.journal.events import Draft, Event
 from action_assistant.runner.analysis import annotations, expected_runs, exports, statistics
-from action_assistant.runner.analysis.cause_texts import words
+from action_assistant.runner.analysis.cause_texts import cause_sentence
 from action_assistant.runner.analysis.causes import causes
 from action_assistant.runner.analysis.comparison import RunComparison, SentTree, compare
 from action_assistant.runner.analysis.course_checks import CheckedCourses, check_courses
@@ -55,7 +55,7 @@ Format: TypeAlias = Literal["jsonl", "csv", "mcap"]
 
 
 class RunMarks(msgspec.Struct, frozen=True):
-    """What people noted about a run."""
+    """The marks that people gave a run."""
 
     pinned: bool
     note: str
@@ -76,7 +76,7 @@ class CauseShown(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class ReviewQueries(Protocol):
-    """Somebody who answers what a method of `ReviewService` would."""
+    """Answers methods of `ReviewService` elsewhere, as `WorkerQueries` does in a worker."""
 
     async def value(
         self,
@@ -84,13 +84,14 @@ class ReviewQueries(Protocol):
         *args: P.args,
         **kw: P.kwargs,
     ) -> T:
-        """The answer."""
+        """Return what the method returns."""
         ...
 
 
 class ReviewService:
-    """Looks back on runs. Nothing here commands a robot. What only reads is asked of a worker that
-    has its own, over the same file and with nothing that goes on."""
+    """Answers questions about runs and stores what people note. It commands no robot. With `asked`,
+    what is expensive is asked of a worker; the worker has a service of its own over the same file,
+    without open runs."""
 
     def __init__(
         self,
@@ -110,8 +111,7 @@ class ReviewService:
         self._keyframes = KeyframeLoop(control, self._make_keyframes)
 
     async def run(self) -> None:
-        """Sum up runs that have ended, those of earlier processes too, and keep keyframes of long ones
-        that go on, until cancelled."""
+        """Sum up ended runs and store keyframes of long ones, until cancelled."""
         async with anyio.create_task_group() as tasks:
             tasks.start_soon(self._sums.run)
             tasks.start_soon(self._keyframes.run)
@@ -124,7 +124,7 @@ class ReviewService:
         )
 
     async def made_keyframes(self, run_id: str) -> int:
-        """The event up to which there are keyframes of a run, now that they are made. Raises NotFound."""
+        """Make the keyframes of a run; return the seq of the last one. Raises NotFound."""
         return (await self.keyframe_store.keyframes(run_id)).keys[-1].seq
 
     async def _summed(self, run_id: str) -> annotations.SummedUp:
@@ -133,15 +133,15 @@ class ReviewService:
         return await self._asked.value(ReviewService.summed, run_id, self._clock_us())
 
     async def summed(self, run_id: str, now: int) -> annotations.SummedUp:
-        """The sum of a run that is over. Raises NotFound."""
+        """Return the sum of a run that is over. `now`: microseconds UTC. Raises NotFound."""
         found = (await self.keyframe_store.keyframes(run_id)).keys[-1].run
         good = found.end == "finished" and found.result == "on_true"
-        graph = None if good else await self._graph(run_id)  # only failures have causes
+        graph = None if good else await self._graph(run_id)  # only a run that went badly has causes
         said = await self._said(run_id)
         return await self._run_in_worker(lambda: annotations.sum_of(found, graph, now, said))
 
     async def _said(self, run_id: str) -> list[str]:
-        """The texts of a run's events, each once, in order. Raises Unavailable."""
+        """Return the texts of a run's events, each once, in order. Raises Unavailable."""
         event = runner_event.c
         chosen = select(event.kind, event.body).where(
             event.stream == stream_of(run_id), event.kind != Observed.kind
@@ -150,24 +150,24 @@ class ReviewService:
         for row in await self.rows(chosen.order_by(event.seq).limit(_SAYING)):
             try:
                 texts.update(dict.fromkeys(said_in(decode(row.kind, row.body))))
-            except msgspec.DecodeError:  # damaged, which is told where the run is read
+            except msgspec.DecodeError:  # a damaged event is reported where the run is read
                 continue
         return list(texts)
 
     async def whole(self, run_id: str) -> views.RunWhole:
-        """A run that is over, and the graph as it was sent. Raises NotFound."""
+        """Return a run that is over, with the graph as it was sent. Raises NotFound."""
         sent = await self.sent(run_id)
         found, place = await self.known(run_id), await self.place(run_id)
         return views.whole_view(found, sent, place=place)
 
     async def followed(self, run_id: str, robots_too: bool) -> tuple[Run, int]:
-        """A run and the seq of its last event; with few visits unless it has to go on exactly.
-        Raises NotFound."""
+        """Return a run and the seq of its last event. `robots_too`: with all of its visits, so that
+        it can go on; else with those that people are shown. Raises NotFound."""
         key = (await self.keyframe_store.keyframes(run_id)).keys[-1]
         return (key.run if robots_too else views.with_newest_visits(key.run)), key.seq
 
     async def known(self, run_id: str) -> Run:
-        """A run, open or over. Raises NotFound."""
+        """Return a run, open or over. Raises NotFound."""
         opened = self._control.open.get(run_id)
         return (
             opened.run
@@ -178,10 +178,10 @@ class ReviewService:
     # --- one run ------------------------------------------------------------------------------
 
     async def causes(self, run_id: str) -> list[CauseShown]:
-        """What is proven to be behind the end of a run, the weightiest first. Raises NotFound."""
+        """Return the proven causes of a run's end, the weightiest first. Raises NotFound."""
         found, graph = await self.known(run_id), await self._graph(run_id)
         named = await self._run_in_worker(
-            lambda: [(each, words(each, found)) for each in causes(found, graph)[:_CAUSES]]
+            lambda: [(each, cause_sentence(each, found)) for each in causes(found, graph)[:_CAUSES]]
         )
         shown: list[CauseShown] = []
         for each, text in named:
@@ -200,24 +200,25 @@ class ReviewService:
         return shown
 
     async def rows(self, statement: Select[Any]) -> list[Row[Any]]:
-        """Rows of the tables. Raises Unavailable."""
+        """Return rows of the tables. Raises Unavailable."""
         return await self._journal.query(statement)
 
     async def events(self, run_id: str, after: int, limit: int) -> Sequence[Event]:
-        """Stored events of a run. Raises Unavailable."""
+        """Return stored events of a run with `seq > after`. Raises Unavailable."""
         return await self._control.history.events(run_id, after, limit)
 
     async def sent(self, run_id: str) -> Sent:
-        """The graph as it was sent, and the values of its actions. Raises NotFound."""
+        """Return the graph as it was sent, and the values of its actions. Raises NotFound."""
         return sent_of(await self._control.history.requested(run_id))
 
     async def place(self, run_id: str) -> Row[Any] | None:
-        """Where the events of a run are, when they are in an archive."""
+        """Return number, time and file of an archived run; None when its events are in the
+        journal."""
         return await self._journal.place(stream_of(run_id))
 
     async def raw(self, run_id: str, recordings: Sequence[Recording], now: int) -> RawMessages:
-        """The raw messages of its robot from its time; `recordings` are all of it that are here.
-        Raises NotFound."""
+        """Return the raw messages of the run's robot from its time. `recordings`: all of that robot
+        that are here; `now`: microseconds UTC. Raises NotFound."""
         run_ = await self.known(run_id)
         until = run_.ended_at or now
         first, last = hours(run_.started_at or run_.requested_at, until)
@@ -226,27 +227,27 @@ class ReviewService:
             for each in recordings
             if not run_.simulated and first <= each.name[: len(first)] <= last
         ]
-        told = await self._journal.read(stream_of_raw(run_.engine))
-        gone = (msgspec.json.decode(event.body, type=RawArchived) for event in told)
+        archived = await self._journal.read(stream_of_raw(run_.engine))
+        gone = (msgspec.json.decode(event.body, type=RawArchived) for event in archived)
         return raw_of(run_, here, gone, until)
 
     async def replay(self, run_id: str, after: int) -> RunReplay:
-        """A page of the run's replay. Raises NotFound."""
+        """Return a page of the run's replay. Raises NotFound."""
         return await run_replay(self.keyframe_store, run_id, after=after)
 
     async def umrf(self, run_id: str) -> bytes:
-        """The graph as it was sent. Raises NotFound."""
+        """Return the graph as it was sent. Raises NotFound."""
         return (await self._control.history.umrf(run_id)).encode()
 
     async def mark(self, run_id: str, marks: annotations.Marks, author: Author) -> RunMarks:
-        """Pin, note or label a run. Raises NotFound."""
+        """Pin, note or label a run, and return its marks. Raises NotFound."""
         await self.known(run_id)
         marked = annotations.Marked(self._clock_us(), author, marks)
         await self._journal.append(annotations.stream_about(run_id), [annotations.draft(marked)])
         return await self.marks(run_id)
 
     async def marks(self, run_id: str) -> RunMarks:
-        """What people noted about it."""
+        """Return the marks of a run."""
         rows = await self._journal.query(select(review).where(review.c.run == run_id))
         labels = await self._journal.query(
             select(run_label.c.label).where(run_label.c.run == run_id).order_by(run_label.c.label)
@@ -255,7 +256,7 @@ class ReviewService:
         return RunMarks(bool(pinned), note, [row.label for row in labels])
 
     async def compare(self, a: str, b: str) -> RunComparison:
-        """Two runs side by side. Raises NotFound."""
+        """Compare two runs. Raises NotFound."""
         one, other = await self.known(a), await self.known(b)
         sent_a, sent_b = await self._sent_tree(a), await self._sent_tree(b)
         return await self._run_in_worker(lambda: compare(one, other, sent_a, sent_b))
@@ -266,7 +267,7 @@ class ReviewService:
         return SentTree(sent.umrf, inside, sent.script)
 
     async def export(self, run_id: str, form: Format) -> bytes:
-        """The run as a file. Raises NotFound."""
+        """Return the run as a file of this format. Raises NotFound."""
         found = await self.known(run_id)
         if form == "csv":
             return await self._run_in_worker(lambda: exports.intervals(found))
@@ -276,8 +277,8 @@ class ReviewService:
         return await self._run_in_worker(lambda: b"".join(exports.lines(run_id, events)))
 
     async def lines(self, run_id: str, after: int) -> tuple[int, bytes]:
-        """A page of JSON lines, and the seq of its last event; the run may be longer than memory
-        should hold. Raises NotFound when there is nothing at all."""
+        """Return a page of JSON lines, and the seq of its last event: a long run need not be in
+        memory as a whole. Raises NotFound when the run has no events."""
         events = await self._journal.read(stream_of(run_id), after=after, limit=_PAGE)
         if not events and not after:
             raise NotFound("There is no such run.")
@@ -286,7 +287,7 @@ class ReviewService:
     async def script(
         self, run_id: str, fault: tuple[str, expected_runs.Fault] | None, umrf: bytes | None = None
     ) -> expected_runs.Recorded:
-        """What the run did as a script, for its own graph or for another version of it. Raises
+        """Return the run as a script, for its own graph or for another version of it. Raises
         NotFound, BadInput, NotUmrf, TooLarge."""
         found = await self.known(run_id)
         if fault is not None and fault[0] not in found.actions:
@@ -300,7 +301,7 @@ class ReviewService:
     # --- many runs ----------------------------------------------------------------------------
 
     async def statistics(self, graph: str, engine: str | None, last: int) -> statistics.Statistics:
-        """The newest runs of a graph together."""
+        """Return statistics of the newest runs of a graph."""
         rows = await self._journal.query(statistics.runs_of(graph, engine, min(last, _LAST)))
         ids = [row.id for row in rows]
         sums: list[Row[Any]] = []
@@ -317,8 +318,9 @@ class ReviewService:
             return None
 
     async def take_in(self, texts: Sequence[bytes], author: Author) -> list[str]:
-        """Take in recorded runs as examples, each once; their ids. Raises BadInput, Unavailable."""
-        taken: list[str] = []
+        """Import recorded runs as examples, each once; return their ids. Raises BadInput,
+        Unavailable."""
+        imported: list[str] = []
         for text in texts:
             first, rest = examples.read(text)
             stream = stream_of(first.run)
@@ -330,17 +332,17 @@ class ReviewService:
                 )
                 begin = examples.numbered(first, self._control.next_number())
                 await self._journal.append(stream, [begin, *rest], expected=0)
-            taken.append(first.run)
-        self._sums.begin_again()  # they ended long ago
-        return taken
+            imported.append(first.run)
+        self._sums.begin_again()  # the imported runs ended long ago
+        return imported
 
     # --- expectations -------------------------------------------------------------------------
 
     async def expect(
         self, wanted: expected_runs.Expect, author: Author
     ) -> expected_runs.Expectation:
-        """Save a course as what is expected for ever. Raises NotFound, BadInput, NotUmrf, TooLarge,
-        Conflict when the simulator does not take the same course as the run."""
+        """Save an expected course. Raises NotFound, BadInput, NotUmrf, TooLarge, Conflict when the
+        simulator does not take the same course as the run."""
         name = expected_runs.name_of(wanted.name)
         now = self._clock_us()
         opened = self._control.open.get(wanted.run)
@@ -363,7 +365,8 @@ class ReviewService:
         author: Author,
         now: int,
     ) -> expected_runs.Expected:
-        """What would be expected. Raises NotFound, BadInput, NotUmrf, TooLarge, Conflict."""
+        """Return the event that saves an expected course. Raises NotFound, BadInput, NotUmrf,
+        TooLarge, Conflict."""
         if wanted.run == "":
             return expected_runs.of_dry_run(wanted, name, author, now)
         found = await self.known(wanted.run)
@@ -373,13 +376,14 @@ class ReviewService:
         return expected_runs.of_run(found, sent.umrf, name, author, now, sent.subgraphs)
 
     async def expectations(self) -> list[expected_runs.Expectation]:
-        """All of them, by name."""
+        """Return all expected courses, by name."""
         return [expected_runs.shown(saved) for saved in await self._all_saved()]
 
     async def checked_courses(
         self, graph: str, umrf: bytes, subgraphs: Sequence[SentSubgraph] = ()
     ) -> CheckedCourses:
-        """The expected courses of a graph against it as it is now. Raises BadInput, NotUmrf, TooLarge."""
+        """Check the expected courses of a graph against this text of it. Raises BadInput, NotUmrf,
+        TooLarge."""
         saved = await self._all_saved(expectation.c.graph == graph)
         return await self._run_in_worker(lambda: check_courses(saved, umrf, subgraphs=subgraphs))
 
@@ -392,7 +396,7 @@ class ReviewService:
         return msgspec.json.decode(event.body, type=expected_runs.Expected)
 
     async def retire(self, name: str, author: Author) -> None:
-        """Expect it no more. Raises NotFound."""
+        """Remove an expected course. Raises NotFound."""
         if not await self._journal.query(select(expectation).where(expectation.c.name == name)):
             raise NotFound(f"Nothing is expected under the name {name!r}.")
         retired = expected_runs.Retired(self._clock_us(), name, author)

@@ -1,7 +1,7 @@
-"""Queries about stored runs, answered in a worker that reads the database itself, read-only.
+"""Answers questions about stored runs in a worker that reads the database itself, read-only.
 
-A question is a method of `ReviewService`. `WorkerQueries` is the runner's side: it has what was just shown stored
-before it asks, and keeps what the worker folded on the way.
+A question is a method of `ReviewService`. `WorkerQueries` is the runner's side: it waits until what
+was just shown is stored before it asks, and stores keyframes that the worker made on the way.
 """
 
 import asyncio
@@ -33,15 +33,15 @@ T = TypeVar("T")
 
 
 class StoragePaths(msgspec.Struct, frozen=True):
-    """Where the runs are: the database file, and the folder of archives."""
+    """The paths of runs: the database file, and the folder of archives."""
 
     database: Path
     archive: Path
 
 
 class WorkerQueries:
-    """Asks a worker. `opened` are the runs that go on, once that is known. What is worth keeping is
-    stored in `tasks`, when whoever asked has the answer."""
+    """Asks questions in a worker. `opened` are the open runs, once they are known. Snapshots that
+    the worker made are stored in `tasks`, after the answer was given."""
 
     def __init__(
         self,
@@ -62,7 +62,8 @@ class WorkerQueries:
         *args: P.args,
         **kw: P.kwargs,
     ) -> T:
-        """What a method of `ReviewService` returns. Raises what that raises, Unavailable, TooMany."""
+        """Return what a method of `ReviewService` returns. Raises what that raises, Unavailable,
+        TooMany."""
         await self._settled(args)
         found, kept = await self._run_in_worker(
             answered, self._place, partial(question, **kw) if kw else question, args
@@ -77,7 +78,7 @@ class WorkerQueries:
         *args: P.args,
         **kw: P.kwargs,
     ) -> bytes:
-        """The same as JSON: it need not be taken apart and put together here."""
+        """Return what a method of `ReviewService` returns, as JSON that the worker encoded."""
         await self._settled(args)
         found, kept = await self._run_in_worker(
             encoded, self._place, partial(question, **kw) if kw else question, args
@@ -87,12 +88,13 @@ class WorkerQueries:
         return text
 
     async def newest(self, run: str) -> int:
-        """The seq of the last stored event of a run; 0 when there is none. Raises Unavailable."""
+        """Return the seq of the last stored event of a run; 0 when there is none. Raises
+        Unavailable."""
         await self._settled([run])
         return await self._journal.newest(stream_of(run))
 
     async def past(self, run: str, robots_too: bool) -> tuple[Run, int]:
-        """As `history.Past`."""
+        """Return a run that is over, and the seq of its last event, as `history.Past`."""
         return await self.value(ReviewService.followed, run, robots_too)
 
     async def _settled(self, args: Sequence[object]) -> None:
@@ -106,20 +108,21 @@ class WorkerQueries:
             self._tasks.start_soon(self._store, kept)
 
     async def _store(self, kept: Sequence[StreamSnapshot]) -> None:
-        """A cache: it is made again when the journal can be written, and its loss ends nothing."""
+        """Store snapshots. They are a cache: a failure ends nothing, and they are made again
+        later."""
         for each in kept:
             try:
                 await self._journal.keep_snapshot(each.stream, each.seq, each.state)
             except Refused as why:
-                log.info("what %s adds up to is not kept: %s", each.stream, why.detail)
+                log.info("the snapshot of %s is not stored: %s", each.stream, why.detail)
             except Exception:
-                log.exception("what %s adds up to is not kept", each.stream)
+                log.exception("the snapshot of %s is not stored", each.stream)
 
 
 def answered(
     place: StoragePaths, question: Callable[..., Awaitable[Any]], args: Sequence[Any]
 ) -> tuple[Any, list[StreamSnapshot]]:
-    """In the worker: the answer, and what of it is worth keeping."""
+    """Answer a question in the worker; return the answer and the snapshots to store."""
     review_service, file = _reading(place)
     found = asyncio.run(_asked(question, review_service, args))
     return found, file.given()
@@ -128,7 +131,7 @@ def answered(
 def encoded(
     place: StoragePaths, question: Callable[..., Awaitable[Any]], args: Sequence[Any]
 ) -> tuple[bytes, list[StreamSnapshot]]:
-    """The same as JSON."""
+    """Answer a question in the worker, as JSON; return it and the snapshots to store."""
     found, kept = answered(place, question, args)
     return msgspec.json.encode(found), kept
 
@@ -142,20 +145,22 @@ async def _asked(
 @lru_cache(maxsize=1)
 def _reading(place: StoragePaths) -> "tuple[ReviewService, _ReadOnlyJournal]":
     file = _ReadOnlyJournal(place.database)
-    archive_store = ArchiveStore(file, place.archive, _here)
-    return ReviewService(_NoOngoingRuns(archive_store), archive_store, _here, _no_clock), file
+    archive_store = ArchiveStore(file, place.archive, _in_this_thread)
+    return ReviewService(
+        _NoOngoingRuns(archive_store), archive_store, _in_this_thread, _no_clock
+    ), file
 
 
-async def _here(work: Callable[..., T], *args: Any) -> T:
+async def _in_this_thread(work: Callable[..., T], *args: Any) -> T:
     return work(*args)
 
 
 def _no_clock() -> NoReturn:
-    raise AssertionError("what is stored needs no clock to be read")
+    raise AssertionError("reading stored runs needs no clock")
 
 
 class _ReadOnlyJournal(FileJournalReader):
-    """The journal as a worker has it: what is to be kept is given to the runner."""
+    """The journal in a worker: snapshots to store are handed to the runner."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
@@ -164,29 +169,29 @@ class _ReadOnlyJournal(FileJournalReader):
     async def append(
         self, stream: str, drafts: Sequence[Draft], *, expected: int | None = None
     ) -> int:
-        """Never."""
+        """Refuse to write. Raises Unavailable."""
         raise Unavailable("A worker writes nothing.")
 
     async def keep_snapshot(self, stream: str, seq: int, state: bytes) -> None:
-        """By the runner."""
+        """Keep a snapshot for the runner to store."""
         self._kept.append(StreamSnapshot(stream, seq, state))
 
     def given(self) -> list[StreamSnapshot]:
-        """What is to be kept, once."""
+        """Return the snapshots to store, each once."""
         given, self._kept = self._kept, []
         return given
 
 
 class _NoOngoingRuns:
-    """Where nothing goes on: all that is known is stored."""
+    """The open runs in a worker: there are none, everything is stored."""
 
     def __init__(self, journal: RunnerJournal) -> None:
         self.open: Mapping[str, OngoingRun] = {}
         self.history = RunHistory(journal)
 
     def next_number(self) -> int:
-        """Nothing begins here."""
+        """Refuse to number a run. Raises NotImplementedError."""
         raise NotImplementedError
 
     def watch(self, watcher: Callable[[OngoingRun], None]) -> None:
-        """Nothing changes here."""
+        """Do nothing: no run changes here."""
