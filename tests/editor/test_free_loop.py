@@ -21,6 +21,8 @@ import msgspec
 import pytest
 
 from action_assistant.editor.app import create_app
+from action_assistant.editor.crdt import replica
+from action_assistant.editor.crdt.updates.update_pieces import PIECE_BYTES
 from action_assistant.editor.history import change_index
 from action_assistant.journal.journal import Journal
 from action_assistant.settings import EditorSettings
@@ -42,11 +44,13 @@ VALUES: Final = 5 * (LARGE - SMALL)
 
 class Work(msgspec.Struct):
     """What was done. `calls`: on the loop's thread; `values`: in what workers were sent and sent back; `rows`: read
-    or written by this process in one statement, at most."""
+    or written by this process in one statement, at most; `applied`: bytes that the CRDT library was given in one
+    call, at most."""
 
     calls: int = 0
     values: int = 0
     rows: int = 0
+    applied: int = 0
 
 
 def file_of(actions: int, name: str) -> bytes:
@@ -180,7 +184,20 @@ def counted(editor: Served, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         editor.work.rows = max(editor.work.rows, rows["most"])
         return found
 
+    applied = replica.Replica._applied, replica.Replica._apply
+
+    def apply_ready(self: Any, update: bytes, read: Any, *, is_applied: bool = False) -> bool:
+        if not is_applied:
+            editor.work.applied = max(editor.work.applied, len(update))
+        return applied[0](self, update, read, is_applied=is_applied)
+
+    def apply(self: Any, *updates: bytes) -> None:
+        editor.work.applied = max(editor.work.applied, sum(map(len, updates)))
+        applied[1](self, *updates)
+
     with monkeypatch.context() as patch:
+        patch.setattr(replica.Replica, "_applied", apply_ready)
+        patch.setattr(replica.Replica, "_apply", apply)
         patch.setattr(lanes.Lane, "_done", _done)
         patch.setattr(Journal, "_ask", _ask)
         patch.setattr(Journal, "derive", derive)
@@ -337,7 +354,26 @@ def is_free(small: Work, large: Work) -> bool:
         large.calls <= small.calls + SLACK
         and large.values <= small.values + VALUES
         and large.rows <= max(small.rows, change_index.ROWS)
+        and large.applied <= 2 * PIECE_BYTES
     )
+
+
+#: Where the file of a graph is sent to.
+BROUGHT: Final = ("/api/graphs", "/api/graphs?preview=true", "/api/pieces")
+
+
+async def test_no_import_works_on_the_loop_as_long_as_its_file_is_large(served: Served) -> None:
+    grown: dict[str, tuple[Work, Work]] = {}
+    for path in BROUGHT:
+        small, large = [
+            await served.during(
+                lambda: served.ask("POST", path, file_of(actions, f"B{actions}"))  # noqa: B023
+            )
+            for actions in (SMALL, LARGE)
+        ]
+        if not is_free(small, large):
+            grown[path] = small, large
+    assert not grown, "\n".join(f"{name}: {of}" for name, of in grown.items())
 
 
 async def test_the_index_of_an_imported_graph_is_made_elsewhere_and_stored_in_slices(

@@ -79,7 +79,7 @@ async def _opened(document: bytes, run_in_worker: RunInWorker) -> Replica | None
         return None
     replica = Replica()
     try:
-        for piece in await _pieces(kept.state, run_in_worker):
+        for piece in await pieces_aside(kept.state, run_in_worker):
             # The writer's thread needs the interpreter, too: a turn of the loop alone would not be enough.
             await asyncio.sleep(replica.open_piece(piece))
         replica.go_on(kept, kept.state)
@@ -88,14 +88,15 @@ async def _opened(document: bytes, run_in_worker: RunInWorker) -> Replica | None
     return replica
 
 
-async def _pieces(state: bytes, run_in_worker: RunInWorker) -> list[bytes]:
-    if run_in_worker is run_here or len(state) <= PIECE_BYTES:
-        return [state]
+async def pieces_aside(update: bytes, run_in_worker: RunInWorker) -> list[bytes]:
+    """Split a large update in a worker. Return it as it is where that fails."""
+    if run_in_worker is run_here or len(update) <= PIECE_BYTES:
+        return [update]
     try:
-        return await run_in_worker(pieces_of, state)
+        return await run_in_worker(pieces_of, update)
     except Refused as error:
-        log.warning("a document of %d bytes is opened at once: %s", len(state), error.detail)
-        return [state]
+        log.warning("%d bytes are applied at once: %s", len(update), error.detail)
+        return [update]
 
 
 async def stored(

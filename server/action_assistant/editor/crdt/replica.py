@@ -1,5 +1,6 @@
 """A document in memory that says what each update brought."""
 
+import asyncio
 import logging
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -74,7 +75,7 @@ class Replica:
         self._known: dict[int, int] = {}
         self._waiting: dict[bytes, tuple[UpdateOutline, str]] = {}
         self._released: list[bytes] = []
-        self._opening_s = 0.0  # processor time that applying a snapshot took
+        self.pieces_s = 0.0  # processor time that applying pieces took
         self._state: bytes | None = (
             None  # the document as bytes, where it is large and they were asked for
         )
@@ -95,6 +96,39 @@ class Replica:
         if self._waiting and update in self._waiting:
             return UpdateEffect.NOTHING
         read = read or outline(update)
+        new = self._check(update, author, holder, read)
+        return self._take(update, author, read, new, is_applied=False)
+
+    async def take_in_pieces(
+        self,
+        update: bytes,
+        author: str,
+        holder: Callable[[int], str | None],
+        read: UpdateOutline,
+        pieces: Sequence[bytes],
+    ) -> UpdateEffect:
+        """Apply an update that was tried on a copy, as `take` does, in pieces that bring the same; rest after
+        each for as long as it took. Nothing else may change the document meanwhile. Raises as `take` does."""
+        if self._waiting and update in self._waiting:
+            return UpdateEffect.NOTHING
+        new = self._check(update, author, holder, read)
+        is_applied = bool(new) and read.ready(self._known)
+        if is_applied:
+            try:
+                for piece in pieces:
+                    await asyncio.sleep(self.open_piece(piece))
+            except Malformed as error:  # a part of it may be there
+                raise Panicked(str(error)) from error
+        return self._take(update, author, read, new, is_applied=is_applied)
+
+    def _check(
+        self,
+        update: bytes,
+        author: str,
+        holder: Callable[[int], str | None],
+        read: UpdateOutline,
+    ) -> list[int]:
+        """Return the clients of which an update brings something new. Raise what forbids it."""
         known = self._known
         new = [client for client, _, end in read.brings if end > known.get(client, 0)]
         for client in new:
@@ -105,10 +139,18 @@ class Replica:
         if read.ready(known):
             self.paired.check(update, read, known)
             check_cut_items(self.doc, update, read, known)
-            brought = self._grew(update, read)
-            check_whole(self.doc, read)
         else:
             self._check_patience(update, author)
+        return new
+
+    def _take(
+        self, update: bytes, author: str, read: UpdateOutline, new: list[int], *, is_applied: bool
+    ) -> UpdateEffect:
+        """Apply an update that nothing forbids, unless its pieces were applied already."""
+        if read.ready(self._known):
+            brought = self._grew(update, read, is_applied=is_applied)
+            check_whole(self.doc, read)
+        else:
             self._waiting[update] = read, author
             brought = UpdateEffect.WAITS
         for client in new:
@@ -178,18 +220,18 @@ class Replica:
         self.go_on(kept, kept.state)
 
     def open_piece(self, piece: bytes) -> float:
-        """Apply the next piece of the document of a snapshot; return the seconds of processor time that it
+        """Apply one of the pieces of a snapshot or an update; return the seconds of processor time that it
         took. Raises Malformed, Panicked."""
         begun = time.thread_time()
         self._apply(piece)
         took = time.thread_time() - begun
-        self._opening_s += took
+        self.pieces_s += took
         return took
 
     def go_on(self, kept: "ReplicaState", state: bytes) -> None:
         """Take up the rest of a snapshot, whose document `state` was applied in pieces. Raises Malformed."""
         self._state = state if len(state) > _KEPT_BYTES else None
-        self.opening.opened(self._opening_s, len(state))
+        self.opening.opened(self.pieces_s, len(state))
         self._quota.took(len(state))
         self.owners, self.nesting = kept.owners, Nesting(kept.spans)
         self.paired = PairedTexts(paired_texts_in(state) if kept.paired is None else kept.paired)
@@ -238,10 +280,12 @@ class Replica:
         if len(sizes) >= WAITING_UPDATES or sum(sizes) + len(update) > WAITING_BYTES:
             raise TooMuchWaits
 
-    def _grew(self, update: bytes, read: UpdateOutline) -> UpdateEffect:
+    def _grew(
+        self, update: bytes, read: UpdateOutline, *, is_applied: bool = False
+    ) -> UpdateEffect:
         """Apply what is ready, and what waited for it."""
         try:
-            changed = self._applied(update, read)
+            changed = self._applied(update, read, is_applied=is_applied)
         except Malformed as error:
             check_unchanged(self.doc, self._known, error)
             raise
@@ -291,12 +335,14 @@ class Replica:
         """Updates that wait for earlier ones."""
         return tuple(self._waiting)
 
-    def _applied(self, update: bytes, read: UpdateOutline) -> bool:
-        """Apply what is ready; whether it changed anything."""
+    def _applied(self, update: bytes, read: UpdateOutline, *, is_applied: bool = False) -> bool:
+        """Apply what is ready, unless its pieces were; whether it changed anything."""
         known = self._known
         self._state = None
         depths = self.nesting.depths(read.placed, known)
-        if any(end > known.get(client, 0) for client, _, end in read.brings):
+        if is_applied:
+            changed = True
+        elif any(end > known.get(client, 0) for client, _, end in read.brings):
             with applying():
                 apply_updates(self.doc, update)
             changed = True

@@ -14,10 +14,11 @@ from typing import Any, Final, TypeVar
 
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.crdt.applying import Panicked
-from action_assistant.editor.crdt.loading import Loaded, load
+from action_assistant.editor.crdt.loading import Loaded, load, pieces_aside
 from action_assistant.editor.crdt.replica import Replica, UpdateEffect
 from action_assistant.editor.crdt.trial import adds_nothing
 from action_assistant.editor.crdt.updates.update_outline import UpdateOutline
+from action_assistant.editor.crdt.updates.update_pieces import PIECE_BYTES
 from action_assistant.editor.log.graph_events import DEFERRED, UPDATED, graph_of
 from action_assistant.editor.rooms.batch import (
     LARGE,
@@ -317,7 +318,10 @@ class Room:
                 read = None
                 if member is None or (member.edits and not member.refused):
                     read = await tried_first(offer, self._replica, self._tried)
-                self._take_in(offer, taken, read)
+                if read is not None and len(offer.update) > PIECE_BYTES:
+                    await self._take_in_pieces(offer, taken, read)
+                else:
+                    self._take_in(offer, taken, read)
         except OBJECTIONS as error:
             self._refuse(offer, error)
         self._store(taken)
@@ -343,8 +347,30 @@ class Room:
         finally:
             if offer.member is not None:
                 offer.member.used_cpu(time.thread_time() - begun)
-        if brought is None:
+        if brought is not None:
+            self._note(offer, taken, brought)
+
+    async def _take_in_pieces(self, offer: Offer, taken: Taken, read: UpdateOutline) -> None:
+        """As `_take_in`, of a large edit that was tried: everybody's edits would wait for it otherwise."""
+        pieces = await pieces_aside(offer.update, self._tried)
+        member, holder = offer.member, self.attendance.holder
+        if member is not None and member.refused:
             return
+        replica = self._replica
+        before = replica.pieces_s
+        try:
+            brought = await replica.take_in_pieces(offer.update, offer.author, holder, read, pieces)
+        except OBJECTIONS as error:
+            taken.panicked = isinstance(error, Panicked)
+            self._refuse(offer, error)
+            return
+        finally:
+            if member is not None:
+                member.used_cpu(replica.pieces_s - before)
+        self._note(offer, taken, brought)
+
+    def _note(self, offer: Offer, taken: Taken, brought: UpdateEffect) -> None:
+        """Note what an edit brought: whether it is stored, as which kind, and who is sent it."""
         taken.handled.append(offer)
         if brought is UpdateEffect.WAITS:
             taken.news.append((offer, DEFERRED))
