@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import anyio
@@ -12,6 +13,7 @@ import pytest
 
 from action_assistant.runner.emulator.messages import EngineTraits
 from action_assistant.runner.execution import monitor
+from action_assistant.runner.links import engine_process
 from action_assistant.runner.links.engine_process import EngineProcess, Thread, process, threads
 from action_assistant.runner.stop.engine_threads import EngineThreads
 from runner.fake_link import FakeLink
@@ -150,6 +152,30 @@ def test_threads_of_a_real_process_are_told_apart(node: subprocess.Popen[str]) -
     node.kill()
     node.wait()
     assert threads(known) is None
+
+
+def test_a_list_in_which_a_thread_ends_says_nothing(
+    node: subprocess.Popen[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The thread may have begun the next action's right before, after the kernel's list was read."""
+    known = process(node.pid)
+    assert known is not None
+    _told(node, "begin")
+    began = engine_process._began
+    looks = 0
+
+    def ends_when_listed(folder: Path) -> int | None:
+        nonlocal looks
+        looks += 1
+        return None if looks in vanishing else began(folder)
+
+    monkeypatch.setattr(engine_process, "_began", ends_when_listed)
+    vanishing = range(1, 10_000)
+    assert threads(known) is None
+    looks, vanishing = 0, range(1, 2)  # in the first list only: the second one counts
+    seen = threads(known)
+    assert seen is not None
+    assert len(seen) > 1
 
 
 @pytest.mark.parametrize("node", ["python", "/opt/action_engine_node/python3"], indirect=True)

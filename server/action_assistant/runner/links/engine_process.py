@@ -17,6 +17,7 @@ _PROGRAM: Final = "action_engine_node"  # the engine's own, as ROS 2 starts it
 _FAST_DDS: Final = "010f"  # vendor id at the beginning of a GUID prefix
 _FIRST_PORT: Final = 7400  # of DDS; each domain has the next 250
 _PORTS: Final = 250
+_LOOKS: Final = 3  # at a list of threads of which one has just ended
 
 
 class Thread(msgspec.Struct, frozen=True):
@@ -78,22 +79,29 @@ def engine_process(prefix: str, ours: str, domain: int, name: str) -> EngineProc
 
 
 def threads(known: EngineProcess) -> frozenset[Thread] | None:
-    """Return the threads of a process; None when it has ended, when they cannot be seen, or when it is
-    not the engine's own node. Other engines may not begin a thread for each action."""
+    """Return the threads of the process of an engine's own node; None if they are not known.
+
+    They are not known when the process has ended, is on another computer or runs another program, which
+    may not begin a thread for each action. Nor are they when a thread ends in each of the looks: it may
+    have begun another one that the kernel did not list any more, and the kernel ends its list early at a
+    thread that ends right then.
+    """
     folder = _PROC / str(known.pid)
     try:
         program = (folder / "cmdline").read_bytes().partition(b"\0")[0].decode(errors="replace")
         if _here() != (known.boot, known.namespace) or Path(program).name != _PROGRAM:
             return None
-        numbers = [each.name for each in (folder / "task").iterdir()]
-        found = frozenset(
-            Thread(int(each), began)
-            for each in numbers
-            if (began := _began(folder / "task" / each))
-        )
+        found = next(filter(None, (_listed(folder / "task") for _ in range(_LOOKS))), None)
         return found if _started(known.pid) == known.started else None
     except OSError:
         return None
+
+
+def _listed(tasks: Path) -> frozenset[Thread] | None:
+    """Return the threads in a `task` folder of /proc; None if one of them ended meanwhile."""
+    found = {each.name: _began(each) for each in tasks.iterdir()}
+    listed = [Thread(int(name), began) for name, began in found.items() if began is not None]
+    return frozenset(listed) if len(listed) == len(found) else None
 
 
 def _here() -> tuple[str, str]:
