@@ -10,7 +10,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import msgspec
 
@@ -23,7 +23,9 @@ if TYPE_CHECKING:  # slow to load, and most commands do not need it
     import httpx
 
 
-#: As ids of graphs are made.
+T = TypeVar("T")
+
+#: The form of a graph's id.
 _MADE_ID: Final = re.compile(r"[A-Za-z0-9]{12}")
 
 
@@ -163,6 +165,16 @@ def _here(trust: ssl.SSLContext) -> str:
     ):
         return f"https://127.0.0.1:{port}"
     return f"http://127.0.0.1:{port}"
+
+
+def decoded(answer: "httpx.Response", kind: type[T]) -> T:
+    """Decode the body of an answer. Raises CannotStart for a server whose answers have another form."""
+    try:
+        return msgspec.json.decode(answer.content, type=kind)
+    except msgspec.DecodeError as error:
+        raise CannotStart(
+            f"{answer.request.url} answers in another form than this version expects ({error})."
+        ) from error
 
 
 def print_json(value: object) -> None:

@@ -2,15 +2,26 @@
 
 import argparse
 from collections.abc import Iterable
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
-import msgspec
-
-from action_assistant.commands.client import No, Server, command, print_json, refused, running
+from action_assistant.commands.client import (
+    No,
+    Server,
+    command,
+    decoded,
+    print_json,
+    refused,
+    running,
+)
 from action_assistant.errors import CannotStart
 from action_assistant.safe_text import one_line
 from action_assistant.umrf.difference import Difference
 from action_assistant.umrf.difference_text import lines
+
+if TYPE_CHECKING:  # slow to load, and most calls do not need them
+    from action_assistant.editor.history.drafts.draft_merges import MergePreview
+    from action_assistant.editor.history.drafts.told_merges import DraftConflict
+    from action_assistant.editor.history.told_changes import Changes
 
 _SIDES: Final = ("origin", "draft")
 
@@ -60,53 +71,63 @@ def _list(options: argparse.Namespace) -> int:
     with running(options) as server:
         try:
             graph = server.graph_id(options.graph)
-            drafts = server.editor("GET", f"/api/graphs/{graph}/drafts").json()
+            answer = server.editor("GET", f"/api/graphs/{graph}/drafts")
         except No as error:
             return refused(error)
     if options.json:
-        print_json(drafts)
+        print_json(answer.json())
         return 0
-    for each in drafts:
-        apart = f"{each['ahead']} ahead, {each['behind']} behind"
-        print(one_line(f"{each['id']}  {each['state']}  {apart}  {each['name']}"))
+    from action_assistant.editor.history.drafts.drafts import DraftView
+
+    for each in decoded(answer, list[DraftView]):
+        apart = f"{each.ahead} ahead, {each.behind} behind"
+        print(one_line(f"{each.id}  {each.state}  {apart}  {each.name}"))
     return 0
 
 
 def _new(options: argparse.Namespace) -> int:
+    from action_assistant.editor.history.drafts.drafts import DraftView
+
     wanted = {"name": options.name, "seq": options.at}
     with running(options) as server:
         try:
             graph = server.graph_id(options.graph)
-            made = server.editor("POST", f"/api/graphs/{graph}/drafts", json=wanted).json()
+            answer = server.editor("POST", f"/api/graphs/{graph}/drafts", json=wanted)
         except No as error:
             return refused(error)
-    print(made["id"])
+    print(decoded(answer, DraftView).id)
     return 0
 
 
 def _merge(options: argparse.Namespace) -> int:
+    from action_assistant.editor.history.drafts.draft_merges import MergePreview
+
     asked = {"into": options.into, "choices": _choices(options.choose)}
     with running(options) as server:
         try:
             below = f"/api/drafts/{options.draft}"
-            seen = server.editor("POST", f"{below}/preview", json=asked).json()
+            answer = server.editor("POST", f"{below}/preview", json=asked)
             if options.json and options.look:
-                print_json(seen)
+                print_json(answer.json())
                 return 0
-            _tell(seen)
-            left = [each for each in seen["conflicts"] if each["place"] not in asked["choices"]]
-            _tell_conflicts(left)
+            preview = decoded(answer, MergePreview)
+            _print_preview(preview)
+            left = [each for each in preview.conflicts if each.place not in asked["choices"]]
+            _print_conflicts(left)
             if options.look or left:
                 return 1 if left else 0
-            return _merged(server, below, seen, asked)
+            return _merged(server, below, preview, asked)
         except No as error:
             return refused(error)
 
 
-def _merged(server: Server, below: str, seen: dict[str, Any], asked: dict[str, Any]) -> int:
-    moments = {"seq": seen["seq"], "draft_seq": seen["draft_seq"]}
-    done = server.editor("POST", f"{below}/merge", json=asked | moments).json()
-    print(f"merged: change {done['seq']}" if done["changed"] else "Nothing is to be merged.")
+def _merged(server: Server, below: str, preview: "MergePreview", asked: dict[str, Any]) -> int:
+    """Merge what the preview showed, and return the exit code."""
+    from action_assistant.editor.history.drafts.draft_merges import MergedDraft
+
+    moments = {"seq": preview.seq, "draft_seq": preview.draft_seq}
+    done = decoded(server.editor("POST", f"{below}/merge", json=asked | moments), MergedDraft)
+    print(f"merged: change {done.seq}" if done.changed else "Nothing is to be merged.")
     return 0
 
 
@@ -121,22 +142,23 @@ def _choices(words: Iterable[str]) -> dict[str, str]:
     return found
 
 
-def _tell(seen: dict[str, Any]) -> None:
-    for line in _lines(seen["changes"]):
+def _print_preview(preview: "MergePreview") -> None:
+    for line in changes_lines(preview.changes):
         print(one_line(line))
-    for problem in seen["problems"]:
-        print(one_line(f"! {problem['message']}"))
+    for problem in preview.problems:
+        print(one_line(f"! {problem.message}"))
 
 
-def _tell_conflicts(conflicts: Iterable[dict[str, Any]]) -> None:
+def _print_conflicts(conflicts: Iterable["DraftConflict"]) -> None:
     for each in conflicts:
-        print(one_line(f"? both changed {each['what']}: --choose '{each['place']}=origin|draft'"))
-        for side in _SIDES:
-            did = ["removed it"] if each["removed"] == side else _lines(each[side])
+        print(one_line(f"? both changed {each.what}: --choose '{each.place}=origin|draft'"))
+        for side, changes in (("origin", each.origin), ("draft", each.draft)):
+            did = ["removed it"] if each.removed == side else changes_lines(changes)
             for line in did:
                 print(one_line(f"    {side}: {line.strip()}"))
 
 
-def _lines(changes: dict[str, Any]) -> list[str]:
-    empty = {"before": 0, "after": 0, "fields": [], "actions": [], "relations": []}
-    return [*lines(msgspec.convert(empty | changes, Difference))]
+def changes_lines(changes: "Changes") -> list[str]:
+    """Return the lines of changes, as `difference_text.lines` prints a difference."""
+    parts = changes.fields, changes.actions, changes.relations, changes.notes
+    return [*lines(Difference(0, 0, *parts))]

@@ -2,15 +2,18 @@
 
 import argparse
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import quote
 
 import msgspec
 
-from action_assistant.commands.client import No, command, print_json, refused, running
+from action_assistant.commands.client import No, command, decoded, print_json, refused, running
 from action_assistant.errors import CannotStart
 from action_assistant.safe_text import one_line
 from action_assistant.umrf.facts import SECOND_PERSON
+
+if TYPE_CHECKING:  # slow to load, and most calls do not need it
+    from action_assistant.runner.robots.registration import Robot
 
 
 def _add_robots(robots: argparse.ArgumentParser) -> None:
@@ -60,13 +63,15 @@ COMMANDS: Final = {"robots": _add_robots}
 def _list(options: argparse.Namespace) -> int:
     with running(options) as server:
         try:
-            found: list[dict[str, Any]] = server.runner("GET", "/api/robots").json()
+            answer = server.runner("GET", "/api/robots")
         except No as error:
             return refused(error)
     if options.json:
-        print_json(found)
+        print_json(answer.json())
         return 0
-    for each in found:
+    from action_assistant.runner.robots.registration import Robot
+
+    for each in decoded(answer, list[Robot]):
         print(_line(each))
     return 0
 
@@ -82,12 +87,14 @@ def _add(options: argparse.Namespace) -> int:
         wanted["get_service"] = options.get_service
     with running(options) as server:
         try:
-            known = {each["name"] for each in server.runner("GET", "/api/robots").json()}
-            if options.name in known and not options.replace:
+            from action_assistant.runner.robots.registration import Robot
+
+            robots = decoded(server.runner("GET", "/api/robots"), list[Robot])
+            if options.name in {each.name for each in robots} and not options.replace:
                 return refused(
                     No(f"{options.name} is registered already. --replace registers it anew.")
                 )
-            print(_line(server.runner("POST", "/api/robots", json=wanted).json()))
+            print(_line(decoded(server.runner("POST", "/api/robots", json=wanted), Robot)))
         except No as error:
             return refused(error)
     return 0
@@ -103,11 +110,11 @@ def _remove(options: argparse.Namespace) -> int:
     return 0
 
 
-def _line(robot: dict[str, Any]) -> str:
+def _line(robot: "Robot") -> str:
     """Return one robot as a line: its name, domain and state, and why it does not answer."""
-    place = "" if robot.get("domain") is None else f"  domain {robot['domain']}"
-    why = f": {robot['why']}" if robot.get("why") else ""
-    return one_line(f"{robot['name']}{place}  {robot['state']}{why}")
+    domain = "" if robot.domain is None else f"  domain {robot.domain}"
+    why = f": {robot.why}" if robot.why else ""
+    return one_line(f"{robot.name}{domain}  {robot.state}{why}")
 
 
 def _profile(path: Path) -> dict[str, Any]:

@@ -3,16 +3,26 @@
 import argparse
 import sys
 from pathlib import Path
-from typing import Any
-
-import msgspec
+from typing import TYPE_CHECKING, Any
 
 from action_assistant import paths, settings
-from action_assistant.commands.client import No, Server, command, print_json, refused, running
+from action_assistant.commands.client import (
+    No,
+    Server,
+    command,
+    decoded,
+    print_json,
+    refused,
+    running,
+)
+from action_assistant.commands.drafts import changes_lines
 from action_assistant.errors import CannotStart, Refused
 from action_assistant.safe_text import one_line
 from action_assistant.umrf.difference import Difference
 from action_assistant.umrf.difference_text import lines, without_looks
+
+if TYPE_CHECKING:  # slow to load, and most calls do not need it
+    from action_assistant.editor.history.since_when import SinceWhen
 
 
 def add_since(runs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -43,16 +53,19 @@ def _since(options: argparse.Namespace) -> int:
             good = options.good or _last_good(server, run)
             script = server.runner("GET", f"/api/runs/{options.run}/script").json()
             asked = {"good": good, "bad": bad, "script": {"behaviours": script["behaviours"]}}
-            found = server.editor("POST", f"/api/graphs/{graph}/since", json=asked).json()
+            answer = server.editor("POST", f"/api/graphs/{graph}/since", json=asked)
             query = {"from": good, "to": bad}
-            answer = server.editor("GET", f"/api/graphs/{graph}/diff", params=query)
+            edits = server.editor("GET", f"/api/graphs/{graph}/diff", params=query)
         except No as error:
             return refused(error)
+    from action_assistant.editor.history.since_when import SinceWhen
+
+    found = decoded(answer, SinceWhen)
     if options.json:
-        print_json(found)
+        print_json(answer.json())
     else:
-        _tell(found, msgspec.json.decode(answer.content, type=Difference))
-    return 1 if found["partings"] else 0
+        _print_partings(found, decoded(edits, Difference))
+    return 1 if found.partings else 0
 
 
 def _seq(server: Server, run: dict[str, Any]) -> int:
@@ -74,23 +87,21 @@ def _last_good(server: Server, run: dict[str, Any]) -> int:
     raise No("No run before it went well; name a change of the graph with --good.")
 
 
-def _tell(found: dict[str, Any], difference: Difference) -> None:
-    for each in found["partings"]:
-        who = each["author"]["name"] or each["author"]["id"]
-        verb = "goes another way" if each["parts"] else "goes the first way again"
-        print(one_line(f"since change {each['seq']} of {who}, {each['at'][:16]}, it {verb}:"))
-        changes = {"before": 0, "after": 0, "fields": [], "actions": [], "relations": []}
-        told = msgspec.convert(changes | each["changes"], Difference)
-        for line in lines(told):
+def _print_partings(found: "SinceWhen", difference: Difference) -> None:
+    for each in found.partings:
+        who = each.author.name or each.author.id
+        verb = "goes another way" if each.parts else "goes the first way again"
+        at = each.at.isoformat()[:16]
+        print(one_line(f"since change {each.seq} of {who}, {at}, it {verb}:"))
+        for line in changes_lines(each.changes):
             print(one_line(f"    {line}"))
-        was, now = each["before"], each["after"]
-        print(one_line(f"    step {each['place']}: {was} before, {now} after"))
-    if not found["partings"]:
+        print(one_line(f"    step {each.place}: {each.before} before, {each.after} after"))
+    if not found.partings:
         print("No edit explains it: with what its actions did, the graph goes the same way.")
         for line in lines(without_looks(difference)):
             print(one_line(line))
-    if not found["exact"]:
-        print(f"Only {found['looked']} moments were looked at; there may be further places.")
+    if not found.exact:
+        print(f"Only {found.looked} moments were looked at; there may be further places.")
 
 
 def add_archives(runs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:

@@ -129,13 +129,13 @@ def _kind(parameter: Parameter) -> Json:
 def _swapped(
     uses: list[tuple[Parameter, ...]], known: tuple[Parameter, ...]
 ) -> tuple[tuple[str, str], ...]:
-    said = {parameter.path for parameter in known}
-    gone = {p.path: _kind(p) for use in uses for p in use if p.path not in said}
+    known_paths = {parameter.path for parameter in known}
+    gone = {p.path: _kind(p) for use in uses for p in use if p.path not in known_paths}
     had = {parameter.path for use in uses for parameter in use}
     come = {p.path: _kind(p) for p in known if p.path not in had}
     pairs = []
     for path, kind in gone.items():
-        same = [new for new, its in come.items() if its == kind]
+        same = [new for new, other in come.items() if other == kind]
         if kind is not None and len(same) == 1 and list(gone.values()).count(kind) == 1:
             pairs.append((path, same[0]))
     return tuple(pairs)
@@ -146,10 +146,10 @@ def _sources(
 ) -> dict[str, Parameter]:
     """Return the use's parameter that each of the library's parameters was before, by its path."""
     had = {parameter.path: parameter for parameter in use}
-    said = {parameter.path for parameter in known}
-    found = {path: parameter for path, parameter in had.items() if path in said}
+    known_paths = {parameter.path for parameter in known}
+    found = {path: parameter for path, parameter in had.items() if path in known_paths}
     for old, new in renames.items():
-        if old in had and new in said and old not in said and new not in had:
+        if old in had and new in known_paths and old not in known_paths and new not in had:
             found[new] = had[old]
     return found
 

@@ -129,14 +129,14 @@ def _notes(old: Graph, new: Graph) -> Iterable[NoteChange]:
         a, b = was.get(note), now.get(note)
         if a != b:
             moved = a is not None and b is not None and _but_place(a) == _but_place(b)
-            yield NoteChange(_change(a, b), note, _said(b or a or ""), moved)
+            yield NoteChange(_change(a, b), note, _note_text(b or a or ""), moved)
 
 
-def _said(note: JsonText) -> str:
+def _note_text(note: JsonText) -> str:
     """Return the text of a note or frame; empty if it has none."""
     found = parse_small(note)
-    said = found.get("text") if isinstance(found, dict) else None
-    return said if isinstance(said, str) else ""
+    text = found.get("text") if isinstance(found, dict) else None
+    return text if isinstance(text, str) else ""
 
 
 def _but_place(note: JsonText) -> dict[str, Any] | JsonText:

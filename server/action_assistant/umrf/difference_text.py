@@ -93,7 +93,7 @@ def _relation(change: RelationChange) -> Iterator[str]:
 def _indented(fields: Iterable[Field]) -> Iterator[str]:
     for field in fields:
         for name, before, after in _members(field):
-            yield f"    {name}: {_said(before)} -> {_said(after)}"
+            yield f"    {name}: {_value_text(before)} -> {_value_text(after)}"
 
 
 def _members(field: Field) -> Iterator[tuple[str, Any, Any]]:
@@ -122,7 +122,7 @@ def _plain(value: Any) -> Any:
     return value.get("pvf_value", value) if isinstance(value, dict) else value
 
 
-def _said(value: Any) -> str:
+def _value_text(value: Any) -> str:
     if value is None:
         return "(nothing)"
     if isinstance(value, tuple | float | int):  # a position; parsed texts are none of these types
@@ -142,7 +142,7 @@ def _words(field: str) -> str:
 def _looks(found: Difference) -> Iterator[str]:
     moved = sum(any(_is_look(f) for f in action.fields) for action in found.actions)
     led = sum(any(_is_look(f) for f in relation.fields) for relation in found.relations)
-    told = [
+    changes = [
         *(
             [f"{moved} {'action stands' if moved == 1 else 'actions stand'} elsewhere"]
             * bool(moved)
@@ -154,9 +154,9 @@ def _looks(found: Difference) -> Iterator[str]:
             for note in found.notes
         ),
     ]
-    if told:
+    if changes:
         yield "looks only:"
-        yield from (f"    {line}" for line in told)
+        yield from (f"    {line}" for line in changes)
 
 
 def _meant(fields: Iterable[Field]) -> tuple[Field, ...]:

@@ -89,26 +89,26 @@ def facts_of(profile: Mapping[str, object]) -> EngineFacts:
             raise BadProfile(
                 f"Nothing is known by the name {key!r}; there are: {known}.", f"/{key}"
             )
-    said = {key: _said(key, value) for key, value in profile.items()}
-    commit = said.pop("commit", None)
+    given = {key: _profile_value(key, value) for key, value in profile.items()}
+    commit = given.pop("commit", None)
     base = facts_for(commit if isinstance(commit, str) else None)
-    return msgspec.structs.replace(base, **said)
+    return msgspec.structs.replace(base, **given)
 
 
-def _said(key: str, value: object) -> object:
+def _profile_value(key: str, value: object) -> object:
     """Return one value of a profile with the type of its field. Raises `BadProfile`."""
     try:
         fitting: EngineFacts = msgspec.convert({"commit": "", key: value}, EngineFacts)
     except msgspec.ValidationError as wrong:
         what = str(wrong).partition(" - at `$")[0]
         raise BadProfile(f"{key}: {what}.", f"/{key}") from wrong
-    said = getattr(fitting, key)
-    match said:
-        case frozenset() if unknown := said - ALL_HAZARDS:
+    given = getattr(fitting, key)
+    match given:
+        case frozenset() if unknown := given - ALL_HAZARDS:
             raise BadProfile(f"No hazard is called {min(unknown)!r}.", f"/{key}")
         case bool():
-            return said
-        case int() if said <= 0:
+            return given
+        case int() if given <= 0:
             raise BadProfile(f"{key} is a time in milliseconds, more than 0.", f"/{key}")
         case _:
-            return said
+            return given

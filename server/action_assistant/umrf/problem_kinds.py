@@ -71,7 +71,7 @@ def problem_counts(problems: Iterable[Problem], graph: Graph) -> ProblemCounts:
         arrows.setdefault(relation.child, []).append(relation)
     misfits: dict[Key, frozenset[str]] = {}
     rows: dict[Key, tuple[str, ...]] = {}
-    told: dict[ProblemKind, set[tuple[str, str, str]]] = {
+    counted: dict[ProblemKind, set[tuple[str, str, str]]] = {
         "wrong": set(), "fill-in": set(), "warning": set(), "note": set(),
     }  # fmt: skip
     for problem in problems:
@@ -86,8 +86,8 @@ def problem_counts(problems: Iterable[Problem], graph: Graph) -> ProblemCounts:
             starts = () if action is None else rows[action.key]
             what = "in/" + next((row[:-1] for row in starts if path.startswith(row)), path)
         place = problem.where.relation or problem.where.aid or ""
-        told[kind].add((problem.code, place, what))
-    return ProblemCounts(len(told["wrong"]), len(told["fill-in"]))
+        counted[kind].add((problem.code, place, what))
+    return ProblemCounts(len(counted["wrong"]), len(counted["fill-in"]))
 
 
 def input_of(problem: Problem) -> str | None:

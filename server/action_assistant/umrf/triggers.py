@@ -240,10 +240,10 @@ class _Reports:
         waiting = [(parent, outcome)]
         while waiting:
             parent, outcome = waiting.pop()
-            told = self._reported.setdefault(parent, set())
-            if outcome in told:
+            reported = self._reported.setdefault(parent, set())
+            if outcome in reported:
                 continue
-            told.add(outcome)
+            reported.add(outcome)
             for arrow in self._leaving.get(parent, ()):
                 match arrow.answer(outcome):
                     case "run":

@@ -28,7 +28,7 @@ from action_assistant.umrf.semantics.steps import (
     ExpectedStep,
     course,
     departure,
-    said,
+    step_text,
     unnamed,
 )
 
@@ -220,6 +220,6 @@ def _words(apart: Departure | None, names: Mapping[Key, str]) -> tuple[str, str]
 
     def words(step: ExpectedStep | None) -> str:
         named = None if step is None else replace(step, node=names.get(step.node, step.node))
-        return said(named)
+        return step_text(named)
 
     return words(apart.expected), words(apart.found)

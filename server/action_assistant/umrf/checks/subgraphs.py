@@ -227,7 +227,7 @@ def _sentence(severity: Severity, place: PlaceInside) -> str:
 def _check_again(subject: Subject, graphs: Mapping[str, Graph], known: Container[str]) -> None:
     """Report sub-graphs that an engine has used up when it comes to them. Each engine resolves its
     own actions."""
-    told: set[tuple[Key, str]] = set()
+    reported: set[tuple[Key, str]] = set()
     for actor in sorted({action.actor for action in subject.real} - {""}) or [""]:
 
         def is_other(action: Action, own: tuple[str, str] = ("", actor)) -> bool:
@@ -235,9 +235,9 @@ def _check_again(subject: Subject, graphs: Mapping[str, Graph], known: Container
 
         for found in unresolved(subject.graph, graphs, is_other):
             place = (found.action.key, found.name)
-            if found.why == "recursion" or place in told:
+            if found.why == "recursion" or place in reported:
                 continue
-            told.add(place)
+            reported.add(place)
             inside = "" if found.action.name == found.name else f" inside {found.action.full_name}"
             message = (
                 f"The sub-graph “{found.name}”{inside} comes a second time: the engine has used it up "
@@ -274,10 +274,10 @@ def _findings(inside: Subject) -> tuple[_Finding, ...]:
     errors = [each for each in problems if each.severity == "error"]
     errors.sort(key=lambda each: each.code not in FINAL)  # final errors are always among them
     if errors:
-        told, left = errors[:_ERRORS], len(errors) - _ERRORS
+        reported, left = errors[:_ERRORS], len(errors) - _ERRORS
         return (
-            *(_finding(inside, each) for each in told[:-1]),
-            _finding(inside, told[-1], left),
+            *(_finding(inside, each) for each in reported[:-1]),
+            _finding(inside, reported[-1], left),
         )
     kinds = Counter(each.code for each in problems)
     first = {each.code: each for each in reversed(problems) if each.code in _REACHES_OUT}

@@ -176,7 +176,7 @@ class _Waiting:
         self.subject = subject
         self.net = net
         self.actions = {action.full_name: action for action in subject.real}
-        self._told: set[int] = set()
+        self._reported: set[int] = set()
         self._firsts: dict[int, int] = {}  # many trials leave the same actions waiting
 
     def report(self, trial: Trial) -> bool:
@@ -185,9 +185,9 @@ class _Waiting:
         if not inside and trial.end.waiting:
             return False
         index = self._first(inside) if inside else -1
-        if index in self._told:
+        if index in self._reported:
             return True
-        self._told.add(index)
+        self._reported.add(index)
         words = self._words(index)
         if words is not None:
             action = self.actions[self.net.names[index]] if index >= 0 else trial.action
@@ -227,21 +227,21 @@ def _report_at_exit(subject: Subject, net: Network, found: list[Trial]) -> None:
     """Report each parent that the exit misses and each action whose outputs it misses, once."""
     mended = _mended(subject.graph, {name for trial in found for name in trial.end.lacking})
     is_mend = bool(found) and _never_stuck(mended)
-    told: set[str] = set()
+    reported: set[str] = set()
     for trial in found:
         end = trial.end
         severity: Severity = "warning" if trial.action else "error"
         start = f"{trial.when}, the graph stays RUNNING for ever"
-        if end.inputs and "" not in told:
-            told.add("")
+        if end.inputs and "" not in reported:
+            reported.add("")
             last = net.names[end.last] if end.last >= 0 else ""
             certain = severity == "error" and not _may_fit(subject, last)
             _report_outputs(subject, "error" if certain else "warning", start, last)
         for relation in _exits(subject.graph):
             name = subject.name(relation.parent)
-            if name not in end.lacking or name in told:
+            if name not in end.lacking or name in reported:
                 continue
-            told.add(name)
+            reported.add(name)
             message = (
                 f"{start}: the exit waits for {name}, which then does not run. Where either of them "
                 "shall end the graph, none may be waited for."

@@ -148,7 +148,7 @@ class _Search:
         self._wanted = wanted
         self._budget = budget
         self._far = _distances(net, wanted[0])
-        self._results = [self._telling(row) for row in net.edges]
+        self._results = [self._results_of(row) for row in net.edges]
 
     def found(self) -> tuple[_End, ...] | None:
         """Return the ends after which the arrow is taken, in order; None if none were found."""
@@ -196,7 +196,7 @@ class _Search:
                 case _:
                     pass
 
-    def _telling(self, row: Sequence[EdgeQuestion | None]) -> list[Precondition]:
+    def _results_of(self, row: Sequence[EdgeQuestion | None]) -> list[Precondition]:
         """Return the results of an action that can make a difference.
 
         A failed action gives no outputs and may begin again, and a bypass passes the result itself

@@ -57,16 +57,16 @@ class ArrowCoverage(msgspec.Struct, frozen=True, kw_only=True):
 
 def arrows_of(graph: Graph) -> Iterator[OutcomeArrow]:
     """Yield every outcome of an arrow that its child does not ignore, each once, in file order."""
-    there = {action.key for action in graph.actions if not action.missing} | {ENTRY, EXIT}
+    ends = {action.key for action in graph.actions if not action.missing} | {ENTRY, EXIT}
     found: dict[OutcomeArrow, None] = {}
     for relation in graph.relations:
-        if not there.issuperset((relation.parent, relation.child)):
+        if not ends.issuperset((relation.parent, relation.child)):
             continue
         for outcome in outcomes_of(relation):
             found[OutcomeArrow(relation.parent, relation.child, outcome)] = None
     order = {action.key: n for n, action in enumerate(graph.actions)} | {
         ENTRY: -1,
-        EXIT: len(there),
+        EXIT: len(ends),
     }
     rank = {outcome: n for n, outcome in enumerate(PRECONDITIONS)}
     return iter(sorted(found, key=lambda a: (order[a.parent], order[a.child], rank[a.outcome])))

@@ -17,7 +17,7 @@ from action_assistant.umrf.semantics.steps import (
     Departure,
     ExpectedStep,
     departure,
-    said,
+    step_text,
     steps_of,
     unnamed,
 )
@@ -35,7 +35,7 @@ class CourseCheck(msgspec.Struct, frozen=True):
         """The first difference in words; empty if there is none."""
         if self.apart is None:
             return ""
-        expected, found = said(self.apart.expected), said(self.apart.found)
+        expected, found = step_text(self.apart.expected), step_text(self.apart.found)
         return f"Step {self.apart.place + 1}: expected {expected}, found {found}."
 
 

@@ -60,7 +60,7 @@ def read_action(text: str | bytes) -> ActionReading:
     kept = tuple((k, dump(value[k])) for k in RELATIONS if k in value)
     action = msgspec.structs.replace(action, extra=action.extra + kept)
     own_problems = (p for p in tree.problems if p.where.path.startswith(_PLACE))
-    found, told = located(
+    placed_problems, remarks = located(
         text,
         [*problems, *(moved(problem, [given]) for problem in own_problems)],
         [
@@ -71,8 +71,8 @@ def read_action(text: str | bytes) -> ActionReading:
     return ActionReading(
         action=action,
         dialect=dialect,
-        remarks=told,
-        problems=tuple(found),
+        remarks=remarks,
+        problems=tuple(placed_problems),
         text=text,
         steps=(tree.origins, given),
     )

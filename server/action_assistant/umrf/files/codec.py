@@ -68,7 +68,7 @@ def read(text: str | bytes) -> Reading:
         )
     file, notes, problems, given = translated(value, dialect)
     tree = read_tree(file)
-    found, told = located(
+    placed_problems, remarks = located(
         text,
         [
             *problems,
@@ -80,8 +80,8 @@ def read(text: str | bytes) -> Reading:
     return Reading(
         graph=tree.graph,
         dialect=dialect,
-        remarks=told,
-        problems=tuple(found),
+        remarks=remarks,
+        problems=tuple(placed_problems),
         states=tree.states,
         graph_state=tree.graph_state,
         text=text,

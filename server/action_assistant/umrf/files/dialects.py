@@ -50,8 +50,8 @@ def dialect_of(file: dict[str, Json]) -> str | None:
     if not any(mark in file for mark in _MARKS):
         return action_dialect(file) if _is_action(file) else None
     if "umrf_actions" in file and "actions" not in file:
-        told = {"effect", "type", "package_name"}
-        full = any(told & action.keys() for action in items_of(file, "umrf_actions"))
+        members = {"effect", "type", "package_name"}
+        full = any(members & action.keys() for action in items_of(file, "umrf_actions"))
         return "D1" if full else "D1'"
     ends = [file.get("graph_entry"), file.get("graph_exit")]
     if any(isinstance(end, dict) and isinstance(end.get("actions"), list) for end in ends):
@@ -82,8 +82,8 @@ def action_dialect(file: dict[str, Json]) -> str | None:
     """
     if any(mark in file for mark in _MARKS):
         return None
-    told = file.keys() & {"name", "type", "effect", "suffix", "package_name", *_PARAMETERS}
-    if len(told) < 2:
+    members = file.keys() & {"name", "type", "effect", "suffix", "package_name", *_PARAMETERS}
+    if len(members) < 2:
         return None
     return "D3-action" if "type" in file else "D0"
 

@@ -224,8 +224,8 @@ def _relation(old: OldFile, relation: Json, path: str, side: str) -> Json:
             del relation["condition"]
             relation["conditions"] = conditions
             old.renamed(path, "condition", "conditions")
-            told = ", ".join(str(c) for c in conditions if not str(c).endswith("ignore"))
-            text = f"The condition “{condition}” became {told}."
+            shown = ", ".join(str(c) for c in conditions if not str(c).endswith("ignore"))
+            text = f"The condition “{condition}” became {shown}."
             old.note(text, old.at(path, "condition"))
     return relation
 

@@ -18,7 +18,7 @@ Origins: TypeAlias = Mapping[str, str]
 #: The steps that lead back to the given text, one after the other.
 Steps: TypeAlias = Sequence[Origins]
 
-Told = TypeVar("Told", Problem, Note)
+Located = TypeVar("Located", Problem, Note)
 
 
 def origin(origins: Origins, path: str) -> str:
@@ -37,7 +37,7 @@ def placed(problems: Iterable[Problem], text: str, steps: Steps = ()) -> list[Pr
     return located(text, [moved(problem, steps) for problem in problems])[0]
 
 
-def moved(told: Told, steps: Steps) -> Told:
+def moved(item: Located, steps: Steps) -> Located:
     """Return a problem or note with pointers into the given text, to which `steps` lead."""
 
     def lead(where: Where) -> Where:
@@ -46,8 +46,8 @@ def moved(told: Told, steps: Steps) -> Told:
             path = origin(origins, path)
         return replace(where, path=path)
 
-    where, also = lead(told.where), tuple(map(lead, told.also))
-    return replace(told, where=where, also=also)
+    where, also = lead(item.where), tuple(map(lead, item.also))
+    return replace(item, where=where, also=also)
 
 
 def located(
@@ -68,8 +68,8 @@ def located(
         place = places[where.path]
         return replace(where, path=place.path, line=place.line, column=place.column)
 
-    def all_found(told: Told) -> Told:
-        where, also = find(told.where), tuple(map(find, told.also))
-        return replace(told, where=where, also=also)
+    def all_found(item: Located) -> Located:
+        where, also = find(item.where), tuple(map(find, item.also))
+        return replace(item, where=where, also=also)
 
     return [all_found(problem) for problem in problems], tuple(all_found(note) for note in notes)

@@ -36,14 +36,14 @@ def with_waypoints(graph: Graph, items: Json) -> Graph:
     """Return the graph with the waypoints of a file. Those that fit no relation are left out."""
     if not isinstance(items, list):
         return graph
-    told: dict[_Name, dict[str, JsonText]] = defaultdict(dict)
+    by_name: dict[_Name, dict[str, JsonText]] = defaultdict(dict)
     for item in items:
         if isinstance(item, dict) and "points" in item:
-            told[_name_in(item)][str(item.get("response"))] = dump(item["points"])
+            by_name[_name_in(item)][str(item.get("response"))] = dump(item["points"])
     found = {
-        id(relation): tuple(_in_order(told[name]))
+        id(relation): tuple(_in_order(by_name[name]))
         for name, relation in _named(graph)
-        if name in told
+        if name in by_name
     }
     relations = tuple(
         replace(relation, waypoints=found[id(relation)]) if id(relation) in found else relation
@@ -67,9 +67,9 @@ def _named(graph: Graph) -> Iterable[tuple[_Name, Relation]]:
     """Yield relations with the names of their ends, in the order of the actions."""
     names = {ENTRY: ENTRY, EXIT: EXIT} | {a.key: a.full_name for a in graph.actions}
     order = {key: place for place, key in enumerate(names)}
-    there = [r for r in graph.relations if r.parent in names and r.child in names]
+    known = [r for r in graph.relations if r.parent in names and r.child in names]
     counts: dict[tuple[str, str], int] = defaultdict(int)
-    for relation in sorted(there, key=lambda r: (order[r.parent], order[r.child], r.listing)):
+    for relation in sorted(known, key=lambda r: (order[r.parent], order[r.child], r.listing)):
         ends = names[relation.parent], names[relation.child]
         yield (*ends, counts[ends]), relation
         counts[ends] += 1

@@ -102,9 +102,9 @@ def between(selection: Selection) -> Iterator[FlatteningReason]:
     for relation in selection.graph.relations:
         ahead.setdefault(relation.parent, []).append(relation.child)
         back.setdefault(relation.child, []).append(relation.parent)
-    there = _reached(selection, ahead) & _reached(selection, back)
+    on_paths = _reached(selection, ahead) & _reached(selection, back)
     for action in selection.graph.actions:
-        if action.key in there and action.key not in selection.chosen:
+        if action.key in on_paths and action.key not in selection.chosen:
             at = (HierarchyLevel(selection.graph.name, action.key, action.full_name),)
             yield FlatteningReason("between", "It lies between them and is not chosen.", at)
 
@@ -130,25 +130,25 @@ def ways_in_differ(selection: Selection) -> Iterator[FlatteningReason]:
         yield FlatteningReason("ways-in", message)
         return
     first = selection.entries[0]
-    told = _told(selection, first)
+    answers = _answers_into(selection, first)
     for key in selection.entries[1:]:
-        other = _told(selection, key)
+        other = _answers_into(selection, key)
         one, two = selection.named(first), selection.named(key)
-        for parent in sorted(told.keys() ^ other.keys()):
-            leads, not_ = (one, two) if parent in told else (two, one)
+        for parent in sorted(answers.keys() ^ other.keys()):
+            leads, not_ = (one, two) if parent in answers else (two, one)
             subject = "The entry" if parent == ENTRY else selection.named(parent)
             message = (
                 f"{subject} leads to {leads} and not to {not_}: a sub-graph begins with all "
                 "of its entry actions at once."
             )
             yield FlatteningReason("ways-in", message, selection.at(key))
-        for parent in sorted(told.keys() & other.keys()):
-            if told[parent] != other[parent]:
+        for parent in sorted(answers.keys() & other.keys()):
+            if answers[parent] != other[parent]:
                 message = f"{one} and {two} answer otherwise when {selection.named(parent)} ends."
                 yield FlatteningReason("ways-in", message, selection.at(key))
 
 
-def _told(selection: Selection, key: Key) -> dict[Key, tuple[Conditions | None, bool]]:
+def _answers_into(selection: Selection, key: Key) -> dict[Key, tuple[Conditions | None, bool]]:
     """Return the conditions, and whether it is required, of each arrow from outside to a chosen
     action."""
     ways = (r for r in selection.into if r.child == key)
@@ -203,15 +203,15 @@ def ends_within(selection: Selection, *, closing: bool, gives: bool) -> dict[Key
     free = [o for o in OUTCOMES if not any(selection.answers(key, o) for key in selection.chosen)]
     found: dict[Key, Conditions] = {}
     for key in selection.chosen:
-        said: dict[str, Response] = {}
+        conditions: dict[str, Response] = {}
         for outcome in PRECONDITIONS:
             answers = set(selection.answers(key, outcome).values())
             if answers:
-                said[outcome] = "bypass" if answers == {"bypass"} else "run"
+                conditions[outcome] = "bypass" if answers == {"bypass"} else "run"
             elif closing and outcome in free and not selection.goes_on(key, outcome):
-                said[outcome] = "bypass" if gives or outcome == "on_error" else "run"
-        if said:
-            found[key] = Conditions(**said)
+                conditions[outcome] = "bypass" if gives or outcome == "on_error" else "run"
+        if conditions:
+            found[key] = Conditions(**conditions)
     return found
 
 
@@ -380,10 +380,10 @@ def _with_values(
 
 def middle_of(places: Iterator[Position | None]) -> Position | None:
     """Return the middle of the area that these positions cover; None if there is none."""
-    there = [place for place in places if place is not None]
-    if not there:
+    known = [place for place in places if place is not None]
+    if not known:
         return None
-    xs, ys = [x for x, _ in there], [y for _, y in there]
+    xs, ys = [x for x, _ in known], [y for _, y in known]
     return (min(xs) + max(xs)) / 2, (min(ys) + max(ys)) / 2
 
 
@@ -461,9 +461,9 @@ def _out_remap(
     return ()
 
 
-def _answers_with_values(said: Conditions) -> bool:
+def _answers_with_values(conditions: Conditions) -> bool:
     return bool({"run", "restart", "stop", "pause"} & {
-        said.on_true, said.on_false, said.on_error, said.on_stopped
+        conditions.on_true, conditions.on_false, conditions.on_error, conditions.on_stopped
     })  # fmt: skip
 
 

@@ -73,9 +73,9 @@ def _relations(graph: Graph) -> Iterator[FlatteningReason]:
         if child is None:
             continue
         at = (HierarchyLevel(graph.name, child.key, child.full_name),)
-        said = relation.conditions
+        conditions = relation.conditions
         if relation.parent != ENTRY and {"stop", "pause"} & {
-            said.on_true, said.on_false, said.on_error, said.on_stopped
+            conditions.on_true, conditions.on_false, conditions.on_error, conditions.on_stopped
         }:  # fmt: skip
             yield FlatteningReason(
                 "stops", "It can be told to stop or to pause; how that ends is not looked at.", at
@@ -147,7 +147,7 @@ MOST: Final = 5_000
 REASONS: Final = 100
 #: The most levels below each other.
 DEEPEST: Final = 32
-_SAID: Final = 1_000_000_000  # a larger number of actions is not given exactly in a message
+_COUNTED: Final = 1_000_000_000  # a larger number of actions is not given exactly in a message
 
 
 class FlatOrigin(msgspec.Struct, frozen=True):
@@ -199,8 +199,8 @@ def flattened(
         return Flattened(graph, tuple(_plain(graph)))
     actions = hierarchy.actions_of(graph)
     if actions > MOST:
-        said = f"{actions:,}" if actions <= _SAID else f"more than {_SAID:,}"
-        message = f"One graph would have {said} actions; {MOST:,} are the most."
+        count = f"{actions:,}" if actions <= _COUNTED else f"more than {_COUNTED:,}"
+        message = f"One graph would have {count} actions; {MOST:,} are the most."
         return _unflattenable([FlatteningReason("too-large", message)])
     found = hierarchy.level(graph, ())
     actors = {*hierarchy.actors, *(action.actor for action in graph.actions)} - {""}

@@ -55,12 +55,12 @@ class Drawing:
         """Return whether an action of the sub-graph would overlap something around it."""
         if self._at is None:
             return False
-        there = [a.position for a in around.actions if a.key != action.key]
-        there += [around.entry_position, around.exit_position]
+        others = [a.position for a in around.actions if a.key != action.key]
+        others += [around.entry_position, around.exit_position]
         own = [self._inner(place) for place in self._places.values()]
         return any(
             abs(x - place[0]) < WIDE and abs(y - place[1]) < HIGH
-            for place in there
+            for place in others
             if place is not None
             for x, y in own
         )
@@ -202,8 +202,8 @@ def inlined(
     even where there is room.
     """
     action = next(a for a in around.actions if a.key == own)
-    there = {a.key for a in around.actions}
-    keys = {a.key: _fresh(there, f"{own}/{a.key}") for a in inside.actions}
+    taken = {a.key for a in around.actions}
+    keys = {a.key: _fresh(taken, f"{own}/{a.key}") for a in inside.actions}
     drawing = Drawing(around, action, inside, room)
     actions = [found.entries.get(a.key, a) for a in inside.actions]
     moved = [
@@ -243,14 +243,14 @@ def under_keys(graph: Graph, keys: Mapping[Key, Key]) -> Graph:
 
 def identity(parts: Iterable[str], taken: Iterable[str]) -> str:
     """Return twelve letters and digits that depend only on these texts and are not `taken`."""
-    there, text = set(taken), "\x1f".join(parts)
-    while (found := sha256(text.encode()).hexdigest()[:12]) in there:
+    used, text = set(taken), "\x1f".join(parts)
+    while (found := sha256(text.encode()).hexdigest()[:12]) in used:
         text += "\x1f"
     return found
 
 
-def _fresh(there: set[Key], key: Key) -> Key:
-    while key in there or key in (ENTRY, EXIT):
+def _fresh(taken: set[Key], key: Key) -> Key:
+    while key in taken or key in (ENTRY, EXIT):
         key += "/"
     return key
 

@@ -88,7 +88,7 @@ def _kind(exits: Sequence[Relation]) -> str:
 def _required(relation: Relation, exits: Sequence[Relation], kind: str, *, is_only: bool) -> bool:
     """Return whether the child of a sub-graph waits for each of the actions that stand for it.
     Raises `JoinRefused`."""
-    told = {relation.conditions.answer(end) for end in OUTCOMES}
+    answers = {relation.conditions.answer(end) for end in OUTCOMES}
     if kind == "any":
         if relation.required and not is_only:
             refuse(
@@ -101,7 +101,7 @@ def _required(relation: Relation, exits: Sequence[Relation], kind: str, *, is_on
         return relation.required
     if not relation.required and not is_only:
         refuse("exits", "Its exit waits for several actions; what follows does not for it.")
-    if not told <= (_TO_EXIT if relation.child == EXIT else {"run", "ignore"}):
+    if not answers <= (_TO_EXIT if relation.child == EXIT else {"run", "ignore"}):
         refuse("exits", "Its exit waits for several actions, and what follows is not run.")
     return True
 
@@ -150,9 +150,9 @@ def _check_outputs(
 def _check_end(inside: Graph, end: Relation, following: Sequence[Relation]) -> None:
     """Refuse an end without the values that the exit waits for, unless it is an error or nobody is
     handed anything after it."""
-    said = end.conditions
-    empty: list[Precondition] = [o for o in OUTCOMES[:2] if said.answer(o) == "bypass"]
-    empty += ["on_error"] if said.on_error not in ("bypass", "ignore") else []
+    conditions = end.conditions
+    empty: list[Precondition] = [o for o in OUTCOMES[:2] if conditions.answer(o) == "bypass"]
+    empty += ["on_error"] if conditions.on_error not in ("bypass", "ignore") else []
     if any(r.conditions.answer(o) not in ("ignore", "bypass") for o in empty for r in following):
         refuse(
             "outputs", "It gives values, and can end without them: by a bypass, or with an error."

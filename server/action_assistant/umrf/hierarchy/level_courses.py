@@ -75,14 +75,14 @@ class _LevelInstant(Instant):
         "crossing",
         "finished",
         "lacking",
-        "told",
+        "noted",
     )
 
     def __init__(self, net: Network, moment: _LevelState, watched: int) -> None:
         super().__init__(net, moment.states.__getitem__, 0.0, moment.running, moment.active)
         self._watched = watched
         self.begun = moment.begun
-        self.told: list[tuple[TroubleKind, int]] = []
+        self.noted: list[tuple[TroubleKind, int]] = []
         self.lacking = 0
         self.beside = False
         self.bypassed: list[tuple[int, Precondition]] = []
@@ -106,18 +106,18 @@ class _LevelInstant(Instant):
             return ignored
         if child == self._net.exit:
             if self.end is None and not self._net.needs[child] & ~self._state(child).links:
-                self.told.append(("unready", child))
+                self.noted.append(("unready", child))
             return ignored
         if not self._watched >> child & 1:
             return ignored
         bit = 1 << child
         if self.begun & bit:
-            self.told.append(("again", child))
+            self.noted.append(("again", child))
         elif response == "bypass":
             self.begun |= bit
             self.bypassed.append((child, result))
         elif response != "run":
-            self.told.append(("response", child))
+            self.noted.append(("response", child))
         elif self._state(child).does == RUNS:
             self.begun |= bit
         elif not self._net.needs[child] & ~self._state(child).links:
@@ -159,7 +159,7 @@ def level_courses(
     `is_top`: the results of the graph itself need not be known.
     """
     search = _Courses(graph, inside, is_top=is_top)
-    search.look(budget)
+    search.run(budget)
     return LevelCourses(
         frozenset(search.results),
         tuple(search.troubles.values()),
@@ -179,7 +179,7 @@ class _Courses:
         self.key = {net.index[action.full_name]: action.key for action in graph.actions}
         self.watched = sum(1 << index for index, key in self.key.items() if key in inside)
         self.ends = [
-            self._telling(index, inside.get(self.key[index], frozenset(OUTCOMES)), is_top=is_top)
+            self._results_of(index, inside.get(self.key[index], frozenset(OUTCOMES)), is_top=is_top)
             for index in range(len(net.nodes))
         ]
         self.results: set[Precondition] = set()
@@ -188,7 +188,7 @@ class _Courses:
         self.bypassed: dict[Key, set[Precondition]] = {}
         self.spent = 0
 
-    def _telling(
+    def _results_of(
         self, index: int, results: frozenset[Precondition], *, is_top: bool
     ) -> list[Precondition]:
         """Return the results of an action that can make a difference.
@@ -196,36 +196,36 @@ class _Courses:
         A failed action gives no outputs and may begin again, and a bypass or an inner exit passes
         the result itself on.
         """
-        told = [edge for edge in self.net.edges[index] if edge is not None]
-        ending = any(edge.child == self.net.exit for edge in told) and not is_top
-        if ending or any("bypass" in edge.responses.values() for edge in told):
+        edges = [edge for edge in self.net.edges[index] if edge is not None]
+        ending = any(edge.child == self.net.exit for edge in edges) and not is_top
+        if ending or any("bypass" in edge.responses.values() for edge in edges):
             return [result for result in OUTCOMES if result in results]
-        gives = bool(self.net.nodes[index].outputs) or any(e.child == index for e in told)
+        gives = bool(self.net.nodes[index].outputs) or any(e.child == index for e in edges)
         found: dict[tuple[object, ...], Precondition] = {}
         for result in OUTCOMES:
             if result in results:
-                answers = tuple(edge.responses[result] for edge in told)
+                answers = tuple(edge.responses[result] for edge in edges)
                 found.setdefault((gives and result == "on_error", *answers), result)
         return list(found.values())
 
-    def look(self, budget: int) -> None:
+    def run(self, budget: int) -> None:
         """Follow all courses until the budget is used up."""
         net = self.net
         first = _LevelState(tuple(State(has=has) for has in net.has), 0, 0, 0)
         instant = _LevelInstant(net, first, self.watched)
         instant.begin()
-        open_ = [then] if (then := self._seen(instant, first, -1, "")) is not None else []
+        open_ = [then] if (then := self._after(instant, first, -1, "")) is not None else []
         known = set(open_)
         while open_:
             moment = open_.pop()
             for index, result in self._ends(moment):
                 self.spent += len(moment.states)
                 if self.spent > budget:
-                    self._tell(Trouble("undecided"))
+                    self._note(Trouble("undecided"))
                     return
                 instant = _LevelInstant(net, moment, self.watched)
                 instant.ends(index, result)
-                then = self._seen(instant, moment, index, result)
+                then = self._after(instant, moment, index, result)
                 if then is not None and then not in known:
                     known.add(then)
                     open_.append(then)
@@ -235,20 +235,20 @@ class _Courses:
             if state.does == RUNS:
                 yield from ((index, result) for result in self.ends[index])
 
-    def _tell(self, trouble: Trouble) -> None:
+    def _note(self, trouble: Trouble) -> None:
         self.troubles.setdefault((trouble.kind, trouble.action), trouble)
 
-    def _seen(
+    def _after(
         self, instant: _LevelInstant, before: _LevelState, index: int, result: str
     ) -> _LevelState | None:
         """Record the events of an instant, and return the state after it if the graph continues."""
         by = self.net.names[index] if index >= 0 else ""
-        for kind, child in instant.told:
-            self._tell(Trouble(kind, self.key.get(child), by, result))
+        for kind, child in instant.noted:
+            self._note(Trouble(kind, self.key.get(child), by, result))
         for child, outcome in instant.bypassed:
             self.bypassed.setdefault(self.key[child], set()).add(outcome)
             if instant.crossing:
-                self._tell(Trouble("crossing", self.key[child], by, result))
+                self._note(Trouble("crossing", self.key[child], by, result))
         self.lacking |= instant.lacking
         then = instant.after(before)
         match instant.end:
@@ -256,13 +256,13 @@ class _Courses:
                 self._finished(instant, then, by, result, index)
                 return None
             case "halted":
-                self._tell(Trouble("halts", None, by, result))
+                self._note(Trouble("halts", None, by, result))
                 return None
             case "crashed" | "locked":
-                self._tell(Trouble("crash", None, by, result))
+                self._note(Trouble("crash", None, by, result))
                 return None
             case None if not any(state.does == RUNS for state in then.states):
-                self._tell(Trouble("waits", None, by, result))
+                self._note(Trouble("waits", None, by, result))
                 return None
             case _:
                 return then
@@ -273,9 +273,9 @@ class _Courses:
         if instant.finished is not None:
             self.results.add(instant.finished)
         if instant.early:
-            self._tell(Trouble("early", None, by, result))
+            self._note(Trouble("early", None, by, result))
         if instant.beside:
-            self._tell(Trouble("beside", None, by, result))
+            self._note(Trouble("beside", None, by, result))
         for other in nodes_in(self.watched):
             if other != index and then.states[other].does == RUNS:
-                self._tell(Trouble("ends", self.key[other], by, result))
+                self._note(Trouble("ends", self.key[other], by, result))

@@ -53,8 +53,8 @@ def unpacked(graph: Graph, key: Key, inside: Graph) -> Unpacking:
         return Unpackable(reasons or (empty,))
     place = joined(SubGraphPlace(graph, action, inside, frozenset(), False, frozenset()))
     if not isinstance(place, JoinedPlace):
-        told = (FlatteningReason(each.code, each.message, _at(graph, action)) for each in place)
-        return Unpackable(tuple(dict.fromkeys((*told, *reasons))))
+        against = (FlatteningReason(each.code, each.message, _at(graph, action)) for each in place)
+        return Unpackable(tuple(dict.fromkeys((*against, *reasons))))
     kept = {a.full_name for a in graph.actions if a.key != key}
     found = inlined(graph, key, inside, place, kept, room="needed")
     taken = {a.key for a in graph.actions}

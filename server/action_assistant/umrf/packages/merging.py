@@ -133,7 +133,7 @@ def _taken_over(base: _Lines, ours: _Lines, theirs: _Lines) -> bool:
     """Return whether `ours` has everything that `theirs` changed and differs only elsewhere: a
     person merged it by hand."""
     new = [
-        (_said(base[start:end]) > _said(theirs[first:last]), first, last)
+        (_text_lines(base[start:end]) > _text_lines(theirs[first:last]), first, last)
         for _, start, end, first, last in _edits(base, theirs)
     ]
     own = [(first, last) for _, first, last, _, _ in _edits(theirs, ours)]
@@ -145,6 +145,6 @@ def _taken_over(base: _Lines, ours: _Lines, theirs: _Lines) -> bool:
     )
 
 
-def _said(lines: _Lines) -> int:
+def _text_lines(lines: _Lines) -> int:
     """Return how many lines are not blank."""
     return sum(1 for line in lines if line.strip())

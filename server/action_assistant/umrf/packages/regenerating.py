@@ -136,8 +136,8 @@ def readable_paths(
 ) -> tuple[str, ...]:
     """Return the paths whose contents `regenerated` has to know."""
     known = base or GenerationBase()
-    told = (*known.files, *known.unfinished)
-    return tuple(sorted({*now, *(path for path in told if _is_possible(package, now, path))}))
+    named = (*known.files, *known.unfinished)
+    return tuple(sorted({*now, *(path for path in named if _is_possible(package, now, path))}))
 
 
 def _is_possible(package: str, now: Mapping[str, bytes], path: str) -> bool:

@@ -466,16 +466,16 @@ class Core(Clock):
                 self._stop_node(graph, other)
         self._wait(lambda: any(n.active for n in linked), self.facts.stop_poll_ms, then)
 
-    def _wait(self, going: Callable[[], bool], poll_ms: int, then: Task) -> None:
+    def _wait(self, is_active: Callable[[], bool], poll_ms: int, then: Task) -> None:
         """Call `then` once `going` returns False; it is asked every `poll_ms`."""
 
-        def look() -> None:
-            if going():
-                self._at(self.now + poll_ms, look)
+        def poll() -> None:
+            if is_active():
+                self._at(self.now + poll_ms, poll)
             else:
                 then()
 
-        self._at(self.now + poll_ms, look)
+        self._at(self.now + poll_ms, poll)
 
     def _pause_by_response(self, graph: Running, node: Node) -> None:
         if not self._pause_node(graph, node):

@@ -195,10 +195,10 @@ class Graphs(Core):
             finally:
                 self._free()
 
-        def going() -> bool:
+        def is_active() -> bool:
             return any(node.holds_thread(self.now) for node in left_over)
 
-        self._wait(going, self.facts.stop_poll_ms, then)
+        self._wait(is_active, self.facts.stop_poll_ms, then)
 
     def _begin_graph(self, graph: Running) -> None:
         self.graphs[graph.name] = graph

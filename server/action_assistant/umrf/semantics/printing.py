@@ -92,8 +92,8 @@ class GraphPrinter:
         if children:
             fields["children"] = [_child(edge.label, _renamed(edge, True)) for edge in children]
         if messages:
-            said = [{"message": text, "timestamp": at} for at, text in messages]
-            fields["runtime"] = {"messages": said}
+            printed = [{"message": text, "timestamp": at} for at, text in messages]
+            fields["runtime"] = {"messages": printed}
         return fields
 
 
@@ -132,8 +132,10 @@ def _name(full_name: str) -> dict[str, Any]:
 def _parent(full_name: str, link: NodeLink, with_conditions: bool) -> dict[str, Any]:
     fields = _name(full_name) | {"required": link.required}
     if with_conditions:
-        said = link.conditions
-        fields["conditions"] = [f"{outcome} -> {getattr(said, outcome)}" for outcome in _LISTED]
+        conditions = link.conditions
+        fields["conditions"] = [
+            f"{outcome} -> {getattr(conditions, outcome)}" for outcome in _LISTED
+        ]
     return fields
 
 

@@ -103,7 +103,7 @@ def unnamed(steps: Sequence[ExpectedStep]) -> list[ExpectedStep]:
 _WORDS: Final = {"result": "ends", "runs": "is told to", "state": "is", "hazard": "does"}
 
 
-def said(step: ExpectedStep | None) -> str:
+def step_text(step: ExpectedStep | None) -> str:
     """Return a step in words."""
     if step is None:
         return "the end"
