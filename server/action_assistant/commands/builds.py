@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import msgspec
 
-from action_assistant.commands.client import No, add_server, refused, running
+from action_assistant.commands.client import RequestRefused, add_server, refused, running
 from action_assistant.errors import CannotStart
 from action_assistant.ros_workspace import source_of
 from action_assistant.safe_text import one_line
@@ -155,7 +155,7 @@ def _builds(options: argparse.Namespace) -> int:
                     continue
                 path = f"/api/actions/{document}/build"
                 server.editor("PUT", path, content=msgspec.json.encode(_body(each)))
-        except No as error:
+        except RequestRefused as error:
             return refused(error)
     return 0 if all(each.build.ended_well for each in found) else 1
 

@@ -84,7 +84,7 @@ class Server:
         if not named and _MADE_ID.fullmatch(asked):  # drafts stand in no list
             return str(self.editor("GET", f"/api/graphs/{asked}").json()["id"])
         if len(named) != 1:
-            raise No(
+            raise RequestRefused(
                 f"No graph is called {asked!r}."
                 if not named
                 else f"{len(named)} graphs are called {asked!r}; name one by id: {', '.join(named)}."
@@ -93,7 +93,7 @@ class Server:
         return found
 
 
-class No(Exception):
+class RequestRefused(Exception):
     """The answer is no; `status` is that of HTTP, 0 where nobody was asked."""
 
     def __init__(self, why: str, status: int = 0) -> None:
@@ -112,7 +112,7 @@ def _asked(client: "httpx.Client", method: str, path: str, **body: Any) -> "http
             "Is it running? Start it with `action-assistant serve`."
         ) from error
     if answer.is_error:
-        raise No(sentence(answer), answer.status_code)
+        raise RequestRefused(sentence(answer), answer.status_code)
     return answer
 
 
@@ -181,6 +181,6 @@ def print_json(value: object) -> None:
     sys.stdout.write(msgspec.json.format(msgspec.json.encode(value)).decode() + "\n")
 
 
-def refused(error: No) -> int:
+def refused(error: RequestRefused) -> int:
     print(f"action-assistant: {error}", file=sys.stderr)
     return 1

@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 
 import msgspec
 
-from action_assistant.commands.client import No, Server, add_server, refused, running
+from action_assistant.commands.client import RequestRefused, Server, add_server, refused, running
 from action_assistant.commands.files import file_text, refusal
 from action_assistant.errors import CannotStart
 from action_assistant.safe_text import one_line
@@ -54,7 +54,7 @@ def _diff(options: argparse.Namespace) -> int:
         else:
             with running(options) as server:
                 found = _on_server(server, given)
-    except No as error:
+    except RequestRefused as error:
         return refused(error) + 1  # 1 is for what differs
     if options.without_looks:
         found = without_looks(found)
@@ -84,11 +84,11 @@ def _place(server: Server, asked: str) -> _Moment | _Version:
         if at and seq.isdecimal():
             return _Moment(server.graph_id(name), int(seq))
         return _Moment(server.graph_id(asked), None)
-    except No:
+    except RequestRefused:
         try:
             answer = server.editor("GET", f"/api/versions/{asked}")
-        except No:
-            raise No(f"{asked!r} is no file, no graph and no version.") from None
+        except RequestRefused:
+            raise RequestRefused(f"{asked!r} is no file, no graph and no version.") from None
         return msgspec.json.decode(answer.content, type=_Version)
 
 

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, Final
 
 from action_assistant.commands.client import (
-    No,
+    RequestRefused,
     Server,
     command,
     decoded,
@@ -72,7 +72,7 @@ def _list(options: argparse.Namespace) -> int:
         try:
             graph = server.graph_id(options.graph)
             answer = server.editor("GET", f"/api/graphs/{graph}/drafts")
-        except No as error:
+        except RequestRefused as error:
             return refused(error)
     if options.json:
         print_json(answer.json())
@@ -93,7 +93,7 @@ def _new(options: argparse.Namespace) -> int:
         try:
             graph = server.graph_id(options.graph)
             answer = server.editor("POST", f"/api/graphs/{graph}/drafts", json=wanted)
-        except No as error:
+        except RequestRefused as error:
             return refused(error)
     print(decoded(answer, DraftView).id)
     return 0
@@ -117,7 +117,7 @@ def _merge(options: argparse.Namespace) -> int:
             if options.look or left:
                 return 1 if left else 0
             return _merged(server, below, preview, asked)
-        except No as error:
+        except RequestRefused as error:
             return refused(error)
 
 

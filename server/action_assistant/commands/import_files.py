@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
-from action_assistant.commands.client import No, Server, add_server, refused, running
+from action_assistant.commands.client import RequestRefused, Server, add_server, refused, running
 from action_assistant.errors import CannotStart
 from action_assistant.safe_text import one_line
 from action_assistant.umrf.files import codec
@@ -68,7 +68,7 @@ class _Bringing:
             found = True
             self.file(path, of_folder=True)
         if not found:
-            self.code = refused(No(f"{folder}: has no file of an action (*{_ENDING})."))
+            self.code = refused(RequestRefused(f"{folder}: has no file of an action (*{_ENDING})."))
 
     def file(self, path: Path, *, of_folder: bool = False) -> None:
         body = _bytes(path)
@@ -84,8 +84,8 @@ class _Bringing:
             else:
                 made = self._server.editor("POST", "/api/graphs", content=body, headers=_JSON)
                 _tell(made.json()["id"], made.json()["name"])
-        except No as error:
-            self.code = refused(No(f"{path}: {error}"))
+        except RequestRefused as error:
+            self.code = refused(RequestRefused(f"{path}: {error}"))
 
     def _action(self, path: Path, body: bytes) -> None:
         documents = self._known()
@@ -96,7 +96,9 @@ class _Bringing:
             self._server.editor("POST", "/api/actions", content=body, headers=_JSON)
             return
         if action.name in self._brought:
-            raise No(f"{action.name} was read from {self._brought[action.name]} already.")
+            raise RequestRefused(
+                f"{action.name} was read from {self._brought[action.name]} already."
+            )
         self._brought[action.name] = path
         document = documents.get(action.name)
         if document is None:
@@ -112,7 +114,7 @@ class _Bringing:
             self._server.editor("PUT", path_of, content=body, headers=_JSON)
             _tell(document, f"{action.name}  (updated)")
         else:
-            raise No(
+            raise RequestRefused(
                 f"{action.name} is in the library, and differs. --update makes it what this file says."
             )
 

@@ -4,7 +4,7 @@ import argparse
 from typing import Any, Final
 
 from action_assistant.commands.client import (
-    No,
+    RequestRefused,
     Server,
     add_server,
     command,
@@ -55,7 +55,7 @@ def _list(options: argparse.Namespace) -> int:
     with running(options) as server:
         try:
             sharing = server.editor("GET", "/api/invitations").json()
-        except No as error:
+        except RequestRefused as error:
             return refused(error)
         if options.json:
             print_json(sharing)
@@ -71,7 +71,7 @@ def _invite(options: argparse.Namespace) -> int:
             wanted = {"role": options.role, "label": options.label}
             made = server.editor("POST", "/api/invitations", json=wanted).json()
             _show(server.editor("GET", "/api/invitations").json()["origins"], made)
-        except No as error:
+        except RequestRefused as error:
             return refused(error)
     return 0
 
@@ -103,7 +103,7 @@ def _revoke(options: argparse.Namespace) -> int:
             raise CannotStart(f"{silent} {error}") from error
         print("No server answers; the link is marked as revoked in the data folder.")
         return 0
-    except No as error:
+    except RequestRefused as error:
         return refused(error)
 
 
@@ -111,9 +111,11 @@ def _revoke_at(server: Server, invitation: str) -> int:
     gone = server.editor("POST", f"/api/invitations/{invitation}/revoke").json()
     try:
         server.runner("POST", "/api/revocations", json={"invitation": invitation})
-    except (No, CannotStart) as error:
+    except (RequestRefused, CannotStart) as error:
         return refused(
-            No(f"Revoked, but a runner with a data folder of its own has not been told: {error}")
+            RequestRefused(
+                f"Revoked, but a runner with a data folder of its own has not been told: {error}"
+            )
         )
     print(f"{gone['id']}  {gone['role']} is revoked; {len(gone['guests'])} came in by it.")
     if gone.get("unrecorded"):
@@ -127,7 +129,7 @@ def _link(options: argparse.Namespace) -> int:
     with running(options) as server:
         try:
             sharing = server.editor("GET", "/api/invitations").json()
-        except No as error:
+        except RequestRefused as error:
             return refused(error)
     public = sharing["origins"][:1] if sharing.get("proxied") else []
     token = Keys.known(options.data.resolve()).token

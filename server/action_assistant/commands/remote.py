@@ -10,7 +10,7 @@ from typing import Any, Final, TypeAlias
 import msgspec
 
 from action_assistant.commands.client import (
-    No,
+    RequestRefused,
     Server,
     add_server,
     command,
@@ -26,7 +26,7 @@ from action_assistant.safe_text import one_line, told
 _ENDED: Final = frozenset({"finished", "halted", "stopped", "error", "refused", "lost"})
 _POLL: Final = 0.2  # seconds
 _INSIST_S: Final = 5.0
-_LOOK: Final = "Look at the robot; use its hardware stop."
+_LOOK_AT_ROBOT: Final = "Look at the robot; use its hardware stop."
 
 Run: TypeAlias = dict[str, Any]
 
@@ -117,7 +117,7 @@ def _export(options: argparse.Namespace) -> int:
             graph = server.graph_id(options.graph)
             query = {"at": options.at} if options.at is not None else {}
             answer = server.editor("GET", f"/api/graphs/{graph}/umrf", params=query)
-        except No as error:
+        except RequestRefused as error:
             return refused(error)
         sys.stdout.write(answer.text if answer.text.endswith("\n") else answer.text + "\n")
     return 0
@@ -144,7 +144,7 @@ def _examples(options: argparse.Namespace) -> int:
     with running(options) as server:
         try:
             taken = server.runner("POST", "/api/examples").json()
-        except No as error:
+        except RequestRefused as error:
             return refused(error)
     print(f"{len(taken)} examples are there, with the label “example”.")
     return 0
@@ -155,7 +155,7 @@ def _runs(options: argparse.Namespace) -> int:
         try:
             query = {"graph": server.graph_id(options.graph)} if options.graph else {}
             runs = server.runner("GET", "/api/runs", params=query).json()
-        except No as error:
+        except RequestRefused as error:
             return refused(error)
     if options.json:
         print_json(runs)
@@ -194,7 +194,7 @@ def _run(options: argparse.Namespace) -> int:
             run = server.runner("POST", "/api/runs", json=order).json()
             print(run["id"], flush=True)
             return 0 if options.no_wait else _watch(server, run["id"])
-        except No as error:
+        except RequestRefused as error:
             return refused(error)
 
 
@@ -230,7 +230,7 @@ def _at_rest(options: argparse.Namespace) -> int:
         try:
             path = f"/api/runs/{options.run}/at_rest"
             run = server.runner("POST", path, json={"how": options.how}).json()
-        except No as error:
+        except RequestRefused as error:
             return refused(error)
     print(one_line(f"run {run['number']} of {run['graph_name']} is over: {run['state']}"))
     return 0
@@ -277,10 +277,10 @@ def _stop(options: argparse.Namespace) -> int:
                 if (settled and not graphs) or time.monotonic() > deadline:
                     break
                 time.sleep(_POLL)
-        except No as error:
+        except RequestRefused as error:
             return refused(error)
     doubts = [_unconfirmed(run) for run in runs if not _is_at_rest(run)]
-    doubts += [f"STOP UNCONFIRMED for {each}. {_LOOK}" for each in graphs]
+    doubts += [f"STOP UNCONFIRMED for {each}. {_LOOK_AT_ROBOT}" for each in graphs]
     doubts += [
         f"NOT KNOWN what {each} runs: {why}" for each, why in asked.get("unknown", {}).items()
     ]
@@ -293,7 +293,7 @@ def _stop(options: argparse.Namespace) -> int:
 
 def _unconfirmed(run: Run) -> str:
     said = f"STOP UNCONFIRMED for run {run['number']} of {run['graph_name']}: it is {run['state']}."
-    return f"{said} {_why(run)}{_LOOK}"
+    return f"{said} {_why(run)}{_LOOK_AT_ROBOT}"
 
 
 def _unproven(stopped: dict[str, list[str]], robots: list[dict[str, Any]]) -> list[str]:

@@ -7,7 +7,14 @@ from urllib.parse import quote
 
 import msgspec
 
-from action_assistant.commands.client import No, command, decoded, print_json, refused, running
+from action_assistant.commands.client import (
+    RequestRefused,
+    command,
+    decoded,
+    print_json,
+    refused,
+    running,
+)
 from action_assistant.errors import CannotStart
 from action_assistant.safe_text import one_line
 from action_assistant.umrf.facts import SECOND_PERSON
@@ -64,7 +71,7 @@ def _list(options: argparse.Namespace) -> int:
     with running(options) as server:
         try:
             answer = server.runner("GET", "/api/robots")
-        except No as error:
+        except RequestRefused as error:
             return refused(error)
     if options.json:
         print_json(answer.json())
@@ -92,10 +99,12 @@ def _add(options: argparse.Namespace) -> int:
             robots = decoded(server.runner("GET", "/api/robots"), list[Robot])
             if options.name in {each.name for each in robots} and not options.replace:
                 return refused(
-                    No(f"{options.name} is registered already. --replace registers it anew.")
+                    RequestRefused(
+                        f"{options.name} is registered already. --replace registers it anew."
+                    )
                 )
             print(_line(decoded(server.runner("POST", "/api/robots", json=wanted), Robot)))
-        except No as error:
+        except RequestRefused as error:
             return refused(error)
     return 0
 
@@ -104,7 +113,7 @@ def _remove(options: argparse.Namespace) -> int:
     with running(options) as server:
         try:
             server.runner("DELETE", f"/api/robots/{quote(options.name, safe='')}")
-        except No as error:
+        except RequestRefused as error:
             return refused(error)
     print(one_line(f"{options.name} is not registered any more"))
     return 0

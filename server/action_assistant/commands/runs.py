@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from action_assistant import paths, settings
 from action_assistant.commands.client import (
-    No,
+    RequestRefused,
     Server,
     command,
     decoded,
@@ -56,7 +56,7 @@ def _since(options: argparse.Namespace) -> int:
             answer = server.editor("POST", f"/api/graphs/{graph}/since", json=asked)
             query = {"from": good, "to": bad}
             edits = server.editor("GET", f"/api/graphs/{graph}/diff", params=query)
-        except No as error:
+        except RequestRefused as error:
             return refused(error)
     from action_assistant.editor.history.since_when import SinceWhen
 
@@ -71,7 +71,7 @@ def _since(options: argparse.Namespace) -> int:
 def _seq(server: Server, run: dict[str, Any]) -> int:
     """The change of the graph that a run had. Raises No."""
     if run["graph"] is None or run["version"] is None:
-        raise No("This run is of no version of a graph here.")
+        raise RequestRefused("This run is of no version of a graph here.")
     version = server.editor("GET", f"/api/versions/{run['version']}").json()
     seq: int = version["seq"]
     return seq
@@ -84,7 +84,7 @@ def _last_good(server: Server, run: dict[str, Any]) -> int:
         went_well = each["state"] == "finished" and each["result"] in {None, "on_true"}
         if each["number"] < run["number"] and went_well and each["version"] is not None:
             return _seq(server, each)
-    raise No("No run before it went well; name a change of the graph with --good.")
+    raise RequestRefused("No run before it went well; name a change of the graph with --good.")
 
 
 def _print_partings(found: "SinceWhen", difference: Difference) -> None:
@@ -146,7 +146,7 @@ def _archive(options: argparse.Namespace) -> int:
     with running(options) as server:
         try:
             return _sweep(server, {"runs": options.runs, "raw": options.raw})
-        except No as error:
+        except RequestRefused as error:
             return refused(error)
 
 
@@ -194,7 +194,7 @@ def _restore(options: argparse.Namespace) -> int:
             archive_file.put(path, folder / place)
         except (Refused, OSError) as error:
             text = error.detail if isinstance(error, Refused) else f"{path}: {error.strerror}"
-            code = refused(No(text))
+            code = refused(RequestRefused(text))
             continue
         print(f"{place}: {events} events, all of them sound")
     return code

@@ -6,7 +6,7 @@ from typing import Literal
 
 import msgspec
 
-from action_assistant.commands.client import No, Server, print_json, refused, running
+from action_assistant.commands.client import RequestRefused, Server, print_json, refused, running
 from action_assistant.runner.analysis.expected_runs import Expectation
 from action_assistant.safe_text import one_line, told
 from action_assistant.umrf.courses.expected import check_expected
@@ -33,7 +33,7 @@ def verify(options: argparse.Namespace) -> int:
     with running(options) as server:
         try:
             verdicts = list(_verdicts(server, options))
-        except No as error:
+        except RequestRefused as error:
             return refused(error)
     if options.json:
         print_json(msgspec.to_builtins(verdicts))
@@ -63,7 +63,7 @@ def _now(server: Server, each: Expectation, graph: str) -> VerifyVerdict:
     """Against the graph as it is now. One that is gone cannot be asked any more."""
     try:
         umrf = server.editor("GET", f"/api/graphs/{graph}/umrf").content
-    except No as error:
+    except RequestRefused as error:
         return VerifyVerdict(
             name=each.name, run=each.run, against="now", same=False, why=str(error)
         )

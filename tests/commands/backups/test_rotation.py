@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from action_assistant.commands.backups.options import keeping, name_at, superfluous
+from action_assistant.commands.backups.options import name_at, parse_retention, superfluous
 
 NOW = datetime(2026, 11, 24, 12, tzinfo=UTC)
 
@@ -17,7 +17,7 @@ def paths(*ages: timedelta) -> list[Path]:
 
 
 def left(found: list[Path], rule: str) -> list[Path]:
-    return sorted(set(found) - set(superfluous(found, keeping(rule), NOW)), reverse=True)
+    return sorted(set(found) - set(superfluous(found, parse_retention(rule), NOW)), reverse=True)
 
 
 def test_a_year_of_nights_leaves_seventeen_at_most() -> None:
@@ -50,23 +50,26 @@ def test_nights_without_a_backup_use_up_none_of_those_that_stay() -> None:
 )
 def test_other_files_are_left_alone(name: str) -> None:
     old = [Path("/b") / name, *paths(timedelta(0), timedelta(hours=1))]
-    assert superfluous(old, keeping("1d"), NOW) == old[2:]
+    assert superfluous(old, parse_retention("1d"), NOW) == old[2:]
 
 
 def test_backups_of_a_clock_that_was_wrong_stay_and_none_goes_for_them() -> None:
     of_tomorrow = paths(*(timedelta(days=-n) for n in range(1, 9)))
     nights = paths(*(timedelta(days=n) for n in range(4)))
-    assert superfluous([*of_tomorrow, *nights], keeping("3d"), NOW) == nights[3:]
+    assert superfluous([*of_tomorrow, *nights], parse_retention("3d"), NOW) == nights[3:]
 
 
 def test_all_stay_if_somebody_says_so() -> None:
-    assert superfluous(paths(*(timedelta(hours=n) for n in range(99))), keeping("all"), NOW) == []
+    assert (
+        superfluous(paths(*(timedelta(hours=n) for n in range(99))), parse_retention("all"), NOW)
+        == []
+    )
 
 
 @pytest.mark.parametrize("rule", ["", "0d", "7", "7x", "d", "7d 4w", "-1d"])
 def test_what_is_no_rule_is_refused(rule: str) -> None:
     with pytest.raises(ValueError):
-        keeping(rule)
+        parse_retention(rule)
 
 
 @given(

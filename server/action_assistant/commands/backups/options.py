@@ -19,7 +19,7 @@ _PART: Final = re.compile(r"(\d{1,4})([dwm])")
 DEFAULT: Final = "7d,4w,6m"
 
 
-class Keeping(msgspec.Struct, frozen=True):
+class RetentionRule(msgspec.Struct, frozen=True):
     """A rule of rotation: the numbers of days, weeks and months whose newest backup stays.
 
     With None in all three, every backup stays.
@@ -30,10 +30,10 @@ class Keeping(msgspec.Struct, frozen=True):
     months: int | None = 0
 
 
-def keeping(text: str) -> Keeping:
+def parse_retention(text: str) -> RetentionRule:
     """`7d,4w,6m`, or `all`. Raises ValueError."""
     if text == "all":
-        return Keeping(None, None, None)
+        return RetentionRule(None, None, None)
     counts = {"d": 0, "w": 0, "m": 0}
     for part in text.split(","):
         found = _PART.fullmatch(part.strip())
@@ -42,7 +42,7 @@ def keeping(text: str) -> Keeping:
         counts[found[2]] = int(found[1])
     if not any(counts.values()):
         raise ValueError(text)
-    return Keeping(counts["d"], counts["w"], counts["m"])
+    return RetentionRule(counts["d"], counts["w"], counts["m"])
 
 
 def name_at(moment: datetime) -> str:
@@ -59,7 +59,7 @@ def moment_of(path: Path) -> datetime | None:
         return None
 
 
-def superfluous(paths: Iterable[Path], keep: Keeping, now: datetime) -> list[Path]:
+def superfluous(paths: Iterable[Path], keep: RetentionRule, now: datetime) -> list[Path]:
     """Return the backups that may be deleted.
 
     The newest one always stays. Backups dated after `now` come from a wrong clock: they stay, and
@@ -112,7 +112,7 @@ def span(text: str) -> float:
 def rule(text: str) -> str:
     """Return a rule of how many backups stay, unchanged. Raise ArgumentTypeError for another text."""
     try:
-        keeping(text)
+        parse_retention(text)
     except ValueError as error:
         wrong = f"{text!r} is no rule such as {DEFAULT}, 10d, or all"
         raise argparse.ArgumentTypeError(wrong) from error

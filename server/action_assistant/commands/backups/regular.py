@@ -20,7 +20,12 @@ import msgspec
 from action_assistant.commands.backups.backup_file import FILES, Package
 from action_assistant.commands.backups.data_folder import sweep
 from action_assistant.commands.backups.making import WORK, FinishedBackup, make_backup
-from action_assistant.commands.backups.options import keeping, moment_of, name_at, superfluous
+from action_assistant.commands.backups.options import (
+    moment_of,
+    name_at,
+    parse_retention,
+    superfluous,
+)
 from action_assistant.commands.backups.progress import Progress
 from action_assistant.errors import CannotStart
 from action_assistant.journal.copies import backup_state
@@ -60,7 +65,7 @@ def back_up(plan: RegularBackups, progress: Progress) -> tuple[FinishedBackup, O
             backup_state.made(plan.data, msgspec.structs.replace(done.made, off_site=off_site))
             if not done.made.missing:  # else an older one may have what this one lacks
                 ours = (path for path in plan.into.iterdir() if not _is_anothers(path, done))
-                for path in superfluous(ours, keeping(plan.keep), datetime.now(UTC)):
+                for path in superfluous(ours, parse_retention(plan.keep), datetime.now(UTC)):
                     path.unlink(missing_ok=True)
     except (CannotStart, OSError) as error:
         why = str(error) if isinstance(error, CannotStart) else f"{plan.into}: {error.strerror}."

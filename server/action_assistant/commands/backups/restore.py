@@ -50,7 +50,7 @@ _event: Final = editor_event.c
 _LAST: Final = select(_event.position, _event.chain).order_by(_event.position.desc()).limit(1)
 
 
-class Under(msgspec.Struct, frozen=True):
+class RestoreUnderWay(msgspec.Struct, frozen=True):
     """The restore that is under way, for a later run that continues it.
 
     `sha256` is that of the editor's journal in the backup. `position` and `chain` are the end of
@@ -180,23 +180,23 @@ def _begin(
         raise
 
 
-def _under(mark: Path) -> Under | None:
+def _under(mark: Path) -> RestoreUnderWay | None:
     try:
-        return msgspec.json.decode(mark.read_bytes(), type=Under)
+        return msgspec.json.decode(mark.read_bytes(), type=RestoreUnderWay)
     except FileNotFoundError:
         return None
     except msgspec.DecodeError:
-        return Under("", 0, "")  # cut short by what interrupted it
+        return RestoreUnderWay("", 0, "")  # cut short by what interrupted it
 
 
-def _end_of(folder: Path, about: BackupManifest) -> Under:
+def _end_of(folder: Path, about: BackupManifest) -> RestoreUnderWay:
     if "editor" not in about.journals:
-        return Under("", 0, "")
+        return RestoreUnderWay("", 0, "")
     row = rows_of(folder / "editor.db", _LAST)[0]
-    return Under(about.journals["editor"].sha256, row.position, bytes(row.chain).hex())
+    return RestoreUnderWay(about.journals["editor"].sha256, row.position, bytes(row.chain).hex())
 
 
-def _is_there(url: str, under: Under, about: BackupManifest) -> bool:
+def _is_there(url: str, under: RestoreUnderWay, about: BackupManifest) -> bool:
     """Return whether a database already holds the same backup. Raise CannotStart."""
     if "editor" not in about.journals or under.sha256 != about.journals["editor"].sha256:
         return False

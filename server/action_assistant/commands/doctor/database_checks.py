@@ -242,7 +242,7 @@ def runs_are_there(place: Installation) -> Iterator[Diagnostic]:
         yield fine(file, "There are no runs yet; serve makes the database.")
 
 
-class _DatabaseLook(msgspec.Struct):
+class _DatabaseFindings(msgspec.Struct):
     """The findings of one look into a database."""
 
     damage: str = ""
@@ -264,9 +264,9 @@ def _holds_events(file: Path) -> bool:
 
 def _in_file(what: str, file: Path) -> Iterator[Diagnostic]:
     database = database_of(f"sqlite:///{file}")
-    seen = _DatabaseLook()
+    seen = _DatabaseFindings()
     try:
-        database.look(lambda connection: _look(database, connection, seen))
+        database.look(lambda connection: _examine(database, connection, seen))
     except CannotStart as error:
         yield _refused(file, error)
         return
@@ -276,7 +276,7 @@ def _in_file(what: str, file: Path) -> Iterator[Diagnostic]:
         yield fine(file, f"The database of {what} can be read; its newest events are sound.")
 
 
-def _look(database: Database, connection: Connection, seen: _DatabaseLook) -> None:
+def _examine(database: Database, connection: Connection, seen: _DatabaseFindings) -> None:
     """Into a database of this version or an earlier one. Raises CannotStart for others."""
     if recognize(connection):
         seen.damage = first_damage(database, connection)
@@ -298,7 +298,7 @@ def _refused(where: object, error: CannotStart) -> Diagnostic:
     )
 
 
-def _events(what: str, where: object, seen: _DatabaseLook) -> Iterator[Diagnostic]:
+def _events(what: str, where: object, seen: _DatabaseFindings) -> Iterator[Diagnostic]:
     """Yield the faults of the newest events."""
     if seen.damage:
         yield found(
@@ -365,15 +365,15 @@ def _on_server(data: Path, url: str) -> Iterator[Diagnostic]:
         yield fine(shown, "The database answers, and keeps what it confirms.")
 
 
-async def _asked(database: Database, data: Path) -> _DatabaseLook:
+async def _asked(database: Database, data: Path) -> _DatabaseFindings:
     """Look into a database on a server without changing it. Raise its driver's errors,
     TimeoutError, CannotStart."""
-    seen = _DatabaseLook()
+    seen = _DatabaseFindings()
 
     def question(connection: Connection) -> None:
         seen.weak = weakness(connection)
         seen.lacks = not _holds_mark(connection, data)
-        _look(database, connection, seen)
+        _examine(database, connection, seen)
 
     try:
         with anyio.fail_after(_PATIENCE_S):

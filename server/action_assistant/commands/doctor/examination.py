@@ -55,11 +55,11 @@ def examine(
     """Begin to look at everything, and return what was found in the order of the checks, which run side by
     side: some of them wait for what does not answer."""
     until = time.monotonic() + seconds
-    looks = [_Look(check, place) for check in checks]
-    return (each for look in looks for each in look.seen(until))
+    threads = [_CheckThread(check, place) for check in checks]
+    return (each for thread in threads for each in thread.seen(until))
 
 
-class _Look(threading.Thread):
+class _CheckThread(threading.Thread):
     """Runs one check on a daemon thread."""
 
     def __init__(self, check: Check, place: Installation) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
-from action_assistant.commands.client import No, add_server, refused, running
+from action_assistant.commands.client import RequestRefused, add_server, refused, running
 from action_assistant.commands.packages import workspace
 from action_assistant.commands.packages.folder import write_all
 from action_assistant.commands.packages.planning import PackagesPlan, plan
@@ -178,7 +178,7 @@ def _package(options: argparse.Namespace) -> int:
         place = f"{options.file}:{error.line}:{error.column}"
         print(f"{place}: {error.message}", file=sys.stderr)
         return 1
-    except No as error:
+    except RequestRefused as error:
         return refused(error)
     packages, more = _packages(actions, options.together)
     if refusals := (*refusals, *more):
@@ -216,7 +216,7 @@ def _of_library(options: argparse.Namespace) -> tuple[Action, ...]:
         known = {each["name"]: each["document"] for each in reversed(listed) if each["document"]}
         missing = [name for name in options.name if name not in known]
         if missing:
-            raise No(f"The library has no action {missing[0]!r}.")
+            raise RequestRefused(f"The library has no action {missing[0]!r}.")
         files = [
             server.editor("GET", f"/api/actions/{known[name]}/umrf").text
             for name in dict.fromkeys(options.name)

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from msgspec.structs import replace
 
-from action_assistant.commands.client import No, Server, add_server, running
+from action_assistant.commands.client import RequestRefused, Server, add_server, running
 from action_assistant.commands.directories import why
 from action_assistant.commands.sync.folder import Folder, SyncedFile, sha
 from action_assistant.errors import CannotStart
@@ -126,7 +126,7 @@ class SyncRound:
         """Do what brings one file or graph into step; what is in its way stops no other one."""
         try:
             step(*given)
-        except No as error:
+        except RequestRefused as error:
             self._leave(f"{name}: {error}")
         except OSError as error:
             self._leave(f"{name}: cannot be kept in step: {why(error)}")
@@ -165,7 +165,7 @@ class SyncRound:
             path = f"/api/graphs/{file.graph}/umrf"
             asked = {"params": {"seq": file.seq}, "content": text, "headers": _JSON}
             merged = self._server.editor("PUT", path, **asked).json()
-        except No as error:
+        except RequestRefused as error:
             if error.status != _CONFLICT:
                 raise
             seq, now = self._text(file.graph)
@@ -208,7 +208,7 @@ class SyncRound:
         self._folder.remember(name, SyncedFile("", 0, sha(text)))
         try:
             made = self._server.editor("POST", "/api/graphs", content=text, headers=_JSON).json()
-        except No:
+        except RequestRefused:
             self._folder.forget(name)
             raise
         self._tell(f"{name}: is the graph {made['name']} now")

@@ -20,7 +20,7 @@ from httpx_ws import (
 from pycrdt import Doc, Provider
 from pycrdt.websocket.websocket import HttpxWebsocket
 
-from action_assistant.commands.client import No, reach, refused, running, sentence
+from action_assistant.commands.client import RequestRefused, reach, refused, running, sentence
 from action_assistant.commands.watch.changes import GraphChange, ShownGraph, changes
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.documents import document
@@ -219,7 +219,7 @@ def watch(options: argparse.Namespace) -> int:
         with running(options) as server:
             graph = server.graph_id(options.graph)
         anyio.run(_follow, options, graph)
-    except No as error:
+    except RequestRefused as error:
         return refused(error)
     return 0
 
@@ -283,9 +283,9 @@ def _raise_if_final(why: Exception, *, again: bool) -> None:
     """Raise what coming again does not help against."""
     match why:
         case WebSocketUpgradeError() if why.response.status_code in _FINAL:
-            raise No(sentence(why.response))
+            raise RequestRefused(sentence(why.response))
         case WebSocketDisconnect() if why.code in _CLOSED:
-            raise No(_CLOSED[why.code])
+            raise RequestRefused(_CLOSED[why.code])
         case CannotStart() if again:  # somebody else listens there; our server may come back
             return
         case ExceptionGroup() | WebSocketDisconnect():
