@@ -1,29 +1,35 @@
-"""The monitor of a run: asks its engine, listens, and concludes only what the evidence allows."""
+"""The monitor of a run: takes in what its engine says, and concludes only what the evidence allows."""
 
 import itertools
 import logging
 from collections.abc import Awaitable, Callable, Sequence
 from functools import partial
-from typing import Final, Protocol
+from typing import Final, NamedTuple, TypeAlias
 
 import anyio
-from anyio.abc import TaskGroup
 from msgspec.structs import replace
 
 from action_assistant.errors import Refused
+from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.execution.echo_difference import differs
 from action_assistant.runner.execution.feedback_order import fresh
+from action_assistant.runner.execution.run_changes import LOOK_AT_IT, RunChanges
 from action_assistant.runner.execution.sub_graphs import LastLook, SubGraphs
-from action_assistant.runner.links.engine_process import has_ended
-from action_assistant.runner.links.observations import TERMINAL, Seen, Snapshot
-from action_assistant.runner.links.port import Answer, Link, NoAnswer
+from action_assistant.runner.links.engine_process import EngineProcess
+from action_assistant.runner.links.observations import TERMINAL, Snapshot
+from action_assistant.runner.links.port import Answer, Standing
 from action_assistant.runner.runs import refusals, stall
-from action_assistant.runner.runs.events import Answered, End, Proof, Published, RunEvent, Silent
+from action_assistant.runner.runs.events import Answered, Loading, Proof, Published, Silent
 from action_assistant.runner.runs.fold import is_news
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.stop.doubtful_errors import DoubtfulErrors
 from action_assistant.runner.stop.engine_threads import EngineThreads
-from action_assistant.runner.stop.loading import LoadingAction, LoadingWatch, in_words
+from action_assistant.runner.stop.loading import (
+    LoadingAction,
+    LoadingTimes,
+    LoadingWatch,
+    in_words,
+)
 from action_assistant.runner.stop.proof import RestProof, hash_of
 from action_assistant.umrf.triggers import NEVER_BEGAN
 from action_assistant.web.workers.lanes import RunInWorker
@@ -32,7 +38,6 @@ log: Final = logging.getLogger(__name__)
 
 _POLL_S: Final = 1.0
 _STOP_POLL_S: Final = 0.1
-_GET_S: Final = 1.0  # an engine that is not busy answers within milliseconds
 _SILENT_S: Final = 3.0
 _APPEAR_S: Final = 3.0  # until a started graph must show in answers
 _ABSENT_S: Final = 1.0  # for which answers must lack what the engine has said it refused
@@ -41,90 +46,71 @@ _LOADING_TOLD_S: Final = 1.5  # what feedback has still to tell has come by then
 _NO_PROOF: Final = "{doubt}, so that no answer proves anything"
 
 
-class MonitoredRun(Protocol):
-    """The run that is watched."""
+class Finding(NamedTuple):
+    """The result of a job beside the looks: an alarm, "" for none. `only_open`: it is nothing to a run
+    that is over. `asks`: the engine is to be asked again, since more is known now."""
 
-    run: Run
+    code: str = ""
+    text: str = ""
+    only_open: bool = False
+    asks: bool = False
 
-    def tell(self, event: RunEvent, author: str = "") -> None:
-        """Show and store an event."""
-        ...
 
-    def observe(self, seen: tuple[Seen, ...]) -> None:
-        """Show and store what was seen."""
-        ...
+#: Work that no look waits for. It may raise Refused, then it is given up.
+Job: TypeAlias = Callable[[RunInWorker], Awaitable[Finding]]
 
-    def end(self, state: End, detail: str) -> None:
-        """The run is over."""
-        ...
 
-    def lose(self, why: str) -> None:
-        """The engine does not hold the run any more."""
-        ...
+class Look(NamedTuple):
+    """One look at the engine: its place in the order of everything that is sent and asked, and when it
+    began, in seconds of the event loop's clock."""
 
-    def doubt(self, why: str) -> None:
-        """The code of an action may go on whatever the engine says."""
-        ...
-
-    def load(self, actions: Sequence[LoadingAction], waited_s: float) -> None:
-        """Nothing moves, but these actions may still be loading, for so long by now; none: that is
-        over."""
-        ...
-
-    def engine_ended(self) -> None:
-        """The engine's process was seen to end, and the code of all its actions with it."""
-        ...
-
-    def threads_ended(self) -> None:
-        """No thread of the engine is left that could run code of this run."""
-        ...
-
-    def alarm(self, code: str, text: str) -> None:
-        """Tell people something now."""
-        ...
+    order: int
+    began: float
 
 
 class Monitor:
-    """Evidence of one run. `trouble`: why its stop is not proven yet; `seen_at`: when its engine last
-    showed it; `umrf`: what that has been given last, where it is known. `rested_at`: when it was last
-    seen to be over, for one that moves again."""
+    """Decides what the messages and answers of an engine mean for one run.
+
+    Each method that takes one in returns the changes of the run that follow from it; it gets the run as
+    it is now. `jobs` are left to be worked on beside. `trouble` says why the Stop of the run is not
+    proven yet; `seen_at` when its engine last showed it (µs UTC); `umrf` is what the engine has been
+    given last, where that is known. `rested_at` is when the run was last seen to be over, for one that
+    moves again; `exact` an engine that hides nothing.
+    """
 
     def __init__(
         self,
-        it: MonitoredRun,
-        link: Link,
+        run: Run,
         *,
         exact: bool,
-        clock_us: Callable[[], int],
-        run_in_worker: RunInWorker,
+        clock_us: ClockUs,
         doubts: DoubtfulErrors,
+        loading_times: LoadingTimes,
         rested_at: int | None = None,
     ) -> None:
         self.trouble = ""
         self.seen_at: int | None = None
         self.umrf: str | None = None
-        self._it = it
-        self._link = link
         self._clock_us = clock_us
-        self._run_in_worker = run_in_worker
-        self._look = anyio.Event()
+        self._jobs: list[Job] = []
         self._order = itertools.count(1)
         self._stop_sent: int | None = None
         self._disturbed = 0
         self._begun = 0  # when feedback was the first to show it
         self._sent: str | None = None  # until it was compared with what the engine shows
         self._sent_order = 0
-        self._start = refusals.StartLog(it.run)
+        self._start = refusals.StartLog(run)
         self._absent: float | None = None  # since when answers lack a start that was refused
         self._standstill = stall.Standstill()
         self._stalled_as: object = None  # the actions at which that was told
         self._lacking: str | None = None  # what the graph that was sent lacks to begin
-        self._beside: TaskGroup
         self._parts = SubGraphs()
-        self._loading = LoadingWatch(it.run.graph_name, meddled=it.run.reshaped)
+        self._loading = LoadingWatch(run.graph_name, meddled=run.reshaped)
+        self._loading_times = loading_times
         self._threads = EngineThreads()
         self._reads = False  # the arrows of graphs, for that
         self._loads_since: float | None = None
+        self._loading_told_at = 0.0  # seconds of loading at which that is told again
         self._answered = False  # by a get, since the last feedback
         self._exact = exact
         self._rest = RestProof(exact=exact)
@@ -133,219 +119,222 @@ class Monitor:
         self._seen_wall = rested_at
         self._seen_asked: int | None = None
 
-    def look(self) -> None:
-        """Ask now."""
-        self._look.set()
+    # --- what is sent -------------------------------------------------------------------------
 
-    def starts(self, umrf: str) -> None:
-        """This graph is being started, now: the engine's log may tell what becomes of it."""
+    def starts(self, umrf: str, process: EngineProcess | None) -> None:
+        """Note that this graph is being started, now, in this process: the engine's log may tell what
+        becomes of it."""
         self._start.begins()
-        self._threads.starts(self._link.standing.process)
+        self._threads.starts(process)
         self.sends(umrf)
 
     def sends(self, umrf: str, *, beside: bool = False) -> None:
-        """This graph is handed over: what the engine is asked for from now on is compared with it,
-        once. `beside`: an action of it is started beside those that go on."""
+        """Note that this graph is handed over: the next answer is compared with it. `beside`: an action
+        of it is started beside those that go on."""
         self._loading.sends(umrf, beside=beside)
         self._sent = self.umrf = umrf
         self._sent_order = next(self._order)
 
     def recalls(self, umrf: str) -> None:
-        """This graph was handed over before this began to watch."""
+        """Note that this graph was handed over before this monitor began."""
         self.umrf = umrf
         self._loading.recalls(umrf)
 
-    def hear(self, line: str) -> None:
-        """A line of the engine's own log, about whatever."""
-        if self._start.hear(line):
-            said = refusals.in_words(self._it.run.engine, self._start.words)
-            self._it.alarm(refusals.REFUSED, said)
-
-    def started_by_others(self) -> None:
-        """What the engine's log says of a start may be about that one."""
-        self._start.doubt()
-
     def stop_left(self) -> None:
-        """A stop message has left: whatever is asked from now on may prove it."""
+        """Note that a stop message has left: an answer that is asked for from now on may prove it."""
         if self._stop_sent is None:
             self._stop_sent = next(self._order)
 
+    def started_by_others(self) -> None:
+        """Note that what the engine's log says of a start may be about a start of somebody else."""
+        self._start.doubt()
+
     def disturbed(self, *, meddles: bool) -> None:
-        """Somebody else may just have set it going: what was asked before proves nothing any more.
-        `meddles`: it may be this very graph that goes on, with other arrows or from elsewhere."""
+        """Note that somebody else may just have set the graph going: an answer that was asked for before
+        proves nothing any more. `meddles`: it may be this very graph that goes on, with other arrows or
+        from elsewhere."""
         self._disturbed = next(self._order)
         self._rest.forget()
         if meddles:
             self._loading.meddle()
 
-    def feed(self, ours: tuple[Snapshot, ...], parts: tuple[Snapshot, ...] = ()) -> None:
-        """Feedback of this run, oldest first, and of graphs that have the names of its sub-graphs. That
-        of others says nothing about an answer to us."""
-        if self._is_alone():
+    # --- what is heard ------------------------------------------------------------------------
+
+    def hear(self, run: Run, line: str) -> RunChanges:
+        """Take in a line of the engine's log."""
+        changes = RunChanges(run, self._clock_us)
+        if self._start.hear(line):
+            changes.alarm(refusals.REFUSED, refusals.in_words(run.engine, self._start.words))
+        return changes
+
+    def feed(
+        self,
+        run: Run,
+        standing: Standing,
+        ours: tuple[Snapshot, ...],
+        parts: tuple[Snapshot, ...] = (),
+    ) -> RunChanges:
+        """Take in feedback of this run, oldest first, and of graphs that have the names of its sub-graphs.
+        Feedback of others says nothing about an answer to us."""
+        changes = RunChanges(run, self._clock_us)
+        if self._is_alone(run, standing):
             self._loading.see((*ours, *parts))
         if not ours:
-            return
-        if self._it.run.graph_state is None:
+            return changes
+        if run.graph_state is None:
             self._begun = next(self._order)
         overtaken, self._answered = self._answered, False
         self.seen_at = self._clock_us()
-        if news := fresh(self._it.run, ours) if overtaken else ours:
+        if news := fresh(run, ours) if overtaken else ours:
             asked = self._seen_asked
-            self._it.observe(tuple(replace(each, since_asked=asked) for each in news))
+            changes.observe(tuple(replace(each, since_asked=asked) for each in news))
+        return changes
 
-    def _is_alone(self) -> bool:
+    def _is_alone(self, run: Run, standing: Standing) -> bool:
         """Return whether one engine alone can have taken up starts, in the life that the run was sent to.
         If not, nobody knows who sent feedback, now or before discovery showed it: all of it is
         forgotten."""
-        now = self._link.standing
-        lives = {self._it.run.incarnation, now.incarnation} - {None, ""}
-        if not now.doubt and len(lives) <= 1:
+        lives = {run.incarnation, standing.incarnation} - {None, ""}
+        if not standing.doubt and len(lives) <= 1:
             return True
         self._loading.forget()
         return False
 
-    async def run(self) -> None:
-        """Ask until cancelled. What takes longer is found out beside it: no proof waits for that."""
-        async with anyio.create_task_group() as self._beside:
-            await self._ask()
+    # --- what is asked ------------------------------------------------------------------------
 
-    async def _ask(self) -> None:
-        """Each second, sooner when there is news, ten times as often for a stop."""
-        wait = 0.0
-        while True:
-            with anyio.move_on_after(wait):
-                await self._look.wait()
-            self._look = anyio.Event()
-            order, began = next(self._order), anyio.current_time()
-            try:
-                with anyio.fail_after(_GET_S):
-                    answer = await self._link.get()
-            except (NoAnswer, TimeoutError) as nothing:
-                self._is_alone()
-                self._hear_nothing(str(nothing))
-            else:
-                self._take(answer, order, began)
-                self._compare(answer, order)
-            process = self._it.run.process
-            if process is not None and has_ended(process):
-                self._it.engine_ended()
-            cost = anyio.current_time() - began
-            hurry = self._it.run.desired == "stopped" or self._rest.pending
-            hurry = hurry and not self._it.run.loading  # feedback tells when it begins
-            pace = _STOP_POLL_S if hurry else _POLL_S
-            wait = max(pace, 5 * cost)
+    def begin_look(self) -> Look:
+        """Note that the engine is being asked now."""
+        return Look(next(self._order), anyio.current_time())
 
-    def _hear_nothing(self, why: str) -> None:
+    def pace(self, run: Run) -> float:
+        """Return after how many seconds the engine is to be asked again, at the least."""
+        hurry = run.desired == "stopped" or self._rest.pending
+        hurry = hurry and not run.loading  # feedback tells when it begins
+        return _STOP_POLL_S if hurry else _POLL_S
+
+    def take_jobs(self) -> list[Job]:
+        """Hand over the jobs that have come up since the last call."""
+        jobs, self._jobs = self._jobs, []
+        return jobs
+
+    def unanswered(self, run: Run, standing: Standing, why: str) -> RunChanges:
+        """Take in that the engine has not answered, and why, if that is known."""
+        changes = RunChanges(run, self._clock_us)
+        self._is_alone(run, standing)
+        self._hear_nothing(changes, why)
+        return changes
+
+    def answered(self, run: Run, standing: Standing, answer: Answer, look: Look) -> RunChanges:
+        """Take in the answer to one look, and `standing` as it is after that."""
+        changes = RunChanges(run, self._clock_us)
+        self._take(changes, standing, answer, look)
+        self._compare(changes.run, answer, look.order)
+        return changes
+
+    def _hear_nothing(self, changes: RunChanges, why: str) -> None:
         silent = anyio.current_time() - self._heard_at
         self.trouble = why or "the engine does not answer"
-        if silent >= _SILENT_S and self._it.run.unknown_since is None:
+        if silent >= _SILENT_S and changes.run.unknown_since is None:
             at = self._clock_us()
-            self._it.tell(Silent(at, at - round(silent * 1e6), self.trouble))
+            changes.tell(Silent(at, at - round(silent * 1e6), self.trouble))
 
-    def _take(self, answer: Answer, order: int, asked: float) -> None:
+    def _take(self, changes: RunChanges, standing: Standing, answer: Answer, look: Look) -> None:
         """Draw the conclusions that one answer allows, and no others."""
-        name = self._it.run.graph_name
-        if len({self._it.run.incarnation, answer.incarnation} - {None, ""}) > 1:
-            if not self._it.run.lost:
-                self._it.alarm("engine_restarted", "The engine was restarted: look at the robot.")
-                self._it.lose("The engine was restarted while the run went on.")
+        run = changes.run
+        name = run.graph_name
+        if len({run.incarnation, answer.incarnation} - {None, ""}) > 1:
+            if not run.lost:
+                changes.alarm("engine_restarted", "The engine was restarted: look at the robot.")
+                changes.lose("The engine was restarted while the run went on.")
             return
         own = next((each for each in answer.graphs if each.graph == name), None)
-        standing = self._link.standing
-        if own is None or own.run != self._it.run.id:
+        if own is None or own.run != run.id:
             if standing.doubt and standing.servers:
-                self._hear_nothing(_NO_PROOF.format(doubt=standing.doubt))
+                self._hear_nothing(changes, _NO_PROOF.format(doubt=standing.doubt))
                 return
             self._heard_at = anyio.current_time()
-            if order >= self._begun:
-                self._missing(own, answer)
+            if look.order >= self._begun:
+                self._missing(changes, standing, own, answer)
             return
         self._heard_at, self.seen_at, self._answered = anyio.current_time(), answer.at, True
-        if self._it.run.incarnation is None:  # the runner died between sending and noting it
-            process = self._link.standing.process
-            self._it.tell(Published(answer.at, answer.incarnation, process))
-        if self._it.run.unknown_since is not None or self._it.run.lost:
-            self._it.tell(Answered(answer.at))
+        if run.incarnation is None:  # the runner died between sending and noting it
+            changes.tell(Published(answer.at, answer.incarnation, standing.process))
+        if changes.run.unknown_since is not None or changes.run.lost:
+            changes.tell(Answered(answer.at))
         parts = [each for each in answer.graphs if each.graph.startswith(f"{name}__")]
-        shown = [own, *(part for part in parts if part.run in {None, self._it.run.id})]
+        shown = [own, *(part for part in parts if part.run in {None, run.id})]
         ours = [own, *self._parts.ours(own, shown[1:])]
-        self._note(ours)
+        self._note(changes, ours)
         if standing.doubt:
-            self._is_alone()
+            self._is_alone(changes.run, standing)
             self._rest.forget()
             self.trouble = _NO_PROOF.format(doubt=standing.doubt)
         else:
             self._loading.see(ours)
-            self._conclude(shown, ours, answer, order, asked)
+            self._conclude(changes, shown, ours, answer, look)
 
-    def _compare(self, answer: Answer, order: int) -> None:
-        """Once: whether the engine has what was sent. It is never stopped for that by itself."""
-        sent, text = self._sent, answer.texts.get(self._it.run.graph_name)
-        if sent is None or text is None or self._it.run.graph_state is None:
+    def _compare(self, run: Run, answer: Answer, order: int) -> None:
+        """Have the engine's graph compared with what was sent, once. The engine is never stopped for a
+        difference by itself."""
+        sent, text = self._sent, answer.texts.get(run.graph_name)
+        if sent is None or text is None or run.graph_state is None:
             return
         if order < self._sent_order:  # asked before that was handed over
             return
         self._sent = None
 
-        async def compare() -> None:
-            if why := await self._run_in_worker(differs, sent, text):
-                self._it.alarm(
-                    "echo_differs", f"What {self._it.run.engine} shows is not what was sent: {why}"
-                )
+        async def compare(run_in_worker: RunInWorker) -> Finding:
+            why = await run_in_worker(differs, sent, text)
+            told = f"What {run.engine} shows is not what was sent: {why}"
+            return Finding("echo_differs", told) if why else Finding()
 
-        self._beside.start_soon(self._found_out, compare)
+        self._jobs.append(compare)
 
-    async def _found_out(self, work: Callable[[], Awaitable[None]]) -> None:
-        """What only helps people is given up where nobody can work on it."""
-        try:
-            await work()
-        except Refused as why:
-            log.warning("run %s: %s", self._it.run.id, why.detail)
-
-    def _note(self, shown: list[Snapshot]) -> None:
-        """Keep what an answer says beyond what is known already."""
+    def _note(self, changes: RunChanges, shown: list[Snapshot]) -> None:
+        """Add what an answer shows beyond what is known already."""
         usual = LastLook(self._seen_wall, self._seen_asked)
         self._seen_wall, self._seen_asked = shown[0].at, shown[0].asked_at
         looks = {each.graph: self._parts.last_look(each.graph, usual) for each in shown}
         news = tuple(
             replace(each, since=looks[each.graph].at, since_asked=looks[each.graph].asked)
             for each in shown
-            if is_news(self._it.run, each)
+            if is_news(changes.run, each)
         )
         if news:
-            self._it.observe(news)
+            changes.observe(news)
 
-    def _missing(self, other: Snapshot | None, answer: Answer) -> None:
-        """The answer does not show this run."""
+    def _missing(
+        self, changes: RunChanges, standing: Standing, other: Snapshot | None, answer: Answer
+    ) -> None:
+        """Draw the conclusions that an answer allows which does not show this run; `other` is the graph
+        of its name that the answer shows."""
         self._rest.forget()
-        if self._it.run.graph_state is not None:
-            self._it.lose(
+        run = changes.run
+        if run.graph_state is not None:
+            changes.lose(
                 "The engine does not hold this run any more."
                 if other is None
                 else "Another start has taken the place of this run."
             )
             return
         waited = anyio.current_time() - self._began_at
-        if self._refused_and_absent():
-            why = refusals.why_refused(self._it.run.engine, self._start.words)
-            self._it.end("refused", why)
+        if self._refused_and_absent(standing):
+            changes.end("refused", refusals.why_refused(run.engine, self._start.words))
             return
         if waited < _APPEAR_S:
             return
-        if self._it.run.incarnation is None:
-            self._it.lose("The runner ended before it could note whether the start was sent.")
-        elif self._it.run.desired == "stopped" and waited >= _GIVEN_UP_S:
-            self._it.lose("The engine answers but has never shown this run.")
-        elif self._it.run.unknown_since is None:
+        if run.incarnation is None:
+            changes.lose("The runner ended before it could note whether the start was sent.")
+        elif run.desired == "stopped" and waited >= _GIVEN_UP_S:
+            changes.lose("The engine answers but has never shown this run.")
+        elif run.unknown_since is None:
             since = answer.at - round(waited * 1e6)
-            self._it.tell(
-                Silent(answer.at, since, "The engine answers but does not show this run.")
-            )
+            changes.tell(Silent(answer.at, since, "The engine answers but does not show this run."))
 
-    def _refused_and_absent(self) -> bool:
-        """Whether the engine has taken the start in, has refused it, and has not held it for a while
-        since: then nothing of it has begun, and nothing of it is left that could begin."""
-        if not self._start.words or self._link.standing.doubt:
+    def _refused_and_absent(self, standing: Standing) -> bool:
+        """Return whether the engine has taken the start in, has refused it, and has not held it for a
+        while since: then nothing of it has begun, and nothing of it is left that could begin."""
+        if not self._start.words or standing.doubt:
             self._absent = None
             return False
         self._absent = self._absent if self._absent is not None else anyio.current_time()
@@ -353,132 +342,166 @@ class Monitor:
 
     def _conclude(
         self,
+        changes: RunChanges,
         shown: list[Snapshot],
         ours: list[Snapshot],
         answer: Answer,
-        order: int,
-        asked: float,
+        look: Look,
     ) -> None:
-        """`shown`: the graph and all that may be sub-graphs of it; `ours`: those that it has begun."""
-        if order < self._disturbed:
+        """Decide whether the run is over, or why that is not proven. `shown`: the graph and all that may
+        be sub-graphs of it; `ours`: those that it has begun."""
+        if look.order < self._disturbed:
             return
-        own, at_rest = shown[0], self._rest.seen(shown, asked)
+        own, at_rest = shown[0], self._rest.seen(shown, look.began)
         if any(each.active for each in ours):
             self._threads.see_moving()
         doubt = self._doubts.look(shown)
-        if doubt and doubt != self._it.run.unconfirmed:
-            self._it.doubt(doubt)
-        if self._it.run.unconfirmed:
-            going = ", ".join(self._it.run.active)
-            self.trouble = f"{going} has not stopped yet" if going else self._it.run.unconfirmed
+        if doubt and doubt != changes.run.unconfirmed:
+            changes.doubt(doubt)
+        run = changes.run
+        if run.unconfirmed:
+            going = ", ".join(run.active)
+            self.trouble = f"{going} has not stopped yet" if going else run.unconfirmed
             if self._exact and at_rest:
-                self._it.engine_ended()  # a simulated one is switched off, and nothing has moved
-            elif at_rest and self._threads.have_ended(self._it.run.process):
-                self._it.threads_ended()
+                changes.engine_ended()  # a simulated one is switched off, and nothing has moved
+            elif at_rest and self._threads.have_ended(run.process):
+                changes.threads_ended()
             return
         if _never_began(own) and self.umrf is not None and self._lacking is None:
             self._lacking = ""
-            self._beside.start_soon(self._found_out, self._find_lacking)
-        loading = self._still_loading(ours, answer)
-        if self._it.run.desired != "stopped":
-            end = self._it.run.apparent_end
+            self._jobs.append(partial(self._find_lacking, self.umrf))
+        loading = self._still_loading(changes, ours, answer)
+        run = changes.run
+        if run.desired != "stopped":
+            end = run.apparent_end
             if end is not None and own.state in TERMINAL and at_rest:
                 if not loading:
-                    self._it.end(end, "")
-            elif at_rest and _never_began(own) and not self._has_begun():
-                self._it.end("refused", self._why_unbegun())
+                    changes.end(end, "")
+            elif at_rest and _never_began(own) and not _has_begun(run):
+                changes.end("refused", self._why_unbegun(run))
             else:
-                self._look_for_trouble(shown, asked)
+                self._look_for_trouble(changes, shown, look.began)
             return
-        if self._stop_sent is None or order <= self._stop_sent:
+        if self._stop_sent is None or look.order <= self._stop_sent:
             return
         if at_rest and loading:
             self.trouble = in_words(loading)
         elif at_rest:
-            self._it.tell(Proof(answer.at, answer.asked_at, hash_of(shown)))
-            self._it.end(self._it.run.apparent_end or "stopped", "")
+            changes.tell(Proof(answer.at, answer.asked_at, hash_of(shown)))
+            changes.end(changes.run.apparent_end or "stopped", "")
         elif self._rest.pending:
             self.trouble = "nothing moves, but an action may still be about to begin"
         elif own.state == "FINISHED":
             self.trouble = (
                 "the graph has finished, so the engine ignores Stop, while "
-                f"{', '.join(self._it.run.active)} goes on"
+                f"{', '.join(run.active)} goes on"
             )
         else:
-            self.trouble = f"{', '.join(self._it.run.active) or own.graph} has not stopped yet"
+            self.trouble = f"{', '.join(run.active) or own.graph} has not stopped yet"
 
-    def _still_loading(self, ours: list[Snapshot], answer: Answer) -> tuple[LoadingAction, ...]:
-        """Return what may still be loading where nothing moves, and tell of it when it stays so."""
+    def _still_loading(
+        self, changes: RunChanges, ours: list[Snapshot], answer: Answer
+    ) -> tuple[LoadingAction, ...]:
+        """Return the actions that may still be loading where nothing moves, and tell of them when it stays
+        so."""
         if self._exact:
             return ()
         if not self._rest.pending:
             self._loads_since = None
-            self._it.load((), 0.0)
+            self._tell_loading(changes, (), 0.0)
             return ()
         unread = self._loading.unread(ours)
         if unread and not self._reads:
             self._reads = True
-            self._beside.start_soon(self._found_out, partial(self._read_arrows, unread, answer))
+            self._jobs.append(partial(self._read_arrows, unread, answer))
         found = self._loading.actions(ours)
-        if found and self._threads.have_ended(self._it.run.process):
+        if found and self._threads.have_ended(changes.run.process):
             found = ()
         if not found:
             self._loads_since = None
-            self._it.load((), 0.0)
+            self._tell_loading(changes, (), 0.0)
         elif self._loads_since is None:
             self._loads_since = anyio.current_time()
         elif (waited := anyio.current_time() - self._loads_since) >= _LOADING_TOLD_S:
-            self._it.load(found, waited)
+            self._tell_loading(changes, found, waited)
         return found
 
-    async def _read_arrows(self, graphs: Sequence[str], answer: Answer) -> None:
+    def _tell_loading(
+        self, changes: RunChanges, actions: Sequence[LoadingAction], waited_s: float
+    ) -> None:
+        """Add that these actions may still be loading, for so long by now, or, of none, that this is over.
+        The time is told again each time that it has doubled."""
+        run = changes.run
+        why, known = in_words(actions), run.loading
+        if not why and not known:
+            return
+        is_same = bool(why) and known.startswith(why)
+        if is_same and waited_s < self._loading_told_at:
+            return
+        self._loading_told_at = max(4.0, 2 * waited_s)
+        usual = self._loading_times.usual(run.engine, actions)
+        times = [f"{waited_s:.0f} s so far"] * is_same + [usual] * bool(usual)
+        told = f"{why} ({'; '.join(times)})" if times else why
+        places = tuple((each.graph, each.node) for each in actions)
+        changes.tell(Loading(self._clock_us(), told, places))
+        if why:
+            changes.alarm("stop_unconfirmed", f"STOP UNCONFIRMED: {why}. {LOOK_AT_IT}")
+
+    async def _read_arrows(
+        self, graphs: Sequence[str], answer: Answer, run_in_worker: RunInWorker
+    ) -> Finding:
         try:
-            await self._loading.read(graphs, answer.texts, self._run_in_worker)
+            await self._loading.read(graphs, answer.texts, run_in_worker)
+        except Refused as why:  # whoever has not begun counts as loading then
+            log.warning("the arrows of %s cannot be read: %s", ", ".join(graphs), why.detail)
         finally:
             self._reads = False
-            self.look()
+        return Finding(asks=True)
 
-    def _has_begun(self) -> bool:
-        """Whether it was ever seen otherwise: somebody may have played its start again."""
-        return any(action.visits for action in self._it.run.actions.values())
-
-    def _why_unbegun(self) -> str:
-        """An engine calls a graph running before the first answer after its start. One that it holds
-        and does not call so was not begun, and only another start would begin it."""
-        engine, words = self._it.run.engine, self._start.words
+    def _why_unbegun(self, run: Run) -> str:
+        """Return why the run was not begun. An engine calls a graph running before the first answer after
+        its start, so one that it holds and does not call so would begin by another start only."""
+        words = self._start.words
         if words:
-            return f"{refusals.why_refused(engine, words)} It has begun none of it."
-        told = f"{engine} holds the graph and has not begun it, without a word why. {self._lacking or ''}"
+            return f"{refusals.why_refused(run.engine, words)} It has begun none of it."
+        told = f"{run.engine} holds the graph and has not begun it, without a word why. {self._lacking or ''}"
         return told.rstrip()
 
-    async def _find_lacking(self) -> None:
-        self._lacking = await self._run_in_worker(stall.lacking_in_words, self.umrf)
+    async def _find_lacking(self, umrf: str, run_in_worker: RunInWorker) -> Finding:
+        self._lacking = await run_in_worker(stall.lacking_in_words, umrf)
+        return Finding()
 
-    async def _tell_stall(self) -> None:
-        run = self._it.run
+    async def _tell_stall(self, run: Run, run_in_worker: RunInWorker) -> Finding:
         try:
-            text = await self._run_in_worker(stall.told_of, stall.packed(run), self.umrf)
+            text = await run_in_worker(stall.told_of, stall.packed(run), self.umrf)
         except Refused:  # nobody can read the graph now; what is known must be said all the same
             text = stall.told(run, None)
-        if self._it.run.end is None and self._standstill.lasts:
-            self._it.alarm(stall.STALLED, text)
+        if not self._standstill.lasts:
+            return Finding()
+        return Finding(stall.STALLED, text, only_open=True)
 
-    def _look_for_trouble(self, shown: list[Snapshot], asked: float) -> None:
-        """It goes on, as far as the engine says."""
-        run, own = self._it.run, shown[0]
+    def _look_for_trouble(self, changes: RunChanges, shown: list[Snapshot], asked: float) -> None:
+        """Look for a fault of a run that goes on, as far as the engine says."""
+        run, own = changes.run, shown[0]
         if self._start.words and not _never_began(own):
             text = (
                 f"{run.engine} refused the start ({self._start.words}) and yet shows the graph "
                 f"{own.state}: some of it may have begun. Stop it, and restart its engine."
             )
-            self._it.alarm(refusals.HALF_BEGUN, text)
+            changes.alarm(refusals.HALF_BEGUN, text)
         stalls = self._standstill.seen(shown, asked) and not self._exact
         if stalls and self._stalled_as is not run.actions:
             self._stalled_as = run.actions
-            self._beside.start_soon(self._tell_stall)
+            self._jobs.append(partial(self._tell_stall, changes.run))
+
+
+def _has_begun(run: Run) -> bool:
+    """Return whether an action of the run was ever seen to begin: somebody may have played its start
+    again."""
+    return any(action.visits for action in run.actions.values())
 
 
 def _never_began(own: Snapshot) -> bool:
-    """Whether an engine holds a graph of which it has begun nothing. Unlike a graph that has ended it
-    was not even tried: no state of an action can hide that one ran."""
+    """Return whether an engine holds a graph of which it has begun nothing. Unlike a graph that has ended
+    it was not even tried: no state of an action can hide that one ran."""
     return NEVER_BEGAN.issuperset({own.state, *own.nodes.values()})

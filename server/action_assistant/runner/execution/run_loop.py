@@ -1,22 +1,24 @@
-"""The loop of a run that is not over: starts it, watches it, and stops it until that is proven.
+"""A run that is not over: starts it, watches it, and stops it until that is proven.
 
-One task listens, one asks, one stops (`stop_loop`), one writes. None of them waits for another: a stop leaves
-while a get hangs, and everything goes on while the journal is down.
+What the engine says goes one way: the link gives a message or an answer, the monitor returns the changes
+that follow from it (`Monitor`), they are folded into the run, stored, and shown to everybody. One task
+listens, one asks, one stops, one writes. None of them waits for another: a stop leaves while a get hangs,
+and everything goes on while the journal is down.
 """
 
 import logging
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable
 from typing import Final
 
 import anyio
 import msgspec
 
-from action_assistant.errors import Refused
+from action_assistant.errors import OutcomeUnknown, Refused
 from action_assistant.runner.clock import ClockUs
-from action_assistant.runner.execution.graph_change import send_change
-from action_assistant.runner.execution.monitor import Monitor
+from action_assistant.runner.execution.monitor import Job, Monitor
+from action_assistant.runner.execution.run_changes import RunChanges
+from action_assistant.runner.links.engine_process import has_ended
 from action_assistant.runner.links.engine_text import run_in
-from action_assistant.runner.links.observations import Hazard, Seen
 from action_assistant.runner.links.port import (
     EngineChanged,
     EngineLog,
@@ -33,50 +35,46 @@ from action_assistant.runner.links.port import (
 )
 from action_assistant.runner.robots.robot_events import alarm_of
 from action_assistant.runner.runs.events import (
-    AlarmRaised,
     AtRest,
     Author,
     End,
     Ended,
     EngineSaid,
-    Loading,
+    ModifyRefused,
     ModifyRequested,
     MovesAgain,
-    Observed,
     PauseRequested,
     Published,
     ResumeRequested,
     RunEvent,
     Silent,
-    Unconfirmed,
+    StopSent,
 )
-from action_assistant.runner.runs.fold import follow, thin
 from action_assistant.runner.runs.history import sent_of
 from action_assistant.runner.runs.recorder import RunRecorder, Store
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.stop.doubtful_errors import DoubtfulErrors
-from action_assistant.runner.stop.loading import LoadingAction, LoadingTimes, in_words
-from action_assistant.runner.stop.proof import SET_GOING
+from action_assistant.runner.stop.loading import LoadingTimes
+from action_assistant.runner.stop.proof import SET_GOING, send_stop
 from action_assistant.runner.stop.stop_loop import StopLoop
 from action_assistant.web.workers.lanes import RunInWorker
 
 log: Final = logging.getLogger(__name__)
 
-_TOLD: Final = frozenset({"H7", "H8"})  # the run goes nowhere, and the engine says nothing
-_LOOK_AT_IT: Final = "Look at the robot; its hardware stop is the one to use."
-
 _HAND_OVER_S: Final = 5.0
+_UNCONFIRMED_S: Final = 2.0
+_SWITCH_OFF_S: Final = 10.0  # a simulated engine that does not obey harms nobody
+_GET_S: Final = 1.0  # an engine that is not busy answers within milliseconds
 _NO_TURN: Final = (
     "It was not sent: its turn among the starts on its domain did not come within 5 seconds."
 )
 _LINES: Final = 2_000  # of the engine's log, kept with one run
 _LONGEST_LINE: Final = 2_000  # characters
 
-_RESULTS: Final = {"HALTED": "on_halted", "STOPPED": "on_stopped", "ERROR": "on_error"}
-
 
 class OpenRun:
-    """A run that is not over. `changed` is called after every change of what people see."""
+    """A run that is not over. `changed` is called after every change of what people see, and changes no
+    run itself."""
 
     def __init__(
         self,
@@ -103,17 +101,17 @@ class OpenRun:
         self._doubts = DoubtfulErrors(
             reached=seq > 1 and not owns_link
         )  # what came before is not known
-        self.watch = self._watched()
-        self._lines = 0
-        self._loading_told_at = 0.0  # seconds of loading at which that is told again
         self._loading_times = loading_times or LoadingTimes()
+        self.watch = self._watched()
+        self._asks = anyio.Event()
+        self._lines = 0
         self._sent_at: int | None = None  # when its start left; None: an earlier process sent it
         self._changed = changed
         self._over = anyio.Event()
         self._again = anyio.Event()
         self._is_left = False
         self._handing = anyio.CancelScope()  # while the start is handed over
-        self._stopping = StopLoop(self, link, simulated=owns_link, clock_us=clock_us)
+        self._stopping = StopLoop(run, clock_us)
         self._early: list[Report] = []
 
     # --- what people want ---------------------------------------------------------------------
@@ -121,7 +119,8 @@ class OpenRun:
     def stop(self, author: Author, stop_id: str) -> None:
         """Want the run stopped, now and until it is. Never waits, never fails."""
         self._doubts.reach()
-        self._stopping.press(author, stop_id)
+        if pressed := self._stopping.press(author, stop_id):
+            self.tell(pressed, author.id)
         self._handing.cancel()
 
     @property
@@ -134,13 +133,13 @@ class OpenRun:
         self._doubts.reach()
         self.tell(PauseRequested(self._clock_us(), author), author.id)
         await self._link.pause(self.run.graph_name)
-        self.watch.look()
+        self.look()
 
     async def resume(self, author: Author) -> None:
         """Want the run to go on. Raises NotSent."""
         self.tell(ResumeRequested(self._clock_us(), author), author.id)
         await self._link.resume(self.run.graph_name)
-        self.watch.look()
+        self.look()
 
     async def modify(
         self, author: Author, order: Order, version: str, digest: str, continue_from: str
@@ -157,7 +156,33 @@ class OpenRun:
             continue_from=continue_from,
         )
         self._doubts.reach()
-        await send_change(self, self._link, order, asked, self._clock_us)
+        before = self.run
+        self.tell(asked, author.id)
+        try:
+            await self._link.modify(order, continue_from)
+        except (NotSent, EngineRefused) as why:
+            self.tell(
+                ModifyRefused(
+                    at=self._clock_us(),
+                    version=before.version,
+                    digest=before.digest,
+                    actions={name: action.aid for name, action in before.actions.items()},
+                    why=str(why),
+                )
+            )
+            raise
+        except Exception as error:  # also a deadline: the message may have left
+            log.exception("run %s: the change may or may not have left", before.id)
+            text = f"Nobody knows whether the graph was changed on {before.engine}: {error!r}"
+            self.alarm("modify_unknown", text)
+            self._compare_change(order, continue_from)
+            raise OutcomeUnknown(text) from error
+        self._compare_change(order, continue_from)
+
+    def _compare_change(self, order: Order, continue_from: str) -> None:
+        """Have the next answer of the engine compared with a change that may have left."""
+        self.watch.sends(order.umrf, beside=bool(continue_from))
+        self.look()
 
     @property
     def pauses(self) -> bool:
@@ -176,23 +201,30 @@ class OpenRun:
         alarm = alarm_of(command, self.run.engine, self.run.graph_name)
         if alarm is not None:
             self.alarm(*alarm)
-            self.watch.look()
+            self.look()
 
     # --- what happens -------------------------------------------------------------------------
 
     def tell(self, event: RunEvent, author: str = "") -> None:
         """Show an event to everybody and store it as soon as the journal can."""
-        if self.run.end is not None and not isinstance(event, AlarmRaised | MovesAgain):
-            return
-        self.run = follow(self.run, event)
-        self.recorder.put(event, author or self.run.engine)
-        if self.run.end is not None:
-            self._over.set()
-        if isinstance(event, Ended) and self._sent_at is not None:
-            self._loading_times.learn(self.run, self._sent_at)
-            self._sent_at = None
-        self._stopping.notice()
-        self._touch()
+        changes = self._changes()
+        changes.tell(event, author)
+        self._apply(changes)
+
+    def _changes(self) -> RunChanges:
+        return RunChanges(self.run, self._clock_us)
+
+    def _apply(self, changes: RunChanges) -> None:
+        """Show and store changes that were made of the run as it is now."""
+        for event, author, self.run in changes:
+            self.recorder.put(event, author or self.run.engine)
+            if self.run.end is not None:
+                self._over.set()
+            if isinstance(event, Ended) and self._sent_at is not None:
+                self._loading_times.learn(self.run, self._sent_at)
+                self._sent_at = None
+            self._stopping.notice(self.run)
+            self._touch()
 
     def _touch(self) -> None:
         self.revision += 1
@@ -240,15 +272,13 @@ class OpenRun:
         return True
 
     def _watched(self) -> Monitor:
-        rested_at = self.run.ended_at
         return Monitor(
-            self,
-            self._link,
+            self.run,
             exact=self._owns_link,
             clock_us=self._clock_us,
-            run_in_worker=self._run_in_worker,
             doubts=self._doubts,
-            rested_at=rested_at,
+            loading_times=self._loading_times,
+            rested_at=self.run.ended_at,
         )
 
     async def _opens_again(self) -> bool:
@@ -270,10 +300,72 @@ class OpenRun:
         async with anyio.create_task_group() as tasks:
             if self._owns_link:
                 tasks.start_soon(self._steadily, self._link.run)
-            tasks.start_soon(self._steadily, self.watch.run)
-            tasks.start_soon(self._steadily, self._stopping.run)
+            tasks.start_soon(self._steadily, self._ask)
+            tasks.start_soon(self._steadily, self._send_stops)
             await self._over.wait()
             tasks.cancel_scope.cancel()
+
+    async def _send_stops(self) -> None:
+        """Send stop messages from the first press on, until cancelled. A simulated engine that does not
+        obey is given up."""
+        async for attempt in self._stopping.attempts(lambda: self.run):
+            failed = await send_stop(self._link, self.run.graph_name)
+            if not failed:
+                self.watch.stop_left()
+            self.tell(StopSent(self._clock_us(), attempt.number, failed))
+            self.look()
+            waited = anyio.current_time() - attempt.since
+            if waited >= _UNCONFIRMED_S:
+                why = failed or self.watch.trouble or "no proof has come"
+                self.alarm("stop_unconfirmed", f"STOP UNCONFIRMED: {why}.")
+            if self._owns_link and waited >= _SWITCH_OFF_S:
+                why = self._stopping.hung or f"It does not obey: {self.watch.trouble}."
+                self.end("lost", f"{why} The simulated engine was switched off.")
+                return
+
+    def look(self) -> None:
+        """Ask the engine now."""
+        self._asks.set()
+
+    async def _ask(self) -> None:
+        """Ask the engine until cancelled: each second, sooner when there is news, ten times as often for a
+        stop. What takes longer is worked on beside it, so that no proof waits for that."""
+        async with anyio.create_task_group() as beside:
+            wait = 0.0
+            while True:
+                with anyio.move_on_after(wait):
+                    await self._asks.wait()
+                self._asks = anyio.Event()
+                look = self.watch.begin_look()
+                try:
+                    with anyio.fail_after(_GET_S):
+                        answer = await self._link.get()
+                except (NoAnswer, TimeoutError) as why:
+                    changes = self.watch.unanswered(self.run, self._link.standing, str(why))
+                else:
+                    changes = self.watch.answered(self.run, self._link.standing, answer, look)
+                self._apply(changes)
+                for job in self.watch.take_jobs():
+                    beside.start_soon(self._work_on, job)
+                if self.run.process is not None and has_ended(self.run.process):
+                    over = self._changes()
+                    over.engine_ended()
+                    self._apply(over)
+                cost = anyio.current_time() - look.began
+                wait = max(self.watch.pace(self.run), 5 * cost)
+
+    async def _work_on(self, job: Job) -> None:
+        """Carry out work of the monitor. It only helps people, so it is given up where no worker can be
+        had."""
+        try:
+            found = await job(self._run_in_worker)
+        except Refused as why:
+            log.warning("run %s: %s", self.run.id, why.detail)
+            return
+        if found.text and not (found.only_open and self.run.end is not None):
+            self.alarm(found.code, found.text)
+        if found.asks:
+            self.look()
 
     async def _steadily(self, work: Callable[[], Awaitable[None]]) -> None:
         """A fault in one of these must neither end the others nor itself."""
@@ -294,7 +386,7 @@ class OpenRun:
         if self.run.end is not None:  # refused since it was written down
             return
         at = self._clock_us()
-        self.watch.starts(order.umrf)
+        self.watch.starts(order.umrf, self._link.standing.process)
         if self.run.desired == "stopped":
             self.end("stopped", "Stopped before anything was sent.")
             return
@@ -340,14 +432,15 @@ class OpenRun:
             return
         match report:
             case Transitions(run=run, changes=changes) if run == self.run.id:
-                self.observe(changes)
+                seen = self._changes()
+                seen.observe(changes)
+                self._apply(seen)
             case Feedback(snapshots=snapshots):
                 ours = tuple(each for each in snapshots if each.run == self.run.id)
                 inside = f"{self.run.graph_name}__"
                 others = (each for each in snapshots if each.run is None)
-                self.watch.feed(
-                    ours, tuple(each for each in others if each.graph.startswith(inside))
-                )
+                parts = tuple(each for each in others if each.graph.startswith(inside))
+                self._apply(self.watch.feed(self.run, self._link.standing, ours, parts))
             case EngineLog():
                 self._hear_line(report)
             case EngineChanged(state="gone", why=why) if self._owns_link:
@@ -357,97 +450,42 @@ class OpenRun:
                 self._stopping.hung = why
             case _:
                 return
-        self.watch.look()
+        self.look()
 
     def _hear_line(self, line: EngineLog) -> None:
         if self._is_ours(line.graph) and self._lines < _LINES:
             self._lines += 1
             self.tell(EngineSaid(line.at, line.text[:_LONGEST_LINE]))
-        self.watch.hear(line.text)
+        self._apply(self.watch.hear(self.run, line.text))
 
     def _is_ours(self, graph: str | None) -> bool:
         name = self.run.graph_name
         return graph is None or graph == name or graph.startswith(f"{name}__")
 
-    def observe(self, seen: tuple[Seen, ...]) -> None:
-        """Show and store what was seen."""
-        self.tell(Observed(self._clock_us(), thin(self.run, seen)))
-        for item in seen:
-            if isinstance(item, Hazard) and (item.effect != "goes on" or item.code in _TOLD):
-                place = f" at {item.node}" if item.node else ""
-                self.alarm(item.code, f"{item.code}{place}: {item.message or item.effect}")
-
     # --- without a proof ----------------------------------------------------------------------
 
     def lose(self, why: str) -> None:
-        """The engine does not hold the run any more: whether its code has ended is not known."""
-        if self.run.simulated:
-            self.end("lost", why)
-        elif self.run.lost != why:
-            self.tell(Unconfirmed(self._clock_us(), why, lost=True))
-            self.alarm("stop_unconfirmed", f"STOP UNCONFIRMED: {why} {_LOOK_AT_IT}")
-
-    def doubt(self, why: str) -> None:
-        """The code of an action may go on, and the engine will never tell of its end."""
-        self.tell(Unconfirmed(self._clock_us(), why))
-        self.alarm("stop_unconfirmed", f"STOP UNCONFIRMED: {why}. {_LOOK_AT_IT}")
-
-    def load(self, actions: Sequence[LoadingAction], waited_s: float) -> None:
-        """Nothing moves, but these actions may still be loading, for so long by now; none: that is over.
-        How long is told again each time that it has doubled."""
-        why, known = in_words(actions), self.run.loading
-        if not why and not known:
-            return
-        is_same = bool(why) and known.startswith(why)
-        if is_same and waited_s < self._loading_told_at:
-            return
-        self._loading_told_at = max(4.0, 2 * waited_s)
-        usual = self._loading_times.usual(self.run.engine, actions)
-        times = [f"{waited_s:.0f} s so far"] * is_same + [usual] * bool(usual)
-        told = f"{why} ({'; '.join(times)})" if times else why
-        places = tuple((each.graph, each.node) for each in actions)
-        self.tell(Loading(self._clock_us(), told, places))
-        if why:
-            self.alarm("stop_unconfirmed", f"STOP UNCONFIRMED: {why}. {_LOOK_AT_IT}")
-
-    def engine_ended(self) -> None:
-        """The engine's process has ended, and the code of every action with it."""
-        process = self.run.process
-        how = (
-            "The simulated engine was switched off."
-            if process is None
-            else f"The engine's process, {process.pid} on this computer, has ended."
-        )
-        self._rests_by_itself(how)
-
-    def threads_ended(self) -> None:
-        """No thread is left that the engine began for this run, and none of its code goes on."""
-        process = self.run.process
-        where = f"process {process.pid} on this computer" if process else "the engine's process"
-        self._rests_by_itself(f"No thread that the engine began for this run is left in {where}.")
-
-    def _rests_by_itself(self, how: str) -> None:
-        run = self.run
-        state: End = "error" if run.doubt else "lost"
-        self._rests(AtRest(None, self._clock_us(), how), state, run.doubt or run.lost or how)
+        """Note that nobody knows whether the code of the run has ended, and why."""
+        changes = self._changes()
+        changes.lose(why)
+        self._apply(changes)
 
     def confirm_rest(self, author: Author, how: str) -> None:
-        """Somebody has seen that it is at rest, where no answer of the engine can prove it."""
+        """End the run by the word of a person who has seen that it rests, where no answer of the engine
+        can prove it."""
+        changes = self._changes()
         why = self.run.doubt or self.run.lost or self.watch.trouble
-        self._rests(AtRest(author, self._clock_us(), how), "error", why, author.id)
-
-    def _rests(self, seen: AtRest, state: End, why: str, author: str = "") -> None:
-        self.tell(Ended(seen.at, state, self._result(), why, seen), author)
-
-    def _result(self) -> str | None:
-        return self.run.result or _RESULTS.get(self.run.graph_state or "")
+        changes.rests(AtRest(author, self._clock_us(), how), "error", why, author.id)
+        self._apply(changes)
 
     def end(self, state: End, detail: str) -> None:
-        """The run is over. The first end counts."""
-        if self.run.end is None:
-            self.tell(Ended(self._clock_us(), state, self._result(), detail))
+        """End the run in this state, unless it has ended already."""
+        changes = self._changes()
+        changes.end(state, detail)
+        self._apply(changes)
 
     def alarm(self, code: str, text: str) -> None:
         """Tell people something now, once."""
-        if all((alarm.code, alarm.text) != (code, text) for alarm in self.run.alarms):
-            self.tell(AlarmRaised(self._clock_us(), code, text))
+        changes = self._changes()
+        changes.alarm(code, text)
+        self._apply(changes)

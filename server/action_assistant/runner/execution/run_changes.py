@@ -1,0 +1,117 @@
+"""The changes of one run: events, each with the run as it is after that event. Nothing is shown or stored
+here, so whoever decides what an engine's answer means returns a value of this kind."""
+
+from collections.abc import Iterator
+from typing import Final, NamedTuple
+
+from action_assistant.runner.clock import ClockUs
+from action_assistant.runner.links.observations import Hazard, Seen
+from action_assistant.runner.runs.events import (
+    AlarmRaised,
+    AtRest,
+    End,
+    Ended,
+    MovesAgain,
+    Observed,
+    RunEvent,
+    Unconfirmed,
+)
+from action_assistant.runner.runs.fold import follow, thin
+from action_assistant.runner.runs.run import Run
+
+#: The end of every alarm about a Stop that nothing proves.
+LOOK_AT_IT: Final = "Look at the robot; its hardware stop is the one to use."
+
+_TOLD: Final = frozenset({"H7", "H8"})  # the run goes nowhere, and the engine says nothing
+_RESULTS: Final = {"HALTED": "on_halted", "STOPPED": "on_stopped", "ERROR": "on_error"}
+
+
+class RunChange(NamedTuple):
+    """One event, its author ("" for the engine), and the run as it is after the event."""
+
+    event: RunEvent
+    author: str
+    run: Run
+
+
+class RunChanges:
+    """Collects the next events of a run and folds each into `run` at once.
+
+    An event that comes after the end of the run is dropped, unless it is an alarm or says that the run
+    moves again.
+    """
+
+    def __init__(self, run: Run, clock_us: ClockUs) -> None:
+        self.run = run
+        self._clock_us = clock_us
+        self._changes: list[RunChange] = []
+
+    def __iter__(self) -> Iterator[RunChange]:
+        return iter(self._changes)
+
+    def tell(self, event: RunEvent, author: str = "") -> None:
+        """Add an event; `author` is the id of a person, or "" for the engine."""
+        if self.run.end is not None and not isinstance(event, AlarmRaised | MovesAgain):
+            return
+        self.run = follow(self.run, event)
+        self._changes.append(RunChange(event, author, self.run))
+
+    def observe(self, seen: tuple[Seen, ...]) -> None:
+        """Add what was seen of the engine, and an alarm for each hazard that people must know of."""
+        self.tell(Observed(self._clock_us(), thin(self.run, seen)))
+        for item in seen:
+            if isinstance(item, Hazard) and (item.effect != "goes on" or item.code in _TOLD):
+                place = f" at {item.node}" if item.node else ""
+                self.alarm(item.code, f"{item.code}{place}: {item.message or item.effect}")
+
+    def alarm(self, code: str, text: str) -> None:
+        """Add an alarm, unless the run has one of this code and text already."""
+        if all((alarm.code, alarm.text) != (code, text) for alarm in self.run.alarms):
+            self.tell(AlarmRaised(self._clock_us(), code, text))
+
+    def end(self, state: End, detail: str) -> None:
+        """End the run in this state, unless it has ended already."""
+        if self.run.end is None:
+            self.tell(Ended(self._clock_us(), state, self._result(), detail))
+
+    def lose(self, why: str) -> None:
+        """Note that the engine does not hold the run any more, so that nobody knows whether its code
+        has ended. A simulated run ends by that."""
+        if self.run.simulated:
+            self.end("lost", why)
+        elif self.run.lost != why:
+            self.tell(Unconfirmed(self._clock_us(), why, lost=True))
+            self.alarm("stop_unconfirmed", f"STOP UNCONFIRMED: {why} {LOOK_AT_IT}")
+
+    def doubt(self, why: str) -> None:
+        """Note that the code of an action may go on, and that the engine will never tell of its end."""
+        self.tell(Unconfirmed(self._clock_us(), why))
+        self.alarm("stop_unconfirmed", f"STOP UNCONFIRMED: {why}. {LOOK_AT_IT}")
+
+    def engine_ended(self) -> None:
+        """End the run because the engine's process has ended, and the code of every action with it."""
+        process = self.run.process
+        how = (
+            "The simulated engine was switched off."
+            if process is None
+            else f"The engine's process, {process.pid} on this computer, has ended."
+        )
+        self._rests_by_itself(how)
+
+    def threads_ended(self) -> None:
+        """End the run because no thread is left that the engine began for it."""
+        process = self.run.process
+        where = f"process {process.pid} on this computer" if process else "the engine's process"
+        self._rests_by_itself(f"No thread that the engine began for this run is left in {where}.")
+
+    def _rests_by_itself(self, how: str) -> None:
+        run = self.run
+        state: End = "error" if run.doubt else "lost"
+        self.rests(AtRest(None, self._clock_us(), how), state, run.doubt or run.lost or how)
+
+    def rests(self, seen: AtRest, state: End, why: str, author: str = "") -> None:
+        """End the run by an observation of rest, where no answer of the engine proves any."""
+        self.tell(Ended(seen.at, state, self._result(), why, seen), author)
+
+    def _result(self) -> str | None:
+        return self.run.result or _RESULTS.get(self.run.graph_state or "")
