@@ -177,7 +177,7 @@ test("what may go otherwise is asked, and what cannot be is refused with its pla
   await saved(page);
   await pickAll(page, "One", "Two");
   const warned = await asked(page, "2 actions");
-  await expect(warned.getByRole("list", { name: "What may be otherwise" })).toContainText("HALTED");
+  await expect(warned.getByRole("list", { name: "What may be different" })).toContainText("HALTED");
   expect(await violations(page)).toEqual([]);
   await warned.getByRole("button", { name: "Cancel" }).click();
 

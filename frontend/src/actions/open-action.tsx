@@ -186,7 +186,7 @@ function Places({ known, action, knowledge, context }: PlacesProps) {
     try {
       await takeFromGraph(context.id, graph);
       notifications.show({
-        message: `The library has what ${isolated(name)} had. The history leads back.`,
+        message: `The library has what ${isolated(name)} had. You can go back in the history.`,
       });
     } catch (error) {
       notifications.show({ color: "red", title: "Not taken over", message: errorText(error) });

@@ -128,7 +128,7 @@ function Others({ update }: { update: Update }) {
   return (
     <details className={style.others}>
       <summary>
-        {update.suggested.length > 0 ? "Something else is" : "Say what is"} only called otherwise
+        {update.suggested.length > 0 ? "Something else was" : "Choose what was"} only renamed
       </summary>
       {names.map((name) => {
         const choices = update.possible.filter((each) => nameOf(each) === name);
@@ -163,7 +163,7 @@ function RenameChoices({ update }: { update: Update }) {
   if (update.suggested.length + update.possible.length === 0) return null;
   return (
     <fieldset className={style.renames}>
-      <legend>Only called otherwise? Then its value is kept under the new name.</legend>
+      <legend>Only renamed? Then its value is kept under the new name.</legend>
       {update.suggested.map((each) => (
         <Checkbox
           key={each.key}
@@ -228,7 +228,7 @@ function Done({ done, update }: { done: readonly UpdatedUse[]; update: Update })
       <p>
         <IconCheck size={15} aria-hidden />{" "}
         {changed.length === 1 ? "1 graph is updated" : `${changed.length} graphs are updated`} and
-        saved. The history of each leads back.
+        saved. You can go back in the history of each.
       </p>
       <ul aria-label="Updated graphs">
         {changed.map(({ graph }) => (

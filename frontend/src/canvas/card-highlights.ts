@@ -2,8 +2,9 @@
  * Highlights on cards: the actions of one robot, the two ends of a data flow, open comments, and
  * what no expected course visits.
  */
-import { createContext, type ReactNode, useSyncExternalStore } from "react";
+import { createContext, type ReactNode } from "react";
 import type { Key, Precondition } from "../graph/model";
+import { useWatched, Watched } from "../ui/watched";
 
 /** The actions that give a value, and the actions that take it. */
 interface TouchedActions {
@@ -33,43 +34,29 @@ interface CardHighlights {
 
 const ALL: CardHighlights = { robot: null, openThreads: new Map(), untaken: null, touched: null };
 
-class CardHighlightStore {
-  #now: CardHighlights = ALL;
-  #listeners = new Set<() => void>();
+const store = new Watched<CardHighlights>(ALL);
 
-  subscribe = (listener: () => void): (() => void) => {
-    this.#listeners.add(listener);
-    return () => this.#listeners.delete(listener);
-  };
-  now = (): CardHighlights => this.#now;
-
-  set(change: Partial<CardHighlights>): void {
-    this.#now = { ...this.#now, ...change };
-    for (const listener of [...this.#listeners]) listener();
-  }
-
-  reset = (): void => this.set(ALL);
-}
-
-export const cardHighlights = new CardHighlightStore();
+/** The page has one canvas, hence one store; each card subscribes to its own part. */
+export const cardHighlights = {
+  subscribe: store.subscribe,
+  now: store.now,
+  set: (change: Partial<CardHighlights>): void => store.set({ ...store.now(), ...change }),
+  reset: (): void => store.set(ALL),
+};
 
 /** Return the robot whose actions are highlighted; null: all actions. */
 export function useHighlightedRobot(): string | null {
-  return useSyncExternalStore(cardHighlights.subscribe, () => cardHighlights.now().robot);
+  return useWatched(cardHighlights, ({ robot }) => robot);
 }
 
 /** Return whether a robot's actions are dimmed, since another robot is highlighted. */
 export function useIsDimmed(robot: string): boolean {
-  return useSyncExternalStore(cardHighlights.subscribe, () => {
-    const lit = cardHighlights.now().robot;
-    return lit !== null && lit !== robot;
-  });
+  return useWatched(cardHighlights, ({ robot: lit }) => lit !== null && lit !== robot);
 }
 
 /** Return whether an action gives or takes the value of the focused parameter. */
 export function useDataRole(key: Key): "gives" | "takes" | undefined {
-  return useSyncExternalStore(cardHighlights.subscribe, () => {
-    const { touched } = cardHighlights.now();
+  return useWatched(cardHighlights, ({ touched }) => {
     if (touched?.producers.has(key)) return "gives";
     return touched?.consumers.has(key) ? "takes" : undefined;
   });
@@ -77,28 +64,19 @@ export function useDataRole(key: Key): "gives" | "takes" | undefined {
 
 /** Return the number of open comment threads about an action. */
 export function useOpenThreadCount(key: Key): number {
-  return useSyncExternalStore(
-    cardHighlights.subscribe,
-    () => cardHighlights.now().openThreads.get(key) ?? 0,
-  );
+  return useWatched(cardHighlights, ({ openThreads }) => openThreads.get(key) ?? 0);
 }
 
 const NONE: readonly Precondition[] = [];
 
 /** Return the outcomes of a relation that no expected course takes; empty while coverage is not shown. */
 export function useUntakenOutcomes(relation: string): readonly Precondition[] {
-  return useSyncExternalStore(
-    cardHighlights.subscribe,
-    () => cardHighlights.now().untaken?.outcomes.get(relation) ?? NONE,
-  );
+  return useWatched(cardHighlights, ({ untaken }) => untaken?.outcomes.get(relation) ?? NONE);
 }
 
 /** Return whether no expected course visits an action; false while coverage is not shown. */
 export function useIsUnvisited(key: Key): boolean {
-  return useSyncExternalStore(
-    cardHighlights.subscribe,
-    () => cardHighlights.now().untaken?.actions.has(key) ?? false,
-  );
+  return useWatched(cardHighlights, ({ untaken }) => untaken?.actions.has(key) ?? false);
 }
 
 /** Replaces the state on cards where the canvas shows something else than one run. */

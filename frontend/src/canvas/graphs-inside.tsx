@@ -1,10 +1,10 @@
 /** Sub-graphs as the canvas and the menus know them; the folder `levels`, which is loaded late, fills these stores. */
-import { type ComponentType, useSyncExternalStore } from "react";
+import type { ComponentType } from "react";
 import type { LibraryAction } from "../api/documents/library";
 import type { Action, Key } from "../graph/model";
 import type { ToldProblem } from "../graph/problems/told-problems";
 import type { Progress } from "../status/progress";
-import { Watched } from "../ui/watched";
+import { useWatched, Watched } from "../ui/watched";
 import type { Size, Sizes } from "./geometry/arrange";
 
 export interface InsideSignProps {
@@ -54,17 +54,15 @@ export const graphsInside = new Watched<GraphsInside | null>(null);
 
 /** Draws the buttons of an action that stands for a graph, once they are loaded. */
 export function InsideSpot({ of, name }: InsideSignProps) {
-  const { subscribe, now } = graphsInside;
-  const Sign = useSyncExternalStore(subscribe, () =>
-    now()?.byName.has(name) ? now()?.Sign : undefined,
+  const Sign = useWatched(graphsInside, (inside) =>
+    inside?.byName.has(name) ? inside.Sign : undefined,
   );
   return Sign && <Sign of={of} name={name} />;
 }
 
 /** Shows the name of a graph. */
 export function NameOfGraph({ id }: { id: string }) {
-  const { subscribe, now } = graphsInside;
-  return useSyncExternalStore(subscribe, () => now()?.names.get(id)) ?? "…";
+  return useWatched(graphsInside, (inside) => inside?.names.get(id)) ?? "…";
 }
 
 /**
@@ -109,9 +107,8 @@ export const expandedGraphs = new Watched<ExpandedGraphs | null>(null);
 
 /** Return the size of an expanded card and the component that draws its graph; null if it is not expanded. */
 export function useExpandedCard(key: Key): { size: Size; Frame: ExpandedGraphs["Frame"] } | null {
-  const { subscribe, now } = expandedGraphs;
-  const size = useSyncExternalStore(subscribe, () => now()?.sizes.get(key));
-  const Frame = now()?.Frame;
+  const size = useWatched(expandedGraphs, (expanded) => expanded?.sizes.get(key));
+  const Frame = expandedGraphs.now()?.Frame;
   return size && Frame ? { size, Frame } : null;
 }
 

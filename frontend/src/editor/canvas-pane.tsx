@@ -1,8 +1,9 @@
 /** The canvas with its tools and bars, and the hint on an empty canvas. */
+
 import { Button, Kbd, Skeleton } from "@mantine/core";
 import { IconFocus2, IconRouteAltLeft } from "@tabler/icons-react";
 import { ReactFlowProvider } from "@xyflow/react";
-import { type ReactNode, useEffect, useMemo, useRef, useSyncExternalStore } from "react";
+import { type ReactNode, useEffect, useMemo, useRef } from "react";
 import { ChangeMarked } from "../canvas/marks/change-marks";
 import { NO_PROBLEM_MARKS, type ProblemMarks } from "../canvas/marks/problem-marks";
 import { type EditorContext, useEditorContext } from "../edit-actions/editor-context";
@@ -17,6 +18,7 @@ import { Empty } from "../ui/empty";
 import { useHasFingersOnly } from "../ui/hooks/use-screen-size";
 import { lazyPart } from "../ui/parts/lazy-part";
 import { PartBoundary } from "../ui/parts/part-boundary";
+import { useWatched } from "../ui/watched";
 import { EditableCanvas } from "./canvas/editable-canvas";
 import { useCanvasElements } from "./canvas/use-canvas-elements";
 import { useFirstLayout } from "./canvas/use-first-layout";
@@ -127,7 +129,7 @@ function FollowRun({ onFollow }: { onFollow: () => void }) {
 
 function Inside(props: Props) {
   const { me, canvasHandle, compact, phone, writing, corner, past } = props;
-  const seen = useSyncExternalStore(past.drawn.subscribe, past.drawn.now);
+  const seen = useWatched(past.drawn);
   const context = useDrawnContext(seen);
   const { graph } = context;
   const dry = context.dryRun !== null || undefined;

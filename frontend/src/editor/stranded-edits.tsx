@@ -209,7 +209,7 @@ function Body({ choice, by, onLater }: BodyProps) {
     <>
       <Text>
         {causeOf(stranded, changes(all.length), when)} Behind this dialog is the graph as it is now.
-        Which of them shall be made in it?
+        Which of them should be applied to it?
       </Text>
       <Group mt="xs" gap="xs" className={style.marks ?? ""}>
         <Button size="compact-sm" onClick={() => setLeft(new Set())}>

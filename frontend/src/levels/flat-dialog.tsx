@@ -27,8 +27,8 @@ interface Props {
 function Reasons({ reasons, context, onClose }: Props & { reasons: readonly FlatteningReason[] }) {
   return (
     <>
-      <p>One graph would not do the same as this one with those inside of it, so none is made:</p>
-      <ReasonList label="Why none is made" {...{ reasons, context, onClose }} />
+      <p>A flattened graph would behave differently from this one, so none is made:</p>
+      <ReasonList label="Why no graph is made" {...{ reasons, context, onClose }} />
     </>
   );
 }
@@ -55,7 +55,7 @@ function Origins({ flat: { origins, left_out } }: { flat: FlatGraph }) {
       </ul>
       {left_out.length > 0 && (
         <p className={style.quiet}>
-          No action has these any more:{" "}
+          These entries belong to no action of the flattened graph:{" "}
           {left_out
             .map(({ levels, fields }) => `${fields.join(", ")} of ${wayWords(levels)}`)
             .join("; ")}

@@ -6,7 +6,7 @@ import {
   IconStack2,
   IconStairsDown,
 } from "@tabler/icons-react";
-import { memo, useMemo, useSyncExternalStore } from "react";
+import { memo, useMemo } from "react";
 import { CardState } from "../canvas/action-card";
 import card from "../canvas/action-card.module.css";
 import { pillWord } from "../canvas/arrows/bundles";
@@ -32,6 +32,7 @@ import type { Progress } from "../status/progress";
 import { progressBelow, type RunOnCanvas, runOnCanvas } from "../status/progress-inside";
 import { StateLabel } from "../status/state-label";
 import { colorOfName } from "../ui/name-colors";
+import { useWatched } from "../ui/watched";
 import { isolated } from "../words/isolated";
 import style from "./level-frame.module.css";
 import { expansion, type LevelGraph } from "./level-graph";
@@ -67,7 +68,7 @@ export function progressOf(
 function useLevelProgress(level: LevelGraph): ReadonlyMap<Key, Progress> {
   const { dryRun, graph } = useEditorContext();
   const { name: outermost } = graph;
-  const run = useSyncExternalStore(runOnCanvas.subscribe, runOnCanvas.now);
+  const run = useWatched(runOnCanvas);
   return useMemo(
     () => progressOf(level, { dryRun, run, outermost }),
     [level, dryRun, run, outermost],
@@ -97,8 +98,7 @@ export function marksInside(told: readonly ToldProblem[]): ProblemMarks {
 }
 
 function useMarkInside(path: string): ProblemMark | undefined {
-  const { subscribe, now } = toldOnCanvas;
-  return useSyncExternalStore(subscribe, () => marksInside(now()).get(path));
+  return useWatched(toldOnCanvas, (told) => marksInside(told).get(path));
 }
 
 const NO_OUTCOMES: readonly Precondition[] = [];
@@ -347,7 +347,7 @@ function LevelFrame({ level, name, progress }: FrameProps) {
 
 /** Draws the expanded graph on the card of an action of the canvas. */
 export function ExpandedCard({ of, progress }: LevelFrameProps) {
-  const level = useSyncExternalStore(expansion.subscribe, () => expansion.now().levels.get(of));
+  const level = useWatched(expansion, ({ levels }) => levels.get(of));
   if (!level) return null;
   const name = level.names.at(-1)?.name ?? "";
   return <LevelFrame level={level} name={name} progress={progress} />;

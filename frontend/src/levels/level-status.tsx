@@ -2,14 +2,16 @@
  * Shows the way out of an inner graph, and the graphs that contain this one, which every edit here
  * changes.
  */
+
 import { Menu } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconSitemap, IconStairsUp } from "@tabler/icons-react";
-import { useEffect, useSyncExternalStore } from "react";
+import { useEffect } from "react";
 import { Link } from "wouter";
 import { useLibrary } from "../api/documents/library";
 import { graphsInside, usedIn } from "../canvas/graphs-inside";
 import { useEditorContext } from "../edit-actions/editor-context";
+import { useWatched } from "../ui/watched";
 import { isolated } from "../words/isolated";
 import style from "./levels.module.css";
 
@@ -17,8 +19,7 @@ import style from "./levels.module.css";
 function useUsedIn(): readonly string[] {
   const { id, graph } = useEditorContext();
   const { data: actions = [] } = useLibrary();
-  const { subscribe, now } = graphsInside;
-  const stands = useSyncExternalStore(subscribe, () => now()?.isNamed ?? false);
+  const stands = useWatched(graphsInside, (inside) => inside?.isNamed ?? false);
   return stands ? usedIn(actions, { id, name: graph.name }) : [];
 }
 
@@ -84,8 +85,7 @@ function UsedIn() {
 
 /** The button to leave an inner graph; it replaces the line of levels on narrow screens. */
 function Out() {
-  const { subscribe, now } = graphsInside;
-  const leave = useSyncExternalStore(subscribe, () => now()?.leave);
+  const leave = useWatched(graphsInside, (inside) => inside?.leave);
   if (!leave) return null;
   return (
     <button type="button" className={`${style.used} ${style.out}`} onClick={leave}>

@@ -191,12 +191,12 @@ function Form({ look, again, ...props }: ExtractProps & Looked) {
     >
       <TextInput
         label="Name of the new graph"
-        description="The action that stands for it here is called the same."
+        description="The action that stands for it here gets the same name."
         maxLength={200}
         required
         ref={field}
         value={name}
-        error={isTaken ? "A graph or an action is called that already." : wrong || undefined}
+        error={isTaken ? "A graph or an action has this name already." : wrong || undefined}
         onChange={(event) => {
           setTyped(event.currentTarget.value);
           setWrong("");
@@ -207,9 +207,9 @@ function Form({ look, again, ...props }: ExtractProps & Looked) {
         <p className={style.quiet}>It does what these actions do now, for all of their results.</p>
       ) : (
         <div className={style.warned}>
-          <p>As a sub-graph they may do otherwise than in one graph, as now:</p>
+          <p>As a sub-graph, the actions may behave differently than they do now:</p>
           <ReasonList
-            label="What may be otherwise"
+            label="What may be different"
             reasons={differences}
             told={ofGraph(context)}
             {...{ context, onClose }}
@@ -222,7 +222,7 @@ function Form({ look, again, ...props }: ExtractProps & Looked) {
       <div className={style.answers}>
         <Button onClick={onClose}>Cancel</Button>
         <Button type="submit" variant="filled" loading={busy} disabled={isTaken}>
-          {differences.length === 0 ? "Make it" : "Make it all the same"}
+          {differences.length === 0 ? "Make it" : "Make it anyway"}
         </Button>
       </div>
     </form>
@@ -239,7 +239,7 @@ function Refused({ look, context, onClose }: ExtractProps & { look: ExtractionLo
     <>
       <p>No graph can be made of exactly these actions:</p>
       <ReasonList
-        label="Why none is made"
+        label="Why no graph is made"
         reasons={look.reasons ?? []}
         told={ofGraph(context)}
         {...{ context, onClose }}
@@ -304,14 +304,15 @@ function Asked({ look, context, onClose, name }: Asking) {
       {told.length > 0 && (
         <p>
           {refused
-            ? "No actions in its place would do the same, so it stays:"
-            : "In its place they may do otherwise than inside:"}
+            ? "Its actions would behave differently outside of it, so nothing is unpacked:"
+            : "Outside of it, its actions may behave differently:"}
         </p>
       )}
-      <ReasonList label="What would be otherwise" reasons={told} {...{ context, onClose }} />
+      <ReasonList label="What would be different" reasons={told} {...{ context, onClose }} />
       {left.length > 0 && (
         <p className={style.quiet}>
-          No action has these any more: {left.map(isolated).join(", ")} of <bdi>{name}</bdi>.
+          These entries belong to no action after unpacking: {left.map(isolated).join(", ")} of{" "}
+          <bdi>{name}</bdi>.
         </p>
       )}
       <div className={style.answers}>
@@ -324,7 +325,7 @@ function Asked({ look, context, onClose, name }: Asking) {
               unpack(context, look);
             }}
           >
-            {told.length > 0 ? "Unpack it all the same" : "Unpack it"}
+            {told.length > 0 ? "Unpack it anyway" : "Unpack it"}
           </Button>
         )}
       </div>

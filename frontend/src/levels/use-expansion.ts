@@ -1,5 +1,6 @@
 /** Keeps which graphs are expanded, and tells the canvas, which makes room for them. */
-import { useEffect, useMemo, useRef, useState, useSyncExternalStore } from "react";
+
+import { useEffect, useMemo, useRef, useState } from "react";
 import { spreading } from "../canvas/folding/spread";
 import { expandedGraphs, type PartOnCard } from "../canvas/graphs-inside";
 import { useEditorContext } from "../edit-actions/editor-context";
@@ -8,6 +9,7 @@ import { runOnCanvas } from "../status/progress-inside";
 import { announcer } from "../ui/announcer";
 import { useKeptKeys } from "../ui/hooks/use-kept-keys";
 import { useStableCallback } from "../ui/hooks/use-stable-callback";
+import { useWatched } from "../ui/watched";
 import { ExpandedCard, progressOf, type StateSource } from "./level-frame";
 import {
   expansion,
@@ -97,7 +99,7 @@ function partsOf(level: LevelGraph | undefined, source: StateSource): PartOnCard
 /** Return a ref to the current sources of states, for callers outside of rendering. */
 function useStateSource() {
   const { dryRun, graph } = useEditorContext();
-  const run = useSyncExternalStore(runOnCanvas.subscribe, runOnCanvas.now);
+  const run = useWatched(runOnCanvas);
   const source = useRef<StateSource>({ dryRun, run, outermost: graph.name });
   source.current = { dryRun, run, outermost: graph.name };
   return source;

@@ -1,8 +1,8 @@
 /** Spreads the drawing of a graph so that expanded cards have room, without changing the document. */
 import type { ReactFlowInstance } from "@xyflow/react";
-import { useMemo, useSyncExternalStore } from "react";
+import { useMemo } from "react";
 import type { Graph, Position } from "../../graph/model";
-import { Watched } from "../../ui/watched";
+import { useWatched, Watched } from "../../ui/watched";
 import type { Arrow, CanvasNode } from "../elements";
 import type { Positions, Sizes } from "../geometry/arrange";
 import type { Folding } from "./folding";
@@ -49,7 +49,7 @@ const AS_IT_STANDS = {
 };
 
 export function useSpread({ graph, rest, folding, flow }: StandingGraph): Spread {
-  const spread = useSyncExternalStore(spreading.subscribe, spreading.now);
+  const spread = useWatched(spreading);
   return useMemo(
     () => spread?.({ graph, rest, folding, flow }) ?? { ...AS_IT_STANDS, graph, folding, flow },
     [spread, graph, rest, folding, flow],

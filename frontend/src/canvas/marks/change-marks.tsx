@@ -1,12 +1,6 @@
 /** Marks on cards, notes and arrows that were added, removed or changed between two moments of a graph. */
-import {
-  createContext,
-  type ReactNode,
-  use,
-  useLayoutEffect,
-  useState,
-  useSyncExternalStore,
-} from "react";
+import { createContext, type ReactNode, use, useLayoutEffect, useState } from "react";
+import { useWatched, Watched } from "../../ui/watched";
 import style from "./change-marks.module.css";
 
 export interface ChangeMark {
@@ -42,30 +36,20 @@ function isSameMark(a: ChangeMark, b: ChangeMark): boolean {
 
 const NO_ROWS: ReadonlySet<string> = new Set();
 
-/** Every card and arrow subscribes to its own mark; between two moments most marks stay the same. */
-class ChangeMarkStore {
-  #marks: ChangeMarks = new Map();
-  #listeners = new Set<() => void>();
+const NO_MARKS: ChangeMarks = new Map();
 
-  subscribe = (listener: () => void): (() => void) => {
-    this.#listeners.add(listener);
-    return () => this.#listeners.delete(listener);
-  };
-  get = (key: string): ChangeMark | undefined => this.#marks.get(key);
-
-  set(marks: ChangeMarks | null): void {
-    const before = this.#marks;
-    const kept = [...(marks ?? [])].map(([key, mark]): [string, ChangeMark] => {
+/** Return the new marks, in which every mark that equals the one before is the identical old object. */
+function keepEqualMarks(before: ChangeMarks, marks: ChangeMarks): ChangeMarks {
+  if (marks.size === 0 && before.size === 0) return before;
+  return new Map(
+    [...marks].map(([key, mark]) => {
       const known = before.get(key);
       return [key, known !== undefined && isSameMark(known, mark) ? known : mark];
-    });
-    if (kept.length === 0 && before.size === 0) return;
-    this.#marks = new Map(kept);
-    for (const listener of [...this.#listeners]) listener();
-  }
+    }),
+  );
 }
 
-const ChangeMarksContext = createContext<ChangeMarkStore>(new ChangeMarkStore());
+const ChangeMarksContext = createContext(new Watched(NO_MARKS));
 
 interface ChangeMarkedProps {
   /** Null: nothing is compared. */
@@ -75,16 +59,15 @@ interface ChangeMarkedProps {
 
 /** Provides the marks of all cards, notes and arrows of one canvas. */
 export function ChangeMarked({ marks, children }: ChangeMarkedProps) {
-  const [store] = useState(() => new ChangeMarkStore());
-  useLayoutEffect(() => store.set(marks), [store, marks]);
+  const [store] = useState(() => new Watched(NO_MARKS));
+  useLayoutEffect(() => store.set(keepEqualMarks(store.now(), marks ?? NO_MARKS)), [store, marks]);
   return <ChangeMarksContext value={store}>{children}</ChangeMarksContext>;
 }
 
 export const CHANGE_SIGNS = { added: "+", removed: "−", changed: "△" } as const;
 
 export function useChangeMark(key: string): ChangeMark | undefined {
-  const { subscribe, get } = use(ChangeMarksContext);
-  return useSyncExternalStore(subscribe, () => get(key));
+  return useWatched(use(ChangeMarksContext), (marks) => marks.get(key));
 }
 
 /** Shows the kind of change and its author. `beside`: leaves room for another tag at the same place. */

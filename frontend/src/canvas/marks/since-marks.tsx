@@ -1,6 +1,6 @@
 /** Marks on cards and arrows that have changed since a run last went well. */
-import { type ComponentType, useSyncExternalStore } from "react";
-import { Watched } from "../../ui/watched";
+import type { ComponentType } from "react";
+import { useWatched, Watched } from "../../ui/watched";
 
 export interface SinceMark {
   readonly change: "added" | "changed";
@@ -36,7 +36,7 @@ export const sinceMarks = new Watched<SinceMarks | null>(null);
 
 /** Draws the mark of an action or arrow, if it has one. */
 export function SinceSpot({ of, on }: Pick<SinceSignProps, "of" | "on">) {
-  const mark = useSyncExternalStore(sinceMarks.subscribe, () => sinceMarks.now()?.marks.get(of));
+  const mark = useWatched(sinceMarks, (since) => since?.marks.get(of));
   const since = sinceMarks.now();
   return mark && since && <since.Sign {...{ of, on, mark, since }} />;
 }

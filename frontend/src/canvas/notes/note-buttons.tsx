@@ -25,7 +25,7 @@ export function ActionLink({ link }: { link: NoteLink }) {
   const target = links.target(link);
   if (target === null) {
     return (
-      <span className={style.lost} title="No action, or more than one, is called so">
+      <span className={style.lost} title="No action, or more than one, has this name">
         {link.name}
       </span>
     );

@@ -6,15 +6,7 @@
 
 import { useThrottledValue } from "@mantine/hooks";
 import { Panel, type ReactFlowInstance, useStore, type Viewport } from "@xyflow/react";
-import {
-  memo,
-  type PointerEvent,
-  type RefObject,
-  useEffect,
-  useMemo,
-  useRef,
-  useSyncExternalStore,
-} from "react";
+import { memo, type PointerEvent, type RefObject, useEffect, useMemo, useRef } from "react";
 import type { Arrow, CanvasNode } from "../../canvas/elements";
 import { expandedGraphs, type PartOnCard } from "../../canvas/graphs-inside";
 import { noteColor } from "../../canvas/notes/note-nodes";
@@ -23,6 +15,7 @@ import type { Key } from "../../graph/model";
 import { runOnCanvas } from "../../status/progress-inside";
 import { toneColor } from "../../status/state-label";
 import { colorOfName } from "../../ui/name-colors";
+import { useWatched } from "../../ui/watched";
 
 /** A rectangle in px of the graph. */
 interface MapArea {
@@ -207,8 +200,8 @@ export function GraphMap({ nodes, flow }: Props) {
   const map = useRef<SVGSVGElement>(null);
   // Each update computes and paints all paths again.
   const throttled = useThrottledValue(nodes, REST);
-  const run = useThrottledValue(useSyncExternalStore(runOnCanvas.subscribe, runOnCanvas.now), REST);
-  const expanded = useSyncExternalStore(expandedGraphs.subscribe, expandedGraphs.now);
+  const run = useThrottledValue(useWatched(runOnCanvas), REST);
+  const expanded = useWatched(expandedGraphs);
   // biome-ignore lint/correctness/useExhaustiveDependencies: with each change of the run there are other states
   const { paths, area } = useMemo(
     () => mapMarks(throttled, expanded?.partsOf),

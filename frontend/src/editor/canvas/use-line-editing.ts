@@ -27,8 +27,8 @@ export function leadElsewhere(
   else {
     notifications.show({
       color: "red",
-      title: "The arrow stays",
-      message: "These two are tied already, or no arrow can lead there.",
+      title: "The arrow was not moved",
+      message: "These two are connected already, or no arrow can lead there.",
     });
   }
 }

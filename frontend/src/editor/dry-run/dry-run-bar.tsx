@@ -256,7 +256,7 @@ function Said({ run }: { run: DryRun }) {
   return (
     <>
       {run.words.join(" · ") || "…"}
-      {last && run.cut && <i> · It goes on; the dry-run is cut here.</i>}
+      {last && run.cut && <i> · It continues, but the dry-run ends here.</i>}
       {last && !run.cut && run.sighting.running.length > 0 && (
         <i>
           {" "}

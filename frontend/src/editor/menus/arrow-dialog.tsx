@@ -306,7 +306,7 @@ export function ArrowDialog(props: ArrowDialogProps) {
           initial={early}
           find={(search) => matching(ends(context, ENTRY, null), search)}
           onPick={chooseFrom}
-          none="No action is called so."
+          none="No action has this name."
         />
       )}
       {step === "outcome" && from !== null && to !== null && (
@@ -327,7 +327,7 @@ export function ArrowDialog(props: ArrowDialogProps) {
               if (next !== null) setOutcome(next);
               return next !== null;
             }}
-            none="No action is called so."
+            none="No action has this name."
             take="draw"
           />
         </>
@@ -443,7 +443,7 @@ export function RetargetDialog({ context, relation: id, outcome, onClose }: Reta
         placeholder={end === "child" ? "What follows instead?" : "After which action instead?"}
         find={(search) => matching(placesFor(context, relation, end), search)}
         onPick={lead}
-        none="No action is called so."
+        none="No action has this name."
         take="lead there"
       />
     </Modal>

@@ -123,7 +123,7 @@ export function CommandPalette({
           placeholder="What do you want to do, or where to go?"
           find={(search) => matching(options, search).slice(0, MOST)}
           onPick={onPick}
-          none="Nothing is called so."
+          none="Nothing has this name."
           take="do it"
         />
       </dialog>

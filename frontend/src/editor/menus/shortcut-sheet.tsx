@@ -89,7 +89,7 @@ function KeysWanted({ editAction, own, setChanging }: Omit<Props, "changing">) {
         </Button>
         {changed && (
           <Button size="compact-xs" onClick={() => give(editAction.shortcuts)}>
-            As it came
+            Default keys
           </Button>
         )}
         <Button size="compact-xs" variant="subtle" onClick={() => setChanging(null)}>
@@ -180,8 +180,8 @@ export function ShortcutSheet({ onClose }: { onClose: () => void }) {
         <Switch
           checked={all}
           onChange={(event) => setAll(event.currentTarget.checked)}
-          label="Show what has no keys, too"
-          description="The pencil gives keys, on this device."
+          label="Show actions without keys, too"
+          description="The pencil assigns keys, on this device."
         />
         {Object.keys(own).length > 0 && (
           <Button size="compact-sm" onClick={() => keepOwn({})}>

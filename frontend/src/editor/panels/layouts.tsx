@@ -1,11 +1,12 @@
 /** Arranges the parts of the editor: one at a time on a phone, around the canvas elsewhere. */
+
 import { ActionIcon, Button } from "@mantine/core";
 import {
   IconLayoutSidebar,
   IconLayoutSidebarLeftCollapse,
   IconLayoutSidebarRight,
 } from "@tabler/icons-react";
-import { type ReactNode, useEffect, useRef, useSyncExternalStore } from "react";
+import { type ReactNode, useEffect, useRef } from "react";
 import { actionDrag } from "../../canvas/action-drag";
 import { dryRun } from "../../edit-actions/dry-run-actions";
 import { isEnabled } from "../../edit-actions/edit-action";
@@ -17,6 +18,7 @@ import { type ListTab, useListTab } from "../../ui/hooks/use-list-tab";
 import { lazyPart } from "../../ui/parts/lazy-part";
 import { PartBoundary } from "../../ui/parts/part-boundary";
 import { Segments } from "../../ui/segments";
+import { useWatched } from "../../ui/watched";
 import style from "./layouts.module.css";
 import type { Pane, Panels } from "./use-panels";
 
@@ -197,7 +199,7 @@ function SideTabs({ panels: { side, setSide } }: { panels: Panels }) {
 /** Shows the lists beside the canvas, or over it on a narrow screen or beside a rail. */
 function ListSide({ wide, panels, told, outline, history, list }: DesktopParts) {
   const { left, side, folded, fold } = panels;
-  const carrying = useSyncExternalStore(actionDrag.subscribe, actionDrag.now) !== null;
+  const carrying = useWatched(actionDrag) !== null;
   const beside = wide && !folded;
   const open = beside || (left && !carrying);
   return (
