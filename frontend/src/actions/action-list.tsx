@@ -17,6 +17,7 @@ import { useMay } from "../api/use-person";
 import { useSearchKey } from "../ui/hooks/use-search-key";
 import { keyOf } from "../ui/keys";
 import { LongList } from "../ui/long-list";
+import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";
 import style from "./actions-page.module.css";
 import { type ActionFilter, addressOf, foundActions, type ListedAction } from "./listing";
@@ -220,7 +221,7 @@ export function ActionList({ actions, robots, current, onNew, onImport, foot }: 
       />
       <Filters robots={robots} filter={filter} onFilter={setFilter} />
       <p className="visually-hidden" role="status">
-        {found.length === 1 ? "1 action" : `${found.length} actions`}
+        {counted(found.length, "action")}
       </p>
       <nav aria-label="Actions" className={style.scroll} aria-busy={wanted !== search}>
         <ActionRows actions={found} current={current} />

@@ -8,6 +8,7 @@ import { useGraphs } from "../api/graphs";
 import type { Parameter } from "../graph/model";
 import { type RobotAction, type RobotsKnowledge, robotDifferences } from "../library/robot-actions";
 import { colorOfName } from "../ui/name-colors";
+import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";
 import style from "./action-overview.module.css";
 import { type ParameterFacts, parameterFacts } from "./parameter-facts";
@@ -87,9 +88,7 @@ export function UsedIn({ usedIn, differs, onTake }: UsedInProps) {
     <section>
       <h3 className={style.heading}>
         Used in
-        {usedIn.length > 0 && (
-          <span>{usedIn.length === 1 ? "1 graph" : `${usedIn.length} graphs`}</span>
-        )}
+        {usedIn.length > 0 && <span>{counted(usedIn.length, "graph")}</span>}
       </h3>
       {usedIn.length === 0 && <p className={style.quiet}>No graph uses it yet.</p>}
       <ul className={style.facts} aria-label="Graphs that use it">

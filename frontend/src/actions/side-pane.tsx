@@ -10,6 +10,7 @@ import { PackagePane } from "../packages/package-pane";
 import { lazyPart } from "../ui/parts/lazy-part";
 import { PartBoundary } from "../ui/parts/part-boundary";
 import { ago, instant, useNow } from "../ui/times";
+import { counted } from "../words/counted";
 import style from "./open-action.module.css";
 
 type BuildFault = ActionBuild["errors"][number];
@@ -23,7 +24,7 @@ export function faultPlace({ file, line, column }: BuildFault): string {
 export function buildWords({ ended_well, errors }: ActionBuild): string {
   if (ended_well) return "built";
   if (errors.length === 0) return "not built, for errors of others in its package";
-  return errors.length === 1 ? "1 error" : `${errors.length} errors`;
+  return counted(errors.length, "error");
 }
 
 function LastBuild({ id }: { id: string }) {

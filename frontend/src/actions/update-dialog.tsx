@@ -19,6 +19,7 @@ import { refreshGraphs, refreshLibrary } from "../api/graphs";
 import { errorText, Refusal } from "../api/http";
 import { pathWords } from "../graph/value-text";
 import { DifferenceView } from "../history/difference-view";
+import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";
 import {
   clashes,
@@ -250,7 +251,6 @@ function Body({ id, mayEdit, onClose }: Props) {
   if (found.isPending) return <Skeleton height={160} />;
   if (found.isError) return <p role="alert">{errorText(found.error)}</p>;
   const older = uses.filter((use) => use.changed);
-  const count = chosen.length === 1 ? "1 graph" : `${chosen.length} graphs`;
   return (
     <div aria-busy={update.renewing}>
       {update.wrong !== "" && (
@@ -279,7 +279,7 @@ function Body({ id, mayEdit, onClose }: Props) {
             disabled={chosen.length === 0 || update.renewing}
             onClick={() => void update.update()}
           >
-            Update {count}
+            Update {counted(chosen.length, "graph")}
           </Button>
         )}
       </div>

@@ -2,11 +2,13 @@
  * Asks after a graph was renamed whether the actions of other graphs that stand for it get the new
  * name, too.
  */
+
 import { Button, Checkbox, Group, Modal, Stack } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { useState } from "react";
 import { callUses } from "../api/documents/inside";
 import { errorText } from "../api/http";
+import { counted } from "../words/counted";
 
 export interface RenamedUse {
   readonly id: string;
@@ -23,8 +25,6 @@ interface Props {
   onClose: () => void;
 }
 
-const counted = (n: number) => (n === 1 ? "1 graph" : `${n} graphs`);
-
 export function RenamedUses({ graph, before, name, uses, onClose }: Props) {
   const [left, setLeft] = useState<ReadonlySet<string>>(new Set());
   const [busy, setBusy] = useState(false);
@@ -40,7 +40,7 @@ export function RenamedUses({ graph, before, name, uses, onClose }: Props) {
     try {
       const graphs = chosen.map(({ id }) => id);
       const { changed } = await callUses(graph, { before, name, graphs });
-      notifications.show({ message: `Changed in ${counted(changed.length)}, too.` });
+      notifications.show({ message: `Changed in ${counted(changed.length, "graph")}, too.` });
       onClose();
     } catch (error) {
       setWrong(errorText(error));
@@ -52,8 +52,8 @@ export function RenamedUses({ graph, before, name, uses, onClose }: Props) {
       <Stack gap="sm">
         <p>
           <bdi>“{before}”</bdi> is called <bdi>“{name}”</bdi> now. Actions called{" "}
-          <bdi>“{before}”</bdi> stand for it in {counted(uses.length)}; if you leave them as they
-          are, they stand for no graph any more.
+          <bdi>“{before}”</bdi> stand for it in {counted(uses.length, "graph")}; if you leave them
+          as they are, they stand for no graph any more.
         </p>
         {uses.map((use) => (
           <Checkbox
@@ -73,7 +73,7 @@ export function RenamedUses({ graph, before, name, uses, onClose }: Props) {
             disabled={chosen.length === 0}
             onClick={() => void change()}
           >
-            Change in {counted(chosen.length)}
+            Change in {counted(chosen.length, "graph")}
           </Button>
         </Group>
       </Stack>

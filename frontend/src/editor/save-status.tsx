@@ -1,4 +1,5 @@
 /** Shows in words whether everything on screen is stored. */
+
 import {
   IconAlertTriangle,
   IconCheck,
@@ -16,6 +17,7 @@ import { useLink, useRoom } from "../sync/use-room";
 import { textScope, useWaitingTexts } from "../ui/drafts/kept-texts";
 import { type DraftCounts, pendingDrafts } from "../ui/drafts/pending-drafts";
 import { Tooltip } from "../ui/floating/tooltip";
+import { counted } from "../words/counted";
 import style from "./save-status.module.css";
 
 const whys: Record<RefusalReason, string> = {
@@ -38,10 +40,6 @@ export interface SaveStatusText {
   words: string;
 }
 
-function changes(n: number): string {
-  return n === 1 ? "1 change" : `${n} changes`;
-}
-
 const NO_DRAFTS: DraftCounts = { writing: 0, waiting: 0 };
 
 /**
@@ -56,7 +54,7 @@ export function saveStatusText(
   const link = { ...room, unsaved: room.unsaved + writing };
   if (link.state === "refused") {
     const why = link.why ? whys[link.why] : "Refused";
-    const kept = link.unsaved > 0 ? ` · ${changes(link.unsaved)} not saved` : "";
+    const kept = link.unsaved > 0 ? ` · ${counted(link.unsaved, "change")} not saved` : "";
     return { tone: "bad", words: why + kept };
   }
   if (link.state === "live" && link.seq > 0) {
@@ -64,7 +62,7 @@ export function saveStatusText(
     if (link.unsaved > 0) return { tone: "busy", words: `Saving ${link.unsaved}` };
     return waiting === 0
       ? { tone: "good", words: "Saved" }
-      : { tone: "draft", words: `${waiting === 1 ? "1 draft" : `${waiting} drafts`} not saved` };
+      : { tone: "draft", words: `${counted(waiting, "draft")} not saved` };
   }
   if (link.seq === 0) {
     return link.why === undefined
@@ -72,7 +70,7 @@ export function saveStatusText(
       : { tone: "off", words: whys[link.why] };
   }
   if (link.unsaved === 0) return { tone: "off", words: "Offline" };
-  return { tone: "off", words: `Offline with ${changes(link.unsaved)}` };
+  return { tone: "off", words: `Offline with ${counted(link.unsaved, "change")}` };
 }
 
 const signs = {

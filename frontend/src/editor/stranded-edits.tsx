@@ -14,6 +14,7 @@ import {
   useRoom,
   useStrandedEdits,
 } from "../sync/use-room";
+import { counted } from "../words/counted";
 import notices from "./room-notices.module.css";
 import style from "./stranded-edits-dialog.module.css";
 
@@ -86,7 +87,7 @@ export function OthersDialog({ graph, waiting, opened, onClose }: OthersProps) {
         {others.map((other) => (
           <li key={other.id}>
             <b>{name(other)}</b>
-            <span>{other.waiting === 1 ? "1 change" : `${other.waiting} changes`}</span>
+            <span>{counted(other.waiting, "change")}</span>
             <Button size="compact-sm" onClick={() => save(other)}>
               Save as a file
             </Button>
@@ -107,10 +108,6 @@ export function OthersDialog({ graph, waiting, opened, onClose }: OthersProps) {
 }
 
 const signs = { added: "+", removed: "−", changed: "~" } as const;
-
-function changes(n: number): string {
-  return n === 1 ? "1 change" : `${n} changes`;
-}
 
 function Lines({ lines }: { lines: readonly ChangedField[] }) {
   return (
@@ -208,8 +205,8 @@ function Body({ choice, by, onLater }: BodyProps) {
   return (
     <>
       <Text>
-        {causeOf(stranded, changes(all.length), when)} Behind this dialog is the graph as it is now.
-        Which of them should be applied to it?
+        {causeOf(stranded, counted(all.length, "change"), when)} Behind this dialog is the graph as
+        it is now. Which of them should be applied to it?
       </Text>
       <Group mt="xs" gap="xs" className={style.marks ?? ""}>
         <Button size="compact-sm" onClick={() => setLeft(new Set())}>

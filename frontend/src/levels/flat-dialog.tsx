@@ -2,6 +2,7 @@
  * The dialog that flattens a graph with its sub-graphs into one graph, or tells why the result
  * would behave differently.
  */
+
 import { Button, Modal, Skeleton, TextInput } from "@mantine/core";
 import { useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
@@ -16,6 +17,7 @@ import { type GraphSummary, queryKeys, refreshGraphs } from "../api/graphs";
 import { errorText } from "../api/http";
 import type { EditorContext } from "../edit-actions/editor-context";
 import { copyNameOf } from "../graph/edit/copy-name";
+import { counted } from "../words/counted";
 import style from "./levels.module.css";
 import { MOST, ReasonList, wayWords } from "./reason-list";
 
@@ -38,9 +40,9 @@ function Origins({ flat: { origins, left_out } }: { flat: FlatGraph }) {
   return (
     <>
       <p>
-        It has {origins.length === 1 ? "1 action" : `${origins.length} actions`}, and does what this
-        graph does with those inside of it as they are now: the same actions with the same values,
-        in the same order, with the same end.
+        It has {counted(origins.length, "action")}, and does what this graph does with those inside
+        of it as they are now: the same actions with the same values, in the same order, with the
+        same end.
       </p>
       <ul className={style.list} aria-label="Where its actions come from">
         {origins.slice(0, MOST).map(({ key, action, levels }) => (

@@ -12,7 +12,6 @@ import card from "../canvas/action-card.module.css";
 import { pillWord } from "../canvas/arrows/bundles";
 import { pathOf } from "../canvas/arrows/line-path";
 import { CardLines } from "../canvas/card-lines";
-import { actionsWord } from "../canvas/folding/folding";
 import { CARD_LINES } from "../canvas/geometry/arrange";
 import { graphsInside, type LevelFrameProps, toldOnCanvas } from "../canvas/graphs-inside";
 import {
@@ -33,6 +32,7 @@ import { progressBelow, type RunOnCanvas, runOnCanvas } from "../status/progress
 import { StateLabel } from "../status/state-label";
 import { colorOfName } from "../ui/name-colors";
 import { useWatched } from "../ui/watched";
+import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";
 import style from "./level-frame.module.css";
 import { expansion, type LevelGraph } from "./level-graph";
@@ -164,15 +164,18 @@ const LevelLines = memo(function LevelLines({ lines, progress }: LevelLinesProps
 interface ButtonProps {
   label: string;
   keys?: string;
+  small?: boolean;
   Sign: typeof IconStack2;
   onClick: () => void;
 }
 
-function HeadButton({ label, keys, Sign, onClick }: ButtonProps) {
+/** A button on a card; `small`: in the head of a card of the canvas. */
+export function CardButton({ label, keys, Sign, small = false, onClick }: ButtonProps) {
   return (
     <button
       type="button"
       className={`${style.button} nodrag`}
+      data-small={small || undefined}
       title={keys === undefined ? label : `${label}  ${keys}`}
       aria-label={label}
       onClick={(event) => {
@@ -181,7 +184,7 @@ function HeadButton({ label, keys, Sign, onClick }: ButtonProps) {
       }}
       onDoubleClick={(event) => event.stopPropagation()}
     >
-      <Sign size={15} aria-hidden />
+      <Sign size={small ? 14 : 15} aria-hidden />
     </button>
   );
 }
@@ -235,7 +238,7 @@ const InnerCard = memo(function InnerCard({
         </b>
         {instanceId > 0 && <span className={card.instance}>{instanceId}</span>}
         {opensGraph(name) && (
-          <HeadButton
+          <CardButton
             label={`Expand the graph inside ${isolated(name)}`}
             Sign={IconArrowsDiagonal}
             onClick={() => expansion.now().toggle(path)}
@@ -264,7 +267,7 @@ interface FrameProps {
 function Head({ level, name, progress }: FrameProps) {
   const { graph, path } = level;
   const count =
-    graph === null || typeof graph === "string" ? "" : actionsWord(graph.actions.length);
+    graph === null || typeof graph === "string" ? "" : counted(graph.actions.length, "action");
   return (
     <div className={style.head}>
       <IconStack2 size={15} aria-hidden />
@@ -274,13 +277,13 @@ function Head({ level, name, progress }: FrameProps) {
       {progress && <StateLabel tone={progress.tone} word={progress.word} />}
       <span className={style.count}>{count}</span>
       <span className={style.buttons}>
-        <HeadButton
+        <CardButton
           label={`Open the graph inside ${isolated(name)}`}
           keys="]"
           Sign={IconStairsDown}
           onClick={() => expansion.now().enter(path)}
         />
-        <HeadButton
+        <CardButton
           label={`Collapse the graph inside ${isolated(name)}`}
           keys="}"
           Sign={IconArrowsDiagonalMinimize2}

@@ -1,7 +1,8 @@
 /** Finds the graphs for which actions stand, and opens, expands and leaves them. */
+
 import { IconArrowsDiagonal, IconStairsDown } from "@tabler/icons-react";
 import { useQueryClient } from "@tanstack/react-query";
-import { type MouseEvent, useCallback, useEffect, useMemo } from "react";
+import { useCallback, useEffect, useMemo } from "react";
 import { useLocation, useSearch } from "wouter";
 import { useGraphsAsActions, useLibrary } from "../api/documents/library";
 import { refreshLibrary } from "../api/graphs";
@@ -12,46 +13,24 @@ import type { Graph } from "../graph/model";
 import { announcer } from "../ui/announcer";
 import { useStableCallback } from "../ui/hooks/use-stable-callback";
 import { isolated } from "../words/isolated";
+import { CardButton } from "./level-frame";
 import { expansion } from "./level-graph";
 import style from "./levels.module.css";
 import { useExpansion } from "./use-expansion";
 
-interface SignProps {
-  title: string;
-  label: string;
-  Sign: typeof IconStairsDown;
-  onClick: () => void;
-}
-
-function SignButton({ title, label, Sign, onClick }: SignProps) {
-  return (
-    <button
-      type="button"
-      className={`${style.inside} nodrag`}
-      title={title}
-      aria-label={label}
-      onClick={(event: MouseEvent) => {
-        event.stopPropagation(); // else the click would select the card
-        onClick();
-      }}
-      onDoubleClick={(event) => event.stopPropagation()}
-    >
-      <Sign size={14} aria-hidden />
-    </button>
-  );
-}
-
 function InsideSign({ of, name }: InsideSignProps) {
   return (
     <span className={style.signs} data-signs>
-      <SignButton
-        title="Expand the graph inside  }"
+      <CardButton
+        small
+        keys="}"
         label={`Expand the graph inside ${isolated(name)}`}
         Sign={IconArrowsDiagonal}
         onClick={() => graphsInside.now()?.expand.toggle(of)}
       />
-      <SignButton
-        title="Open the graph inside  ]"
+      <CardButton
+        small
+        keys="]"
         label={`Open the graph inside ${isolated(name)}`}
         Sign={IconStairsDown}
         onClick={() => graphsInside.now()?.enter(of)}

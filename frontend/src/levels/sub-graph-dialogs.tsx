@@ -29,6 +29,7 @@ import { newAid } from "../graph/ids";
 import type { Key, Position } from "../graph/model";
 import { announcer } from "../ui/announcer";
 import { useStableCallback } from "../ui/hooks/use-stable-callback";
+import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";
 import style from "./levels.module.css";
 import { ReasonList } from "./reason-list";
@@ -261,9 +262,13 @@ export function ExtractDialog(props: ExtractProps) {
     staleTime: Number.POSITIVE_INFINITY,
     gcTime: 0,
   });
-  const count = actions.length === 1 ? "1 action" : `${actions.length} actions`;
   return (
-    <Modal opened onClose={onClose} title={`A sub-graph of ${count}`} size="32rem">
+    <Modal
+      opened
+      onClose={onClose}
+      title={`A sub-graph of ${counted(actions.length, "action")}`}
+      size="32rem"
+    >
       {isPending && <Skeleton height={180} />}
       {error !== null && <p role="alert">{errorText(error)}</p>}
       {data?.umrf === null && <Refused look={data} {...props} />}
@@ -292,7 +297,7 @@ function unpack(context: EditorContext, look: UnpackingLook): void {
   }
   makeActionEdit(context, changes);
   const count = (look.actions ?? []).length;
-  announcer.say(count === 1 ? "Unpacked into 1 action" : `Unpacked into ${count} actions`);
+  announcer.say(`Unpacked into ${counted(count, "action")}`);
 }
 
 function Asked({ look, context, onClose, name }: Asking) {

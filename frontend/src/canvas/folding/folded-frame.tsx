@@ -1,6 +1,8 @@
 /** A folded frame: one block with its title, the number of actions in it, and their states. */
+
 import { Handle, type NodeProps, Position } from "@xyflow/react";
 import { memo, use } from "react";
+import { counted } from "../../words/counted";
 import { ProblemBadge } from "../marks/problem-marks";
 import { FoldButton, FoldFrameContext } from "../notes/note-buttons";
 import { NoteEditingContext, NoteField, NoteTools } from "../notes/note-card";
@@ -9,7 +11,6 @@ import { noteColor } from "../notes/note-nodes";
 import { OUTCOMES } from "../outcome";
 import { STATE_LETTER } from "../zoom-detail";
 import style from "./folded-frame.module.css";
-import { actionsWord } from "./folding";
 
 /** React Flow attaches arrows to these invisible handles; the router chooses where lines really end. */
 function Ports({ direction }: Pick<FrameBlock, "direction">) {
@@ -65,7 +66,7 @@ export const FoldedFrame = memo(function FoldedFrame({ data, selected }: NodePro
           <b className={style.name}>{note.text || "Frame"}</b>
         )}
       </div>
-      <p className={style.count}>{actionsWord(block.actions)}</p>
+      <p className={style.count}>{counted(block.actions, "action")}</p>
       {block.states.length > 0 && <States states={block.states} />}
       <Ports direction={block.direction} />
     </div>

@@ -13,6 +13,7 @@ import {
 } from "../../graph/model";
 import { spokenNote } from "../../graph/note-links";
 import type { Progress, Tone } from "../../status/progress";
+import { counted } from "../../words/counted";
 import { isolated } from "../../words/isolated";
 import type { Scene } from "../arrows/scene";
 import type { Arrow, CanvasNode } from "../elements";
@@ -176,8 +177,6 @@ interface RunAndProblems {
   readonly marks: ProblemMarks;
 }
 
-export const actionsWord = (count: number) => (count === 1 ? "1 action" : `${count} actions`);
-
 const statesWord = ({ states }: FrameBlock) =>
   states.map(({ count, word }) => `${count} ${word}`).join(" · ");
 
@@ -202,7 +201,7 @@ function portsOf(width: number, height: number, direction: Direction): NodeHandl
 function foldedNode(node: NoteNode, block: FrameBlock): FoldedNode {
   const { id, position, width = 0, height = 0, selected = false, measured } = node;
   const { note } = node.data;
-  const says = [actionsWord(block.actions), statesWord(block)].filter(Boolean).join(": ");
+  const says = [counted(block.actions, "action"), statesWord(block)].filter(Boolean).join(": ");
   const name = spokenNote(note.text) || "empty";
   return {
     ...{ id, position, width, height, selected },
