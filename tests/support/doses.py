@@ -11,3 +11,11 @@ _LEAST: Final = 10 if _SHARE >= 1 else 5
 def examples(usual: int) -> int:
     """Return on how many generated examples a property is tried that asks for `usual` of them."""
     return max(_LEAST, round(usual * _SHARE))
+
+
+def is_share(found: int, drawn: int, share: float) -> bool:
+    """Return whether more than a share of the drawn examples was found; of few examples, whether any was.
+
+    How many of few examples are found is a matter of chance.
+    """
+    return found > (drawn * share if drawn >= 150 else 0)
