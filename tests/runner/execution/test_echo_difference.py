@@ -2,7 +2,7 @@
 
 from msgspec.structs import replace
 
-from action_assistant.runner.execution.echo_difference import difference
+from action_assistant.runner.execution.evidence import difference
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Parameter
 from runner.harness import sequence

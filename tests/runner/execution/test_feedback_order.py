@@ -5,7 +5,7 @@ import itertools
 from hypothesis import given
 from hypothesis import strategies as st
 
-from action_assistant.runner.execution.feedback_order import fresh
+from action_assistant.runner.execution.evidence import newer_than_answers
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.runs.events import Author, Observed, Published, Requested
 from action_assistant.runner.runs.fold import begin, follow
@@ -69,7 +69,7 @@ def test_however_batches_and_an_answer_cross_every_action_has_one_visit(
     edges = sorted({0, *cuts, 6})
     for start, end in itertools.pairwise(edges):
         batch = [told[i] for i in range(start, end) if i in kept]
-        run = follow(run, Observed(20 + start, fresh(run, batch)))
+        run = follow(run, Observed(20 + start, newer_than_answers(run, batch)))
     furthest = told[max([asked, *kept])]
     assert {name: action.state for name, action in run.actions.items()} == furthest.nodes
     assert all(len(action.visits) <= 1 for action in run.actions.values())
@@ -78,4 +78,4 @@ def test_however_batches_and_an_answer_cross_every_action_has_one_visit(
 def test_what_goes_on_after_the_answer_is_news() -> None:
     told, run = history(), begun()
     run = follow(run, Observed(5, (told[2],)))
-    assert fresh(run, told[:4]) == (told[3],)
+    assert newer_than_answers(run, told[:4]) == (told[3],)

@@ -8,7 +8,7 @@ import pytest
 
 from action_assistant.runner.emulator.engine import EmulatedEngine
 from action_assistant.runner.emulator.messages import index_of
-from action_assistant.runner.execution.sub_graphs import SubGraphs
+from action_assistant.runner.execution.evidence import SubGraphs
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.runs.events import Override

@@ -10,7 +10,7 @@ from contextlib import suppress
 import anyio
 import msgspec
 
-from action_assistant.runner.execution.echo_difference import difference
+from action_assistant.runner.execution.evidence import difference
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import (
     Answer,

@@ -11,10 +11,13 @@ from msgspec.structs import replace
 
 from action_assistant.errors import Refused
 from action_assistant.runner.clock import ClockUs
-from action_assistant.runner.execution.echo_difference import differs
-from action_assistant.runner.execution.feedback_order import fresh
+from action_assistant.runner.execution.evidence import (
+    LastLook,
+    SubGraphs,
+    differs,
+    newer_than_answers,
+)
 from action_assistant.runner.execution.run_changes import LOOK_AT_IT, RunChanges
-from action_assistant.runner.execution.sub_graphs import LastLook, SubGraphs
 from action_assistant.runner.links.engine_process import EngineProcess
 from action_assistant.runner.links.observations import TERMINAL, Snapshot
 from action_assistant.runner.links.port import Answer, Standing
@@ -185,7 +188,7 @@ class Monitor:
             self._begun = next(self._order)
         overtaken, self._answered = self._answered, False
         self.seen_at = self._clock_us()
-        if news := fresh(run, ours) if overtaken else ours:
+        if news := newer_than_answers(run, ours) if overtaken else ours:
             asked = self._seen_asked
             changes.observe(tuple(replace(each, since_asked=asked) for each in news))
         return changes
