@@ -18,7 +18,7 @@ from action_assistant.runner.links.engine_process import EngineProcess, Thread, 
 from action_assistant.runner.stop.engine_threads import EngineThreads
 from runner.fake_link import FakeLink
 from runner.harness import ANN, BEN, order, sequence, until, virtual
-from runner.robots_in_network import STUBBORN, RobotsInNetwork, asked, shown
+from runner.robots_in_network import OTHER, STUBBORN, RobotsInNetwork, asked, shown
 
 ENGINE = EngineProcess("boot", "pid:[1]", 42, 1)
 BEFORE = frozenset({Thread(1, 10), Thread(2, 10)})
@@ -237,6 +237,7 @@ async def test_an_action_that_did_not_obey_is_over_when_its_thread_has_ended(
         assert (ended.state, ended.proof_at) == ("error", None)
         assert ended.at_rest is not None
         assert ended.at_rest.how.startswith("No thread that the engine began for this run is left")
+        await control.start(order(OTHER, engine="David"), ANN)  # nothing is in its way any more
 
 
 def _with_process(plain: Any) -> Any:

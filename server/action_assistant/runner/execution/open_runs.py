@@ -111,6 +111,10 @@ class OpenRuns:
     def _changed(self, opened: OpenRun) -> None:
         self._news.set()
         self._news = anyio.Event()
+        run = opened.run
+        if run.end is not None and run.at_rest is not None and not run.simulated:
+            life = run.incarnation or ""
+            self._settled[run.id] = Settled(run.engine, run.id, life, opened.failed)
         engine = self._robots.link(opened.run.engine)
         if engine is not None and opened.run.end is not None:
             engine.look_closely()
@@ -141,12 +145,9 @@ class OpenRuns:
             runs, key=lambda run: (bool(run.loading), run.graph_name != graph_name), default=None
         )
 
-    def settle(self, run: Run, failed: frozenset[tuple[str, str]]) -> None:
-        """Note that a person has seen this run at rest, with these actions in ERROR."""
-        self._settled[run.id] = Settled(run.engine, run.id, run.incarnation or "", failed)
-
     def settled_on(self, engine: str) -> tuple[Settled, ...]:
-        """Return what people have seen at rest on an engine since this process began. A run whose start
+        """Return the runs that ended on an engine since this process began because they were seen at rest, by
+        a person or by the end of their code. A run whose start
         message somebody else sent again is left out: what it does now was not seen."""
         found = (each for each in self._settled.values() if each.engine == engine)
         is_of_others = self.late_activity.is_of_others

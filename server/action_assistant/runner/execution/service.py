@@ -226,9 +226,7 @@ class ExecutionService:
         """Take somebody's word that a run is at rest, where its engine's is none. Raises NotFound,
         BadInput, Conflict."""
         opened = await self._movable(run)
-        told = interventions.confirm_rest(opened, asked, author)
-        self._runs.settle(told, opened.failed)
-        return told
+        return interventions.confirm_rest(opened, asked, author)
 
     async def _movable(self, run: str) -> OpenRun:
         opened = self.open.get(run)
