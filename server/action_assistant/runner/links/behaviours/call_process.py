@@ -1,6 +1,6 @@
-"""One call of a behaviour: a process of its own, and a thread here that hears it and sees to its end.
+"""One call of a behaviour: a process of its own, and a thread of this process that reads its output and ends it.
 
-A call has ended when nothing of it is left: its process, and all that it has started, were waited for.
+A call has ended when its process, and every process that it has started, have ended and were waited for.
 """
 
 import os
@@ -19,15 +19,14 @@ from action_assistant.runner.links.behaviours.sayings import LineReader, Sayings
 from action_assistant.umrf.semantics import Call, Returned
 
 _CHUNK: Final = 65_536  # bytes that are read at once, as many as a pipe holds
-_PACE_S: Final = 0.025  # after so much: who floods is heard slowly, and waits
-_LAST: Final = 64  # chunks that are read of what it has left behind
-_PENDING: Final = (
-    65_536  # bytes of commands that it does not read; what comes after them is dropped
-)
+_PACE_S: Final = 0.025  # after a full chunk, so that a flood of output is read slowly
+_LAST: Final = 64  # chunks of output that are read after the end of the process
+_PENDING: Final = 65_536  # bytes of commands that wait; further ones are dropped, but for stop
 
 
 class CallProcess:
-    """A call that goes on. `ended` hears once, on another thread, when nothing of it is left."""
+    """A call of a behaviour that goes on. `ended` is called once, on another thread, when every process of the
+    call has ended."""
 
     def __init__(
         self, folder: BehaviourFolder, call: Call, ended: Callable[[Returned], None]
@@ -39,31 +38,31 @@ class CallProcess:
         self._sayings = Sayings(call.outputs)
         self._commands = bytearray()
         self._order = b""
-        self._wrong = ""  # why it is ended by force
+        self._wrong = ""  # why the call is killed
         self._closed = False
         self._nudge = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._thread = threading.Thread(target=self._live, name="behaviour", daemon=True)
 
     def begin(self) -> None:
-        """Let it run. Raises RuntimeError where no thread can be had."""
+        """Start the call on its thread. Raises RuntimeError when no thread can be started."""
         self._thread.start()
 
     def tell(self, command: str) -> None:
-        """`stop`, `pause` or `resume`; waits for nothing."""
+        """Send the behaviour a command (`stop`, `pause` or `resume`) without waiting."""
         with self._lock:
             if len(self._commands) < _PENDING or command == "stop":
                 self._commands += msgspec.json.encode({"kind": command}) + b"\n"
             self._wake()
 
     def kill(self, why: str) -> str | None:
-        """End it by force; `ended` hears when that is done. What it had to say, and why."""
+        """Kill the call; `ended` is called when that is done. Return its messages so far and `why`, as one text."""
         with self._lock:
             self._wrong = self._wrong or why
             self._wake()
             return self._sayings.told(why)
 
     def joined(self, seconds: float) -> bool:
-        """Whether nothing of it is left, after so many seconds at most."""
+        """Wait for the end of the call, so many seconds at most; return whether it has ended."""
         self._thread.join(seconds)
         return not self._thread.is_alive()
 
@@ -97,7 +96,7 @@ class CallProcess:
         )
 
     def _carried_out(self) -> str:
-        """Begin the process, hear it, see all of it end; what went wrong, or "". Raises OSError,
+        """Start the process, read its output and wait for its end; return what went wrong, or "". Raises OSError,
         Unusable."""
         source = self._folder.source(self._call.name)
         order = {
@@ -117,7 +116,7 @@ class CallProcess:
         return _death(code) if done is None else done.error or ""
 
     def _hear_out(self, keeper: Keeper) -> None:
-        """Tell and hear it until its keeper has ended."""
+        """Send commands to the behaviour and read its output until its keeper has ended."""
         readers = {
             keeper.said: LineReader(self._sayings.hear, cut=False),
             keeper.printed: LineReader(self._sayings.hear_print, cut=True),
@@ -141,7 +140,7 @@ class CallProcess:
             self._take(lines.end)
 
     def _tell_on(self, keeper: Keeper, selector: selectors.BaseSelector) -> None:
-        """Write what it can take; be woken for the rest."""
+        """Write as much to the behaviour as it takes, and have the selector report when it takes more."""
         if self._order:
             self._order = self._order[keeper.write(self._order) :]
         with self._lock:
@@ -154,7 +153,7 @@ class CallProcess:
             selector.unregister(keeper.commands)
 
     def _hear(self, number: int, lines: LineReader) -> bool:
-        """Read once; whether more may come."""
+        """Read one chunk; return whether more may come."""
         try:
             chunk = os.read(number, _CHUNK)
         except BlockingIOError:
@@ -165,7 +164,7 @@ class CallProcess:
         return bool(chunk)
 
     def _take(self, said: Callable[[], None]) -> None:
-        """Believe it, as far as it keeps the rules."""
+        """Take in output; output that breaks the rules is kept as the reason to kill the call."""
         with self._lock:
             try:
                 if not self._wrong:
@@ -178,7 +177,8 @@ _RESULTS: Final = {True: "on_true", False: "on_false"}
 
 
 def _death(code: int) -> str:
-    """What to say of a process that has ended without a result."""
+    """Return the sentence for a process that has ended without a result, by its exit code or minus its
+    signal."""
     if code == -signal.SIGXCPU:
         return "The behaviour has used all the processor time that a call may have."
     how = f"was ended by {signal.Signals(-code).name}" if code < 0 else f"ended with code {code}"

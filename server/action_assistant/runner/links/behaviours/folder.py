@@ -1,4 +1,4 @@
-"""The folder of behaviours: which file an action has, and what is in it. No other file is ever read."""
+"""The folder of behaviours: finds and reads the Python file of an action. No other file is ever read."""
 
 import errno
 import os
@@ -21,13 +21,12 @@ _MOST: Final = 1_000  # names of a list
 
 
 class Unusable(Exception):
-    """What stands for an action in the folder cannot be run; the message is a sentence."""
+    """The file of an action cannot be run; the message is a sentence for people."""
 
 
 class BehaviourList(msgspec.Struct, frozen=True):
-    """The behaviours that there are. `names`: in snake case, as the files are called without `.py`;
-    `refused`: those that cannot be run, and why. `problem`: why the folder cannot be read; "" if it
-    can."""
+    """The list of behaviours in a folder. `names` are in snake case, as the files without `.py`; `refused` are
+    those that cannot be run, with the reason; `problem` is why the folder cannot be read, "" if it can."""
 
     names: tuple[str, ...] = ()
     refused: dict[str, str] = {}
@@ -35,13 +34,13 @@ class BehaviourList(msgspec.Struct, frozen=True):
 
 
 class BehaviourFolder(msgspec.Struct, frozen=True):
-    """A folder with a file for each action that it has, as the administrator named it."""
+    """A folder with one Python file for each action that has a behaviour; the administrator names it."""
 
     path: Path
 
     @classmethod
     def opened(cls, path: Path) -> "BehaviourFolder":
-        """The folder. Raises CannotStart when there is none, or where there can be none."""
+        """Return the folder at `path`. Raises CannotStart when there is none, and outside of Linux."""
         if sys.platform != "linux":
             raise CannotStart("Behaviours need Linux, which ends their processes for certain.")
         found = cls(path.absolute())
@@ -54,7 +53,7 @@ class BehaviourFolder(msgspec.Struct, frozen=True):
         return found
 
     def has(self, name: str) -> bool:
-        """Whether something stands there for actions of this name, be it usable or not."""
+        """Return whether there is a file for actions of this name, usable or not."""
         if (file := file_of(name)) is None:
             return False
         try:
@@ -67,7 +66,7 @@ class BehaviourFolder(msgspec.Struct, frozen=True):
         return True
 
     def source(self, name: str) -> str:
-        """The text of an action's behaviour. Raises Unusable."""
+        """Return the Python text of an action's behaviour. Raises Unusable."""
         file = file_of(name)
         if file is None:
             raise Unusable(f"“{name}” is no name that a behaviour can have.")
@@ -83,7 +82,7 @@ class BehaviourFolder(msgspec.Struct, frozen=True):
             raise Unusable(f"The behaviour {file} cannot be read: {why}.") from error
 
     def listed(self, names: Iterable[str] | None = None) -> BehaviourList:
-        """What there is; of actions of these names only, if any are given."""
+        """List the behaviours in the folder, or only those for actions of these names."""
         try:
             with self._entered() as folder, os.scandir(folder) as entries:
                 found = [_FILE.fullmatch(each.name) for each in entries]
@@ -104,7 +103,8 @@ class BehaviourFolder(msgspec.Struct, frozen=True):
 
     @contextmanager
     def _entered(self) -> Iterator[int]:
-        """The folder itself, whatever its path leads to meanwhile. Raises OSError."""
+        """Open the folder and yield its descriptor, so that all reads go to this folder even if its path is
+        changed meanwhile. Raises OSError."""
         folder = os.open(self.path, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
         try:
             yield folder
@@ -113,12 +113,12 @@ class BehaviourFolder(msgspec.Struct, frozen=True):
 
 
 def file_of(name: str) -> str | None:
-    """The file of an action of this name; None for names that no action package can have."""
+    """Return the file name for an action of this name; None for names that no action package can have."""
     return None if check_name(name) else f"{snake_case(name)}.py"
 
 
 def _text(file: str, folder: int) -> str:
-    """A regular file. Raises OSError, Unusable."""
+    """Return the text of a regular file in an open folder. Raises OSError, Unusable."""
     flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
     with os.fdopen(os.open(file, flags, dir_fd=folder), "rb") as opened:
         if not stat.S_ISREG(os.fstat(opened.fileno()).st_mode):

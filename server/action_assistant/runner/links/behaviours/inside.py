@@ -1,7 +1,7 @@
-"""The process of one call, from within. Started by its path, isolated: it imports nothing of ours.
+"""The program of one call: started by its path in isolated mode, so it imports nothing of this package.
 
-Two processes: the keeper waits, and when its lifeline ends, or the behaviour does, it kills whatever
-descends from it, waits for all of that, and ends itself. The other one runs the behaviour.
+It is two processes. One runs the behaviour. The other one, the keeper, waits until the behaviour ends or its
+lifeline (a socket to the runner) is closed; then it kills all its descendants, waits for them, and exits.
 """
 
 import contextlib
@@ -25,15 +25,15 @@ _NICE: Final = 10
 _PROCESSOR_S: Final = 600
 _MEMORY: Final = 512 << 20  # bytes of address space
 _FILES: Final = 256
-_WRITTEN: Final = 1 << 30  # bytes of a file that it writes
+_WRITTEN: Final = 1 << 30  # bytes of a file that the behaviour writes
 _AGAIN_S: Final = 0.002
 
 
 class PerformedAction:
-    """What a behaviour sees of its action.
+    """The argument of a behaviour's `run`: its action, with inputs, outputs and commands.
 
-    `inputs`: values by flat name (`pose::x`), numbers as floats. `outputs`: set them by flat name; a
-    name or a type that the action does not have ends it with an error.
+    `inputs` are values by flat name (`pose::x`), numbers as floats. `outputs` are set by flat name; a name
+    or a type that the action does not have ends it with an error.
     """
 
     def __init__(self, inputs: dict[str, Any], say: "_Saying") -> None:
@@ -45,12 +45,12 @@ class PerformedAction:
 
     @property
     def stopped(self) -> bool:
-        """Whether the action was told to stop: five seconds later it is killed."""
+        """True once the action was told to stop; five seconds later it is killed."""
         return self._stopped
 
     def sleep(self, seconds: float) -> bool:
-        """Wait for so many seconds, in which a pause does not count. False, at once, when the action
-        was told to stop; then return soon."""
+        """Wait for so many seconds; a pause does not count. Returns False at once when the action was told to
+        stop: then `run` should return soon."""
         left = float(seconds)
         with self._changed:
             while not self._stopped and (self._paused or left > 0):
@@ -62,7 +62,7 @@ class PerformedAction:
             return not self._stopped
 
     def message(self, text: object) -> None:
-        """Say something that the run keeps; of very many messages the first ones."""
+        """Add a message to the run, which keeps the first 20 of a call."""
         self._say(kind="message", text=str(text)[:10_000])
 
     def _told(self, command: str) -> None:
@@ -73,7 +73,7 @@ class PerformedAction:
 
 
 class _Outputs(dict[str, Any]):
-    """Values that are told as they are set."""
+    """A dict of outputs that sends each value to the runner as it is set."""
 
     def __init__(self, say: "_Saying") -> None:
         super().__init__()
@@ -84,13 +84,13 @@ class _Outputs(dict[str, Any]):
         super().__setitem__(name, value)
 
     def update(self, *args: Any, **values: Any) -> None:
-        """As of any dict."""
+        """Set several values, as `dict.update` does, and send each."""
         for name, value in dict(*args, **values).items():
             self[name] = value
 
 
 class _Saying:
-    """Lines of JSON to whoever called."""
+    """Writes lines of JSON to the runner; may be called on any thread."""
 
     def __init__(self, out: TextIO) -> None:
         self._out = out
@@ -107,7 +107,8 @@ class _Saying:
 
 
 def keep(lifeline: int) -> NoReturn:
-    """Begin the behaviour, and see to its end. Exits as it does: its code, or 128 and the signal."""
+    """Fork the behaviour, wait for its end or the lifeline's, and kill all descendants. Exits with the code of
+    the behaviour, or 128 plus the signal that ended it."""
     libc = ctypes.CDLL(None)
     libc.prctl(_SUBREAPER, 1)
     libc.prctl(_NO_NEW_PRIVILEGES, 1)
@@ -120,9 +121,9 @@ def keep(lifeline: int) -> NoReturn:
         os.setpgid(0, 0)
         os.close(lifeline)
         _live()
-    with contextlib.suppress(OSError):  # it has ended already
+    with contextlib.suppress(OSError):  # the child has ended already
         os.setpgid(child, child)
-    with contextlib.suppress(OSError):  # nobody is there any more: then this is the end
+    with contextlib.suppress(OSError):  # the runner is gone: then the poll below ends at once
         os.write(lifeline, b"%d\n" % child)
     nothing = os.open(os.devnull, os.O_RDWR)
     for number in (0, 1, 2):
@@ -135,7 +136,7 @@ def keep(lifeline: int) -> NoReturn:
 
 
 def _end_all(child: int) -> int:
-    """Kill all that descends from here, until nothing is left; how the child has ended."""
+    """Kill all descendants until none is left; return the exit code of the child, or 128 plus its signal."""
     status = 0
     _kill(-child)
     while True:
@@ -153,7 +154,7 @@ def _end_all(child: int) -> int:
 
 
 def _children() -> Iterable[int]:
-    """What descends from here directly, and what its parents have left to us."""
+    """Return the ids of the child processes, orphans of descendants included (this is their subreaper)."""
     listed = os.open(f"/proc/self/task/{os.getpid()}/children", os.O_RDONLY)
     with os.fdopen(listed, "rb") as children:
         return [int(each) for each in children.read().split()]
@@ -177,15 +178,17 @@ def _live() -> NoReturn:
     threading.Thread(target=_obey, args=(commands, action), daemon=True).start()
     result, error = _result(order["file"], order["source"], action)
     for printed in (sys.stdout, sys.stderr):
-        with contextlib.suppress(AttributeError, OSError, ValueError):  # it may have closed them
+        with contextlib.suppress(
+            AttributeError, OSError, ValueError
+        ):  # the behaviour may have closed them
             printed.flush()
     say(kind="done", result=result, error=error)
     os._exit(0)
 
 
 def _wired() -> tuple[TextIO, _Saying]:
-    """What is said to us, and where we answer. Anything that is printed goes where errors go, so that
-    it cannot be taken for an answer."""
+    """Return the stream of commands and the writer of answers. `print` is redirected to stderr, so that printed
+    text cannot be taken for an answer."""
     commands = os.fdopen(os.dup(0), "r", encoding="utf-8")
     out = os.fdopen(os.dup(1), "w", encoding="utf-8")
     nothing = os.open(os.devnull, os.O_RDONLY)
@@ -197,11 +200,12 @@ def _wired() -> tuple[TextIO, _Saying]:
 
 
 def _bounded() -> None:
-    """What it may take. Others go first when processor or memory run short."""
-    import resource  # of POSIX alone, as all of this is
+    """Limit the processor time, memory, files and priority of the behaviour, so that other processes go first
+    when processor or memory run short."""
+    import resource  # exists on POSIX only, like this program
 
     os.nice(_NICE)
-    with contextlib.suppress(OSError):  # some containers have none: the kernel chooses by size then
+    with contextlib.suppress(OSError):  # some containers lack it
         score = os.open("/proc/self/oom_score_adj", os.O_WRONLY)
         os.write(score, b"1000")
         os.close(score)
@@ -223,7 +227,7 @@ def _obey(commands: TextIO, action: PerformedAction) -> None:
 
 
 def _result(file: str, source: str, action: PerformedAction) -> tuple[bool, str | None]:
-    """What the behaviour makes of it: true or false, or what went wrong."""
+    """Run the behaviour; return its result and what went wrong, None for nothing."""
     linecache.cache[file] = (len(source), None, source.splitlines(keepends=True), file)
     try:
         known: dict[str, Any] = {"__name__": file.removesuffix(".py"), "__file__": file}
@@ -242,7 +246,7 @@ def _result(file: str, source: str, action: PerformedAction) -> tuple[bool, str 
 
 
 def _told_of(error: BaseException, file: str) -> str:
-    """An error in a line, with its place in the file."""
+    """Return an error as one line, with its line number in the behaviour's file."""
     places = [
         each.lineno for each in traceback.extract_tb(error.__traceback__) if each.filename == file
     ]

@@ -1,4 +1,4 @@
-"""Our end of a call's process: begun, told, and ended for certain."""
+"""The runner's end of a call's process: starts it, writes commands to it, and ends it for certain."""
 
 import logging
 import os
@@ -14,11 +14,11 @@ from typing import Final, Self
 log: Final = logging.getLogger(__name__)
 
 _INSIDE: Final = Path(__file__).with_name("inside.py")
-_KEEPER_S: Final = 1.0  # that it has to end all that descends from it
+_KEEPER_S: Final = 1.0  # for the keeper to end all its descendants
 _AGAIN_S: Final = 0.05
-_LONG_S: Final = 10.0  # after so much somebody should know
-#: All of our environment that a behaviour sees. The last one says that this Python, which `make ros` has
-#: made, was started anew already to find its libraries.
+_LONG_S: Final = 10.0  # after this an error is logged
+#: The only environment variables that a behaviour gets. The last one says that a Python made by `make ros` was
+#: restarted already to find its libraries.
 _KNOWN: Final = (
     *("PATH", "HOME", "LANG", "LC_ALL", "TZ", "LD_LIBRARY_PATH"),
     "_ROS_WHEELS_BOOTSTRAP_COMPLETE",
@@ -26,11 +26,11 @@ _KNOWN: Final = (
 
 
 class Keeper:
-    """The process that begins a behaviour and ends all that descends from it, when the behaviour ends,
-    when it is let go of, or when we die. To be used on one thread."""
+    """A process that starts a behaviour and kills all its descendants when the behaviour ends, when `let_go` is
+    called, or when the runner dies. Used on one thread."""
 
     def __init__(self) -> None:
-        """Begin it. Raises OSError."""
+        """Start the process. Raises OSError."""
         with ExitStack() as opened:
             ours, theirs = (opened.enter_context(each) for each in socket.socketpair())
             self._lifeline, lifeline = (opened.enter_context(each) for each in socket.socketpair())
@@ -79,32 +79,32 @@ class Keeper:
 
     @property
     def commands(self) -> int:
-        """Where commands are written, as a file that never waits."""
+        """The descriptor that commands are written to, which never blocks."""
         return self._commands.fileno()
 
     def write(self, text: bytes) -> int:
-        """Tell it; how many bytes were taken."""
+        """Write to the behaviour without waiting; return how many bytes were taken."""
         try:
             return self._commands.send(text)
         except BlockingIOError:
             return 0
         except OSError:
-            return len(text)  # it has ended: nobody will read it
+            return len(text)  # the process has ended: nobody will read this
 
     @property
     def patience(self) -> float | None:
-        """For how many seconds nothing has to be done, as long as nothing is heard."""
+        """Seconds after which `is_over` has to be asked again although nothing was read; None for never."""
         return None if self._let_go is None else _AGAIN_S
 
     def let_go(self) -> None:
-        """All that descends from it shall end now."""
+        """Have the behaviour and all its descendants killed now."""
         if self._let_go is None:
             self._let_go = time.monotonic()
             with suppress(OSError):
                 self._lifeline.shutdown(socket.SHUT_WR)
 
     def is_over(self) -> bool:
-        """Whether it has ended. One that takes too long is killed itself."""
+        """Return whether the process has ended; kill it when it takes too long to end its descendants."""
         if self._process.poll() is not None:
             return True
         waited = 0.0 if self._let_go is None else time.monotonic() - self._let_go
@@ -117,17 +117,17 @@ class Keeper:
         return False
 
     def ended(self) -> int:
-        """After it has ended: how the behaviour's process has, as its code or minus the signal. Waits
-        until nothing of it is left."""
+        """Return how the behaviour's process ended, as its exit code or minus its signal, once every descendant
+        has ended. Call it after the process has ended."""
         code: int = self._process.wait()
-        if code >= 0:  # it has waited for all of it
+        if code >= 0:  # the keeper has waited for all its descendants
             return code if code < 128 else 128 - code
         while self._kill_group():
             time.sleep(_AGAIN_S)
         return -signal.SIGKILL
 
     def _kill_group(self) -> bool:
-        """Whether there was anything to kill."""
+        """Kill the process group of the behaviour; return whether it had any process."""
         with suppress(OSError, ValueError):
             self._child = self._child or int(self._lifeline.recv(32) or b"0")
         if not self._child:

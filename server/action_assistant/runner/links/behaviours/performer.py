@@ -1,4 +1,5 @@
-"""Behaviours as what an engine gives its calls to. Whoever drives the engine takes what came of them."""
+"""The performer that an engine gives the calls of its behaviours to; whoever drives the engine collects the
+results with `taken`."""
 
 import ctypes
 import logging
@@ -25,15 +26,15 @@ _ARENA_MAX: Final = -8  # M_ARENA_MAX of glibc
 
 
 def bound_address_space() -> None:
-    """For processes that have little of it: threads with small stacks, and one heap for all of them
-    (else glibc reserves 64 MB for each)."""
+    """Save address space in a process that has little: threads get small stacks and share one heap (glibc would
+    reserve 64 MB for each thread)."""
     threading.stack_size(_STACK)
     if mallopt := getattr(ctypes.CDLL(None), "mallopt", None):
         mallopt(_ARENA_MAX, 1)
 
 
 class BehaviourPerformer:
-    """The calls of one engine. `wake` is called on other threads when there is something to take."""
+    """The calls of one engine. `wake` is called on other threads when a call has ended."""
 
     def __init__(self, folder: BehaviourFolder, wake: Callable[[], None] = lambda: None) -> None:
         self.wake = wake
@@ -45,16 +46,16 @@ class BehaviourPerformer:
 
     @property
     def is_killing(self) -> bool:
-        """Whether anything that was given up may still go on."""
+        """True while a call that was given up may still run."""
         with self._lock:
             return bool(self._given_up)
 
     def performs(self, name: str) -> bool:
-        """Whether there is a file for actions of this name, be it usable or not."""
+        """Return whether there is a file for actions of this name, usable or not."""
         return self._folder.has(name)
 
     def begin(self, call: Call) -> None:
-        """Begin its process, on a thread of its own."""
+        """Start the process of a call, on a thread of its own. A call that cannot be started ends with an error."""
         with self._lock:
             going = len(self._calls)
         why = f"{MOST} behaviours run already."
@@ -70,19 +71,19 @@ class BehaviourPerformer:
         self._end(Returned(number=call.number, result="on_error", message=why))
 
     def stop(self, number: int) -> None:
-        """Tell it; it has as long as the engine waits."""
+        """Tell a call to stop; it has the 5 s that the engine waits."""
         self._tell(number, "stop")
 
     def pause(self, number: int) -> None:
-        """Tell it: its `sleep` lasts until it may go on."""
+        """Tell a call to pause: its `sleep` then lasts until it is resumed."""
         self._tell(number, "pause")
 
     def resume(self, number: int) -> None:
-        """Tell it."""
+        """Tell a paused call to go on."""
         self._tell(number, "resume")
 
     def give_up(self, number: int) -> str | None:
-        """Kill it; what it had to say."""
+        """Kill a call; return its messages so far, None when it has ended already."""
         with self._lock:
             process = self._calls.get(number)
             if process is None:
@@ -91,7 +92,7 @@ class BehaviourPerformer:
         return process.kill(_GIVEN_UP)
 
     def taken(self) -> list[Returned]:
-        """What has ended since the last time."""
+        """Return the results of the calls that have ended since the last time."""
         with self._lock:
             taken, self._returned = self._returned, []
             self._given_up -= {each.number for each in taken}
@@ -99,17 +100,17 @@ class BehaviourPerformer:
 
     @property
     def is_busy(self) -> bool:
-        """Whether any call goes on, or there is something to take."""
+        """True while a call goes on, or `taken` has a result."""
         with self._lock:
             return bool(self._calls or self._returned)
 
     @property
     def has_returned(self) -> bool:
-        """Whether there is something to take."""
+        """True while `taken` has a result."""
         return bool(self._returned)
 
     def kill_all(self) -> list[CallProcess]:
-        """End all of it by force; what that was."""
+        """Kill all calls; return those that were going on."""
         with self._lock:
             going = list(self._calls.values())
         for process in going:
@@ -117,7 +118,7 @@ class BehaviourPerformer:
         return going
 
     def end(self) -> None:
-        """The same, and wait until nothing is left of it, 3 s at most."""
+        """Kill all calls and wait for their end, 3 s at most."""
         deadline = time.monotonic() + _ENDING_S
         for process in self.kill_all():
             if not process.joined(max(0.0, deadline - time.monotonic())):
@@ -130,7 +131,7 @@ class BehaviourPerformer:
             process.tell(command)
 
     def _end(self, returned: Returned) -> None:
-        """Nothing of a call is left; mostly told on its thread."""
+        """Note that a call has ended; mostly called on the thread of that call."""
         with self._lock:
             self._calls.pop(returned.number, None)
             self._returned.append(returned)

@@ -1,4 +1,4 @@
-"""A whole simulation with behaviours in one call: as `umrf.semantics.simulate`, in real time."""
+"""Simulates a whole run with behaviours in one call: `umrf.semantics.simulate` in real time."""
 
 import threading
 import time
@@ -25,8 +25,12 @@ def simulate_in_real_time(
     states: Mapping[Key, str],
     signatures: Mapping[str, Signature] | None = None,
 ) -> Iterator[Trace]:
-    """Everything that happens from the start until nothing is left to happen, `until_ms` or
-    `max_events`. `commands` as there. Whatever goes on at the end is killed."""
+    """Yield every event from the start of a graph until nothing is left to do, until `until_ms`, or for
+    `max_events` events.
+
+    `commands` are (ms, verb, graph name or None), as for `umrf.semantics.simulate`. Behaviours that still run
+    at the end are killed.
+    """
     performer, news = BehaviourPerformer(folder), threading.Event()
     performer.wake = news.set
     engine = Engine(
@@ -69,7 +73,7 @@ def _next(
     now: float,
     graph: Graph,
 ) -> list[Trace]:
-    """What has happened by now."""
+    """Carry out what is due at `now` (ms): commands, results of behaviours, steps of the engine."""
     traces: list[Trace] = []
     while pending and pending[0][0] <= now:
         at_ms, verb, name = pending.pop(0)

@@ -1,4 +1,4 @@
-"""What the process of a call says: lines of JSON that are believed only as far as they are checked."""
+"""Reads the output of a call's process: lines of JSON, each checked before it is used."""
 
 import math
 from collections.abc import Callable
@@ -14,24 +14,24 @@ _TEXT: Final = 500  # characters of each
 
 
 class Unbelievable(Exception):
-    """What it says breaks the rules; the message is a sentence. It is ended for that."""
+    """Output of a behaviour that breaks the rules, for which it is killed; the message is a sentence for people."""
 
 
 class OutputSaid(msgspec.Struct, frozen=True, tag_field="kind", tag="output"):
-    """An output has this value now."""
+    """The behaviour has set an output to this value."""
 
     name: str
     value: Any
 
 
 class MessageSaid(msgspec.Struct, frozen=True, tag_field="kind", tag="message"):
-    """Something for people."""
+    """The behaviour has a message for people."""
 
     text: str
 
 
 class DoneSaid(msgspec.Struct, frozen=True, tag_field="kind", tag="done"):
-    """It has ended; with `error` the result does not count."""
+    """The behaviour has ended; with an `error` the result does not count."""
 
     result: bool
     error: str | None = None
@@ -41,16 +41,17 @@ _Said: TypeAlias = OutputSaid | MessageSaid | DoneSaid
 
 
 class LineReader:
-    """Bytes in, whole lines out. Raises Unbelievable for a line that is too long."""
+    """Splits chunks of bytes into lines and passes each on. A line that is too long is cut (`cut`), or raises
+    Unbelievable."""
 
     def __init__(self, hear: Callable[[bytes], None], *, cut: bool) -> None:
         self._hear = hear
-        self._cut = cut  # rather than refuse: the rest of a long line is dropped
+        self._cut = cut  # drop the rest of a line that is too long, instead of refusing it
         self._rest = bytearray()
         self._drops = False
 
     def take(self, chunk: bytes) -> None:
-        """What was read."""
+        """Take in the next chunk of bytes."""
         *whole, rest = chunk.split(b"\n")
         for each in whole:
             self._add(each)
@@ -61,7 +62,7 @@ class LineReader:
         self._add(rest)
 
     def end(self) -> None:
-        """Nothing more comes: what has no end of line counts as one."""
+        """Take in the end of the output: a last line without a line end counts as a line."""
         if self._rest and not self._drops:
             self._hear(bytes(self._rest))
         self._rest.clear()
@@ -81,7 +82,7 @@ class LineReader:
 
 
 class Sayings:
-    """All that one call has said. `types`: of its outputs, by flat name."""
+    """The checked output of one call. `types` are the types of the action's outputs, by flat name."""
 
     def __init__(self, types: dict[str, str]) -> None:
         self._types = types
@@ -91,7 +92,7 @@ class Sayings:
         self._printed = _Kept()
 
     def hear(self, line: bytes) -> None:
-        """A line of the protocol. Raises Unbelievable."""
+        """Take in one line of the protocol. Raises Unbelievable."""
         try:
             said = msgspec.json.decode(line, type=_Said)
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
@@ -105,11 +106,11 @@ class Sayings:
                 self.done = self.done or said
 
     def hear_print(self, line: bytes) -> None:
-        """A line that was printed."""
+        """Take in one line that the behaviour has printed."""
         self._printed.add(line.decode(errors="replace"))
 
     def told(self, *more: str) -> str | None:
-        """All of it that is for people, and more; None if there is nothing."""
+        """Return the messages and printed lines, followed by `more`, as one text; None if there are none."""
         lines = [*self._messages.told("messages"), *self._printed.told("printed lines"), *more]
         return "\n".join(lines) or None
 
@@ -125,7 +126,7 @@ class Sayings:
 
 
 class _Kept:
-    """The first lines, and how many more there were."""
+    """Keeps the first lines, and counts the others."""
 
     def __init__(self) -> None:
         self._lines: list[str] = []
@@ -144,8 +145,8 @@ class _Kept:
 
 
 def value_of(kind: str, value: Any) -> Any:
-    """A value as an engine holds one of this type, numbers as doubles. What is no native type may be
-    anything. Raises ValueError, OverflowError."""
+    """Return a value as an engine holds one of this type, numbers as floats. A type that is not native may have
+    any value. Raises ValueError, OverflowError."""
     if kind.endswith("s") and (one := kind[:-1]) in _NATIVE:
         if not isinstance(value, list):
             raise ValueError
