@@ -68,7 +68,7 @@ class Client:
         message = messages.parse(frame)
         assert message is not None
         self.sent += isinstance(message, messages.Edit)
-        self.room.hear(self.member, message)
+        self.room.receive(self.member, message)
 
     async def listen(self) -> bool:
         """Take in what the room has for us; whether there was anything."""

@@ -17,10 +17,10 @@ from pathlib import Path
 from typing import Any, Final
 
 from action_assistant.editor.crdt import messages
+from action_assistant.editor.rooms.broadcast import UpdateBroadcast
 from action_assistant.editor.rooms.member import Member
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.editor.rooms.room import Room
-from action_assistant.editor.rooms.room_news import RoomNews
 from action_assistant.journal.events import nothing
 from action_assistant.journal.health import quick_commits
 from action_assistant.journal.journal import Journal
@@ -74,10 +74,10 @@ class Trap:
 
     def set(self) -> None:
         """Put it into the way of every edit."""
-        self.around(Room, "_take", before="before the edit is applied")
+        self.around(Room, "_apply_batch", before="before the edit is applied")
         self.around(Journal, "append_then", before="before the append")
         self.around(SqliteSession, "store", after="after the commit")
-        self.around(RoomNews, "tell", before="before the broadcast")
+        self.around(UpdateBroadcast, "send", before="before the broadcast")
         self.around(Member, "post", after="within the broadcast")
         self.around(Member, "post_ack", before="before the acknowledgement")
         original = SqliteSession.__init__
@@ -131,8 +131,8 @@ async def serve(folder: Path, stream: str, trap: Trap, at_once: bool) -> None:
             speaking = asyncio.create_task(_speak(pipe, member, trap))
             with contextlib.suppress(asyncio.IncompleteReadError, ConnectionError):
                 while message := messages.parse(await pipe.receive_bytes()):
-                    room.hear(member, message)
-                    await member.until_heard()
+                    room.receive(member, message)
+                    await member.until_caught_up()
             room.leave(member)
             speaking.cancel()
 

@@ -49,7 +49,7 @@ class Writer:
         try:
             async with editor.socket(graph, "?acks=1") as session:
                 await session.send_bytes(messages.question(self.doc.get_state()))
-                await self.converse(session)
+                await self.serve_by_asgi(session)
         except* (httpx_ws.HTTPXWSException, httpx.TransportError, LocalProtocolError, OSError):
             pass
 
@@ -58,11 +58,11 @@ class Writer:
         try:
             await pipe.send_bytes(self.name.encode())
             await pipe.send_bytes(messages.question(self.doc.get_state()))
-            await self.converse(pipe)
+            await self.serve_by_asgi(pipe)
         except (asyncio.IncompleteReadError, ConnectionError):
             pipe.close()
 
-    async def converse(self, session: httpx_ws.AsyncWebSocketSession | Pipe) -> None:
+    async def serve_by_asgi(self, session: httpx_ws.AsyncWebSocketSession | Pipe) -> None:
         sent: list[int] = []  # how much was written when each message left
         while True:
             frame = await session.receive_bytes()

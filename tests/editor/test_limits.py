@@ -37,7 +37,7 @@ def add(client: Client, *aids: str) -> None:
 
 
 async def seen(room: Room) -> int:
-    return await room.look(lambda replica, _: document_quota.actions_in(replica.doc))
+    return await room.read(lambda replica, _: document_quota.actions_in(replica.doc))
 
 
 @pytest.fixture
@@ -61,7 +61,7 @@ async def test_one_action_too_many_is_refused_to_its_maker_and_others_go_on(room
         await settle(ada, eve, vic)
         assert await end_of(eve) == messages.FULL
         assert eve.member is not None
-        assert eve.member.said == "a graph may have 10 actions"
+        assert eve.member.close_text == "a graph may have 10 actions"
         # Ada renames, deletes, and has room for one more; Vic sees all of it.
         actions_of(ada)["a0"] = "Renamed"
         del actions_of(ada)["a1"]
@@ -198,8 +198,8 @@ def test_a_cursor_may_move_two_hundred_times_a_second_for_ever_and_not_faster() 
     rate_limits = ByteRateLimits(limits=True, clock=lambda: now)
     for n in range(200 * 60 * 10):
         now = n / 200
-        assert rate_limits.speak("ada", 100) == 0
-    waits = [rate_limits.speak("eve", 100) for _ in range(60_000)]
+        assert rate_limits.spend_on_presence("ada", 100) == 0
+    waits = [rate_limits.spend_on_presence("eve", 100) for _ in range(60_000)]
     assert waits[0] == 0
     assert waits[-1] > 100
 
@@ -210,4 +210,4 @@ def test_a_crowd_of_people_is_not_remembered_for_ever() -> None:
     for n in range(5_000):
         now += 1.0
         rate_limits.spend(f"person {n}", 1)
-    assert len(rate_limits._left) <= 1_001
+    assert len(rate_limits._buckets) <= 1_001

@@ -146,7 +146,7 @@ async def test_a_document_takes_so_many_fields_and_no_more(
         await settle(ada, eve)
         assert eve.member is not None
         assert await eve.member.ended() == messages.FULL
-        assert eve.member.said == "a graph may have 100 fields"
+        assert eve.member.close_text == "a graph may have 100 fields"
         del fields["a|8"]
         fields["a|9 and another"] = 1
         await settle(ada)
@@ -209,7 +209,7 @@ async def test_an_update_that_takes_long_is_refused_and_others_go_on(rooms: Room
         await room.quiet()
         assert eve.member is not None
         assert await eve.member.ended() == messages.TOO_BIG
-        assert "so long" in (eve.member.said or "")
+        assert "so long" in (eve.member.close_text or "")
         ada.map["k"] = "v"
         await settle(ada)
         assert ada.durable == ada.sent
@@ -311,7 +311,7 @@ async def test_many_small_updates_make_no_graph_that_takes_long_to_open(
         await settle(ada, eve)
         assert eve.member is not None
         assert await eve.member.ended() == messages.FULL
-        assert eve.member.said == "a graph may take 0.0 s to open; go on with a copy of it"
+        assert eve.member.close_text == "a graph may take 0.0 s to open; go on with a copy of it"
         del ada.map["k"]
         await settle(ada)
         assert ada.durable == ada.sent

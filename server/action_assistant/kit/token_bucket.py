@@ -1,8 +1,10 @@
-"""A token bucket: how much somebody may do at once, and how much a second after that."""
+"""Token buckets: how much somebody may do at once, and how much a second after that."""
 
 import time
 from collections.abc import Callable
 from typing import Final
+
+Clock = Callable[[], float]
 
 
 class TokenBucket:
@@ -11,9 +13,7 @@ class TokenBucket:
 
     __slots__ = ("_at", "_capacity", "_clock", "_rate", "_tokens")
 
-    def __init__(
-        self, capacity: float, rate: float, clock: Callable[[], float] = time.monotonic
-    ) -> None:
+    def __init__(self, capacity: float, rate: float, clock: Clock = time.monotonic) -> None:
         self._capacity: Final = capacity
         self._rate: Final = rate
         self._clock: Final = clock
@@ -25,6 +25,14 @@ class TokenBucket:
         self._refill()
         self._tokens -= tokens
 
+    def take(self) -> bool:
+        """Take one token. Return False where there was none; what there is of the next one is lost then, so
+        that whoever tries without end never gets one."""
+        self._refill()
+        there = self._tokens >= 1
+        self._tokens = max(0.0, self._tokens - 1)
+        return there
+
     @property
     def is_overdrawn(self) -> bool:
         """Tell whether tokens were owed after the last `spend`."""
@@ -35,7 +43,51 @@ class TokenBucket:
         self._refill()
         return max(0.0, -self._tokens / self._rate)
 
+    @property
+    def used_at(self) -> float:
+        """The time of the last call, by the clock of the bucket."""
+        return self._at
+
     def _refill(self) -> None:
         now = self._clock()
         self._tokens = min(self._capacity, self._tokens + (now - self._at) * self._rate)
         self._at = now
+
+
+class TokenBuckets:
+    """A token bucket for each key, such as a person or an address. Beyond `remembered` keys it drops those
+    that have not been used for as long as an empty bucket takes to be full."""
+
+    def __init__(
+        self,
+        capacity: float,
+        rate: float,
+        clock: Clock = time.monotonic,
+        *,
+        remembered: int = 1000,
+    ) -> None:
+        self._capacity: Final = capacity
+        self._rate: Final = rate
+        self._clock: Final = clock
+        self._remembered: Final = remembered
+        self._buckets: dict[str, TokenBucket] = {}
+
+    def __len__(self) -> int:
+        return len(self._buckets)
+
+    def of(self, key: str) -> TokenBucket:
+        """Return the bucket of a key, a full one for a key that is new."""
+        bucket = self._buckets.get(key)
+        if bucket is None:
+            bucket = self._buckets[key] = TokenBucket(self._capacity, self._rate, self._clock)
+            if len(self._buckets) > self._remembered:
+                self._forget_full(key)
+        return bucket
+
+    def _forget_full(self, newest: str) -> None:
+        since = self._clock() - self._capacity / self._rate
+        self._buckets = {
+            key: bucket
+            for key, bucket in self._buckets.items()
+            if bucket.used_at > since or key == newest
+        }

@@ -3,7 +3,11 @@
 import asyncio
 from typing import Any
 
-from action_assistant.editor.api.conversation import Conversation, converse, converse_directly
+from action_assistant.editor.api.room_connection import (
+    RoomConnection,
+    serve_by_asgi,
+    serve_directly,
+)
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.rooms.member import Member
 from action_assistant.editor.rooms.open_rooms import Rooms
@@ -15,11 +19,11 @@ from editor.client import STREAM
 SECOND = PER_MINUTE // 60  # bytes
 
 
-def talk_of(room: Room, owed: float) -> Conversation:
+def talk_of(room: Room, owed: float) -> RoomConnection:
     """Of somebody who would have to wait for so many seconds."""
     limits = ByteRateLimits(limits=True, clock=lambda: 0.0)
     limits.spend("eve", AT_ONCE + int(owed * SECOND))
-    return Conversation(room, Member(Person("eve", "Eve"), edits=False, acks=False), limits)
+    return RoomConnection(room, Member(Person("eve", "Eve"), edits=False, acks=False), limits)
 
 
 class Socket:
@@ -55,7 +59,7 @@ async def held_for(rooms: Rooms, owed: float, seconds: float) -> tuple[bool | No
     socket: Any = Socket()
     async with rooms.enter(STREAM) as room:
         talk = talk_of(room, owed)
-        talking = asyncio.create_task(converse_directly(talk, socket))
+        talking = asyncio.create_task(serve_directly(talk, socket))
         await asyncio.sleep(seconds)
         found = socket.was_held, socket.is_held
         talk.member.close(1000)
@@ -85,7 +89,7 @@ async def heard(rooms: Rooms, owed: float, seconds: float) -> int:
 
     async with rooms.enter(STREAM) as room:
         talk = talk_of(room, owed)
-        talking = asyncio.create_task(converse(talk, receive, send))
+        talking = asyncio.create_task(serve_by_asgi(talk, receive, send))
         await asyncio.sleep(seconds)
         found = asked
         talk.member.close(1000)

@@ -64,7 +64,7 @@ async def made(services: EditorServices, *file: Any, **more: Any) -> str:
 async def rewritten(services: EditorServices, graph: str, graph_file: bytes) -> None:
     """Somebody draws something else there."""
     async with services.rooms.enter(graph_stream(graph)) as room:
-        state = await room.look(lambda replica, _: replica.doc.get_update())
+        state = await room.read(lambda replica, _: replica.doc.get_update())
         then = changes.first(codec.read(graph_file).graph)
         await room.submit(changes.restoring(state, then), "ada")
 

@@ -69,7 +69,7 @@ async def test_whose_edit_finds_the_machine_busy_may_send_it_again(
     run_in_worker = Troubled(trouble)
     async with edited(journal, run_in_worker, large) as member:
         assert await member.ended() == messages.TOO_SLOW
-        assert "busy" in (member.said or "")
+        assert "busy" in (member.close_text or "")
     assert run_in_worker.asked == 1
 
 
@@ -93,7 +93,7 @@ async def test_an_edit_that_would_take_minutes_costs_seconds(journal: Journal) -
     lane = Lane("edits", 1, 120.0, 0, CapacityLimiter(2), [trial.__name__])
     async with edited(journal, lane, at_once(120_000)) as member:
         assert await member.ended() == messages.TOO_BIG
-        assert "so long" in (member.said or "")
+        assert "so long" in (member.close_text or "")
     lane.close()
 
 

@@ -163,7 +163,7 @@ async def edited(rooms: Rooms, seed: int, edits: int) -> list[Maps]:
         async def submit(author: str, update: bytes) -> None:
             before = room.seq
             if await room.submit(update, author) > before:
-                held.append(await room.look(lambda replica, _: maps_of(replica.doc)))
+                held.append(await room.read(lambda replica, _: maps_of(replica.doc)))
             for other in people:
                 if other.name != author:
                     waiting[other.name].append(update)

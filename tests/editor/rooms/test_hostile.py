@@ -166,7 +166,7 @@ async def test_whatever_two_bytes_a_viewer_begins_with_nothing_changes(rooms: Ro
                 except Malformed:
                     continue
                 if message is not None and vic.member is not None:
-                    room.hear(vic.member, message)
+                    room.receive(vic.member, message)
                 vic.leave()
             await room.quiet()
         assert room.seq == 1

@@ -20,14 +20,14 @@ def writing(*, acks: bool = True) -> tuple[Member, list[bytes]]:
 async def test_an_acknowledgement_goes_in_one_write_with_the_news() -> None:
     member, written = writing()
     member.edit_handled()
-    assert member.sends(NEWS, 7)
+    assert member.send_now(NEWS, 7)
     assert written == [NEWS + framed(messages.acks(1, 7))]
 
 
 async def test_nothing_is_acknowledged_twice() -> None:
     member, written = writing()
-    assert member.sends(b"", 7)
-    assert member.sends(b"", 7)
+    assert member.send_now(b"", 7)
+    assert member.send_now(b"", 7)
     member.post_ack(7)
     assert (len(written), member.has_news) == (1, False)
 
@@ -35,7 +35,7 @@ async def test_nothing_is_acknowledged_twice() -> None:
 async def test_an_acknowledgement_never_overtakes_what_waits() -> None:
     member, written = writing()
     member.post(messages.BEAT)
-    assert not member.sends(NEWS, 7)
+    assert not member.send_now(NEWS, 7)
     member.post(messages.change(b"\x00\x00"))
     member.post_ack(7)
     assert written == []
@@ -45,12 +45,12 @@ async def test_an_acknowledgement_never_overtakes_what_waits() -> None:
 async def test_what_could_not_be_written_is_not_taken_for_said() -> None:
     member, _ = writing()
     member.write_now = lambda _: False
-    assert not member.sends(NEWS, 7)
+    assert not member.send_now(NEWS, 7)
     member.post_ack(7)
     assert member.gather() == [messages.acks(0, 7)]
 
 
 async def test_who_knows_no_acknowledgements_hears_the_news_alone() -> None:
     member, written = writing(acks=False)
-    assert member.sends(NEWS, 7)
+    assert member.send_now(NEWS, 7)
     assert written == [NEWS]

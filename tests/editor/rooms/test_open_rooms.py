@@ -7,10 +7,10 @@ import pytest
 
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.crdt.loading import Loaded, load
-from action_assistant.editor.rooms.batch import Taken
+from action_assistant.editor.rooms.batch import BatchOutcome
+from action_assistant.editor.rooms.broadcast import UpdateBroadcast
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.editor.rooms.room import Room
-from action_assistant.editor.rooms.room_news import RoomNews
 from action_assistant.journal.journal import Journal
 from editor.client import STREAM, Client, bodies, settle
 
@@ -88,7 +88,7 @@ async def test_where_a_graph_may_be_deleted_whoever_comes_asks_and_whoever_is_th
     ada = Client()
     async with rooms.enter(STREAM) as room:
         ada.join(room)
-        rooms.doubt(STREAM)
+        rooms.check_existence(STREAM)
         assert not rooms.is_joined(STREAM)
         assert not rooms.is_deleted(STREAM)
         assert ada.member is not None
@@ -138,14 +138,14 @@ async def test_a_room_that_fails_closes_alone(
             client.join(room)
             client.speak()
         await settle(ada, bob)
-        original = RoomNews.tell
+        original = UpdateBroadcast.send
 
-        def tell(self: RoomNews, taken: Taken, seq: int) -> None:
+        def tell(self: UpdateBroadcast, outcome: BatchOutcome, seq: int) -> None:
             if ada.member in self._members:
                 raise Panic
-            original(self, taken, seq)
+            original(self, outcome, seq)
 
-        monkeypatch.setattr(RoomNews, "tell", tell)
+        monkeypatch.setattr(UpdateBroadcast, "send", tell)
         for _ in range(2):  # the second within the window
             ada.map["a"] = bob.map["a"] = "1"
             ada.speak()
@@ -157,7 +157,7 @@ async def test_a_room_that_fails_closes_alone(
         assert not bob.member.closed
         assert bob.durable == bob.sent
     assert rooms.open_room("graph/bad") is None
-    monkeypatch.setattr(RoomNews, "tell", original)
+    monkeypatch.setattr(UpdateBroadcast, "send", original)
     async with rooms.enter("graph/bad") as again:  # what was stored is there
         ada.join(again)
         await settle(ada)

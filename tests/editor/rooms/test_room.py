@@ -125,7 +125,7 @@ async def test_the_server_s_own_edit_hears_when_it_cannot_be_stored(
         with pytest.raises(Unavailable):
             await room.submit(update, "server")
         with pytest.raises(Unavailable):
-            await room.look(lambda _, seq: seq)
+            await room.read(lambda _, seq: seq)
 
 
 async def test_bytes_are_stored_as_they_came_and_only_if_they_bring_something(
@@ -191,7 +191,7 @@ async def test_a_snapshot_is_made_of_a_document_that_waits_and_of_what_waits(
     one, two = updates(("a", "1"), ("a", None))
     async with rooms.enter(STREAM) as room:
         await room.submit(two, "x")
-        await room.rest(lambda: True)
+        await room.close_if_unused(lambda: True)
         kept = await journal.snapshot(STREAM)
         assert kept is not None
         assert kept.seq == 1
@@ -226,7 +226,7 @@ async def test_edits_go_on_while_a_snapshot_is_stored(
     journal: Journal, rooms: Rooms, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It is of the moment at which it was begun."""
-    monkeypatch.setattr("action_assistant.editor.rooms.room_snapshots.EVERY", 10)
+    monkeypatch.setattr("action_assistant.editor.rooms.housekeeping.SNAPSHOT_EVENTS", 10)
     may_be_stored, stored = asyncio.Event(), asyncio.Event()
     keep = journal.keep_snapshot
 
@@ -312,11 +312,11 @@ async def test_looking_shows_what_is_committed(rooms: Rooms, gate: Gate) -> None
         gate.open.clear()
         submitting = asyncio.create_task(room.submit(update, "x"))
         await asyncio.sleep(0.02)
-        looking = asyncio.create_task(room.look(see))
+        looking = asyncio.create_task(room.read(see))
         await asyncio.sleep(0.02)
         assert not looking.done()
         gate.open.set()
         assert await looking == ({"a": "1"}, 1)
         assert await submitting == 1
         with pytest.raises(ZeroDivisionError):
-            await room.look(lambda _, seq: seq // 0)
+            await room.read(lambda _, seq: seq // 0)

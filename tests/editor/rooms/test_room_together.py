@@ -106,7 +106,7 @@ async def act(rooms: Rooms, stream: str, clients: list[Client], step: tuple[Any,
                 client.leave()
             room_ = rooms.open_room(stream)
             if room_ is not None:
-                await room_.rest(lambda: False)
+                await room_.close_if_unused(lambda: False)
         case ("settle",):
             await those_here_know_all(rooms, stream, clients)
         case ("check",):

@@ -18,10 +18,10 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
+from action_assistant.kit.token_bucket import TokenBuckets
 from action_assistant.share_links import invitations_as_text
 from action_assistant.web.auth.keys import Keys
 from action_assistant.web.auth.revocations import Revocations
-from action_assistant.web.network.connection_limits import RateLimit
 from editor.process import Editor
 from editor.process import running as editor_running
 from support.product import COMMAND, TOKEN, Product, running
@@ -380,11 +380,11 @@ def test_guessing_is_slowed_down_for_the_one_who_guesses(tmp_path: Path) -> None
 
 def test_an_address_is_forgiven_with_time_and_others_do_not_pay() -> None:
     now = 0.0
-    pace = RateLimit(3, 60, lambda: now)
-    assert [pace.takes("a") for _ in range(4)] == [True, True, True, False]
-    assert pace.takes("b")
+    pace = TokenBuckets(3, 1, lambda: now)
+    assert [pace.of("a").take() for _ in range(4)] == [True, True, True, False]
+    assert pace.of("b").take()
     now = 1.0
-    assert [pace.takes("a") for _ in range(2)] == [True, False]
+    assert [pace.of("a").take() for _ in range(2)] == [True, False]
 
 
 @pytest.mark.parametrize("name", ["../token", "a/b", "", "x" * 41, "ü", "."])

@@ -215,7 +215,7 @@ def _contents(app_state: EditorState) -> list[ControllerRouterHandler]:
         then = await services.graph_reader.at(graph_id, seq)
         inside = await _inside_with(services, then, text)
         async with services.rooms.enter(graph_stream(graph_id)) as room:
-            now, state = await room.look(lambda replica, at: (at, replica.state()))
+            now, state = await room.read(lambda replica, at: (at, replica.state()))
             found = await services.workers.files(merging, then, state, text, inside)
             if found.conflicts:
                 raise Conflict(

@@ -6,11 +6,11 @@ import anyio
 from litestar import WebSocket, websocket
 from litestar.types import ControllerRouterHandler
 
-from action_assistant.editor.api.conversation import (
+from action_assistant.editor.api.room_connection import (
     NORMAL,
-    Conversation,
-    converse,
-    converse_directly,
+    RoomConnection,
+    serve_by_asgi,
+    serve_directly,
 )
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.log import graph_events as h
@@ -29,7 +29,7 @@ _GOODBYE: Final = 1.0  # seconds that a close frame gets
 
 
 def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
-    """The route; `y-websocket` appends the name of its room, which is always `room`."""
+    """Return the route of rooms. Stock clients (`y-websocket`) append the name of their room, always `room`."""
 
     @websocket("/api/graphs/{graph_id:str}/room")
     async def room(socket: Socket, graph_id: str) -> None:
@@ -38,13 +38,15 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         address = socket.client.host if socket.client is not None else ""
         try:
             with services.connection_limits.admitted(person.id, address):
-                if not services.rooms.is_joined(stream):  # to ask is a fifth of what coming costs
+                if not services.rooms.is_joined(
+                    stream
+                ):  # asking the tables is a fifth of the cost of a connection
                     await services.catalogue.require(graph_id)
                 await services.people.seen(person)
                 async with services.rooms.enter(stream) as found:
                     await socket.accept()
-                    if _knows_another(socket, services.epoch, found):
-                        await _part(socket, services.epoch)
+                    if _has_other_history(socket, services.epoch, found):
+                        await _refuse_history(socket, services.epoch)
                         return
                     edits = allowed(person.role, "edit")
                     acks = _wants_acks(socket)
@@ -53,9 +55,9 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
                         member.post_epoch(services.epoch)
                         if services.rooms.is_deleted(stream):  # while this socket was let in
                             member.close(messages.NO_SUCH_GRAPH)
-                        talk = Conversation(found, member, services.rate_limits)
+                        connection = RoomConnection(found, member, services.rate_limits)
                         with about("graph", graph_id):
-                            code = await _converse(socket, talk)
+                            code = await _serve(socket, connection)
                         services.rooms.metrics.closed[code] += 1
         except Refused as refused:
             await _refuse(socket, refused)
@@ -67,8 +69,9 @@ def _wants_acks(socket: Socket) -> bool:
     return bool(socket.query_params.get("acks") == "1")
 
 
-def _knows_another(socket: Socket, epoch: str, room: Room) -> bool:
-    """Whether the client knows another history: by its name, or since this one is shorter."""
+def _has_other_history(socket: Socket, epoch: str, room: Room) -> bool:
+    """Tell whether the client comes from another history of the log: its epoch differs, or it knows later
+    changes than there are."""
     asked = socket.query_params
     if asked.get("epoch", epoch) != epoch:
         return True
@@ -77,29 +80,29 @@ def _knows_another(socket: Socket, epoch: str, room: Room) -> bool:
     return number > room.seq and room.damaged is None
 
 
-async def _part(socket: Socket, epoch: str) -> None:
-    """Send away who knows another history, with the name of this one."""
+async def _refuse_history(socket: Socket, epoch: str) -> None:
+    """Close the socket of a client with another history, and send it the epoch of this one."""
     with anyio.move_on_after(_GOODBYE):
         if _wants_acks(socket):
             await socket.send_bytes(messages.epoch(epoch))
         await socket.close(messages.OTHER_EPOCH, messages.REASONS[messages.OTHER_EPOCH])
 
 
-async def _converse(socket: Socket, talk: Conversation) -> int:
-    """Until one side ends it; the close code."""
+async def _serve(socket: Socket, connection: RoomConnection) -> int:
+    """Serve a socket until one side closes it; return the close code."""
     direct = direct_socket(socket.scope.get("extensions"))
     if direct is not None:
-        code = await converse_directly(talk, direct)
+        code = await serve_directly(connection, direct)
     else:
-        code = await converse(talk, *plain(socket))
+        code = await serve_by_asgi(connection, *plain(socket))
     if code != NORMAL:
         with anyio.move_on_after(_GOODBYE):
-            await socket.close(code, talk.member.said or messages.REASONS.get(code))
+            await socket.close(code, connection.member.close_text or messages.REASONS.get(code))
     return code
 
 
 async def _refuse(socket: Socket, refused: Refused) -> None:
-    """Answer the request for an upgrade with a plain refusal."""
+    """Answer the request for an upgrade with an HTTP error."""
     if socket.connection_state != "init":
         await socket.close(messages.RESTARTING, messages.REASONS[messages.RESTARTING])
         return

@@ -197,7 +197,7 @@ class Catalogue:
         """Take a graph out of sight; everyone in it has to leave."""
         await self._row(graph)
         stream = h.graph_stream(graph)
-        self._rooms.doubt(stream)  # also where it is never known whether this was stored
+        self._rooms.check_existence(stream)  # also where it is never known whether this was stored
         await self._journal.append(h.about_stream(graph), [h.draft(h.DELETED, author)])
         self._rooms.expel(stream)
 
@@ -289,7 +289,7 @@ class Catalogue:
             to_fill_in=None if told is None else told.to_fill_in,
             robots=summary.robots,
             labels=summary.labels,
-            people=() if room is None else room.attendance.people(),
+            people=() if room is None else room.presence.people(),
             deleted_at=None if row.deleted_at is None else h.when(row.deleted_at),
             damaged=summary.damaged,
             kind=row.kind,

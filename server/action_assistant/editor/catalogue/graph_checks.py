@@ -206,7 +206,7 @@ class GraphChecks:
         """The name of a document. Raises Unavailable, TooLarge."""
         room = self._rooms.open_room(graph_stream(graph))
         if room is not None and kind == "graph":
-            return await room.look(lambda replica, _: document.name_of(replica.doc))
+            return await room.read(lambda replica, _: document.name_of(replica.doc))
         info = (await self._about(graph, newest)).info
         if kind == "graph":
             return info.name

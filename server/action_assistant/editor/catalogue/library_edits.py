@@ -230,7 +230,7 @@ class LibraryEdits:
 
 
 async def _now(room: Room, document: str) -> GraphAtSeq:
-    return await room.look(lambda replica, seq: GraphAtSeq(document, seq, replica.state()))
+    return await room.read(lambda replica, seq: GraphAtSeq(document, seq, replica.state()))
 
 
 async def _seen(room: Room, moment: GraphMoment) -> GraphAtSeq:

@@ -16,7 +16,7 @@ async def rename(
     run_in_worker: RunInWorker = run_here,
 ) -> int:
     """Give the graph or action another name or description; the seq."""
-    state = await room.look(lambda replica, _: replica.state())
+    state = await room.read(lambda replica, _: replica.state())
     update = await run_in_worker(renaming, state, name, description, kind)
     return await room.submit(update, author)
 
@@ -25,7 +25,7 @@ async def call_actions(
     room: Room, author: str, before: str, name: str, *, run_in_worker: RunInWorker = run_here
 ) -> bool:
     """Give every action called `before` another name, as one edit. Return whether there was one."""
-    state, seq = await room.look(lambda replica, seq: (replica.state(), seq))
+    state, seq = await room.read(lambda replica, seq: (replica.state(), seq))
     update = await run_in_worker(calling_actions, state, before, name)
     return await room.submit(update, author) > seq
 
@@ -37,5 +37,5 @@ async def restore(
 
     What people said about it stays.
     """
-    state = await room.look(lambda replica, _: replica.state())
+    state = await room.read(lambda replica, _: replica.state())
     return await room.submit(await run_in_worker(restoring, state, then), author)

@@ -106,4 +106,4 @@ class GoingBack:
 
 
 async def _state(room: Room) -> bytes:
-    return await room.look(lambda replica, _: replica.state())
+    return await room.read(lambda replica, _: replica.state())

@@ -1,4 +1,4 @@
-"""What enters a room, and the outcome of a batch of it."""
+"""Requests that wait in the queue of a room, how they are grouped into batches, and the outcome of a batch."""
 
 import asyncio
 import time
@@ -23,17 +23,19 @@ from action_assistant.web.workers.lanes import Crashed, OutOfTime, RunInWorker
 
 T = TypeVar("T")
 
-LARGE: Final = 8 * 1024  # bytes of an update that is tried on a copy first, and by itself
+LARGE: Final = (
+    8 * 1024
+)  # bytes of an update that is tried on a copy first, and is a batch of its own
 _BATCH: Final = 200  # items of one commit
 _BATCH_BYTES: Final = 512 * 1024
-_DEATHS: Final = 2  # of processes that try an update, until it is taken for the cause
-_MERGED: Final = 50  # updates merged at once; merging more costs their square
+_CRASHES: Final = 2  # of workers that try an update, after which the update counts as their cause
+_MERGED: Final = 50  # updates merged at once; the time for it grows with their square
 _MERGED_BYTES: Final = 128 * 1024
 
 
-class Offer(msgspec.Struct, frozen=True):
-    """An edit on its way in: from a socket, or from the server itself (`done` is told). `at`: when it
-    came, by the clock of performance counters."""
+class SubmittedEdit(msgspec.Struct, frozen=True):
+    """An edit that waits in the queue of a room, from a socket (`member`) or from the server itself (`done`
+    gets the sequence number after the commit). `at`: when it was received, in seconds of `perf_counter`."""
 
     update: bytes
     author: str
@@ -42,57 +44,64 @@ class Offer(msgspec.Struct, frozen=True):
     at: float = msgspec.field(default_factory=time.perf_counter)
 
 
-class Ask(msgspec.Struct, frozen=True):
-    """A socket wants what it lacks."""
+class SyncRequest(msgspec.Struct, frozen=True):
+    """A socket asks for the part of the document that is not in its state vector `state`."""
 
     member: Member
     state: bytes
 
 
-class Compare(msgspec.Struct, frozen=True):
-    """A socket says what it shows, and wants to know whether that is right."""
+class ComparisonRequest(msgspec.Struct, frozen=True):
+    """A socket sends a fingerprint of the document that it shows, and asks whether it is right."""
 
     member: Member
     shown: messages.CompareMessage
 
 
-class Look(msgspec.Struct, frozen=True):
-    """Somebody wants to see the document at a moment when all of it is committed."""
+class ReadRequest(msgspec.Struct, frozen=True):
+    """The server calls `see(document, seq)` at a moment when the whole document is committed; `done` gets the
+    result."""
 
     see: Callable[[Replica, int], Any]
     done: "asyncio.Future[Any]"
 
 
-Item: TypeAlias = Offer | Ask | Compare | Look
+QueueItem: TypeAlias = SubmittedEdit | SyncRequest | ComparisonRequest | ReadRequest
 
 
-class Taken:
-    """What became of a batch."""
+class BatchOutcome:
+    """The outcome of applying one batch: the events to store, the updates to send, and the requests to answer
+    after the commit."""
 
     def __init__(self) -> None:
-        self.news: list[tuple[Offer, str]] = []  # to be stored, as which kind
-        self.shown: list[bytes] = []  # what the others can make use of
-        self.for_all = False  # something that waited is among it
-        self.handled: list[Offer] = []
-        self.asks: list[Ask] = []
-        self.compares: list[Compare] = []
-        self.looks: list[Look] = []
+        #: Edits to be stored, each with the kind of its event.
+        self.to_store: list[tuple[SubmittedEdit, str]] = []
+        #: Updates that the members can apply.
+        self.to_send: list[bytes] = []
+        #: Whether among them are earlier updates that have stopped waiting, which not even authors have sent.
+        self.authors_lack_some = False
+        #: Edits to be acknowledged.
+        self.handled: list[SubmittedEdit] = []
+        self.sync_requests: list[SyncRequest] = []
+        self.comparisons: list[ComparisonRequest] = []
+        self.reads: list[ReadRequest] = []
+        #: Whether the CRDT library panicked, so that the document has to be loaded anew.
         self.panicked = False
 
 
 class NotAllowed(Exception):
-    """The edit of somebody who may only look."""
+    """A person who may only view sent an edit that would change the document."""
 
 
 class NotNow(Exception):
-    """The machine has no time for this edit; whoever sends it again may have more luck."""
+    """The machine has no time to try this edit; the client may send it again."""
 
     def __init__(self, cause: Refused) -> None:
         super().__init__(cause.detail)
         self.cause: Final = cause
 
 
-#: Why an edit was not taken.
+#: Reasons to refuse an edit.
 Objection: TypeAlias = (
     Malformed
     | ForeignClient
@@ -104,7 +113,7 @@ Objection: TypeAlias = (
     | NotNow
 )
 
-#: All of them, to be caught.
+#: The same classes, for `except`.
 OBJECTIONS: Final = (
     Malformed,
     ForeignClient,
@@ -117,17 +126,17 @@ OBJECTIONS: Final = (
 )
 
 
-def refuse(offer: Offer, error: Objection) -> None:
-    """Take nothing of an offer: its socket is closed, or whoever waits for it is told."""
-    code, reason, said = _answer(error)
-    if offer.member is not None:
-        offer.member.refuse(code, said)
-    if offer.done is not None and not offer.done.done():
-        offer.done.set_exception(reason)
+def refuse(edit: SubmittedEdit, error: Objection) -> None:
+    """Refuse an edit: close its socket with the reason, or raise the reason where the server waits for it."""
+    code, reason, text = _answer(error)
+    if edit.member is not None:
+        edit.member.refuse(code, text)
+    if edit.done is not None and not edit.done.done():
+        edit.done.set_exception(reason)
 
 
 def _answer(error: Objection) -> tuple[int, Refused, str | None]:
-    """The close code, the refusal, and what a socket is told beside the code."""
+    """Return the close code, the error, and the text of the close, if there is one."""
     match error:
         case Malformed():
             return messages.MALFORMED, BadInput(f"The update cannot be read: {error}."), None
@@ -148,26 +157,31 @@ def _answer(error: Objection) -> tuple[int, Refused, str | None]:
             return messages.TOO_SLOW, error.cause, "the server is busy, come again"
 
 
-async def tried_first(offer: Offer, replica: Replica, tried: RunInWorker) -> UpdateOutline | None:
-    """Its outline; None where it has to be read again, since in a document with depth also what
-    lies beside something deep counts. Raises Malformed, Panicked, TooSlow, NotNow, QuotaExceeded."""
-    read = None if len(offer.update) > LARGE else outline(offer.update)
+async def tried_first(
+    edit: SubmittedEdit, replica: Replica, run_in_worker: RunInWorker
+) -> UpdateOutline | None:
+    """Try an edit on a copy of the document in a worker where that is needed, and return its outline.
+
+    Return None where the outline has to be read again: in a document with nested types it depends on what
+    lies beside the new parts. Raises Malformed, Panicked, TooSlow, NotNow, QuotaExceeded.
+    """
+    read = None if len(edit.update) > LARGE else outline(edit.update)
     released = [] if read is None else replica.freed_by(read)
     freed = sum(map(len, released))
     small = read is not None and freed <= LARGE
-    if small and not replica.opening.is_doubtful_with(len(offer.update) + freed):
+    if small and not replica.opening.is_doubtful_with(len(edit.update) + freed):
         return read
     state = replica.state()
     waiting = replica.waiting if read is None else released
-    found = await tried_for(offer.author, tried, state, offer.update, waiting)
+    found = await tried_for(edit.author, run_in_worker, state, edit.update, waiting)
     replica.opening.opened(found.opening, len(state))
     replica.opening.refuse(found)
     return None if replica.nesting.spans else found
 
 
-def fail(item: Item, reason: Refused) -> None:
-    """Tell whoever waits for it that it will not be done."""
-    if isinstance(item, Ask | Compare) or item.done is None or item.done.done():
+def fail(item: QueueItem, reason: Refused) -> None:
+    """Raise `reason` where the server waits for this item. Sockets are closed by the room."""
+    if isinstance(item, SyncRequest | ComparisonRequest) or item.done is None or item.done.done():
         return
     item.done.set_exception(reason)
 
@@ -179,23 +193,23 @@ async def tried_for(
     update: bytes,
     released: Sequence[bytes] = (),
 ) -> TriedOutline:
-    """The outline of an update that may be applied to a document of this state, and after it the
-    updates that waited for it.
+    """Try an update on a document of this state, and after it the updates that waited for it (`released`).
+    Return its outline.
 
-    Raises Malformed, Panicked, TooSlow; NotNow for what does not lie in the update.
+    Raises Malformed, Panicked, TooSlow; NotNow where the reason is not in the update.
     """
     return await _done_for(person, run_in_worker, tried, state, update, released)
 
 
-async def adds_nothing_aside(offer: Offer, state: bytes, run_in_worker: RunInWorker) -> bool:
-    """As `adds_nothing`: reading a large update takes long. Raises as `tried_for`."""
-    return await _done_for(offer.author, run_in_worker, adds_nothing, state, offer.update)
+async def adds_nothing_aside(edit: SubmittedEdit, state: bytes, run_in_worker: RunInWorker) -> bool:
+    """Call `adds_nothing` for a large edit in a worker. Raises as `tried_for` does."""
+    return await _done_for(edit.author, run_in_worker, adds_nothing, state, edit.update)
 
 
 async def _done_for(
     person: str, run_in_worker: RunInWorker, work: Callable[..., T], *arguments: object
 ) -> T:
-    died = 0
+    crashes = 0
     while True:
         try:
             with acting_for(person):
@@ -203,8 +217,8 @@ async def _done_for(
         except OutOfTime as error:
             raise TooSlow(OVERLONG) from error
         except Crashed as error:
-            died += 1
-            if died == _DEATHS:  # one may have been for want of memory
+            crashes += 1
+            if crashes == _CRASHES:  # the first one may have been for want of memory
                 raise Malformed("an update that ends the process") from error
         except TooLarge as error:
             raise TooSlow(f"This change cannot be taken: {error.detail}") from error
@@ -212,12 +226,14 @@ async def _done_for(
             raise NotNow(error) from error
 
 
-def batch_of(items: list[Item], *, one: bool = False) -> tuple[list[Item], list[Item]]:
-    """What one commit takes, and the rest. Small enough for readers that keep up; a large update is
-    alone; with `one` each is."""
+def batch_of(
+    items: list[QueueItem], *, one: bool = False
+) -> tuple[list[QueueItem], list[QueueItem]]:
+    """Return the items of the next commit, and the rest. A batch is small enough for clients that read in
+    time; a large update is a batch of its own; with `one` every item is."""
     size = count = 0
     for item in items[: 1 if one else _BATCH]:
-        own = len(item.update) if isinstance(item, Offer) else 0
+        own = len(item.update) if isinstance(item, SubmittedEdit) else 0
         size += own
         if count and (size > _BATCH_BYTES or own > LARGE):
             break
@@ -227,22 +243,25 @@ def batch_of(items: list[Item], *, one: bool = False) -> tuple[list[Item], list[
     return items[:count], items[count:]
 
 
-def before_doubt(items: Sequence[Item], is_doubtful: Callable[[int], bool]) -> int:
-    """How many of these, from the first one on, may be taken together without doubt that the document
-    can be opened soon enough after them. `is_doubtful` is asked with a number of bytes."""
+def before_doubt(items: Sequence[QueueItem], is_doubtful: Callable[[int], bool]) -> int:
+    """Return how many items, from the first one on, can be applied before it is doubtful that the document
+    still opens in time. `is_doubtful` is asked with a number of bytes."""
     size = 0
     for n, item in enumerate(items):
-        if isinstance(item, Offer):
+        if isinstance(item, SubmittedEdit):
             size += len(item.update)
             if is_doubtful(size):
                 return n
     return len(items)
 
 
-def next_batch(waiting: list[Item], replica: Replica) -> tuple[list[Item], list[Item], bool]:
-    """What is taken next, what then waits, and whether the one is an edit that has to be tried first."""
+def next_batch(
+    waiting: list[QueueItem], replica: Replica
+) -> tuple[list[QueueItem], list[QueueItem], bool]:
+    """Return the next batch, the items that wait on, and whether the batch is one edit that has to be tried
+    on a copy first."""
     match waiting:  # nearly always
-        case [Offer(update)] if (
+        case [SubmittedEdit(update)] if (
             len(update) <= LARGE
             and not replica.waits
             and not replica.opening.is_doubtful_with(len(update))
@@ -250,19 +269,19 @@ def next_batch(waiting: list[Item], replica: Replica) -> tuple[list[Item], list[
             return waiting, [], False
     much_waits = replica.waiting_bytes > LARGE
     batch, rest = batch_of(waiting, one=much_waits)
-    freed = min(replica.waiting_bytes, LARGE)  # what more than that frees is looked at alone
+    freed = min(replica.waiting_bytes, LARGE)  # an edit that could free more is a batch of its own
     sure = before_doubt(batch, lambda size: replica.opening.is_doubtful_with(size + freed))
     count = max(sure, 1)
     rest = [*batch[count:], *rest]
     match batch[:count]:
-        case [Offer(update)] as alone if much_waits or not sure or len(update) > LARGE:
+        case [SubmittedEdit(update)] as alone if much_waits or not sure or len(update) > LARGE:
             return alone, rest, True
         case several:
             return several, rest, False
 
 
 def merged(updates: list[bytes]) -> list[bytes]:
-    """The same changes in few updates; none so large that a client that echoes would be refused."""
+    """Merge updates into few, none so large that a client that echoes it would be refused."""
     groups: list[list[bytes]] = []
     size = 0
     for update in updates:

@@ -73,14 +73,14 @@ class BatchWindow:
     def _open(self) -> None:
         now = self._loop.time()
         if now - self._looked_at > _MEMORY:
-            self._look(now)
+            self._adapt_length(now)
         self._next = now + self._length
         waiting, self._waiting = self._waiting, []
         for work in waiting:
             self.turn_end.do(work)
 
-    def _look(self, now: float) -> None:
-        """How long windows are from here on."""
+    def _adapt_length(self, now: float) -> None:
+        """Set the length of windows by the share of the time that the loop has worked lately."""
         worked = time.thread_time()
         busy = (worked - self._worked) / (now - self._looked_at)
         self._worked, self._looked_at = worked, now

@@ -11,31 +11,31 @@ PALETTE: Final = (
     "#ac50b0", "#626dc8", "#d72190", "#ba2cdf", "#8b5cce", "#b05b60", "#5f7b63", "#6a7587",
     "#8e7110", "#a65c86", "#5760fe", "#e1156e", "#bc4993", "#8e6b79", "#6572a5", "#a54ccc",
 )  # fmt: skip
-#: Of who has not been here since others took all colours.
+#: The colour of people who left before others took all colours.
 NOBODYS: Final = "#757575"
 
 
 def colour_at(place: int) -> str:
-    """The colour of a place. Beyond the palette its colours come again, each time a bit other."""
+    """Return the colour at a place of the palette. Beyond its end the colours come again, slightly changed."""
     turn, at = divmod(place, len(PALETTE))
     red_and_green, blue = PALETTE[at][:5], int(PALETTE[at][5:], 16)
     return f"{red_and_green}{(blue + turn if blue < 128 else blue - turn) % 256:02x}"
 
 
 class PersonColours:
-    """Who has which colour, over all rooms. Whoever is here keeps theirs, whoever comes or goes.
+    """Assigns colours to people, the same in all rooms. A colour does not change while its person is connected.
 
-    Who has left keeps theirs, too, until all of the palette is taken: then whoever left first
-    gives theirs up. Held in memory: after a restart people come in another order.
+    People who have left keep theirs until the whole palette is taken; then the one who left first loses
+    theirs. Held in memory: a restart assigns colours anew.
     """
 
     def __init__(self) -> None:
-        self._places: dict[str, int] = {}  # by person, who was here last at the end
-        self._sockets: dict[str, int] = {}  # of those who are here
+        self._places: dict[str, int] = {}  # by person, in the order in which they left
+        self._sockets: dict[str, int] = {}  # open sockets of each person
 
     @contextmanager
     def held(self, person: str) -> Iterator[str]:
-        """The colour of somebody who is here, by one socket more."""
+        """Count one more socket of a person while inside, and yield their colour."""
         colour = self.given(person)
         self._sockets[person] = self._sockets.get(person, 0) + 1
         try:
@@ -47,13 +47,13 @@ class PersonColours:
                 self._places[person] = self._places.pop(person)
 
     def given(self, person: str) -> str:
-        """The colour of somebody who acts: theirs, or one that is free."""
+        """Return the colour of a person; assign a free one if they have none."""
         if person not in self._places:
             self._places[person] = self._free()
         return colour_at(self._places[person])
 
     def of(self, person: str) -> str:
-        """The colour of somebody who may be long gone."""
+        """Return the colour of a person who may have left; grey if they have none any more."""
         place = self._places.get(person)
         return NOBODYS if place is None else colour_at(place)
 

@@ -1,4 +1,4 @@
-"""One socket in a room: what waits to be sent to it, and when it is too slow (rule R5)."""
+"""One socket in a room: its send queue, its back-pressure and its end (rule R5)."""
 
 import asyncio
 from collections.abc import Callable
@@ -17,20 +17,20 @@ WAITING_FRAMES: Final = 256
 WAITING_BYTES: Final = 1 << 20
 _BURST_S: Final = 0.1  # processor time of the loop that edits of one socket may take at once
 _SHARE: Final = 0.2  # of the time, that they may take for long
-_UNHANDLED_EDITS: Final = 256  # that a socket may have sent ahead of the room
+_UNHANDLED_EDITS: Final = 256  # of one socket that may wait in the room
 
 
-class _Answer(Enum):
-    """Where the document is that the socket asked for."""
+class _SyncState(Enum):
+    """The state of the document that the socket asked for."""
 
-    NONE = "nowhere"
-    WANTED = "still to be made"
-    WAITS = "waits to be taken"
-    LEFT = "is being sent"
+    NONE = "not asked for"
+    WANTED = "still to be encoded"
+    WAITS = "in the send queue"
+    LEFT = "being sent"
 
 
 class Member:
-    """Someone's socket. The room posts; whoever owns the socket takes and sends."""
+    """The send queue of one socket. The room posts messages; the owner of the socket takes and sends them."""
 
     def __init__(
         self,
@@ -46,28 +46,28 @@ class Member:
         self.acks: Final = acks
         self.synced = False  # has been sent the document
         self.refused = False  # nothing more is taken from it
-        self.said: str | None = None  # why, where the close code does not tell enough
+        self.close_text: str | None = None  # where the close code alone does not say enough
         self._cpu: Final = TokenBucket(_BURST_S, _SHARE)  # seconds of the loop's processor time
         self.handled = 0  # edits of this socket that the room has dealt with
-        self._heard = 0  # edits that the socket brought
+        self._received = 0  # edits that the socket sent
         self._frames: list[bytes] = []
         self._bytes = 0
-        self._answer = _Answer.NONE
+        self._answer = _SyncState.NONE
         self._presence: PresenceNews | None = None
         self._ack: tuple[int, int] | None = None
-        self._said = -1, -1  # with the last acknowledgement
-        self._news: asyncio.Event | None = None  # while somebody takes what there is
-        #: Called when there is something to be sent, or the end has come.
-        self.on_news: Callable[[], None] = self._tell_taker
-        #: Writes framed messages at once, where whoever owns the socket can: whether it did.
+        self._last_ack = -1, -1
+        self._news: asyncio.Event | None = None  # while `take` waits
+        #: Called when there is something to send, or the socket is to be closed.
+        self.on_news: Callable[[], None] = self._wake_taker
+        #: Writes framed messages at once and returns True; False where the owner of the socket cannot.
         self.write_now: Callable[[bytes], bool] = _never
-        self._room_again: asyncio.Event | None = None  # few sockets are ever far ahead
+        self._caught_up: asyncio.Event | None = None  # made for the few sockets that wait
         self._loop = asyncio.get_running_loop()
         self._taken_at = self._loop.time()
         self._closed: asyncio.Future[int] = self._loop.create_future()
 
     def post(self, frame: bytes) -> None:
-        """Send a message some time soon; who has too much waiting is closed."""
+        """Append a message to the send queue. Closes the socket where too much waits in it."""
         if self._closed.done():
             return
         if len(self._frames) >= WAITING_FRAMES or self._bytes > WAITING_BYTES:
@@ -77,95 +77,93 @@ class Member:
         self._bytes += len(frame)
         self.on_news()
 
-    def sends(self, news: bytes, durable: int | None = None) -> bool:
-        """Send framed messages at once, the same bytes as to many others, and behind them up to which
-        event all is durable; False where that has to be posted, behind what waits."""
+    def send_now(self, news: bytes, durable: int | None = None) -> bool:
+        """Write framed messages to the socket at once, and behind them the acknowledgement that everything up
+        to `durable` is stored. Return False where they have to be posted, behind what is in the queue."""
         if self._frames or self._ack is not None or self._presence is not None:
             return False
-        says = self._said
+        says = self._last_ack
         if durable is not None and self.acks and self.synced:
             says = self.handled, durable
-            if says != self._said:
+            if says != self._last_ack:
                 news += _framed_acks(*says)
         if not news:
             return True
         if self._closed.done() or not self.write_now(news):
             return False
-        self._said = says
+        self._last_ack = says
         self._taken_at = self._loop.time()
         return True
 
-    def asks(self) -> bool:
-        """The socket wants the document; False when it is still on its way for an earlier wish.
-
-        What changes meanwhile is sent behind it, so that a second one would tell nothing new.
-        """
-        if self._answer is not _Answer.NONE:
+    def begins_sync(self) -> bool:
+        """Note that the socket asks for the document. Return False while an earlier answer is still on its way:
+        changes are sent behind it, so a second answer would hold nothing new."""
+        if self._answer is not _SyncState.NONE:
             return False
-        self._answer = _Answer.WANTED
+        self._answer = _SyncState.WANTED
         return True
 
     def post_answer(self, frame: bytes) -> None:
-        """Send the document, however large: it was asked for."""
-        self._answer = _Answer.WAITS
+        """Append the document that was asked for to the send queue, however large it is."""
+        self._answer = _SyncState.WAITS
         self._frames.append(frame)
         self.on_news()
 
     def post_epoch(self, epoch: str) -> None:
-        """Say which history this is, to those who know our own messages."""
+        """Send the epoch of the log to a client that knows our own messages."""
         if self.acks:
             self.post(messages.epoch(epoch))
 
     def post_read_only(self, why: str) -> None:
-        """Say that nobody may change the document, to those who know our own messages."""
+        """Send the reason why the document is read-only to a client that knows our own messages."""
         if self.acks:
             self.post(messages.read_only(why))
 
     def post_presence(self, news: PresenceNews) -> None:
-        """Tell who is where; only the last word of each client waits."""
+        """Send presence entries; of each client only the newest waits in the queue."""
         if news.entries:
             waiting = self._presence
             self._presence = news if waiting is None else waiting.followed_by(news)
             self.on_news()
 
     def post_ack(self, seq: int) -> None:
-        """Say what is durable, and that everything up to `seq` was sent; the last word counts."""
+        """Acknowledge the edits handled so far, and that everything up to `seq` was sent. Only the newest
+        acknowledgement waits in the queue."""
         if self.acks and self.synced:
             says = self.handled, seq
-            if says != self._said:
-                self._said = self._ack = says
+            if says != self._last_ack:
+                self._last_ack = self._ack = says
                 self.on_news()
 
     async def take(self) -> list[bytes]:
-        """What is to be sent next, in order; waits until there is something. Whoever takes again has
-        sent what was taken before."""
+        """Wait for messages, and return them in order. The next call confirms that they have been sent."""
         self.all_sent()
         while not self.has_news and not self.closed:
             self._news = asyncio.Event()
             await self._news.wait()
         return self.gather()
 
-    def _tell_taker(self) -> None:
+    def _wake_taker(self) -> None:
         if self._news is not None:
             self._news.set()
 
     def all_sent(self) -> None:
-        """What was gathered has gone out."""
-        if self._answer is _Answer.LEFT:
-            self._answer = _Answer.NONE
+        """Note that the messages that `gather` returned have been sent."""
+        if self._answer is _SyncState.LEFT:
+            self._answer = _SyncState.NONE
 
     @property
     def has_news(self) -> bool:
-        """Whether there is something to be sent."""
+        """Tell whether anything waits in the send queue."""
         return bool(self._frames or self._presence is not None or self._ack is not None)
 
     def gather(self) -> list[bytes]:
-        """What is to be sent next, in order."""
+        """Empty the send queue and return its messages in order."""
         self._taken_at = self._loop.time()
         frames, self._frames = self._frames, []
         self._bytes = 0
-        if self._answer is _Answer.WAITS:
-            self._answer = _Answer.LEFT
+        if self._answer is _SyncState.WAITS:
+            self._answer = _SyncState.LEFT
         if self._presence is not None:
             frames.append(self._presence.frame)
             self._presence = None
@@ -174,14 +172,14 @@ class Member:
             self._ack = None
         return frames
 
-    def beat(self, silence: float) -> None:
-        """Say something if nothing was said for so many seconds (rule R10)."""
+    def send_heartbeat(self, silence: float) -> None:
+        """Send a heartbeat if nothing was sent for so many seconds (rule R10)."""
         if self._loop.time() - self._taken_at >= silence:
             self.post(messages.BEAT)
 
-    def heard_edit(self) -> None:
-        """The socket brought an edit."""
-        self._heard += 1
+    def edit_received(self) -> None:
+        """Count an edit that the socket sent."""
+        self._received += 1
 
     def used_cpu(self, seconds: float) -> None:
         """Count the processor time that an edit of this socket took from the event loop."""
@@ -197,53 +195,53 @@ class Member:
         return self._cpu.debt()
 
     def edit_handled(self) -> None:
-        """The room has dealt with the next edit of this socket, for good."""
+        """Count an edit of this socket that the room has stored or refused."""
         self.handled += 1
-        self._let_on()
+        self._wake_reader()
 
     @property
-    def far_ahead(self) -> bool:
-        """Whether the socket has said much that the room has not dealt with."""
-        return self._heard - self.handled > _UNHANDLED_EDITS and not self.closed
+    def is_far_ahead(self) -> bool:
+        """Tell whether so many edits of the socket wait in the room that it is not to be read on."""
+        return self._received - self.handled > _UNHANDLED_EDITS and not self.closed
 
-    async def until_heard(self) -> None:
-        """Wait while this socket is far ahead of the room."""
-        while self.far_ahead:
-            again = self._room_again = asyncio.Event()
+    async def until_caught_up(self) -> None:
+        """Wait while the socket is far ahead of the room."""
+        while self.is_far_ahead:
+            again = self._caught_up = asyncio.Event()
             await again.wait()
 
-    def _let_on(self) -> None:
-        if self._room_again is not None:
-            self._room_again.set()
+    def _wake_reader(self) -> None:
+        if self._caught_up is not None:
+            self._caught_up.set()
 
     def close(self, code: int) -> None:
-        """End this socket. The first reason counts."""
+        """Close the socket with a code. The first code counts."""
         if not self._closed.done():
             self._closed.set_result(code)
-            self._let_on()
+            self._wake_reader()
             self.on_news()
 
-    def refuse(self, code: int, said: str | None = None) -> None:
-        """End this socket for what it did; what it sent after that is not looked at."""
+    def refuse(self, code: int, text: str | None = None) -> None:
+        """Close the socket for what it sent, and ignore what it sends after that."""
         self.refused = True
-        self.said = self.said if self.closed else said
+        self.close_text = self.close_text if self.closed else text
         self.close(code)
 
     @property
     def closed(self) -> bool:
-        """Whether somebody ended it."""
+        """Tell whether the socket has been closed, by either side."""
         return self._closed.done()
 
     async def ended(self) -> int:
-        """Wait for the end; the close code."""
+        """Wait until the socket is closed, and return the close code."""
         return await asyncio.shield(self._closed)
 
 
-@lru_cache(64)  # those who only listen all hear the same
+@lru_cache(64)  # all members that only receive are sent the same
 def _framed_acks(handled: int, seq: int) -> bytes:
     return framed(messages.acks(handled, seq))
 
 
 def _never(_: bytes) -> bool:
-    """Nothing can be written at once."""
+    """Return that the owner of the socket cannot write at once."""
     return False

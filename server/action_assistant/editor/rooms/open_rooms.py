@@ -1,4 +1,4 @@
-"""Which rooms are open: loaded once, kept while somebody needs them, let go some seconds later."""
+"""The rooms that are open. Each is loaded once, kept while somebody uses it, and unloaded some seconds later."""
 
 import asyncio
 from collections.abc import AsyncIterator
@@ -17,13 +17,13 @@ from action_assistant.web.workers.lanes import RunInWorker, run_here
 
 LINGER: Final = 5.0  # seconds that a room stays after the last one left
 _TICK: Final = 2.0  # seconds
-_MOMENTS: Final = 10  # windows after which listeners hear again which moment they show
-_SILENCE: Final = 10.0  # seconds without a word after which a socket hears a beat
+_ANNOUNCEMENT_WINDOWS: Final = 10  # between two announcements of the sequence number
+_SILENCE: Final = 10.0  # seconds without a message after which a socket is sent a heartbeat
 
 
 class Rooms:
-    """The rooms of this process, by stream. What depends on the size of a document is done `run_in_worker`;
-    large updates are `tried` in another process before a room takes them."""
+    """Opens and unloads the rooms of this process, by stream. `run_in_worker` does what grows with a document;
+    `tried` tries large updates in another process before a room applies them."""
 
     def __init__(
         self,
@@ -38,7 +38,7 @@ class Rooms:
         self._run_in_worker = run_in_worker
         self._tried = tried
         self._window = BatchWindow(window)
-        self._moments = _MOMENTS * window
+        self._announcement_interval = _ANNOUNCEMENT_WINDOWS * window
         self._linger = linger
         self._rooms: dict[str, Room] = {}
         self._loading: dict[str, asyncio.Task[Room]] = {}
@@ -49,11 +49,12 @@ class Rooms:
         self._closed = False
         self._divergences = 0
         self.metrics: Final = RoomMetrics()
-        self._heartbeat = asyncio.create_task(self._beat(), name="heartbeat")
+        self._heartbeat = asyncio.create_task(self._send_heartbeats(), name="heartbeat")
 
     @asynccontextmanager
     async def enter(self, stream: str) -> AsyncIterator[Room]:
-        """The room of a stream; it is not unloaded while you are inside. Raises Unavailable."""
+        """Yield the room of a stream, and load it if needed. It is not unloaded while you are inside. Raises
+        Unavailable."""
         self._holders[stream] = self._holders.get(stream, 0) + 1
         timer = self._timers.pop(stream, None)
         if timer is not None:
@@ -64,66 +65,66 @@ class Rooms:
             self._holders[stream] -= 1
             if self._holders[stream] == 0:
                 del self._holders[stream]
-                self._let_go_later(stream)
+                self._unload_later(stream)
 
     def open_room(self, stream: str) -> Room | None:
-        """The room if it is open, without opening it."""
+        """Return the room of a stream if it is open; None otherwise."""
         return self._rooms.get(stream)
 
     def open_rooms(self) -> list[Room]:
-        """All that are open."""
+        """Return all rooms that are open."""
         return list(self._rooms.values())
 
     @property
     def divergences(self) -> int:
-        """How often a page showed something else than its room, since this process began."""
+        """Count the pages that showed something else than their room, since this process began."""
         return self._divergences + sum(room.comparisons.divergences for room in self.open_rooms())
 
     def is_joined(self, stream: str) -> bool:
-        """Whether sockets are in the room of a graph that was there when they came, and that nobody has
-        begun to delete since: for whoever else comes the tables need not be asked."""
+        """Tell whether a graph certainly exists: sockets are in its room, and nobody has begun to delete it. The
+        tables need not be asked then."""
         room = self._rooms.get(stream)
-        return room is not None and bool(room.members) and room.is_of_sure_graph
+        return room is not None and bool(room.members) and room.graph_exists
 
-    def doubt(self, stream: str) -> None:
-        """The graph may be deleted: from now on the tables tell whether it is there."""
+    def check_existence(self, stream: str) -> None:
+        """Have the tables asked from now on whether this graph exists: it may be deleted soon."""
         room = self._rooms.get(stream)
         if room is not None:
-            room.is_of_sure_graph = False
+            room.graph_exists = False
 
     def expel(self, stream: str) -> None:
-        """The graph was deleted: send everyone away, also who is on the way in."""
+        """Close all sockets of a graph that was deleted, also those that are being opened."""
         self._deleted.add(stream)
-        self.doubt(stream)
+        self.check_existence(stream)
         room = self._rooms.get(stream)
         for member in list(room.members) if room is not None else []:
             member.close(messages.NO_SUCH_GRAPH)
 
     def readmit(self, stream: str) -> None:
-        """The graph is there again."""
+        """Let sockets into a graph that was recovered."""
         self._deleted.discard(stream)
 
     def is_deleted(self, stream: str) -> bool:
-        """Whether everyone was sent away from this graph."""
+        """Tell whether this graph was deleted since this process began."""
         return stream in self._deleted
 
     async def close(self) -> None:
-        """Finish and let go of every room."""
+        """Finish and unload every room."""
         self._closed = True
         self._heartbeat.cancel()
         for timer in self._timers.values():
             timer.cancel()
         await asyncio.gather(*self._loading.values(), return_exceptions=True)
-        await asyncio.gather(*(room.rest(lambda: False) for room in self.open_rooms()))
+        await asyncio.gather(*(room.close_if_unused(lambda: False) for room in self.open_rooms()))
         if self._tasks:
             await asyncio.wait(self._tasks)
 
-    async def _beat(self) -> None:
+    async def _send_heartbeats(self) -> None:
         while True:
             await asyncio.sleep(_TICK)
             for room in self.open_rooms():
                 for member in room.members:
-                    member.beat(_SILENCE)
+                    member.send_heartbeat(_SILENCE)
 
     async def _room(self, stream: str) -> Room:
         room = self._rooms.get(stream)
@@ -146,20 +147,20 @@ class Rooms:
                 loaded,
                 self._forget,
                 self._window,
-                self._moments,
+                self._announcement_interval,
                 self._run_in_worker,
                 self._tried,
                 self.metrics,
             )
             self.metrics.opened += 1
             if stream not in self._holders:  # whoever came was gone before it was loaded
-                self._let_go_later(stream)
+                self._unload_later(stream)
             return room
         finally:
             del self._loading[stream]
 
-    def _let_go_later(self, stream: str) -> None:
-        """Nobody is in the room any more."""
+    def _unload_later(self, stream: str) -> None:
+        """Unload a room that nobody uses after some seconds."""
         if stream in self._rooms and not self._closed:
             loop = asyncio.get_running_loop()
             self._timers[stream] = loop.call_later(self._linger, self._unload, stream)
@@ -179,4 +180,4 @@ class Rooms:
     async def _unloading(self, stream: str) -> None:
         room = self._rooms.get(stream)
         if room is not None:
-            await room.rest(lambda: stream in self._holders)
+            await room.close_if_unused(lambda: stream in self._holders)

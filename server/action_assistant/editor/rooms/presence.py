@@ -1,4 +1,4 @@
-"""Who is in a room, as the server vouches for it (rule R6)."""
+"""The presence entries of a room, in which the server writes the name of each person (rule R6)."""
 
 from collections.abc import Iterable
 from functools import cached_property
@@ -19,7 +19,7 @@ _decode: Final = msgspec.json.Decoder(dict[str, msgspec.Raw])
 
 
 class PersonStamp(msgspec.Struct, frozen=True):
-    """What the server says about a person, in the field `user` of every entry."""
+    """The name and colour of a person, which the server writes into the field `user` of each entry."""
 
     id: str
     name: str
@@ -27,12 +27,12 @@ class PersonStamp(msgspec.Struct, frozen=True):
 
 
 def stamp_of(person: PersonRef, colour: str) -> bytes:
-    """The stamp as JSON."""
+    """Return the JSON of a person's `PersonStamp`."""
     return msgspec.json.encode(PersonStamp(person.id, person.name, colour))
 
 
 class PresenceOwner:
-    """The one client id that a socket speaks for."""
+    """Binds a socket to the one Yjs client id in whose name it sends presence."""
 
     def __init__(self, person: PersonRef, colour: str = NOBODYS) -> None:
         self.person: Final = person
@@ -40,7 +40,7 @@ class PresenceOwner:
         self._stamp: Final = msgspec.Raw(stamp_of(person, colour))
 
     def stamped(self, entry: PresenceEntry) -> PresenceEntry | None:
-        """The entry under the person's own name; None when it is none that can be shown."""
+        """Return the entry with the person's own name in it; None for one that is too large or unreadable."""
         if max(entry.client, entry.clock) > MOST_NUMBER:
             return None
         if entry.state == _GONE:
@@ -57,36 +57,39 @@ class PresenceOwner:
 
 
 class PresenceNews:
-    """What many are told about who is where: put into bytes once for all of them."""
+    """Presence entries for many members, encoded once for all of them."""
 
     def __init__(self, entries: Iterable[PresenceEntry]) -> None:
         self.entries: Final = {entry.client: entry for entry in entries}
 
     @cached_property
     def frame(self) -> bytes:
-        """As a message."""
+        """The entries as an awareness message."""
         return messages.presence(self.entries.values())
 
     @cached_property
     def framed(self) -> bytes:
-        """As it goes over the wire."""
+        """The same message with the header of its WebSocket frame."""
         return framed(self.frame)
 
     def followed_by(self, later: "PresenceNews") -> "PresenceNews":
-        """Both; what is later about the same client counts."""
+        """Return these entries and later ones together; of each client the later one counts."""
         return PresenceNews((self.entries | later.entries).values())
 
 
 class RoomPresence:
-    """The entries of a room. Each belongs to an owner and vanishes with it."""
+    """The presence entries of a room. Each belongs to a socket, and is removed with it."""
 
     def __init__(self) -> None:
         self._entries: dict[int, PresenceEntry] = {}
         self._owners: dict[int, PresenceOwner] = {}
 
-    def hear(self, owner: PresenceOwner, entries: tuple[PresenceEntry, ...]) -> list[PresenceEntry]:
-        """What the others are to be told; entries that are not this owner's are dropped."""
-        told: list[PresenceEntry] = []
+    def update(
+        self, owner: PresenceOwner, entries: tuple[PresenceEntry, ...]
+    ) -> list[PresenceEntry]:
+        """Store the entries that a socket sent, and return those to be sent on. Entries for other clients
+        are dropped."""
+        accepted: list[PresenceEntry] = []
         for entry in entries:
             if not self._is_own(owner, entry):
                 continue
@@ -94,16 +97,16 @@ class RoomPresence:
             if stamped is None:
                 continue
             if stamped.state == _GONE:
-                told += self.leave(owner, entry.clock)
+                accepted += self.leave(owner, entry.clock)
                 continue
             owner.client = entry.client
             self._owners[entry.client] = owner
             self._entries[entry.client] = stamped
-            told.append(stamped)
-        return told
+            accepted.append(stamped)
+        return accepted
 
     def leave(self, owner: PresenceOwner, clock: int | None = None) -> list[PresenceEntry]:
-        """Take an owner's entry away; what the others are to be told."""
+        """Remove the entry of a socket, and return the entries that tell the others."""
         client, owner.client = owner.client, None
         if client is None or self._owners.get(client) is not owner:
             return []
@@ -113,12 +116,12 @@ class RoomPresence:
         return [PresenceEntry(client, last.clock if clock is None else clock, _GONE)]
 
     def holder(self, client: int) -> str | None:
-        """The person whose socket speaks for a client."""
+        """Return the id of the person whose socket sends for a client; None where there is none."""
         owner = self._owners.get(client)
         return None if owner is None else owner.person.id
 
     def people(self) -> tuple[PersonRef, ...]:
-        """Who is there now, each once, by name."""
+        """Return the people in the room, each once, sorted by name."""
         there = {owner.person.id: owner.person for owner in self._owners.values()}
         return tuple(
             PersonRef(person.id, person.name)
@@ -126,14 +129,14 @@ class RoomPresence:
         )
 
     def everyone(self) -> tuple[PresenceEntry, ...]:
-        """Who is there now."""
+        """Return all entries."""
         return tuple(self._entries.values())
 
     def _is_own(self, owner: PresenceOwner, entry: PresenceEntry) -> bool:
-        """Stock clients echo what they hear of others; those entries are not theirs to say.
+        """Tell whether a socket may send this entry. Stock clients also echo the entries of others.
 
-        A socket speaks for the first client id it names. If another socket of the same person
-        speaks for that one, it is what is left of the connection before this one.
+        A socket sends for the first client id that it names. If another socket of the same person already
+        sends for that id, it is the connection before this one.
         """
         if owner.client is not None:
             return owner.client == entry.client

@@ -1,37 +1,31 @@
-"""Rate limits of rooms: bytes per person and minute. Whoever sends more waits; nobody else does."""
+"""Rate limits of rooms: bytes of each person and minute. A socket beyond them is read later; nothing is refused."""
 
 import time
-from collections.abc import Callable
 from typing import Final
+
+from action_assistant.kit.token_bucket import Clock, TokenBuckets
 
 PER_MINUTE: Final = 16 << 20  # bytes, of all sockets of a person
 AT_ONCE: Final = 32 << 20  # bytes: a large graph after a day without a network
-_REMEMBERED: Final = 1000  # people
-#: What a word about oneself costs at least: so that two hundred a second may go on for ever.
-_WORD: Final = PER_MINUTE // (60 * 200)
+#: Bytes that a presence message counts for at least, so that 200 of them a second are allowed without end.
+_PRESENCE: Final = PER_MINUTE // (60 * 200)
 
 
 class ByteRateLimits:
-    """What each person may still bring. Nothing is refused: the socket is read later."""
+    """Counts the bytes that each person sends. Without `limits` nobody ever waits."""
 
-    def __init__(self, *, limits: bool, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, *, limits: bool, clock: Clock = time.monotonic) -> None:
         self._limits = limits
-        self._clock = clock
-        self._left: dict[str, tuple[float, float]] = {}  # bytes, and when that was
+        self._buckets: Final = TokenBuckets(AT_ONCE, PER_MINUTE / 60, clock)
 
-    def speak(self, person: str, size: int) -> float:
-        """Somebody said so many bytes about themselves: as `spend`."""
-        return self.spend(person, max(size, _WORD))
+    def spend_on_presence(self, person: str, size: int) -> float:
+        """Count a presence message of `size` bytes; return as `spend` does."""
+        return self.spend(person, max(size, _PRESENCE))
 
     def spend(self, person: str, size: int) -> float:
-        """Somebody brought so many bytes: the seconds to wait before more of theirs is read."""
+        """Count `size` bytes that a person sent; return the seconds to wait before more of theirs is read."""
         if not self._limits:
             return 0.0
-        now = self._clock()
-        left, then = self._left.get(person, (float(AT_ONCE), now))
-        left = min(AT_ONCE, left + (now - then) * PER_MINUTE / 60) - size
-        self._left[person] = left, now
-        if len(self._left) > _REMEMBERED:
-            full = AT_ONCE * 60 / PER_MINUTE  # seconds after which all is forgiven
-            self._left = {p: each for p, each in self._left.items() if now - each[1] < full}
-        return max(0.0, -left * 60 / PER_MINUTE)
+        bucket = self._buckets.of(person)
+        bucket.spend(size)
+        return bucket.debt()

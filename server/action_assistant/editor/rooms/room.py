@@ -1,8 +1,8 @@
-"""A room: one document, its sockets, and the queue through which every edit enters.
+"""A room: one document, its sockets, and the queue through which every edit passes.
 
-Rules R1 … R16 of docs/room-protocol.md. Everything that concerns the document happens batch by batch:
-apply, append, commit, and only then tell anyone. One step calls the next; a task is begun only for what
-takes long (decision 87).
+Rules R1 to R16 of docs/room-protocol.md. The room works batch by batch: apply the edits, append them to the
+log, commit, and only then send anything. Each step calls the next one; a task is started only for slow work
+(decision 87).
 """
 
 import asyncio
@@ -23,14 +23,14 @@ from action_assistant.editor.log.graph_events import DEFERRED, UPDATED, graph_of
 from action_assistant.editor.rooms.batch import (
     LARGE,
     OBJECTIONS,
-    Ask,
-    Compare,
-    Item,
-    Look,
+    BatchOutcome,
+    ComparisonRequest,
     NotAllowed,
     Objection,
-    Offer,
-    Taken,
+    QueueItem,
+    ReadRequest,
+    SubmittedEdit,
+    SyncRequest,
     adds_nothing_aside,
     fail,
     next_batch,
@@ -38,15 +38,20 @@ from action_assistant.editor.rooms.batch import (
     tried_first,
 )
 from action_assistant.editor.rooms.batch_window import BatchWindow
-from action_assistant.editor.rooms.comparisons import Comparisons
-from action_assistant.editor.rooms.measured_ahead import MeasuredAhead
+from action_assistant.editor.rooms.broadcast import (
+    PresenceBroadcast,
+    UpdateBroadcast,
+    answer_requests,
+)
+from action_assistant.editor.rooms.housekeeping import (
+    Comparisons,
+    OpeningTimeMeasurement,
+    RoomSnapshots,
+    begin_room_task,
+)
 from action_assistant.editor.rooms.member import Member
 from action_assistant.editor.rooms.presence import PresenceNews, RoomPresence
-from action_assistant.editor.rooms.presence_spread import PresenceSpread
 from action_assistant.editor.rooms.room_metrics import RoomMetrics
-from action_assistant.editor.rooms.room_news import RoomNews, answer_all
-from action_assistant.editor.rooms.room_snapshots import RoomSnapshots
-from action_assistant.editor.rooms.room_task import begin_room_task
 from action_assistant.errors import Conflict, Refused, Unavailable
 from action_assistant.journal.events import Addition, Draft
 from action_assistant.journal.journal import Journal
@@ -63,16 +68,17 @@ _ENDS: Final = (asyncio.CancelledError, KeyboardInterrupt, SystemExit)
 
 
 class Room:
-    """The memory of one graph. `gone` is called when nobody may join any more."""
+    """Holds the document of one graph in memory while somebody uses it. `on_end` is called when nobody may join
+    it any more. `run_in_worker` does what grows with the document, `tried` tries large edits."""
 
     def __init__(
         self,
         stream: str,
         journal: Journal,
         loaded: Loaded,
-        gone: Callable[["Room"], None],
+        on_end: Callable[["Room"], None],
         window: BatchWindow,
-        moments: float = 0.0,
+        announcement_interval: float = 0.0,
         run_in_worker: RunInWorker = run_here,
         tried: RunInWorker = run_here,
         metrics: RoomMetrics | None = None,
@@ -82,202 +88,208 @@ class Room:
         self._metrics = metrics or RoomMetrics()
         self.seq = loaded.seq
         self.members: set[Member] = set()
-        self.attendance: Final = RoomPresence()
+        self.presence: Final = RoomPresence()
         self._journal = journal
         self._replica = loaded.replica
         self._snapshots: Final = RoomSnapshots(stream, journal, loaded.kept)
         self.damaged: Final = loaded.damaged
-        self.is_of_sure_graph = True  # nobody has begun to delete it
-        self._gone = gone
+        #: False from the moment in which somebody begins to delete the graph.
+        self.graph_exists = True
+        self._on_end = on_end
         self._window = window
         self.turn_end: Final = window.turn_end
         self._run_in_worker = run_in_worker
         self._tried = tried
-        self._spoken: Final = RoomNews(self.members, moments, self._metrics)
-        self._spread: Final = PresenceSpread(self.members, window)
+        self._updates: Final = UpdateBroadcast(self.members, announcement_interval, self._metrics)
+        self._presence_updates: Final = PresenceBroadcast(self.members, window)
         self.comparisons: Final = Comparisons(self, run_in_worker)
-        self._waiting: list[Item] = []
-        self._in_hand: list[Item] = []
+        self._opening_time: Final = OpeningTimeMeasurement(stream, tried)
+        self._waiting: list[QueueItem] = []
+        self._batch: list[QueueItem] = []  # being processed
         self._ended = self._is_busy = False
         self._loop = asyncio.get_running_loop()
-        self._quiet = asyncio.Event()
-        self._quiet.set()
-        self._aside: asyncio.Task[None] | None = None  # what takes long of the batch in hand
-        self._measured: Final = MeasuredAhead(stream, tried)
+        self._idle = asyncio.Event()
+        self._idle.set()
+        self._slow_work: asyncio.Task[None] | None = None  # of the batch being processed
 
-    # --- people ---------------------------------------------------------------------------------
+    # --- members --------------------------------------------------------------------------------
 
     def join(self, member: Member) -> None:
-        """Let a socket in: it is asked what it has, and told who is there."""
+        """Add a socket: ask which updates it has (sync step 1), and send it who is there."""
         self.members.add(member)
         if self.damaged is not None:
             member.edits = False
             member.post_read_only(_DAMAGED.format(self.damaged.seq))
         if member.edits:
-            # Not from a batch that is being committed: an older state only asks for more.
+            # The state may already hold a batch that is being committed. If that fails, the room closes and
+            # the client sends everything again.
             member.post(messages.question(self._replica.doc.get_state()))
-        member.post_presence(PresenceNews(self.attendance.everyone()))
+        member.post_presence(PresenceNews(self.presence.everyone()))
 
     def leave(self, member: Member) -> None:
-        """A socket is gone, and what it said about itself with it."""
+        """Remove a socket, and its presence entry with it."""
         self.members.discard(member)
-        self._spread.tell(self.attendance.leave(member.presence_owner), member)
+        self._presence_updates.add(self.presence.leave(member.presence_owner), member)
 
-    def hear(self, member: Member, message: messages.Message) -> None:
-        """Something that a socket says. Never blocks; the answer comes through the member."""
+    def receive(self, member: Member, message: messages.Message) -> None:
+        """Take a message of a socket. Never blocks; the answer is posted to the member later."""
         match message:
             case messages.Edit(update):
-                member.heard_edit()
+                member.edit_received()
                 if len(update) > messages.UPDATE_LIMIT:
                     self._metrics.refused["too_big"] += 1
                     member.refuse(messages.TOO_BIG)
                     return
-                self._enter(Offer(update, member.person.id, member))
+                self._enqueue(SubmittedEdit(update, member.person.id, member))
             case messages.Presence(entries):
-                self._spread.tell(self.attendance.hear(member.presence_owner, entries), member)
+                self._presence_updates.add(
+                    self.presence.update(member.presence_owner, entries), member
+                )
             case messages.Question(state):
-                if member.asks():
-                    self._enter(Ask(member, state))
+                if member.begins_sync():
+                    self._enqueue(SyncRequest(member, state))
             case messages.CompareMessage():
-                self._enter(Compare(member, message))
+                self._enqueue(ComparisonRequest(member, message))
             case messages.WhoIsThere():
-                member.post_presence(PresenceNews(self.attendance.everyone()))
+                member.post_presence(PresenceNews(self.presence.everyone()))
 
-    # --- what the server itself asks for --------------------------------------------------------
+    # --- requests of the server itself ----------------------------------------------------------
 
     async def submit(self, update: bytes, author: str) -> int:
-        """An edit of the server's own (rule R9); the seq up to which the log then goes.
+        """Apply and store an edit of the server's own (rule R9). Return the sequence number up to which the
+        log is committed then; also where the edit changed nothing.
 
-        Raises BadInput, Unavailable. Returns after the commit, also when nothing changed.
+        Raises BadInput, Conflict, TooLarge, Unavailable.
         """
         if self.damaged is not None:
             raise Conflict(_DAMAGED.format(self.damaged.seq))
         if self._ended:
             raise Unavailable(_CLOSING)
         done: asyncio.Future[int] = self._loop.create_future()
-        self._enter(Offer(update, author, None, done))
+        self._enqueue(SubmittedEdit(update, author, None, done))
         return await done
 
-    async def look(self, see: Callable[[Replica, int], T]) -> T:
-        """What `see(document, seq)` finds when everything that entered before is committed.
+    async def read(self, see: Callable[[Replica, int], T]) -> T:
+        """Call `see(document, seq)` once every edit that was submitted before is committed; return its result.
 
-        `see` must not change the document nor keep it. Raises what `see` does, and Unavailable.
+        `see` must neither change the document nor keep it. Raises what `see` raises, and Unavailable.
         """
         if self._ended:
             raise Unavailable(_CLOSING)
         done: asyncio.Future[T] = self._loop.create_future()
-        self._enter(Look(see, done))
+        self._enqueue(ReadRequest(see, done))
         return await done
 
     async def quiet(self) -> Replica:
-        """The document when nothing is on its way: what it holds until you await is committed."""
-        await self._quiet.wait()
+        """Wait until no edit is being stored, and return the document. Until the next `await` it is what is
+        committed. Raises Unavailable."""
+        await self._idle.wait()
         if self._ended:
             raise Unavailable(_CLOSING)
         return self._replica
 
-    async def rest(self, needed: Callable[[], bool]) -> None:
-        """Keep a snapshot and be freed, unless somebody needs the room by then."""
-        await self._quiet.wait()
+    async def close_if_unused(self, is_needed: Callable[[], bool]) -> None:
+        """Store a snapshot and end the room, unless `is_needed()` by then."""
+        await self._idle.wait()
         if not self._ended and self.damaged is None:
-            await self._snapshots.keep(self.seq, self._replica)
-        if needed() or self._waiting or self._ended:
+            await self._snapshots.store_now(self.seq, self._replica)
+        if is_needed() or self._waiting or self._ended:
             return
-        self._gone(self)  # from here on whoever comes opens another room
+        self._on_end(self)  # from here on whoever comes opens another room
         await self.stop()
 
     async def stop(self) -> None:
-        """Finish what has entered, then send everyone away."""
-        await self._quiet.wait()
+        """Finish the batch being processed, then close all sockets."""
+        await self._idle.wait()
         if not self._ended:
             self._end(Unavailable(_CLOSING))
 
     # --- batch after batch ----------------------------------------------------------------------
 
-    def _enter(self, item: Item) -> None:
+    def _enqueue(self, item: QueueItem) -> None:
         if self._ended:
-            return  # whoever said it is being sent away, and will say it again
+            return  # the client is being disconnected, and will send it again
         self._waiting.append(item)
         if not self._is_busy:
             self._is_busy = True
-            self._quiet.clear()
-            self._window.when_open(self._act)
+            self._idle.clear()
+            self._window.when_open(self._process_batch)
 
-    def _act(self) -> None:
-        """The next batch: apply it, and have it stored."""
+    def _process_batch(self) -> None:
+        """Take the next batch from the queue, apply it, and have it stored."""
         if self._ended:
             return
         try:
-            batch, self._waiting, alone = next_batch(self._waiting, self._replica)
-            self._in_hand = batch
+            batch, self._waiting, needs_trial = next_batch(self._waiting, self._replica)
+            self._batch = batch
             match batch:
-                case [Offer() as offer] if alone:
-                    self._do_aside(self._take_large(offer))
+                case [SubmittedEdit() as edit] if needs_trial:
+                    self._start_slow_work(self._apply_after_trial(edit))
                 case _:
-                    self._store(self._take(batch))
-        except BaseException as error:  # noqa: BLE001 - also a panic of the library: it is this room's alone
+                    self._store(self._apply_batch(batch))
+        except BaseException as error:  # noqa: BLE001 - also a panic of the library: it ends this room alone
             self._fail(error)
 
-    def _store(self, taken: Taken) -> None:
-        if not taken.news:
-            self._committed(taken)
+    def _store(self, outcome: BatchOutcome) -> None:
+        if not outcome.to_store:
+            self._after_commit(outcome)
             return
-        drafts = tuple([Draft(kind, offer.author, offer.update) for offer, kind in taken.news])
+        drafts = tuple([Draft(kind, edit.author, edit.update) for edit, kind in outcome.to_store])
         addition = Addition(self.stream, drafts, self.seq)
-        self._journal.append_then(addition, partial(self._stored, taken))
+        self._journal.append_then(addition, partial(self._stored, outcome))
 
-    def _stored(self, taken: Taken, seq: int | None, error: BaseException | None) -> None:
-        """Called after the commit, or when there is none."""
+    def _stored(self, outcome: BatchOutcome, seq: int | None, error: BaseException | None) -> None:
+        """Continue after the commit (`seq`), or fail where there was none (`error`)."""
         if self._ended:
             return
         try:
             if seq is None:
                 raise error or Unavailable(_CLOSING)
             self.seq = seq
-            self._snapshots.grew(sum([len(offer.update) for offer, _ in taken.news]))
-            self._committed(taken)
-        except BaseException as failure:  # noqa: BLE001 - as in `_act`
+            self._snapshots.grew(sum([len(edit.update) for edit, _ in outcome.to_store]))
+            self._after_commit(outcome)
+        except BaseException as failure:  # noqa: BLE001 - as in `_process_batch`
             self._fail(failure)
 
-    def _committed(self, taken: Taken) -> None:
-        self._spoken.tell(taken, self.seq)
-        if taken.panicked:
-            self._do_aside(self._loaded_anew(taken))
+    def _after_commit(self, outcome: BatchOutcome) -> None:
+        self._updates.send(outcome, self.seq)
+        if outcome.panicked:
+            self._start_slow_work(self._reload_and_answer(outcome))
             return
-        self._answer(taken)
+        self._answer(outcome)
 
-    async def _loaded_anew(self, taken: Taken) -> None:
+    async def _reload_and_answer(self, outcome: BatchOutcome) -> None:
         await self._reload()
-        self._answer(taken)
+        self._answer(outcome)
 
-    def _answer(self, taken: Taken) -> None:
-        """What was asked for; then the batch in hand is done with."""
-        answer_all(taken, self._replica, self.seq, self.comparisons)
-        if taken.news:
-            self._measured.look(self._replica)
-            self._snapshots.look(self.seq, self._replica)
-        self._in_hand = []
+    def _answer(self, outcome: BatchOutcome) -> None:
+        """Answer the requests of the batch, which ends it, and go on with the next one."""
+        answer_requests(outcome, self._replica, self.seq, self.comparisons)
+        if outcome.to_store:
+            self._opening_time.measure_if_due(self._replica)
+            self._snapshots.store_if_due(self.seq, self._replica)
+        self._batch = []
         if self._waiting:
-            self._window.when_open(self._act)
+            self._window.when_open(self._process_batch)
         else:
             self._is_busy = False
-            self._quiet.set()
+            self._idle.set()
 
-    def _do_aside(self, work: Coroutine[Any, Any, None]) -> None:
-        """What takes long, in a task; nothing else of this room is done meanwhile."""
+    def _start_slow_work(self, work: Coroutine[Any, Any, None]) -> None:
+        """Run slow work on the current batch in a task; the room processes nothing else meanwhile."""
 
         async def guarded() -> None:
             begin_room_task(self.stream)
             try:
                 await work
-            except BaseException as error:  # noqa: BLE001 - as in `_act`
+            except BaseException as error:  # noqa: BLE001 - as in `_process_batch`
                 self._fail(error)
 
-        self._aside = self._loop.create_task(guarded())
+        self._slow_work = self._loop.create_task(guarded())
 
     def _fail(self, error: BaseException) -> None:
-        """Whatever goes wrong closes the room; its log opens the next one. Raises what ends a task or the
-        process."""
+        """Log an error and end the room; the next one is loaded from the log. Raises the error again if it
+        ends a task or the process."""
         reason = error if isinstance(error, Refused) else Unavailable(_CLOSING)
         with about("graph", self._graph):
             if isinstance(error, Refused):
@@ -288,114 +300,124 @@ class Room:
         if isinstance(error, _ENDS):
             raise error
 
-    def _take(self, batch: Sequence[Item]) -> Taken:
-        """Apply a batch. After a panic the rest of it waits for a sound document."""
-        taken = Taken()
+    def _apply_batch(self, batch: Sequence[QueueItem]) -> BatchOutcome:
+        """Apply the edits of a batch. After a panic of the library the rest of it waits until the document has
+        been loaded anew."""
+        outcome = BatchOutcome()
         for n, item in enumerate(batch):
             match item:
-                case Offer():
-                    self._take_in(item, taken)
-                case Ask():
-                    taken.asks.append(item)
-                case Compare():
-                    taken.compares.append(item)
-                case Look():
-                    taken.looks.append(item)
-            if taken.panicked:
+                case SubmittedEdit():
+                    self._apply(item, outcome)
+                case SyncRequest():
+                    outcome.sync_requests.append(item)
+                case ComparisonRequest():
+                    outcome.comparisons.append(item)
+                case ReadRequest():
+                    outcome.reads.append(item)
+            if outcome.panicked:
                 self._waiting = [*batch[n + 1 :], *self._waiting]
                 break
-        return taken
+        return outcome
 
-    async def _take_large(self, offer: Offer) -> None:
-        """Apply one edit that was tried on a copy first: how long an update takes cannot be told from
-        its size, and some end the process."""
-        taken = Taken()
-        member = offer.member
+    async def _apply_after_trial(self, edit: SubmittedEdit) -> None:
+        """Try one edit on a copy of the document, and apply it if that went well: how long an update takes
+        does not follow from its size, and some updates end the process."""
+        outcome = BatchOutcome()
+        member = edit.member
         try:
-            if member is not None and not member.edits and len(offer.update) > LARGE:
-                await self._look_at_large(offer, member, taken)
+            if member is not None and not member.edits and len(edit.update) > LARGE:
+                await self._check_large_edit_of_viewer(edit, member, outcome)
             else:
                 read = None
                 if member is None or (member.edits and not member.refused):
-                    read = await tried_first(offer, self._replica, self._tried)
-                if read is not None and len(offer.update) > PIECE_BYTES:
-                    await self._take_in_pieces(offer, taken, read)
+                    read = await tried_first(edit, self._replica, self._tried)
+                if read is not None and len(edit.update) > PIECE_BYTES:
+                    await self._apply_in_pieces(edit, outcome, read)
                 else:
-                    self._take_in(offer, taken, read)
+                    self._apply(edit, outcome, read)
         except OBJECTIONS as error:
-            self._refuse(offer, error)
-        self._store(taken)
+            self._refuse(edit, error)
+        self._store(outcome)
 
-    async def _look_at_large(self, offer: Offer, member: Member, taken: Taken) -> None:
-        """Ignore one edit of somebody who may only look, or refuse it."""
+    async def _check_large_edit_of_viewer(
+        self, edit: SubmittedEdit, member: Member, outcome: BatchOutcome
+    ) -> None:
+        """Acknowledge an edit of somebody who may only view if it changes nothing. Raises NotAllowed if it
+        does."""
         if member.refused:
             return
         state = self._replica.doc.get_state()
-        if not await adds_nothing_aside(offer, state, self._tried):
+        if not await adds_nothing_aside(edit, state, self._tried):
             raise NotAllowed
-        taken.handled.append(offer)
+        outcome.handled.append(edit)
 
-    def _take_in(self, offer: Offer, taken: Taken, read: UpdateOutline | None = None) -> None:
-        """Apply one edit, or refuse it."""
+    def _apply(
+        self, edit: SubmittedEdit, outcome: BatchOutcome, read: UpdateOutline | None = None
+    ) -> None:
+        """Apply one edit, or refuse it. `read` is its outline, where that is known."""
         begun = time.thread_time()
         try:
-            brought = self._brought(offer, read)
+            effect = self._effect_of(edit, read)
         except OBJECTIONS as error:
-            taken.panicked = isinstance(error, Panicked)
-            self._refuse(offer, error)
+            outcome.panicked = isinstance(error, Panicked)
+            self._refuse(edit, error)
             return
         finally:
-            if offer.member is not None:
-                offer.member.used_cpu(time.thread_time() - begun)
-        if brought is not None:
-            self._note(offer, taken, brought)
+            if edit.member is not None:
+                edit.member.used_cpu(time.thread_time() - begun)
+        if effect is not None:
+            self._note_effect(edit, outcome, effect)
 
-    async def _take_in_pieces(self, offer: Offer, taken: Taken, read: UpdateOutline) -> None:
-        """As `_take_in`, of a large edit that was tried: everybody's edits would wait for it otherwise."""
-        pieces = await pieces_aside(offer.update, self._tried)
-        member, holder = offer.member, self.attendance.holder
+    async def _apply_in_pieces(
+        self, edit: SubmittedEdit, outcome: BatchOutcome, read: UpdateOutline
+    ) -> None:
+        """Apply one large edit that was tried, or refuse it. The loop does other work between its pieces."""
+        pieces = await pieces_aside(edit.update, self._tried)
+        member, holder = edit.member, self.presence.holder
         if member is not None and member.refused:
             return
         replica = self._replica
         before = replica.pieces_s
         try:
-            brought = await replica.take_in_pieces(offer.update, offer.author, holder, read, pieces)
+            effect = await replica.take_in_pieces(edit.update, edit.author, holder, read, pieces)
         except OBJECTIONS as error:
-            taken.panicked = isinstance(error, Panicked)
-            self._refuse(offer, error)
+            outcome.panicked = isinstance(error, Panicked)
+            self._refuse(edit, error)
             return
         finally:
             if member is not None:
                 member.used_cpu(replica.pieces_s - before)
-        self._note(offer, taken, brought)
+        self._note_effect(edit, outcome, effect)
 
-    def _note(self, offer: Offer, taken: Taken, brought: UpdateEffect) -> None:
-        """Note what an edit brought: whether it is stored, as which kind, and who is sent it."""
-        taken.handled.append(offer)
-        if brought is UpdateEffect.WAITS:
-            taken.news.append((offer, DEFERRED))
-        elif brought is UpdateEffect.NEWS:
-            taken.news.append((offer, UPDATED))
+    def _note_effect(
+        self, edit: SubmittedEdit, outcome: BatchOutcome, effect: UpdateEffect
+    ) -> None:
+        """Add an edit that was applied to the outcome: as which event it is stored, and what is sent."""
+        outcome.handled.append(edit)
+        if effect is UpdateEffect.WAITS:
+            outcome.to_store.append((edit, DEFERRED))
+        elif effect is UpdateEffect.NEWS:
+            outcome.to_store.append((edit, UPDATED))
             released = self._replica.released()
-            taken.shown += [offer.update, *released]
-            taken.for_all = taken.for_all or bool(released)
+            outcome.to_send += [edit.update, *released]
+            outcome.authors_lack_some = outcome.authors_lack_some or bool(released)
 
-    def _refuse(self, offer: Offer, error: Objection) -> None:
+    def _refuse(self, edit: SubmittedEdit, error: Objection) -> None:
         with about("graph", self._graph):
-            log.warning("%s: refused an edit of %s: %s", self.stream, offer.author, error)
+            log.warning("%s: refused an edit of %s: %s", self.stream, edit.author, error)
         self._metrics.objected(error)
-        refuse(offer, error)
+        refuse(edit, error)
 
-    def _brought(self, offer: Offer, read: UpdateOutline | None) -> UpdateEffect | None:
-        """Apply one edit; None when it was refused, or comes from a socket that was."""
-        member = offer.member
+    def _effect_of(self, edit: SubmittedEdit, read: UpdateOutline | None) -> UpdateEffect | None:
+        """Apply one edit and return its effect; None where its socket was refused before."""
+        member = edit.member
         if member is not None and member.refused:
             return None
         if member is not None and not member.edits:
-            if not adds_nothing(self._replica.doc.get_state(), offer.update):
+            if not adds_nothing(self._replica.doc.get_state(), edit.update):
                 raise NotAllowed
             return UpdateEffect.NOTHING
-        return self._replica.take(offer.update, offer.author, self.attendance.holder, read)
+        return self._replica.take(edit.update, edit.author, self.presence.holder, read)
 
     # --- memory ---------------------------------------------------------------------------------
 
@@ -404,19 +426,19 @@ class Room:
         self._replica, self.seq = loaded.replica, loaded.seq
 
     def _end(self, reason: Refused) -> None:
-        """Nobody is told anything that is not stored; everyone may come again."""
+        """End the room: fail all requests with `reason`, and close all sockets so that clients connect anew."""
         if self._ended:
             return
         self._ended = True
-        for item in [*self._in_hand, *self._waiting]:
+        for item in [*self._batch, *self._waiting]:
             fail(item, reason)
         self._waiting = []
         self.comparisons.cancel()
-        self._measured.cancel()
-        self._spoken.end()
-        if self._aside is not None and self._aside is not asyncio.current_task():
-            self._aside.cancel()
-        self._quiet.set()
+        self._opening_time.cancel()
+        self._updates.end()
+        if self._slow_work is not None and self._slow_work is not asyncio.current_task():
+            self._slow_work.cancel()
+        self._idle.set()
         for member in self.members:
             member.close(messages.RESTARTING)
-        self._gone(self)
+        self._on_end(self)

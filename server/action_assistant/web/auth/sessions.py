@@ -11,6 +11,7 @@ from litestar.params import JSONBody
 from litestar.types import ControllerRouterHandler
 
 from action_assistant.errors import BadInput, TooMany, Unauthenticated, Unavailable
+from action_assistant.kit.token_bucket import TokenBuckets
 from action_assistant.web.auth.access import (
     Needs,
     cookie_name,
@@ -26,7 +27,6 @@ from action_assistant.web.auth.roles import Role, rank
 from action_assistant.web.auth.session_files import SessionFiles
 from action_assistant.web.http.problems import PROBLEM_JSON, problem_of
 from action_assistant.web.network.addresses import Addresses
-from action_assistant.web.network.connection_limits import RateLimit
 
 _BODY: Final = 10_000  # bytes; strangers send it
 _NAME: Final = 60  # characters
@@ -103,7 +103,7 @@ class Sessions:
         self._device = device_cookie_name(page_port)
         self._reception = reception
         self._addresses = addresses
-        self._pace = RateLimit(_TRIES_AT_ONCE, _TRIES_PER_MINUTE) if limits else None
+        self._pace = TokenBuckets(_TRIES_AT_ONCE, _TRIES_PER_MINUTE / 60) if limits else None
 
     def look(self, invitation: str, request: _Asking) -> Invited:
         """Return the invitation of a link. Raise Unauthenticated or TooMany."""
@@ -186,7 +186,7 @@ class Sessions:
 
     def _admit(self, request: _Asking) -> None:
         address = request.client.host if request.client is not None else ""
-        if self._pace is not None and not self._pace.takes(address):
+        if self._pace is not None and not self._pace.of(address).take():
             raise TooMany("Too many tries from your address; wait a minute.")
 
 

@@ -2,42 +2,19 @@
 
 import time
 from collections import Counter
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from typing import Final
 
 import anyio
 
 from action_assistant.errors import TooMany
+from action_assistant.kit.token_bucket import Clock, TokenBuckets
 
 OF_A_PERSON: Final = 100  # sockets at a time
 OF_AN_ADDRESS: Final = 200
 AT_ONCE: Final = 300  # upgrades of one address
 PER_MINUTE: Final = 300  # after that
-_REMEMBERED: Final = 1000  # addresses
-
-Clock = Callable[[], float]
-
-
-class RateLimit:
-    """So many at once for each address, and so many a minute after that."""
-
-    def __init__(self, at_once: int, per_minute: int, clock: Clock = time.monotonic) -> None:
-        self._at_once = at_once
-        self._per_minute = per_minute
-        self._clock = clock
-        self._left: dict[str, tuple[float, float]] = {}  # what is left, and when that was
-
-    def takes(self, address: str) -> bool:
-        """Count one; false when it was one too many."""
-        now = self._clock()
-        left, then = self._left.get(address, (self._at_once, now))
-        left = min(self._at_once, left + (now - then) * self._per_minute / 60)
-        self._left[address] = max(0.0, left - 1), now
-        if len(self._left) > _REMEMBERED:
-            full = self._at_once * 60 / self._per_minute  # seconds after which all is forgiven
-            self._left = {a: each for a, each in self._left.items() if now - each[1] < full}
-        return left >= 1
 
 
 class ConcurrencyLimit:
@@ -79,7 +56,7 @@ class ConnectionLimits:
         self._keeps_one = keeps_one
         self._people: Counter[str] = Counter()
         self._addresses: Counter[str] = Counter()
-        self._upgrades = RateLimit(AT_ONCE, PER_MINUTE, clock)
+        self._upgrades = TokenBuckets(AT_ONCE, PER_MINUTE / 60, clock)
 
     @contextmanager
     def admitted(self, person: str, address: str) -> Iterator[None]:
@@ -97,7 +74,7 @@ class ConnectionLimits:
                     del counter[key]
 
     def _check(self, person: str, address: str) -> None:
-        if not self._upgrades.takes(address):
+        if not self._upgrades.of(address).take():
             raise TooMany("Too many connections in a short time; wait some seconds.")
         if self._people[person] >= OF_A_PERSON:
             raise TooMany(f"You have {OF_A_PERSON} pages open already; close some.")

@@ -61,7 +61,7 @@ class Editor:
 
     async def now(self, graph: str) -> Maps:
         async with self.rooms.enter(h.graph_stream(graph)) as room:
-            return await room.look(lambda replica, _: maps_of(replica.doc))
+            return await room.read(lambda replica, _: maps_of(replica.doc))
 
     async def edit(self, graph: str, who: str, dice: random.Random, edits: int = 1) -> None:
         """Somebody edits at random; what they gave which key is remembered."""
@@ -69,7 +69,7 @@ class Editor:
             before = await self.now(graph)
             async with self.rooms.enter(h.graph_stream(graph)) as room:
                 me = Person(who, dice)
-                me.hear(await room.look(lambda replica, _: replica.doc.get_update()))
+                me.hear(await room.read(lambda replica, _: replica.doc.get_update()))
                 for update in me.edit():
                     await room.submit(update, who)
             self._remember(who, before, await self.now(graph))
@@ -88,7 +88,7 @@ class Editor:
                     me.map(root)[key] = value
 
         async with self.rooms.enter(h.graph_stream(graph)) as room:
-            state = await room.look(lambda replica, _: replica.doc.get_update())
+            state = await room.read(lambda replica, _: replica.doc.get_update())
             return await room.submit(difference(state, edit), who)
 
     async def preview(self, draft: str, asked: AskedMerge) -> MergePreview:

@@ -1,7 +1,7 @@
-"""A socket in a room, until one side ends it: what it says, and what it is told.
+"""Connects one WebSocket with its room until one side closes it.
 
-Its messages come and go directly where the server below allows that; else as ASGI has it, by two tasks
-and an event for each message. Both ways keep the same rules.
+Under our own server its messages are read and written directly; under any other, by ASGI with two tasks and an
+event for each message. Both ways keep the same rules.
 """
 
 import asyncio
@@ -22,17 +22,18 @@ log: Final = logging.getLogger(__name__)
 NORMAL: Final = 1000
 
 
-class Conversation:
-    """Of one socket with its room."""
+class RoomConnection:
+    """Reads the messages of one WebSocket and passes them to its room."""
 
     def __init__(self, room: Room, member: Member, rate_limits: ByteRateLimits) -> None:
         self.room: Final = room
         self.member: Final = member
         self._rate_limits = rate_limits
 
-    def hear(self, data: bytes | None) -> float:
-        """What the client says; None for text. For how many seconds it is not to be read now, beside the
-        time in which it is far ahead. Ends the member for what cannot be read."""
+    def receive(self, data: bytes | None) -> float:
+        """Handle one binary message; None stands for a text message, which is refused. Return for how many
+        seconds the socket is not to be read, beside the time in which it is far ahead of the room. Closes the
+        socket for a message that cannot be parsed."""
         member = self.member
         if data is None:
             member.refuse(messages.UNREADABLE)
@@ -45,66 +46,66 @@ class Conversation:
             return 0.0
         if message is None:
             return 0.0
-        self.room.hear(member, message)
+        self.room.receive(member, message)
         limits = self._rate_limits
-        spend = limits.spend if isinstance(message, messages.Edit) else limits.speak
+        spend = limits.spend if isinstance(message, messages.Edit) else limits.spend_on_presence
         return spend(member.person.id, len(data))
 
     def debt(self) -> float:
-        """For how many seconds its person is not to be read, for what came by other sockets."""
+        """Return for how many seconds the socket is not to be read, for what its person sent by other sockets."""
         return self._rate_limits.spend(self.member.person.id, 0)
 
     async def pause(self, seconds: float) -> None:
-        """Wait until more may be read."""
-        await self.member.until_heard()
+        """Wait so many seconds, and until the socket may be read again."""
+        await self.member.until_caught_up()
         wait = seconds + self.member.cpu_debt()
         if wait > 0:
             await anyio.sleep(wait)
 
 
-async def converse_directly(talk: Conversation, socket: DirectSocket) -> int:
-    """The code with which to close. Raises what went wrong."""
-    directly = _Directly(talk, socket)
-    talk.room.join(talk.member)
+async def serve_directly(connection: RoomConnection, socket: DirectSocket) -> int:
+    """Serve a socket of our own server until it ends; return the close code. Raises what went wrong."""
+    directly = _Directly(connection, socket)
+    connection.room.join(connection.member)
     socket.take_over(directly)
     try:
-        return await talk.member.ended()
+        return await connection.member.ended()
     finally:
-        talk.room.leave(talk.member)
+        connection.room.leave(connection.member)
         directly.end()
 
 
 class _Directly:
-    """Hears a socket, and writes to it once for each turn of the loop."""
+    """Reads a socket, and writes to it once for each turn of the event loop."""
 
-    def __init__(self, talk: Conversation, socket: DirectSocket) -> None:
-        self._talk = talk
-        self._member = talk.member
+    def __init__(self, connection: RoomConnection, socket: DirectSocket) -> None:
+        self._connection = connection
+        self._member = connection.member
         self._socket = socket
         self._loop = asyncio.get_running_loop()
-        self._turn_end = talk.room.turn_end
+        self._turn_end = connection.room.turn_end
         self._unsent: list[bytes] = []
         self._is_due = False
         self._pause: asyncio.Task[None] | None = None
         self._failure: Exception | None = None
-        talk.member.on_news = self._soon
-        talk.member.write_now = self._write_now
-        self._soon()  # something may wait already
-        if (debt := talk.debt()) > 0:
+        connection.member.on_news = self._write_soon
+        connection.member.write_now = self._write_now
+        self._write_soon()  # something may wait already
+        if (debt := connection.debt()) > 0:
             self._hold(debt)
 
     def heard(self, message: bytes | None) -> None:
-        """A message has come; None for text."""
+        """Handle one message; None stands for text."""
         member = self._member
         if member.closed:
             return
         try:
-            wait = self._talk.hear(message)
+            wait = self._connection.receive(message)
         except Exception as error:  # noqa: BLE001 - raised where the socket's task ends
             self._failure = error
             member.close(NORMAL)
             return
-        if wait > 0 or member.far_ahead or member.is_over_cpu_budget:
+        if wait > 0 or member.is_far_ahead or member.is_over_cpu_budget:
             self._hold(wait)
 
     def _hold(self, seconds: float) -> None:
@@ -112,19 +113,19 @@ class _Directly:
         self._pause = self._loop.create_task(self._hear_later(seconds))
 
     async def _hear_later(self, seconds: float) -> None:
-        await self._talk.pause(seconds)
+        await self._connection.pause(seconds)
         self._socket.resume_hearing()
 
     def may_write(self) -> None:
-        """There is room for more."""
+        """Write on, since the send buffer of the socket has room again."""
         self._write()
 
     def gone(self) -> None:
-        """The client has left."""
+        """Close the member, since the client has disconnected."""
         self._member.close(NORMAL)
 
     def end(self) -> None:
-        """Let go of the socket. Raises what went wrong in between."""
+        """Hand the socket back to its server. Raises an error that a message caused meanwhile."""
         self._member.on_news = _nothing
         if self._pause is not None:
             self._pause.cancel()
@@ -132,17 +133,17 @@ class _Directly:
         if self._failure is not None:
             raise self._failure
 
-    def _soon(self) -> None:
+    def _write_soon(self) -> None:
         if not self._is_due:
             self._is_due = True
             self._turn_end.do(self._write)
 
     def _write_now(self, framed: bytes) -> bool:
-        """What nothing waits before."""
+        """Write framed messages at once, if nothing waits to be written before them."""
         return not self._is_due and not self._unsent and self._socket.write_framed(framed)
 
     def _write(self) -> None:
-        """All that waits, as far as the client reads it."""
+        """Write what waits, as far as the client reads it."""
         self._is_due = False
         member, socket = self._member, self._socket
         if member.closed or not socket.is_writable:
@@ -152,27 +153,27 @@ class _Directly:
         if not self._unsent and socket.is_writable:
             member.all_sent()
             if member.has_news:  # behind what could not be sent earlier
-                self._soon()
+                self._write_soon()
 
 
 def _nothing() -> None:
-    """Nobody is told."""
+    """Ignore news of a socket that has ended."""
 
 
-async def converse(talk: Conversation, receive: Receive, send: Send) -> int:
-    """As `converse_directly`, under any server."""
-    talk.room.join(talk.member)
+async def serve_by_asgi(connection: RoomConnection, receive: Receive, send: Send) -> int:
+    """Serve a socket under any server until it ends; return the close code. Raises what went wrong."""
+    connection.room.join(connection.member)
     # Two plain tasks: a thousand idle sockets are a thousand times what stands around each.
     tasks = [
-        asyncio.create_task(_listen(receive, talk)),
-        asyncio.create_task(_speak(send, talk.member)),
+        asyncio.create_task(_read_messages(receive, connection)),
+        asyncio.create_task(_send_messages(send, connection.member)),
     ]
     for task in tasks:
-        task.add_done_callback(lambda _: talk.member.close(NORMAL))
+        task.add_done_callback(lambda _: connection.member.close(NORMAL))
     try:
-        code = await talk.member.ended()
+        code = await connection.member.ended()
     finally:
-        talk.room.leave(talk.member)
+        connection.room.leave(connection.member)
         for task in tasks:
             task.cancel()
         await asyncio.wait(tasks)
@@ -182,24 +183,24 @@ async def converse(talk: Conversation, receive: Receive, send: Send) -> int:
     return code
 
 
-async def _listen(receive: Receive, talk: Conversation) -> None:
-    """What the client says. Ends the member when the client goes."""
-    if (debt := talk.debt()) > 0:
-        await talk.pause(debt)
+async def _read_messages(receive: Receive, connection: RoomConnection) -> None:
+    """Read messages until the client disconnects, which closes the member."""
+    if (debt := connection.debt()) > 0:
+        await connection.pause(debt)
     while True:
         event = await receive()
         if event["type"] == "websocket.disconnect":
-            talk.member.close(NORMAL)
+            connection.member.close(NORMAL)
         if event["type"] != "websocket.receive":
             return
-        wait = talk.hear(event.get("bytes"))
-        if talk.member.refused:
+        wait = connection.receive(event.get("bytes"))
+        if connection.member.refused:
             return
-        await talk.pause(wait)
+        await connection.pause(wait)
 
 
-async def _speak(send: Send, member: Member) -> None:
-    """What the client is told."""
+async def _send_messages(send: Send, member: Member) -> None:
+    """Send the messages of the member until it is closed."""
     try:
         while not member.closed:
             for frame in await member.take():
