@@ -87,7 +87,7 @@ def facts_of(profile: Mapping[str, object]) -> EngineFacts:
         if key not in EngineFacts.__struct_fields__:
             known = ", ".join(EngineFacts.__struct_fields__)
             raise BadProfile(
-                f"Nothing is known by the name {key!r}; there are: {known}.", f"/{key}"
+                f"There is no fact with the name {key!r}; there are: {known}.", f"/{key}"
             )
     given = {key: _profile_value(key, value) for key, value in profile.items()}
     commit = given.pop("commit", None)

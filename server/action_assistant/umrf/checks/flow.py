@@ -288,7 +288,7 @@ def _report_missed_join(
         if key in net and net.get(relation.parent) == net[key]:
             message = (
                 f"{action.full_name} waits for {parent}, which comes after it: it never runs and the "
-                "graph stays RUNNING for ever. A way back must not be required."
+                "graph stays RUNNING for ever. An arrow back must not be required."
             )
             subject.report(
                 "H8", "error", message, relation=relation, member="/required", fix="not-required"

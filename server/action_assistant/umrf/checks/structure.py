@@ -70,7 +70,7 @@ def _check_number(value: Json) -> tuple[str, Severity, str] | None:
             return (
                 "instance-id-cut",
                 "warning",
-                f"The number {value.text} is no whole one; the engine cuts it.",
+                f"The number {value.text} is not a whole number; the engine cuts it.",
             )
         return (
             "instance-id",

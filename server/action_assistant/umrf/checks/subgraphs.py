@@ -152,7 +152,7 @@ def check_subgraphs(
     graphs of the same name."""
     if resolution.cut:
         message = (
-            "There are more graphs inside this one than are looked at. What lies deeper was not checked, "
+            "There are more graphs inside this one than are examined. Deeper graphs were not checked, "
             "and a dry-run plays it as one action."
         )
         subject.report("not-tried", "warning", message)
@@ -179,7 +179,7 @@ def _check_each(subject: Subject, within: str, graphs: _Graphs) -> None:
         if action.name in graphs.resolution.several:
             message = (
                 f"Several graphs are called “{graph.name}”: the oldest of them is taken. Rename the "
-                "others, so that nobody is mistaken."
+                "others to avoid mistakes."
             )
             subject.report("subgraph-ambiguous", "warning", message, action=action, member="/name")
         if graphs.recurs(action.name, within):

@@ -243,8 +243,8 @@ def _report_at_exit(subject: Subject, net: Network, found: list[Trial]) -> None:
                 continue
             reported.add(name)
             message = (
-                f"{start}: the exit waits for {name}, which then does not run. Where either of them "
-                "shall end the graph, none may be waited for."
+                f"{start}: the exit waits for {name}, which then does not run. If either of them "
+                "is to end the graph, neither may be required."
             )
             subject.report(
                 "H8", severity, message, relation=relation, member="/required",

@@ -119,9 +119,9 @@ def search_arrow(
     ends = search.found()
     if ends is None:
         if search.spent >= budget:
-            return ArrowUndecided(search.looked, "There are more states than are looked at.")
+            return ArrowUndecided(search.looked, "There are more states than are examined.")
         if any(action.type == "spontaneous" for action in graph.actions):
-            return ArrowUndecided(search.looked, "Spontaneous actions end whenever they like.")
+            return ArrowUndecided(search.looked, "Spontaneous actions may end at any time.")
         return ArrowUnreachable(search.looked)
     script = search.script(ends)
     traces = simulate(
@@ -134,7 +134,7 @@ def search_arrow(
     )
     if wanted in arrows_taken(graph, traces).arrows:
         return ArrowReached(script)
-    return ArrowUndecided(search.looked, "The simulator does not go the way that was found.")
+    return ArrowUndecided(search.looked, "The simulator does not follow the course that was found.")
 
 
 class _Search:

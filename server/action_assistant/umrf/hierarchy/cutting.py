@@ -106,7 +106,9 @@ def between(selection: Selection) -> Iterator[FlatteningReason]:
     for action in selection.graph.actions:
         if action.key in on_paths and action.key not in selection.chosen:
             at = (HierarchyLevel(selection.graph.name, action.key, action.full_name),)
-            yield FlatteningReason("between", "It lies between them and is not chosen.", at)
+            yield FlatteningReason(
+                "between", "It lies between chosen actions and is not chosen.", at
+            )
 
 
 def _reached(selection: Selection, ways: Mapping[Key, Sequence[Key]]) -> set[Key]:
@@ -144,7 +146,7 @@ def ways_in_differ(selection: Selection) -> Iterator[FlatteningReason]:
             yield FlatteningReason("ways-in", message, selection.at(key))
         for parent in sorted(answers.keys() & other.keys()):
             if answers[parent] != other[parent]:
-                message = f"{one} and {two} answer otherwise when {selection.named(parent)} ends."
+                message = f"{one} and {two} answer differently when {selection.named(parent)} ends."
                 yield FlatteningReason("ways-in", message, selection.at(key))
 
 

@@ -46,7 +46,7 @@ def behaviour_differences(graph: Graph, other: Graph) -> Iterator[BehaviourDiffe
     mine, theirs = ({a.key: _action(a) for a in each.actions} for each in (graph, other))
     for key in sorted(mine.keys() | theirs.keys()):
         if mine.get(key) != theirs.get(key):
-            yield BehaviourDifference(key, f"{names.get(key, key)} itself would be another.")
+            yield BehaviourDifference(key, f"{names.get(key, key)} itself would change.")
     before, after = _arrows(graph), _arrows(other)
     for pair in sorted(before.keys() | after.keys()):
         parent, child = (names.get(key, key) for key in pair)
@@ -55,7 +55,7 @@ def behaviour_differences(graph: Graph, other: Graph) -> Iterator[BehaviourDiffe
             case None, _:
                 yield BehaviourDifference(about, f"{parent} would lead to {child}.")
             case _, None:
-                yield BehaviourDifference(about, f"{parent} would lead to {child} no more.")
+                yield BehaviourDifference(about, f"{parent} would no longer lead to {child}.")
             case (_ArrowMeaning() as one, _ArrowMeaning() as two) if one != two:
                 yield BehaviourDifference(about, _otherwise(one, two, parent, child))
     ends = exit_owner(graph), exit_owner(other)
@@ -67,8 +67,8 @@ def _otherwise(one: _ArrowMeaning, two: _ArrowMeaning, parent: str, child: str) 
     if one.values != two.values:
         return f"{parent} would hand other values to {child}."
     if one.conditions != two.conditions:
-        return f"{child} would answer otherwise when {parent} ends."
-    return f"{child} would wait otherwise for {parent}."
+        return f"{child} would answer differently when {parent} ends."
+    return f"{child} would wait differently for {parent}."
 
 
 def _action(action: Action) -> tuple[object, ...]:

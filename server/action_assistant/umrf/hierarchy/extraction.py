@@ -81,9 +81,9 @@ def extracted(graph: Graph, chosen: Collection[Key], name: str, key: Key) -> Ext
 
 def _unfit_names(graph: Graph, name: str) -> Iterator[FlatteningReason]:
     if not name.strip() or name in _RESERVED:
-        yield FlatteningReason("name", "No action can be called that.")
+        yield FlatteningReason("name", "No action can have this name.")
     elif name == graph.name:
-        message = "This graph has that name: an action of that name is no graph inside of it."
+        message = "This graph has that name, so an action of that name cannot stand for a graph inside it."
         yield FlatteningReason("name", message)
     elif any(action.name == name for action in graph.actions):
         message = f"“{name}” is an action of this graph; it would stand for the new one."

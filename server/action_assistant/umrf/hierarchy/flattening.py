@@ -61,7 +61,7 @@ def faults(graph: Graph) -> Iterator[FlatteningReason]:
             yield FlatteningReason("faulty", "There is no such action.", at)
         if action.type == "spontaneous":
             yield FlatteningReason(
-                "spontaneous", "A spontaneous action stops what follows as it pleases.", at
+                "spontaneous", "A spontaneous action stops the actions after it at any time.", at
             )
     yield from _relations(graph)
 
@@ -78,11 +78,15 @@ def _relations(graph: Graph) -> Iterator[FlatteningReason]:
             conditions.on_true, conditions.on_false, conditions.on_error, conditions.on_stopped
         }:  # fmt: skip
             yield FlatteningReason(
-                "stops", "It can be told to stop or to pause; how that ends is not looked at.", at
+                "stops",
+                "It can be told to stop or to pause; the courses after that are not examined.",
+                at,
             )
         if relation.parent in actions and _is_choosy(actions[relation.parent], relation, child):
             yield FlatteningReason(
-                "allowed-values", "It takes only some values; what it is given is not known.", at
+                "allowed-values",
+                "It takes only some values, and the value that it is given is not known.",
+                at,
             )
 
 

@@ -41,17 +41,17 @@ class FlatteningReason(msgspec.Struct, frozen=True):
 
 
 _KINDS: Final[dict[TroubleKind, tuple[FlatteningCode, str]]] = {
-    "halts": ("never-ends", "It can end HALTED{when}, which the graph around it is never told: that stays RUNNING for ever, where one graph would be HALTED."),
-    "waits": ("never-ends", "It can wait for ever{when}; the action that it stands for then runs for ever, where one graph would go on."),
-    "unready": ("never-ends", "Its exit is asked and waits for outputs{when}, where one graph would go on."),
-    "early": ("left-running", "It can be FINISHED while actions in it still run{when}: they begin nothing any more then, and would in one graph."),
-    "beside": ("asks-beside", "What leads to its exit can ask another action as well{when}, which begins nothing any more then, and would in one graph."),
-    "ends": ("left-running", "The graph around it can be FINISHED while it runs{when}: the sub-graph then goes on to its end, and one graph would not."),
-    "again": ("begins-again", "It can be told to begin a second time{when}: a sub-graph begins anew each time, with nothing of its last run, and misses what comes while it runs."),
+    "halts": ("never-ends", "It can end HALTED{when}, and the graph around it is not informed: it stays RUNNING for ever, where one graph would be HALTED."),
+    "waits": ("never-ends", "It can wait for ever{when}; the action that it stands for then runs for ever, where one graph would continue."),
+    "unready": ("never-ends", "Its exit is asked and waits for outputs{when}, where one graph would continue."),
+    "early": ("left-running", "It can be FINISHED while actions in it still run{when}: their ends then start nothing, and would in one graph."),
+    "beside": ("asks-beside", "What leads to its exit can ask another action as well{when}, whose end then starts nothing, and would in one graph."),
+    "ends": ("left-running", "The graph around it can be FINISHED while it runs{when}: the sub-graph then continues to its end, and one graph would not."),
+    "again": ("begins-again", "It can be told to begin a second time{when}: a sub-graph begins anew each time, without the values of its last run, and misses reports that come while it runs."),
     "crossing": ("bypass", "It can be bypassed together with others{when}: which of them reports last would differ."),
     "response": ("response", "It can be told to stop, pause or restart as a whole{when}."),
     "crash": ("crash", "The engine can abort or block itself here{when}."),
-    "undecided": ("undecided", "It has more courses than are looked at."),
+    "undecided": ("undecided", "It has more courses than are examined."),
 }  # fmt: skip
 
 

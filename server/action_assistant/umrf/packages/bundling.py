@@ -85,8 +85,8 @@ def _against(package: str, actions: Sequence[Action]) -> Iterator[NameRefusal]:
     if package in names:
         yield NameRefusal(
             package,
-            f"“{package}” is what the package of “{names[package]}” alone is called; call the one of "
-            "all otherwise.",
+            f"“{package}” is what the package of “{names[package]}” alone is called; give the "
+            "package of all another name.",
         )
     if f"{package}_uninstall" in names:
         yield NameRefusal(
