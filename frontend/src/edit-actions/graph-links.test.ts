@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { linkTo, linkToProblem, targetOf } from "./graph-links";
+import { linkTo, linkToProblem, pastOf, targetOf, withPast } from "./graph-links";
 
 const origin = "https://robots.example";
 
@@ -33,4 +33,18 @@ test("an address without a target, or with too many, does no harm", () => {
   expect(targetOf("")).toBeNull();
   expect(targetOf("?utm=1")).toBeNull();
   expect(targetOf(`?${"action=x&".repeat(500)}`)?.selection).toHaveLength(20);
+});
+
+test("an address leads to a moment, and to what it is compared with", () => {
+  expect(pastOf("?at=12")).toEqual({ at: 12, with: "own" });
+  expect(pastOf("?at=12&with=now")).toEqual({ at: 12, with: "now" });
+  expect(pastOf("?at=12&with=7")).toEqual({ at: 12, with: 7 });
+  for (const odd of ["", "?at=0", "?at=x", "?at=1e3"]) expect(pastOf(odd)).toBeNull();
+  expect(pastOf("?at=12&with=<b>")?.with).toBe("own");
+});
+
+test("what else an address says stays", () => {
+  expect(withPast("?action=a1&at=3&with=now", { at: 5, with: "own" })).toBe("?action=a1&at=5");
+  expect(withPast("?at=3", null)).toBe("");
+  expect(pastOf(withPast("", { at: 9, with: 4 }))).toEqual({ at: 9, with: 4 });
 });

@@ -3,6 +3,7 @@
 import { pageUrl } from "../api/page-url";
 import { relationId } from "../graph/document-keys";
 import type { Graph } from "../graph/model";
+import type { PastPlace } from "./editor-context";
 
 /** The address of a graph, with what is to be shown of it. */
 export function linkTo(
@@ -62,4 +63,33 @@ export function present(graph: Graph, selection: readonly string[]): string[] {
 /** Whether an address asks for what was done to the graph. */
 export function asksForHistory(search: string): boolean {
   return new URLSearchParams(search).has("history");
+}
+
+const SEQ = /^[1-9]\d{0,14}$/;
+const RUN = /^run\/[\w-]{1,80}$/;
+
+function comparedWith(text: string | null): PastPlace["with"] {
+  if (text === "nothing" || text === "now" || text === "good") return text;
+  if (text === null) return "own";
+  if (RUN.test(text)) return text as `run/${string}`;
+  return SEQ.test(text) ? Number(text) : "own";
+}
+
+/** What an address asks for; null where it asks for the graph as it is. */
+export function pastOf(search: string): PastPlace | null {
+  const query = new URLSearchParams(search);
+  const at = query.get("at");
+  if (at === null || !SEQ.test(at)) return null;
+  return { at: Number(at), with: comparedWith(query.get("with")) };
+}
+
+/** The query with this moment in the place of the one that was there. */
+export function withPast(search: string, place: PastPlace | null): string {
+  const query = new URLSearchParams(search);
+  query.delete("at");
+  query.delete("with");
+  if (place !== null) query.set("at", `${place.at}`);
+  if (place !== null && place.with !== "own") query.set("with", `${place.with}`);
+  const text = query.toString();
+  return text === "" ? "" : `?${text}`;
 }

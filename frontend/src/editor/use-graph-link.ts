@@ -3,8 +3,7 @@ import { notifications } from "@mantine/notifications";
 import { useEffect, useRef } from "react";
 import { useSearch } from "wouter";
 import type { EditorContext } from "../edit-actions/editor-context";
-import { asksForHistory, present, targetOf } from "../edit-actions/graph-links";
-import { withPast } from "../edit-actions/past-links";
+import { asksForHistory, present, targetOf, withPast } from "../edit-actions/graph-links";
 import { shownKeys } from "../edit-actions/view";
 import { focusField } from "../ui/focus-field";
 

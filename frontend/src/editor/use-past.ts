@@ -2,7 +2,7 @@
 import { useLocalStorage } from "@mantine/hooks";
 import { startTransition, useCallback, useEffect, useState } from "react";
 import type { PastPlace } from "../edit-actions/editor-context";
-import { pastOf, withPast } from "../edit-actions/past-links";
+import { pastOf, withPast } from "../edit-actions/graph-links";
 import type { SeenPast } from "../past/past-bar";
 import { Watched } from "../ui/watched";
 

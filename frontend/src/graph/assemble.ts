@@ -6,7 +6,6 @@
  */
 
 import { relationId } from "./document-keys";
-import { isEqual } from "./equal";
 import {
   type Action,
   EMPTY_GRAPH,
@@ -17,7 +16,7 @@ import {
   type Key,
   type Relation,
 } from "./model";
-import { byText } from "./values";
+import { byText, isEqual } from "./values";
 
 /** An action as its own keys tell it, with its place; numbering is not its own affair. */
 export interface RawAction {

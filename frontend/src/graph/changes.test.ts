@@ -11,8 +11,8 @@ import {
   setField,
   setGraphName,
 } from "./edit";
-import { isEqual } from "./equal";
 import { ENTRY } from "./model";
+import { isEqual } from "./values";
 
 /** What changed from one document to the next, both ways. */
 function between(then: Maps, here: Maps): { difference: ValuesByRoot; before: ValuesByRoot } {

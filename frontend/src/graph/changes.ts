@@ -14,8 +14,8 @@ import {
   segmentsOf,
   splitKey,
 } from "./document-keys";
-import { isEqual } from "./equal";
 import { ENTRY, EXIT, type Key, PRECONDITIONS } from "./model";
+import { isEqual } from "./values";
 import { readWaypoints } from "./waypoints";
 
 /** Values by key; `undefined` where there is none. */

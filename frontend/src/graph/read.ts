@@ -10,6 +10,7 @@ import { type Assembly, assemble, emptyAssembly, type RawAction } from "./assemb
 import {
   bundleOfKey,
   endsOf,
+  isAid,
   type Maps,
   mapsOf,
   ROOTS,
@@ -19,8 +20,6 @@ import {
   splitKey,
   waypointsKey,
 } from "./document-keys";
-import { isEqual } from "./equal";
-import { isAid } from "./ids";
 import {
   type Action,
   ENTRY,
@@ -48,6 +47,7 @@ import {
   asText,
   asTextList,
   byText,
+  isEqual,
 } from "./values";
 
 /** The fields of one owner: what stands right of its first `|`. */

@@ -9,7 +9,7 @@ import { useHasFingersOnly } from "../ui/hooks/use-screen-size";
 import { SharedField } from "./fields/shared-field";
 import { GraphInterface } from "./graph-interface";
 import style from "./inspector.module.css";
-import { LabelsField } from "./labels-field";
+import { LabelsField } from "./labels";
 
 export function GraphForm() {
   const context = useEditorContext();

@@ -5,10 +5,9 @@ import { renameDocument } from "../graph/edit";
 import type { Action } from "../graph/model";
 import { DescriptionField, NameField, TypeField } from "./fields/action-fields";
 import { ProblemsContext, type Told } from "./fields/field-problems";
-import { InLibraryContext } from "./fields/in-library";
-import { ViewOnly } from "./fields/view-only";
+import { InLibraryContext, ViewOnly } from "./fields/view-only";
 import style from "./inspector.module.css";
-import { LabelsField } from "./labels-field";
+import { LabelsField } from "./labels";
 import { ParameterList } from "./parameters/parameter-list";
 
 interface Props {

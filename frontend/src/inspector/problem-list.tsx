@@ -20,9 +20,9 @@ import { focusField } from "../ui/focus-field";
 import { isolated } from "../words/isolated";
 import { fieldOfTold, firstField, type Told } from "./fields/field-problems";
 import { ProblemNote, tellNothingLeft } from "./fields/problem-note";
+import { DataFlowContext } from "./parameters/data-flow";
 import { NumberField } from "./parameters/number-rows";
 import { ParameterValueField } from "./parameters/parameter-field";
-import { DataFlowContext } from "./parameters/use-data-lights";
 import style from "./problem-list.module.css";
 
 /** Where a problem is, as a person would say it; empty for the graph as a whole. */

@@ -16,7 +16,7 @@ import {
 import { type GraphSummary, queryKeys, refreshGraphs } from "../api/graphs";
 import { errorText } from "../api/http";
 import type { EditorContext } from "../edit-actions/editor-context";
-import { copyNameOf } from "../graph/edit/copy-name";
+import { copyNameOf } from "../graph/edit/clip";
 import { counted } from "../words/counted";
 import style from "./levels.module.css";
 import { MOST, ReasonList, wayWords } from "./reason-list";

@@ -17,7 +17,7 @@ import { refreshGraphs, refreshLibrary } from "../api/graphs";
 import { errorText } from "../api/http";
 import { unplaced } from "../canvas/geometry/arrange";
 import type { EditorContext } from "../edit-actions/editor-context";
-import { rootOf, splitKey } from "../graph/document-keys";
+import { newAid, rootOf, splitKey } from "../graph/document-keys";
 import { asOneEdit, moveActions } from "../graph/edit";
 import {
   applyActionChanges,
@@ -25,7 +25,6 @@ import {
   type DocumentChange,
   places,
 } from "../graph/edit/key-changes";
-import { newAid } from "../graph/ids";
 import type { Key, Position } from "../graph/model";
 import { announcer } from "../ui/announcer";
 import { useStableCallback } from "../ui/hooks/use-stable-callback";

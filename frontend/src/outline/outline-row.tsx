@@ -23,8 +23,9 @@ import type { PersonHere } from "../sync/use-room";
 import { colorOfName, initials } from "../ui/name-colors";
 import { isolated } from "../words/isolated";
 import style from "./outline.module.css";
+import type { RowEditKind } from "./row-actions";
 import { type RowAction, rowActionsOf } from "./row-actions";
-import { RowEdit, type RowEditKind } from "./row-edit";
+import { RowEdit } from "./row-edit";
 import type { InsideRow, OutlineItem } from "./rows";
 
 interface Props {

@@ -23,8 +23,7 @@ import style from "./outline.module.css";
 import { OutlineRow, type RowHandlers } from "./outline-row";
 import { PhoneRow } from "./phone-row";
 import { RobotFilter } from "./robot-filter";
-import { moveRow, type RowAction, removeRow, rowActionFor } from "./row-actions";
-import type { RowEditKind } from "./row-edit";
+import { moveRow, type RowAction, type RowEditKind, removeRow, rowActionFor } from "./row-actions";
 import { type BundleRow, bundlesOf, namesOf, type OutlineItem, rowsOf, subjectOf } from "./rows";
 
 const MANY = 40; // actions; above that the rows begin closed

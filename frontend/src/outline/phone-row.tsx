@@ -11,7 +11,8 @@ import type { PersonHere } from "../sync/use-room";
 import { colorOfName } from "../ui/name-colors";
 import { colorOf, labelOf, Others, RowActions, type RowHandlers, Talk, Words } from "./outline-row";
 import style from "./phone-row.module.css";
-import { RowEdit, type RowEditKind } from "./row-edit";
+import type { RowEditKind } from "./row-actions";
+import { RowEdit } from "./row-edit";
 import { type BundleRow, leadingNowhere, type OutlineItem } from "./rows";
 
 interface Props {

@@ -15,8 +15,10 @@ import { type Action, ENTRY, type Key, type Precondition, spokenOutcomes } from 
 import { endName } from "../graph/relation-words";
 import { type KeyPress, keyOf } from "../ui/keys";
 import { isolated } from "../words/isolated";
-import type { RowEditKind } from "./row-edit";
 import type { BundleRow, OutlineItem } from "./rows";
+
+/** An edit of a row that needs a field or a list to choose from. */
+export type RowEditKind = "rename" | "connect" | "response" | "target";
 
 export interface RowAction {
   readonly name:

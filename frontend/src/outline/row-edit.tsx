@@ -1,4 +1,5 @@
 /** What opens under a row of the outline: a new name, another target, another response, an arrow. */
+
 import { Select, Textarea, TextInput } from "@mantine/core";
 import { useState } from "react";
 import { OUTCOMES, outcomeWord } from "../canvas/outcome";
@@ -12,10 +13,8 @@ import { useDraft } from "../ui/drafts/use-draft";
 import { keyOf } from "../ui/keys";
 import { isolated } from "../words/isolated";
 import style from "./outline.module.css";
-import { outcomesOf } from "./row-actions";
+import { outcomesOf, type RowEditKind } from "./row-actions";
 import type { OutlineItem } from "./rows";
-
-export type RowEditKind = "rename" | "connect" | "response" | "target";
 
 interface Props {
   row: OutlineItem;

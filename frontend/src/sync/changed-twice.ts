@@ -16,9 +16,9 @@ import { deviceNow } from "../clock/server-clock";
 import { endsOf, mapsFrom, ROOTS, type Root, rootOf, splitKey } from "../graph/document-keys";
 import { asOneEdit } from "../graph/edit/document-writes";
 import { lostValue } from "../graph/edit/undo-history";
-import { isEqual } from "../graph/equal";
-import type { ChangedTwice, StoredCopy, UnsavedEdit } from "./indexed-db";
-import { type DocumentDifference, type ReplacedEntries, strandedEditsIn } from "./replaced-history";
+import { isEqual } from "../graph/values";
+import type { ChangedTwice, ReplacedEntries, StoredCopy, UnsavedEdit } from "./indexed-db";
+import { type DocumentDifference, strandedEditsIn } from "./replaced-history";
 
 type Compared = Omit<ChangedTwice, "since" | "cause">;
 

@@ -9,16 +9,11 @@
 import * as decoding from "lib0/decoding";
 import type * as Y from "yjs";
 import { type Maps, mapsOf, ROOTS } from "../graph/document-keys";
+import type { Fingerprint } from "./messages";
 import * as messages from "./messages";
 
 /** How long nothing must have happened. */
 const IDLE_MS = 5_000;
-
-export interface Fingerprint {
-  readonly entries: number;
-  /** The sum of the CRCs: exact for any graph of ours. */
-  readonly total: number;
-}
 
 /** What can be compared at the moment: the log up to `seq` and nothing else. */
 export interface RestingState {

@@ -8,7 +8,8 @@
  * Works without React.
  */
 
-import { admissionCheck } from "./admission";
+import { fetchJson, Refusal } from "../api/http";
+import { currentPerson } from "../api/session";
 import {
   browserStore,
   type EditStore,
@@ -27,8 +28,8 @@ import {
   strandedEditsIn,
   strandedEditsOf,
 } from "./replaced-history";
-import type { RefusalReason, Room, RoomLink } from "./room";
-import type { PersistenceOptions, RoomOptions } from "./room-connection";
+import type { Room, RoomLink } from "./room";
+import type { PersistenceOptions, RefusalReason, RoomOptions } from "./room-connection";
 
 /** What the page may say softly about a room that follows another. */
 export type ConnectionNotice = "went-back" | "differed";
@@ -377,3 +378,30 @@ function untilRefused(room: Room): AbortSignal {
   look();
   return controller.signal;
 }
+
+/** For `ConnectOptions.admit`. Throws `Unreachable` when nobody answers. */
+function admissionCheck(
+  graph: string,
+  person: string,
+): (again: boolean) => Promise<RefusalReason | null> {
+  return async (again) => {
+    try {
+      const here = await currentPerson();
+      if (here.id !== person) return "other-person";
+      if (again) await fetchJson(`/api/graphs/${encodeURIComponent(graph)}`);
+      return null;
+    } catch (error) {
+      if (!(error instanceof Refusal)) throw error;
+      const why = REASONS.get(error.details.status);
+      if (why === undefined) throw error;
+      return why;
+    }
+  };
+}
+
+const REASONS: ReadonlyMap<number, RefusalReason> = new Map([
+  [401, "session-ended"],
+  [403, "forbidden"],
+  [404, "no-such-graph"],
+  [410, "no-such-graph"],
+]);

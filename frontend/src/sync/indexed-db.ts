@@ -9,13 +9,15 @@
 
 import { deviceNow } from "../clock/server-clock";
 import type { Root } from "../graph/document-keys";
-import type { ReplacedEntries } from "./replaced-history";
 
 /** Whose copy of which graph. */
 export interface CopyOwner {
   readonly graph: string;
   readonly person: { readonly id: string; readonly name: string };
 }
+
+/** The values that an edit replaced, by key; `undefined` where there was none. */
+export type ReplacedEntries = readonly (readonly [root: Root, key: string, value: unknown])[];
 
 /** An edit that is not durable. Ids sort by the order in which they were made. */
 export interface UnsavedEdit {

@@ -4,7 +4,6 @@ import * as encoding from "lib0/encoding";
 import { type Awareness, encodeAwarenessUpdate } from "y-protocols/awareness";
 import * as sync from "y-protocols/sync";
 import type * as Y from "yjs";
-import type { Fingerprint } from "./fingerprint";
 import type { RefusalReason } from "./room";
 
 export const SYNC = 0;
@@ -48,6 +47,13 @@ export const RETRIED_CLOSES: ReadonlyMap<number, RefusalReason> = new Map([
 
 /** An update that brings nothing. */
 export const EMPTY_UPDATE = new Uint8Array([0, 0]);
+
+/** The content of a document as two numbers, see `fingerprint`. */
+export interface Fingerprint {
+  readonly entries: number;
+  /** The sum of the CRCs: exact for any graph of ours. */
+  readonly total: number;
+}
 
 type Bytes = Uint8Array<ArrayBuffer>;
 

@@ -3,11 +3,10 @@
 import type * as Y from "yjs";
 import { undoOf } from "../graph/edit";
 import type { UndoHistory } from "../graph/edit/undo-history";
-import { isEqual } from "../graph/equal";
 import { followGraph, type GraphSource } from "../graph/read";
-import { FollowedPerson } from "./presence/following";
+import { isEqual } from "../graph/values";
 import { frameScheduler } from "./presence/frame-scheduler";
-import { type PresenceSource, presenceOf } from "./presence/presence";
+import { FollowedPerson, type PresenceSource, presenceOf } from "./presence/presence";
 import { connectRoom, type Room, type RoomOptions } from "./room-connection";
 
 export interface OpenRoom {

@@ -18,15 +18,12 @@ import {
   splitKey,
 } from "../graph/document-keys";
 import { asOneEdit } from "../graph/edit/document-writes";
-import { isEqual } from "../graph/equal";
 import { ENTRY, EXIT } from "../graph/model";
-import type { StoredCopy, UnsavedEdit } from "./indexed-db";
+import { isEqual } from "../graph/values";
+import type { ReplacedEntries, StoredCopy, UnsavedEdit } from "./indexed-db";
 
 /** Plain values by key; `undefined` where the key is erased. */
 export type DocumentDifference = { readonly [R in Root]: ReadonlyMap<string, unknown> };
-
-/** What an edit replaced: values by key, `undefined` where there was none. */
-export type ReplacedEntries = readonly (readonly [root: Root, key: string, value: unknown])[];
 
 /** Edits that wait and that the server does not take as they are. */
 export interface StrandedEdits {

@@ -13,9 +13,8 @@ import {
   useSyncExternalStore,
 } from "react";
 import { type Colored, colorsOf, useKnownPeople } from "../api/people";
-import { isEqual } from "../graph/equal";
 import { EMPTY_GRAPH, type Graph } from "../graph/model";
-
+import { isEqual } from "../graph/values";
 import {
   type ConnectionNotice,
   GraphConnection,

@@ -60,7 +60,7 @@ def example_of(text: JsonText) -> Json:
     """Return the `pvf_example` of a parameter without a value as a value of its type, or None.
 
     Old files spell examples as texts; a text that is no value of the type is not converted. Twin of
-    `frontend/src/graph/edit/examples.ts`.
+    `frontend/src/graph/edit/fixes.ts`.
     """
     leaf = parse_small(text)
     if not isinstance(leaf, dict) or "pvf_value" in leaf:

@@ -1,5 +1,5 @@
 /** A run as it is told anew, in which everything that says the same keeps its identity. Pure. */
-import { isEqual } from "../../graph/equal";
+import { isEqual } from "../../graph/values";
 import type { Run } from "../runs";
 
 type RunActionsTold = NonNullable<Run["actions"]>;

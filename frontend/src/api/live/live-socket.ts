@@ -1,6 +1,6 @@
 /** The one socket to the runner: live state of runs, and the way for Stop. */
 import { hearStamp, tick } from "../../clock/server-clock";
-import { newAid } from "../../graph/ids";
+import { newAid } from "../../graph/document-keys";
 import { errorText, isFinal } from "../http";
 import type { Robot } from "../robots";
 import { getRun, postStop } from "../run-stop";

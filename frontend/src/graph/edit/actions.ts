@@ -6,11 +6,11 @@ import {
   bundleOfKey,
   endsOf,
   extraKey,
+  newAid,
   type Root,
   rootOf,
   splitKey,
 } from "../document-keys";
-import { newAid } from "../ids";
 import {
   type Action,
   ENTRY,

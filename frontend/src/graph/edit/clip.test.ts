@@ -17,7 +17,7 @@ import {
   setResponse,
   undoOf,
 } from ".";
-import { clipOf, paste } from "./clip";
+import { clipOf, copyNameOf, paste } from "./clip";
 
 const graphOf = (doc: Y.Doc) => readGraph(mapsOf(doc));
 
@@ -165,4 +165,10 @@ test("whatever a clip holds, pasting never fails and what it adds can be deleted
       expect(graphOf(doc).actions).toHaveLength(before);
     }),
   );
+});
+
+test("a copy is called after the version, and like nothing that is there", () => {
+  expect(copyNameOf("valves", "v3", ["valves"])).toBe("valves v3");
+  expect(copyNameOf("valves", "v3", ["valves v3", "valves v3 2"])).toBe("valves v3 3");
+  expect(copyNameOf("", "v3", [])).toBe("untitled v3");
 });

@@ -10,7 +10,9 @@ import {
   actionKey,
   bundleOfKey,
   endsOf,
+  isAid,
   mapsOf,
+  newAid,
   noteKey,
   type RelationSide,
   relationId,
@@ -18,7 +20,6 @@ import {
   splitKey,
   waypointsKey,
 } from "../document-keys";
-import { isAid, newAid } from "../ids";
 import { ENTRY, EXIT, type Key, type Position } from "../model";
 import { asNumber, asPosition } from "../values";
 import { readWaypoints, shifted } from "../waypoints";
@@ -203,5 +204,14 @@ function noteAt(value: unknown): { at: Position; fields: Record<string, unknown>
     return at ? { at, fields: fields as Record<string, unknown> } : null;
   } catch {
     return null;
+  }
+}
+
+/** "valves v11", "valves v11 2" …: the first that no graph is called. */
+export function copyNameOf(graph: string, version: string, taken: readonly string[]): string {
+  const stem = `${graph || "untitled"} ${version}`.trim();
+  for (let n = 1; ; n += 1) {
+    const next = n === 1 ? stem : `${stem} ${n}`;
+    if (!taken.includes(next)) return next;
   }
 }

@@ -8,8 +8,7 @@
  * the text as the page wrote it; who stored it is known by the log.
  */
 import type * as Y from "yjs";
-import { rootOf } from "../document-keys";
-import { newAid } from "../ids";
+import { newAid, rootOf } from "../document-keys";
 import type { Key } from "../model";
 import { asOneEdit, eraseKeys, writeKey } from "./document-writes";
 

@@ -14,11 +14,11 @@ import {
   bundleOfKey,
   endsOf,
   extraKey,
+  isAid,
   type Root,
   rootOf,
   splitKey,
 } from "../document-keys";
-import { isAid } from "../ids";
 import type { Key } from "../model";
 import { asInstanceId, asText } from "../values";
 import { asOneEdit, eraseKeys, hasAction, hasEnd, hasRelation, writeKey } from "./document-writes";

@@ -3,6 +3,7 @@
 import * as Y from "yjs";
 import {
   endsOf,
+  isAid,
   mapsFrom,
   mapsOf,
   type Root,
@@ -10,7 +11,6 @@ import {
   splitKey,
   waypointsKey,
 } from "../document-keys";
-import { isAid } from "../ids";
 import {
   ENTRY,
   EXIT,

@@ -1,3 +1,5 @@
+import { readFileSync } from "node:fs";
+import { fileURLToPath } from "node:url";
 import { expect, test } from "vitest";
 import * as Y from "yjs";
 import { mapsOf, rootOf } from "../document-keys";
@@ -9,6 +11,7 @@ import {
   applyExamples,
   applyFix,
   applySafeFixes,
+  exampleOf,
   FIXES,
   type Fix,
   fixOf,
@@ -172,4 +175,11 @@ test("everything that loses nothing is mended at once and undone at once", () =>
 
 test("what removes something that was drawn, or makes a value, is never done unread", () => {
   expect(FIXES.filter((fix) => !ABOUT[fix].safe)).toEqual(["remove-relation", "take-example"]);
+});
+
+const file = new URL("../../../../tests/vectors/examples.json", import.meta.url);
+const vectors = JSON.parse(readFileSync(fileURLToPath(file), "utf8")) as [string, string | null][];
+
+test.each(vectors)("the example of %s is the value %s", (parameter, value) => {
+  expect(exampleOf(parameter)).toBe(value);
 });

@@ -8,8 +8,7 @@
  */
 
 import type * as Y from "yjs";
-import { noteKey, rootOf } from "../document-keys";
-import { newAid } from "../ids";
+import { newAid, noteKey, rootOf } from "../document-keys";
 import type { Direction, JsonText, Key, Position } from "../model";
 import { asPosition } from "../values";
 import { rename } from "./actions";

@@ -10,8 +10,8 @@ import {
   rootOf,
   splitKey,
 } from "../document-keys";
-import { isEqual } from "../equal";
 import { ENTRY, EXIT, type Graph, type Key } from "../model";
+import { isEqual } from "../values";
 import { asOneEdit, graphNow } from "./document-writes";
 
 /** One key of the document; a value that is not there is `undefined`. */

@@ -4,14 +4,18 @@ import type * as Y from "yjs";
 import {
   actionKey,
   extraKey,
+  flatName,
   type ParameterSide,
   parameterKey,
   pathOf,
+  relationId,
   rootOf,
 } from "../document-keys";
 import type { JsonText, Key, Parameter } from "../model";
+import { remapFor, type Tie } from "../parameters/output-choices";
 import { asJsonText } from "../values";
 import { asOneEdit, eraseKeys, graphNow, hasAction, writeKey } from "./document-writes";
+import { setRemap } from "./relations";
 
 const FIELDS = { in: "input_parameters", out: "output_parameters" } as const;
 
@@ -128,4 +132,43 @@ export function parametersFrom(value: unknown): Parameter[] {
   };
   walk(value, []);
   return found;
+}
+
+function arrowOf(doc: Y.Doc, id: string) {
+  return graphNow(doc).relations.find((relation) => relationId(relation) === id);
+}
+
+/** Brings outputs along an arrow to inputs, renamed where the names differ, as one edit. */
+export function takeOutputs(doc: Y.Doc, id: string, ties: readonly Tie[]): boolean {
+  const relation = arrowOf(doc, id);
+  if (relation === undefined) return false;
+  const next = remapFor(relation.remap, ties);
+  const kept = new Map(next.map(({ source, target }) => [source, target]));
+  return asOneEdit(doc, () => {
+    for (const { source, target } of relation.remap) {
+      if (kept.get(source) !== target) setRemap(doc, id, source, null);
+    }
+    const known = new Map(relation.remap.map(({ source, target }) => [source, target]));
+    for (const [source, target] of kept) {
+      if (known.get(source) !== target) setRemap(doc, id, source, target);
+    }
+    return true;
+  });
+}
+
+/** Takes away the renamings that bring outputs to inputs of an action. False when there are none. */
+export function leaveOutputs(doc: Y.Doc, key: Key, paths: readonly string[]): boolean {
+  const names = new Set(paths.map(flatName));
+  const found = graphNow(doc).relations.flatMap((relation) =>
+    relation.child !== key
+      ? []
+      : relation.remap
+          .filter(({ target }) => names.has(target))
+          .map(({ source }) => ({ id: relationId(relation), source })),
+  );
+  if (found.length === 0) return false;
+  asOneEdit(doc, () => {
+    for (const { id, source } of found) setRemap(doc, id, source, null);
+  });
+  return true;
 }

@@ -16,7 +16,7 @@
 import { ObservableV2 } from "lib0/observable";
 import * as Y from "yjs";
 import { endsOf, ROOTS, type Root, rootOf, splitKey } from "../document-keys";
-import { isEqual } from "../equal";
+import { isEqual } from "../values";
 
 /** What a key held for a while. Two of them are the same only if nobody set the key in between. */
 interface KeyState {

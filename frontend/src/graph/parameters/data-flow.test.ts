@@ -4,7 +4,7 @@ import { expect, test } from "vitest";
 import * as Y from "yjs";
 import { mapsOf } from "../document-keys";
 import { addAction, connect, setRemap, setResponse } from "../edit";
-import { leaveOutputs, takeOutputs } from "../edit/data-flow";
+import { leaveOutputs, takeOutputs } from "../edit/parameters";
 import { readGraph } from "../read";
 import { dataFlowOf, touchedBy } from "./data-flow";
 import { handedOver } from "./handed-over";

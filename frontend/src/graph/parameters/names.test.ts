@@ -3,8 +3,7 @@ import * as Y from "yjs";
 import { mapsOf } from "../document-keys";
 import { addAction, connect } from "../edit";
 import { readGraph } from "../read";
-import { nameSuggestions } from "./names";
-import { pathFrom, taken } from "./paths";
+import { nameSuggestions, pathFrom, taken } from "./names";
 
 const parameter = (path: string, type = "number") => ({ path, text: `{"pvf_type": "${type}"}` });
 

@@ -1,4 +1,5 @@
 /** Parameter values by their type: from JSON text to what is typed, and back. Pure. */
+
 import { memberText, withMember } from "../json-members";
 
 export const TYPES = ["string", "number", "bool", "strings", "numbers", "bools"] as const;

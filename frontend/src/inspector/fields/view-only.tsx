@@ -1,8 +1,13 @@
 /** For people who may only look: what changes the graph is off, what shows it is not. */
+
 import { MantineThemeProvider } from "@mantine/core";
-import type { ReactNode } from "react";
+import { createContext, type ReactNode, use } from "react";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import style from "../inspector.module.css";
+
+export const InLibraryContext = createContext(false);
+
+export const useInLibrary = (): boolean => use(InLibraryContext);
 
 const OFF = { defaultProps: { disabled: true } };
 /** Its text can be marked and copied. */

@@ -1,4 +1,5 @@
 /** Where something stands in the JSON text of a graph. Lines count from 0. Pure. */
+import { pointedAt } from "../../graph/json-members";
 import { type Action, ENTRY, EXIT, type Graph, type Relation } from "../../graph/model";
 
 export type Lines = readonly [first: number, last: number];
@@ -79,68 +80,7 @@ function* blocks(lines: readonly string[]): Generator<Lines> {
   }
 }
 
-/** The line to which a JSON pointer (RFC 6901) leads, or the last one on the way there. */
+/** Returns the line to which a JSON pointer (RFC 6901) leads, or the last one on the way there. */
 export function lineOf(text: string, path: string): number {
-  const segments = path
-    .split("/")
-    .slice(1)
-    .map((segment) => segment.replaceAll("~1", "/").replaceAll("~0", "~"));
-  let at = skip(text, 0);
-  for (const segment of segments) {
-    const next = text[at] === "[" ? itemOf(text, at, Number(segment)) : memberOf(text, at, segment);
-    if (next === null) break;
-    at = next;
-  }
-  return text.slice(0, at).split("\n").length - 1;
-}
-
-const BLANK = /[\s,:]*/y;
-const STRING = /"(?:[^"\\]|\\.)*"/y;
-const WORD = /[^\s,:[\]{}"]+/y;
-
-function skip(text: string, at: number, pattern = BLANK): number {
-  pattern.lastIndex = at;
-  return pattern.test(text) ? pattern.lastIndex : at;
-}
-
-/** The index after the value that begins at `at`. */
-function after(text: string, at: number): number {
-  const c = text[at];
-  if (c === '"') return skip(text, at, STRING);
-  if (c !== "{" && c !== "[") return skip(text, at, WORD);
-  let i = skip(text, at + 1);
-  while (i < text.length && text[i] !== "}" && text[i] !== "]") {
-    const next = skip(text, after(text, i));
-    if (next <= i) return text.length;
-    i = next;
-  }
-  return i + 1;
-}
-
-function itemOf(text: string, at: number, index: number): number | null {
-  let i = skip(text, at + 1);
-  for (let n = 0; n < index && text[i] !== "]" && i < text.length; n += 1) {
-    i = skip(text, after(text, i));
-  }
-  return i < text.length && text[i] !== "]" ? i : null;
-}
-
-function memberOf(text: string, at: number, name: string): number | null {
-  if (text[at] !== "{") return null;
-  let i = skip(text, at + 1);
-  while (text[i] === '"') {
-    const end = skip(text, i, STRING);
-    const value = skip(text, end);
-    if (nameIn(text.slice(i, end)) === name) return value;
-    i = skip(text, after(text, value));
-  }
-  return null;
-}
-
-function nameIn(text: string): string | null {
-  try {
-    return String(JSON.parse(text));
-  } catch {
-    return null;
-  }
+  return text.slice(0, pointedAt(text, path)).split("\n").length - 1;
 }

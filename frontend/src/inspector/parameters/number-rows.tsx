@@ -14,14 +14,13 @@ import { pathWords } from "../../graph/value-text";
 import { DraftInput } from "../../ui/draft-input";
 import { Tooltip } from "../../ui/floating/tooltip";
 import { isolated } from "../../words/isolated";
-import { useInLibrary } from "../fields/in-library";
 import { SharedField } from "../fields/shared-field";
+import { useInLibrary } from "../fields/view-only";
 import style from "../inspector.module.css";
+import { DataFlowContext, GiverChips, useDataLights } from "./data-flow";
 import flowStyle from "./data-flow.module.css";
-import { GiverChips } from "./given-value";
 import { OutputPicker } from "./output-picker";
 import { ParameterField } from "./parameter-field";
-import { DataFlowContext, useDataLights } from "./use-data-lights";
 
 interface Props {
   action: Action;

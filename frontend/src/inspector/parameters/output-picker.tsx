@@ -3,7 +3,7 @@ import { ActionIcon, Combobox, useCombobox } from "@mantine/core";
 import { IconArrowLeft, IconLinkOff } from "@tabler/icons-react";
 import { useState } from "react";
 import { useEditorContext } from "../../edit-actions/editor-context";
-import { leaveOutputs, takeOutputs } from "../../graph/edit/data-flow";
+import { leaveOutputs, takeOutputs } from "../../graph/edit/parameters";
 import type { Key } from "../../graph/model";
 import type { OutputChoice } from "../../graph/parameters/output-choices";
 import { Tooltip } from "../../ui/floating/tooltip";

@@ -12,14 +12,13 @@ import type { ParameterValue } from "../../graph/parameters/values";
 import { pathWords } from "../../graph/value-text";
 import { Tooltip } from "../../ui/floating/tooltip";
 import { isolated } from "../../words/isolated";
-import { useInLibrary } from "../fields/in-library";
+import { useInLibrary } from "../fields/view-only";
 import style from "../inspector.module.css";
+import { DataFlowContext, GiverChips, useDataLights } from "./data-flow";
 import flowStyle from "./data-flow.module.css";
-import { GiverChips } from "./given-value";
 import { OutputPicker } from "./output-picker";
 import { ParameterSettings } from "./parameter-settings";
 import { ParameterInput } from "./parameter-value";
-import { DataFlowContext, useDataLights } from "./use-data-lights";
 
 interface Props {
   action: Action;

@@ -1,24 +1,39 @@
 /** The inputs or outputs of an action, and a way to add one. */
+
 import { Autocomplete, Button, Group, Select } from "@mantine/core";
 import { IconPlus } from "@tabler/icons-react";
-import { useMemo, useState } from "react";
+import { use, useMemo, useState } from "react";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import type { ParameterSide } from "../../graph/document-keys";
 import { addParameter, asOneEdit } from "../../graph/edit";
-import type { Action, Parameter } from "../../graph/model";
+import type { Action, Key, Parameter } from "../../graph/model";
 import { dataFlowOf } from "../../graph/parameters/data-flow";
 import { blocksOf, type ParameterBlock } from "../../graph/parameters/groups";
-import { nameSuggestions } from "../../graph/parameters/names";
-import { pathFrom, taken } from "../../graph/parameters/paths";
+import { nameSuggestions, pathFrom, taken } from "../../graph/parameters/names";
 import { fresh, GROUPS, TYPES } from "../../graph/parameters/values";
+import { countsOf } from "../../graph/problems/problem-kinds";
 import { pathWords } from "../../graph/value-text";
 import { usePendingText } from "../../ui/drafts/use-draft";
-import { SectionCounts } from "../fields/section-counts";
+import { fieldOfTold, ProblemsContext } from "../fields/field-problems";
 import { SharedField } from "../fields/shared-field";
 import style from "../inspector.module.css";
+import { DataFlowContext } from "./data-flow";
 import { NumberRows } from "./number-rows";
 import { ParameterField } from "./parameter-field";
-import { DataFlowContext } from "./use-data-lights";
+
+function SectionCounts({ of, side }: { of: Key; side: ParameterSide }) {
+  const here = use(ProblemsContext).filter(
+    (told) => told.place === of && fieldOfTold(told)?.startsWith(`${side}/`),
+  );
+  const { wrong, fillIn } = countsOf(here);
+  if (wrong + fillIn === 0) return null;
+  return (
+    <span className={style.counts}>
+      {wrong > 0 && <span data-kind="wrong">{wrong} wrong</span>}
+      {fillIn > 0 && <span data-kind="fill-in">{fillIn} to fill in</span>}
+    </span>
+  );
+}
 
 interface AddProps {
   action: Action;

@@ -5,7 +5,7 @@ import { useEditorContext } from "../../edit-actions/editor-context";
 import type { ParameterSide } from "../../graph/document-keys";
 import { removeParameter, renameParameter, setParameter } from "../../graph/edit";
 import type { Key, Parameter } from "../../graph/model";
-import { pathFrom, taken } from "../../graph/parameters/paths";
+import { pathFrom, taken } from "../../graph/parameters/names";
 import {
   allowedLines,
   parameterValueOf,

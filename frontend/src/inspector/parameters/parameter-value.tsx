@@ -14,7 +14,7 @@ import { DraftInput } from "../../ui/draft-input";
 import { Tooltip } from "../../ui/floating/tooltip";
 import { Segments } from "../../ui/segments";
 import { isolated } from "../../words/isolated";
-import { useInLibrary } from "../fields/in-library";
+import { useInLibrary } from "../fields/view-only";
 import style from "../inspector.module.css";
 
 const HINTS: Partial<Record<string, string>> = {

@@ -3,7 +3,6 @@
  * from elsewhere. What says the same becomes the same. Pure.
  */
 import { relationId } from "../../graph/document-keys";
-import { isEqual } from "../../graph/equal";
 import {
   type Action,
   fullName,
@@ -13,6 +12,7 @@ import {
   PRECONDITIONS,
   type Relation,
 } from "../../graph/model";
+import { isEqual } from "../../graph/values";
 
 function parsed(text: string): unknown {
   try {

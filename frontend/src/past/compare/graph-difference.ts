@@ -2,7 +2,6 @@
 import type { ChangeMark, ChangeMarks } from "../../canvas/marks/change-marks";
 import { relationId } from "../../graph/document-keys";
 import { notesOf, readNote } from "../../graph/edit/notes";
-import { isEqual } from "../../graph/equal";
 import {
   type Action,
   fullName,
@@ -12,6 +11,7 @@ import {
   type Relation,
 } from "../../graph/model";
 import { cardRows } from "../../graph/parameters/card-rows";
+import { isEqual } from "../../graph/values";
 import { type FieldChange, linesOf } from "../../history/difference-words";
 import { isolated } from "../../words/isolated";
 import { spokenName } from "../told/entry-words";

@@ -8,8 +8,8 @@ import { type GraphSummary, queryKeys, refreshGraphs } from "../../api/graphs";
 import { errorText } from "../../api/http";
 import { pageUrl } from "../../api/page-url";
 import { useEditorContext } from "../../edit-actions/editor-context";
-import { withPast } from "../../edit-actions/past-links";
-import { copyNameOf } from "../../graph/edit/copy-name";
+import { withPast } from "../../edit-actions/graph-links";
+import { copyNameOf } from "../../graph/edit/clip";
 import { copyText } from "../../ui/copy-text";
 import { isolated } from "../../words/isolated";
 

@@ -9,7 +9,7 @@ import { errorPlace, errorText, isOutcomeUnknown } from "../../api/http";
 import { useLive } from "../../api/live/use-live";
 import { type Started, type StartOrder, startRun } from "../../api/runs";
 import { serverNow } from "../../clock/server-clock";
-import { newAid } from "../../graph/ids";
+import { newAid } from "../../graph/document-keys";
 import { memberText } from "../../graph/json-members";
 import { isolated } from "../../words/isolated";
 import { unansweredStarts } from "./unanswered-starts";

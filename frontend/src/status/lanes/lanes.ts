@@ -1,8 +1,8 @@
 /** The actions of a run as lanes of its timeline. */
 import { useRef } from "react";
 import type { Run } from "../../api/runs";
-import { isEqual } from "../../graph/equal";
 import { fullName, type Graph } from "../../graph/model";
+import { isEqual } from "../../graph/values";
 import { type LevelPlace, placesIn, placesOf } from "../level-places";
 import { factOf } from "../level-words";
 

@@ -1,10 +1,15 @@
-/** What people sort a graph under: `labels` in its `gui_attributes`, which no engine reads. */
+/** The labels of a graph, or of an action of the library. */
+
+import { TagsInput } from "@mantine/core";
+import { useState } from "react";
 import type * as Y from "yjs";
+import { useEditorContext } from "../edit-actions/editor-context";
 import { rootOf } from "../graph/document-keys";
 import { asOneEdit } from "../graph/edit/document-writes";
 import { memberText, withMember } from "../graph/json-members";
 import type { Graph } from "../graph/model";
 import { asJsonText } from "../graph/values";
+import { usePendingText } from "../ui/drafts/use-draft";
 
 const KEY = "x/gui_attributes";
 
@@ -31,4 +36,25 @@ export function setLabels(doc: Y.Doc, labels: readonly string[]): void {
     if (text === "{}") rootOf(doc, "meta").delete(KEY);
     else rootOf(doc, "meta").set(KEY, text);
   });
+}
+
+export function LabelsField() {
+  const { doc, graph } = useEditorContext();
+  const [typed, setTyped] = useState("");
+  usePendingText(typed, () => {
+    setLabels(doc, [...graphLabels(graph), typed.trim()]);
+    setTyped("");
+  });
+  return (
+    <TagsInput
+      label="Labels"
+      size="sm"
+      placeholder="night shift, demo …"
+      maxTags={20}
+      value={graphLabels(graph)}
+      searchValue={typed}
+      onSearchChange={setTyped}
+      onChange={(labels) => setLabels(doc, labels)}
+    />
+  );
 }
