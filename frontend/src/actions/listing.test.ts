@@ -43,24 +43,24 @@ const all = listedActions(
 );
 const namesOf = (list: typeof all) => list.map(({ name }) => name);
 
-test("the library, graphs and robots are one list, a pose one thing in it", () => {
+test("the list joins library, graphs and robots, and a pose is one parameter in it", () => {
   expect(namesOf(all)).toEqual(["CloseValve", "Grip", "Wait"]);
   expect(all[0]?.summary).toBe("pose, torque");
 });
 
-test("filters tell them apart", () => {
+test("filters select by origin", () => {
   expect(namesOf(foundActions(all, "library", ""))).toEqual(["CloseValve"]);
   expect(namesOf(foundActions(all, "graphs", ""))).toEqual(["Wait"]);
   expect(namesOf(foundActions(all, "robot:atlas", ""))).toEqual(["Grip"]);
 });
 
-test("a search looks at names, descriptions, parameters and labels", () => {
+test("the search finds names, descriptions, parameters and labels", () => {
   expect(namesOf(foundActions(all, "all", "torque night"))).toEqual(["CloseValve"]);
   expect(namesOf(foundActions(all, "all", "NOTHING"))).toEqual(["Wait"]);
   expect(foundActions(all, "all", "torque nothing")).toEqual([]);
 });
 
-test("each has an address", () => {
+test("every action has an address", () => {
   expect(all.map(addressOf)).toEqual(["/actions/d1", "/actions?name=Grip", "/actions?name=Wait"]);
 });
 

@@ -21,7 +21,7 @@ test("a pose is one row", () => {
   ]);
 });
 
-test("what the JSON says besides is told", () => {
+test("other members of the JSON are listed", () => {
   const text =
     '{"pvf_type":"number","pvf_unit":"N·m","pvf_example":12.50,"pvf_required":false,"pvf_allowed_values":[1, 2.0],"pvf_value":1.0,"pvf_updatable":false}';
   expect(parameterFacts([{ path: "torque", text }])).toEqual([
@@ -37,7 +37,7 @@ test("what the JSON says besides is told", () => {
   ]);
 });
 
-test("what is no parameter of a type has no facts", () => {
+test("a parameter without a type has no value and no other members", () => {
   expect(parameterFacts([{ path: "odd", text: "[1]" }])[0]).toMatchObject({
     type: "no type",
     value: null,

@@ -31,7 +31,7 @@ const uses = [
   }),
 ];
 
-test("what several graphs suggest is asked once", () => {
+test("a rename that several graphs suggest is listed once", () => {
   expect(suggestedRenames(uses)).toEqual([
     { side: "in", from: "speed", to: "velocity", graphs: 2 },
     { side: "out", from: "done", to: "ended", graphs: 1 },
@@ -39,7 +39,7 @@ test("what several graphs suggest is asked once", () => {
   ]);
 });
 
-test("nothing is renamed that nobody has ticked, and two never become one", () => {
+test("only chosen renames are made, and two parameters never become one", () => {
   const all = suggestedRenames(uses);
   expect(renamesOf(new Set(), all)).toEqual(NO_RENAMES);
   const [speed, done, rate] = all;
@@ -53,7 +53,7 @@ test("nothing is renamed that nobody has ticked, and two never become one", () =
   expect(clashes(done, ticked, all)).toBe(false);
 });
 
-test("what nobody suggests can be said by hand, where types allow it", () => {
+test("other renames can be chosen where types allow it", () => {
   const [number, text] = ['{"pvf_type":"number"}', '{"pvf_type":"string"}'];
   const fields = [
     { field: "in/speed", before: number, after: null },

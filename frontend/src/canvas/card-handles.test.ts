@@ -4,7 +4,7 @@ import { expectedCard, expectedEnd } from "./card-handles";
 
 const plain = { inputs: [] };
 
-test("what was never drawn has a size and ends for its arrows, so that it need not be drawn", () => {
+test("a card that was never rendered has a size and handles, so that it need not be rendered", () => {
   for (const direction of ["right", "down"] as const) {
     const { measured, handles } = expectedCard(plain, direction);
     expect(measured.width * measured.height).toBeGreaterThan(0);
@@ -24,7 +24,7 @@ test("what was never drawn has a size and ends for its arrows, so that it need n
   }
 });
 
-test("cards of one size share one object, so that what did not change stays the same", () => {
+test("cards of one size share one object", () => {
   expect(expectedCard({ ...plain }, "right")).toBe(expectedCard({ ...plain }, "right"));
   expect(expectedCard(plain, "right")).not.toBe(expectedCard(plain, "down"));
 });

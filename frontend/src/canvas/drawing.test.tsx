@@ -73,7 +73,7 @@ function draw(graph: Graph, others: ReadonlyMap<string, string> = new Map()): st
   return [...rendered];
 }
 
-test("of a thousand actions only those that somebody changed are rendered again", {
+test("of a thousand actions only the changed ones are rendered again", {
   timeout: 60_000,
 }, () => {
   const doc = new Y.Doc();
@@ -102,7 +102,7 @@ function fresh<T extends { readonly id: string }>(before: readonly T[], next: re
   return next.filter((item) => !known.has(item)).map(({ id }) => id);
 }
 
-test("of a thousand cards and their arrows only what somebody changed is made again", () => {
+test("of a thousand cards and their arrows only the changed ones get new objects", () => {
   const doc = new Y.Doc();
   const source = followGraph(doc);
   const keys = doc.transact(() => {

@@ -40,7 +40,7 @@ const options = (graph: Graph): NodeOptions => ({
   measured: new Map(),
 });
 
-test("each outcome that is answered gets its own arrow from its own handle", () => {
+test("each outcome with a response has its own arrow from its own handle", () => {
   const { graph, a, b } = drawn();
   const around = surroundingsOf(graph, null);
   const arrows = edgesOf(graph, options(graph), around).filter((edge) => edge.source === a);
@@ -52,7 +52,7 @@ test("each outcome that is answered gets its own arrow from its own handle", () 
   expect(arrows.map((edge) => edge.data?.answers !== null)).toEqual([true, false, false]);
 });
 
-test("outcomes with the same response are said together", () => {
+test("outcomes with the same response share a pill", () => {
   const { graph, a } = drawn();
   const relation = graph.relations.find(({ parent }) => parent === a);
   expect(relation && responsesOf(relation)).toEqual([
@@ -61,7 +61,7 @@ test("outcomes with the same response are said together", () => {
   ]);
 });
 
-test("what did not change is not drawn again", () => {
+test("unchanged elements keep their identity", () => {
   const { graph, doc, a } = drawn();
   const before = nodesOf(graph, options(graph));
   expect(keepEqual(before, nodesOf(graph, options(graph)))).toBe(before);
@@ -74,7 +74,7 @@ test("what did not change is not drawn again", () => {
   expect(card(after)?.position).toEqual(card(before)?.position);
 });
 
-test("lines lead to cards as large as these are drawn, also before they are measured", () => {
+test("lines lead to cards of the rendered size, also before these are measured", () => {
   const { graph } = drawn();
   for (const direction of ["right", "down"] as const) {
     const turned: Graph = { ...graph, direction };
@@ -85,14 +85,14 @@ test("lines lead to cards as large as these are drawn, also before they are meas
   }
 });
 
-test("a graph without places stands from entry down to exit", () => {
+test("a graph without places is arranged from the entry down to the exit", () => {
   const { graph, a, b } = drawn();
   const places = arrange(graph);
   const y = (key: string) => places.get(key)?.[1] ?? Number.NaN;
   expect([y(ENTRY) < y(a), y(a) < y(b), y(b) < y(EXIT)]).toEqual([true, true, true]);
 });
 
-test("what has a place keeps it when something without one appears", () => {
+test("elements keep their place when an element without one is added", () => {
   const { graph, a } = drawn();
   const placed: Graph = {
     ...graph,
@@ -137,14 +137,14 @@ function parent() {
   return { name: "Check", instance_id: 0, required: true, conditions };
 }
 
-test("a version means the same as the draft that it was made of, wherever things stand", () => {
+test("a version read from UMRF equals the graph that it was made of", () => {
   const { graph, doc, b } = drawn();
   expect(meaning(fromUmrf(umrf))).toBe(meaning(graph));
   connect(doc, b, EXIT, "on_error");
   expect(meaning(fromUmrf(umrf))).not.toBe(meaning(readGraph(mapsOf(doc))));
 });
 
-test("a version that is no graph is drawn as nothing", () => {
+test("UMRF that is no graph is drawn as an empty graph", () => {
   for (const odd of [null, 5, [], { actions: [null, 7] }, { graph_entry: "x", actions: {} }]) {
     expect(() => fromUmrf(odd)).not.toThrow();
   }

@@ -6,7 +6,7 @@ const id = fc.stringMatching(/^[\w-]{1,12}$/);
 const level: fc.Arbitrary<Level> = fc.record({ graph: id, action: id });
 const searchOf = (address: string) => new URL(address, "http://here").search;
 
-test("whoever goes in by some actions comes out by the same, one after the other", () => {
+test("leaving inner graphs leads back through the same actions", () => {
   fc.assert(
     fc.property(fc.array(level, { minLength: 1, maxLength: 20 }), id, (way, last) => {
       let search = "";
@@ -25,7 +25,7 @@ test("whoever goes in by some actions comes out by the same, one after the other
   );
 });
 
-test("an address that somebody made up leads nowhere else, and its length is bounded", () => {
+test("an invalid address leads to no other page, and its length is bounded", () => {
   expect(levelsOf("?in=../x~y&in=a&in=a~b~c&in=a~b")).toEqual([{ graph: "a", action: "b" }]);
   fc.assert(
     fc.property(fc.string(), fc.string(), (search, text) => {

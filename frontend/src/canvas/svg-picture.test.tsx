@@ -31,7 +31,7 @@ function drawn(name: string, robot: string, text: string) {
   );
 }
 
-test("whatever people write, the picture is well-formed and runs nothing", () => {
+test("for any texts the picture is well-formed and contains no script", () => {
   const hostile = fc.oneof(
     fc.string({ unit: "binary" }),
     fc.constantFrom(
@@ -70,7 +70,7 @@ test("a picture has every card, end, arrow and note within its bounds", () => {
   }
 });
 
-test("a line that was bent by hand goes there in the picture, too", () => {
+test("the picture has the waypoints of bent lines", () => {
   const doc = new Y.Doc();
   const [a, b] = ["A", "B"].map((name, i) => addAction(doc, { name, position: [i * 480, 0] }));
   const id = connect(doc, a ?? "", b ?? "") ?? "";

@@ -16,14 +16,14 @@ test.each([
   expect(detailAt(at, null)).toBe(detail);
 });
 
-test("a far threshold has some play on the way back, and none on the way out", () => {
+test("a threshold is shifted when zooming in, and exact when zooming out", () => {
   expect(detailAt(0.89, "near")).toBe("middle");
   expect(detailAt(0.9, "middle")).toBe("near"); // where graphs open
   expect(detailAt(0.51, "far")).toBe("far");
   expect(detailAt(0.53, "far")).toBe("middle");
 });
 
-test("nearer never shows less, and staying at a zoom changes nothing", () => {
+test("zooming in never shows less, and an unchanged zoom changes nothing", () => {
   fc.assert(
     fc.property(
       zoom,
@@ -39,7 +39,7 @@ test("nearer never shows less, and staying at a zoom changes nothing", () => {
   );
 });
 
-test("a text of 11 units is at least 11 px on screen, and hardly more", () => {
+test("a text of 11 units has 11 px on screen or slightly more", () => {
   fc.assert(
     fc.property(zoom, (at) => {
       expect(11 * unitAt(at) * at).toBeGreaterThanOrEqual(11 * 0.998);

@@ -3,7 +3,7 @@ import { expect, test } from "vitest";
 import type { RoomLink } from "../sync/room-connection";
 import { saveStatusText } from "./save-status";
 
-test("saved is said only when nothing waits and the room is live", () => {
+test("Saved is shown only when nothing waits and the room is live", () => {
   expect(saveStatusText({ state: "live", unsaved: 0, seq: 4 }).words).toBe("Saved");
   expect(saveStatusText({ state: "live", unsaved: 3, seq: 4 }).words).toBe("Saving 3");
   expect(saveStatusText({ state: "live", unsaved: 0, seq: 4 }, false).words).toBe("View only");
@@ -17,7 +17,7 @@ test("saved is said only when nothing waits and the room is live", () => {
   );
 });
 
-test("a room that does not open says why, once that is known", () => {
+test("a room that does not open shows the reason once it is known", () => {
   const link = { state: "offline", unsaved: 0, seq: 0 } as const;
   expect(saveStatusText(link).words).toBe("Opening");
   expect(saveStatusText({ ...link, why: "no-socket" })).toEqual({
@@ -26,7 +26,7 @@ test("a room that does not open says why, once that is known", () => {
   });
 });
 
-test("what is typed and not in the graph yet counts as unsaved", () => {
+test("text that is not yet in the graph counts as unsaved", () => {
   const link = { state: "live", unsaved: 0, seq: 4 } as const;
   const words = (drafts: Parameters<typeof saveStatusText>[2], room: RoomLink = link) =>
     saveStatusText(room, true, drafts).words;
@@ -38,7 +38,7 @@ test("what is typed and not in the graph yet counts as unsaved", () => {
   );
 });
 
-test("saved is said exactly when the room is live and nothing waits, in a field or on the way", () => {
+test("Saved is shown exactly when the room is live and nothing waits, in a field or on the way", () => {
   const number = fc.nat({ max: 2 });
   const link: fc.Arbitrary<RoomLink> = fc.record({
     state: fc.constantFrom("connecting", "live", "offline", "refused"),

@@ -14,7 +14,7 @@ const graph = fromUmrf({
 const empty = fromUmrf({ graph_name: "g", graph_entry: [], graph_exit: [], actions: [] });
 const [wait] = graph.actions;
 
-test("an action of a run that is not drawn, or not yet, is called by its own name", () => {
+test("an action that is not in the graph is announced by its name in the run", () => {
   const run = {
     state: "running",
     ended_at: null,

@@ -46,7 +46,7 @@ function Page() {
   return null;
 }
 
-test("nothing can be changed before the graph has arrived", async () => {
+test("a graph cannot be edited before it has arrived", async () => {
   server.doc.getMap("meta").set("name", "untitled");
   server.seq = 1;
   act(() =>

@@ -17,7 +17,7 @@ const inside = (aids: string[], aid?: string): Problem => ({
 const marksOf = (...problems: Problem[]) =>
   marksInside(toldProblems(problems, { actions: [], relations: [] }));
 
-test("what is wrong inside marks its card and each level on the way, but not the outermost", () => {
+test("a problem in an inner graph marks its card and each level above it, except the outermost", () => {
   const marks = marksOf(inside(["a", "b"], "c"), inside(["a", "b"]), inside(["a"], "d"));
   const wrong = [...marks].map(([path, mark]) => [path, mark.wrong]);
   expect(wrong).toEqual([
@@ -28,7 +28,7 @@ test("what is wrong inside marks its card and each level on the way, but not the
   expect(marks.get("a/d")?.reasons).toBe("about it (H2)");
 });
 
-test("what is wrong with the graph itself marks nothing inside", () => {
+test("a problem of the graph itself marks no inner card", () => {
   const { inside: _, ...own } = inside(["a"], "d");
   expect(marksOf(own).size).toBe(0);
 });

@@ -33,7 +33,7 @@ const graphs = new Map<string, Graph | string | null>([
 const all = (known: KnownGraphs, depth = 9) =>
   new Set(pathsTo(round, depth, known, { path: "", above: ["Round"] }));
 
-test("every place has a level of its own, and a graph is not drawn inside of itself", () => {
+test("every place has its own level, and a graph is not drawn inside itself", () => {
   const known = knownOf(graphs);
   expect([...all(known)].sort()).toEqual([
     "Fetch_1",
@@ -50,13 +50,13 @@ test("every place has a level of its own, and a graph is not drawn inside of its
   expect([...(grip?.levels.keys() ?? [])]).toEqual([]);
 });
 
-test("one level at a time comes into being, and what is unknown is none", () => {
+test("levels load one after the other, and unknown names have none", () => {
   const known = knownOf(graphs);
   expect([...all(known, 1)]).toEqual(["Fetch_1", "Fetch_2"]);
   expect(levelsBelow(round, new Set(["Drive_0", "Gone_7"]), known, undefined, TOP).size).toBe(0);
 });
 
-test("what is still on its way, or cannot be had, takes little room and has nothing in it", () => {
+test("a level that is loading or cannot be loaded is small and empty", () => {
   for (const missing of [null, "There is no such graph."]) {
     const known = knownOf(new Map([...graphs, ["Fetch", missing]]));
     const level = levelsBelow(round, all(known), known, undefined, TOP).get(
@@ -66,7 +66,7 @@ test("what is still on its way, or cannot be had, takes little room and has noth
   }
 });
 
-test("what did not change stays the same object, and what changed does not", () => {
+test("unchanged levels are identical objects, changed ones are not", () => {
   const known = knownOf(graphs);
   const before = levelsBelow(round, all(known), known, undefined, TOP);
   expect(levelsBelow(round, all(known), known, before, TOP)).toBe(before);
@@ -87,7 +87,7 @@ const places = fc.uniqueArray(fc.tuple(fc.nat(5), fc.nat(5)), {
   selector: ([x, y]) => `${x} ${y}`,
 });
 
-test("on a level everything lies in the frame, and nothing upon something else", () => {
+test("everything on a level lies within its frame, and nothing overlaps", () => {
   fc.assert(
     fc.property(
       places,
@@ -129,7 +129,7 @@ test("on a level everything lies in the frame, and nothing upon something else",
   );
 });
 
-test("frames grow with what stands in them, and waypoints keep to their side", () => {
+test("frames grow with their contents, and waypoints stay on their side", () => {
   const note = {
     kind: "frame",
     at: [-40, -40],

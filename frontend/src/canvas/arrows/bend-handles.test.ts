@@ -11,7 +11,7 @@ const line = (
   ...{ points, waypoints, pill },
 });
 
-test("each longer piece can be bent in its middle, in the order of the waypoints", () => {
+test("each longer piece has a handle in its middle, in the order of the waypoints", () => {
   const points: Point[] = [
     [0, 0],
     [100, 0],
@@ -29,7 +29,7 @@ test("each longer piece can be bent in its middle, in the order of the waypoints
   ]);
 });
 
-test("what a pill covers is not taken, nor a piece that is short, unless it is all there is", () => {
+test("a piece below the pill or a short piece has no handle, unless the line has no other", () => {
   const straight = line(
     [
       [0, 0],
@@ -43,7 +43,7 @@ test("what a pill covers is not taken, nor a piece that is short, unless it is a
   expect(middlesOf({ ...straight, waypoints: [[100, 0]] }, 200)).toEqual([]);
 });
 
-test("a waypoint that the line leaves out parts nothing", () => {
+test("a waypoint that is left out divides no piece", () => {
   const points: Point[] = [
     [0, 0],
     [200, 0],

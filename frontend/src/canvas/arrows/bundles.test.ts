@@ -37,7 +37,7 @@ const conditions = fc.record({
   on_stopped: fc.constantFrom(...RESPONSES),
 });
 
-test("every outcome that is answered is on one line, with those of the same response", () => {
+test("outcomes with the same response share one line", () => {
   fc.assert(
     fc.property(conditions, fc.boolean(), (conditions, required) => {
       const bundles = bundlesOf(relation({ conditions, required }));
@@ -55,7 +55,7 @@ test("every outcome that is answered is on one line, with those of the same resp
   );
 });
 
-test("run is what is meant when nothing is said, and what is ignored is not drawn", () => {
+test("the response run has no word on its pill, and ignored outcomes are not drawn", () => {
   const said = { ...IGNORE_ALL, on_true: "run", on_error: "run", on_false: "stop" } as const;
   const bundles = bundlesOf(relation({ conditions: said }));
   expect(bundles.map((bundle) => [bundle.outcomes.join(), pillWord(bundle)])).toEqual([
@@ -64,12 +64,12 @@ test("run is what is meant when nothing is said, and what is ignored is not draw
   ]);
 });
 
-test("a relation that ignores everything still has a line, which says so", () => {
+test("a relation that ignores all outcomes has a line with the words ignores all", () => {
   const [only, ...others] = bundlesOf(relation({}));
   expect([only && pillWord(only), only?.outcomes, others]).toEqual(["ignores all", [], []]);
 });
 
-test("a line keeps its id while outcomes come and go", () => {
+test("a line keeps its id while outcomes are added and removed", () => {
   const some = bundlesOf(relation({ conditions: { ...IGNORE_ALL, on_error: "run" } }));
   const more = bundlesOf(
     relation({ conditions: { ...IGNORE_ALL, on_true: "run", on_error: "run" } }),
@@ -77,7 +77,7 @@ test("a line keeps its id while outcomes come and go", () => {
   expect(some.map(({ id }) => id)).toEqual(more.map(({ id }) => id));
 });
 
-test("the entry says nothing, unless something is wrong there; more to say needs more room", () => {
+test("the entry has a pill only for problems, and a pill grows with its contents", () => {
   const [entry] = bundlesOf(
     relation({ parent: ENTRY, conditions: { ...IGNORE_ALL, on_true: "run" } }),
   );
@@ -92,7 +92,7 @@ test("the entry says nothing, unless something is wrong there; more to say needs
   expect(wide({ ...IGNORE_ALL, on_true: "restart" })).toBeGreaterThan(one);
 });
 
-test("the places through which a line was led are those of its response, also in a published file", () => {
+test("waypoints belong to one response of a relation, also in a published file", () => {
   const conditions = { ...IGNORE_ALL, on_true: "run", on_error: "stop" } as const;
   const [run, stop] = bundlesOf(relation({ conditions, waypoints: [["stop", "[[1,2]]"]] }));
   expect([run?.waypoints, stop?.waypoints]).toEqual([[], [[1, 2]]]);
@@ -107,7 +107,7 @@ test("the places through which a line was led are those of its response, also in
   expect(bundles.map(({ waypoints }) => waypoints)).toEqual([points, []]);
 });
 
-test("while both ends of a line are dragged its bends go along in the scene", () => {
+test("waypoints move along while both ends of a line are dragged", () => {
   const graph: Graph = {
     ...{ ...EMPTY_GRAPH, actions: ["a", "b"].map(actionOf) },
     relations: [

@@ -27,7 +27,7 @@ test("a path has round corners, smaller where there is less room", () => {
   );
 });
 
-test("until a line is routed again it is level or upright, and ends where its cards are now", () => {
+test("until a line is routed again its pieces stay horizontal or vertical and end at the moved cards", () => {
   fc.assert(
     fc.property(
       fc.integer({ min: 0, max: 1e9 }),
@@ -53,7 +53,7 @@ test("until a line is routed again it is level or upright, and ends where its ca
   );
 });
 
-test("what has not moved is the same object", () => {
+test("a line that has not moved is the identical object", () => {
   const given = layeredScene(12, seeded(3), "right");
   const { lines } = routed(given);
   for (const simple of simpleLines(given).values()) {

@@ -42,7 +42,7 @@ const moved = (dx: number): Scene => ({
 });
 const id = scene.lines[0]?.id ?? "";
 
-test("lines are there at once, and are replaced when the worker has better ones", () => {
+test("simple lines are drawn at once, and replaced when the worker has routed ones", () => {
   const store = new LineStore();
   const told: string[] = [];
   for (const line of scene.lines) store.subscribe(line.id, () => told.push(line.id));
@@ -55,7 +55,7 @@ test("lines are there at once, and are replaced when the worker has better ones"
   expect(FakeWorker.all[0]?.asked.length).toBe(1); // nothing has changed
 });
 
-test("while the worker is busy only the last of several moves waits for it", () => {
+test("while the worker is busy, only the last scene waits", () => {
   const store = new LineStore();
   store.show(scene);
   for (const dx of [3, 6, 9]) store.show(moved(dx));
@@ -68,7 +68,7 @@ test("while the worker is busy only the last of several moves waits for it", () 
   ]);
 });
 
-test("only lines that look different are drawn again", () => {
+test("only lines that look different notify their arrows", () => {
   const store = new LineStore();
   store.show(scene);
   FakeWorker.all[0]?.answer();
@@ -79,7 +79,7 @@ test("only lines that look different are drawn again", () => {
   expect([...told].sort()).toEqual(own.map(({ id }) => id).sort());
 });
 
-test("one bundle at a time is open, and those concerned hear of it", () => {
+test("one bundle at a time is open, and only its arrows are notified", () => {
   const store = new LineStore();
   const told: string[] = [];
   for (const each of ["a", "b"]) store.subscribe(each, () => told.push(each));
@@ -88,14 +88,14 @@ test("one bundle at a time is open, and those concerned hear of it", () => {
   expect([store.isOpen("a"), store.isOpen("b"), told]).toEqual([false, true, ["a", "a", "b"]]);
 });
 
-test("a canvas that is gone leaves no worker behind", () => {
+test("closing a canvas ends its worker", () => {
   const store = new LineStore();
   store.show(scene);
   store.close();
   expect(FakeWorker.all[0]?.ended).toBe(true);
 });
 
-test("a line goes where somebody drags it, and stays there until the graph says so, too", () => {
+test("a dragged line stays where it was dropped until the graph has its waypoints", () => {
   const store = new LineStore();
   store.show(scene);
   const waypoints = () => store.lineOf(id)?.waypoints;
@@ -115,7 +115,7 @@ test("a line goes where somebody drags it, and stays there until the graph says 
   expect(waypoints()).toEqual([at]);
 });
 
-test("many lines that move again and again rest in between, and end where the cards are", async () => {
+test("with many lines updates pause between moves, and end at the final places", async () => {
   const many = layeredScene(400, seeded(3), "right");
   expect(many.lines.length).toBeGreaterThan(300);
   const led = many.lines[0];

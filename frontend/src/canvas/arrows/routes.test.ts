@@ -76,7 +76,7 @@ test("the same scene has the same lines", () => {
   );
 });
 
-test("after a move what is routed again is as good, and what has not moved stays", () => {
+test("after a move, lines that are routed again are as good, and the others stay", () => {
   fc.assert(
     fc.property(seed, fc.constantFrom(...DIRECTIONS), (seed, direction) => {
       const random = seeded(seed);
@@ -101,14 +101,14 @@ test("after a move what is routed again is as good, and what has not moved stays
   );
 });
 
-test("nothing is looked for when nothing has moved", () => {
+test("no line is searched when nothing has moved", () => {
   const given = layeredScene(30, seeded(4), "right");
   const first = routed(given);
   const again = routed(given, first.ways);
   expect([again.searched, again.lines]).toEqual([0, first.lines]);
 });
 
-test("cards in a row are joined by straight lines in their middle", () => {
+test("cards in a row are connected by straight lines in their middle", () => {
   for (const direction of DIRECTIONS) {
     const cards = [0, 1, 2].map((i) =>
       direction === "right" ? card(`c${i}`, i * 260, 7) : card(`c${i}`, 7, i * 180),
@@ -123,7 +123,7 @@ test("cards in a row are joined by straight lines in their middle", () => {
   }
 });
 
-test("a loop leaves at one side, runs back in a lane of its own and enters at the other", () => {
+test("a loop leaves at one side, leads back in a lane of its own and enters at the other side", () => {
   const cards = [card("a", 0, 0), card("b", 300, 0), card("c", 600, 0)];
   const given = scene(cards, [line("a", "b"), line("b", "c"), line("c", "a")]);
   const { lines } = routed(given);
@@ -134,14 +134,14 @@ test("a loop leaves at one side, runs back in a lane of its own and enters at th
   expect(faultsOf(given, lines)).toEqual({ ...NONE, shared: 0 });
 });
 
-test("an action that follows itself has a line round itself", () => {
+test("an action that follows itself has a line around its card", () => {
   const given = scene([card("a", 0, 0)], [line("a", "a")]);
   const { lines } = routed(given);
   expect(lines.get("a>a")?.points.length).toBe(6);
   expect(faultsOf(given, lines)).toEqual({ ...NONE, shared: 0 });
 });
 
-test("a pill stands beside the card that its line leaves, also where many leave", () => {
+test("a pill stands beside the card that its line leaves, even if many lines leave it", () => {
   const cards = [card("a", 0, 200), ...[0, 1, 2, 3, 4].map((i) => card(`t${i}`, 400, i * 110))];
   const given = scene(
     cards,
@@ -154,7 +154,7 @@ test("a pill stands beside the card that its line leaves, also where many leave"
   expect(faultsOf(given, lines)).toEqual({ ...NONE, shared: 0 });
 });
 
-test("more lines than there is room for come together before they enter", () => {
+test("lines without room join before they enter a card", () => {
   const end = { key: "exit", x: 900, y: 300, width: 84, height: 32 };
   const cards = [0, 1, 2, 3, 4, 5, 6].map((i) => card(`c${i}`, (i % 2) * 300, i * 110));
   const given = scene(
@@ -169,14 +169,14 @@ test("more lines than there is room for come together before they enter", () => 
   }
 });
 
-test("what cannot be routed is drawn simply: cards on each other, cards worlds apart", () => {
+test("lines between overlapping or very distant cards are drawn simply", () => {
   const pile = scene([card("a", 0, 0), card("b", 10, 10)], [line("a", "b")]);
   expect(routed(pile).lines.size).toBe(1);
   const apart = scene([card("a", 0, 0), card("b", 9e6, 9e6)], [line("a", "b")]);
   expect(routed(apart).lines.get("a>b")?.simple).toBe(true);
 });
 
-test("simple lines begin, end and have their pills where the others do", () => {
+test("simple lines have the same ends and pills as routed lines", () => {
   fc.assert(
     fc.property(seed, fc.constantFrom(...DIRECTIONS), (seed, direction) => {
       const given = layeredScene(16, seeded(seed), direction);
@@ -192,7 +192,7 @@ test("simple lines begin, end and have their pills where the others do", () => {
   );
 });
 
-test("a line to a card that is not there is not drawn", () => {
+test("a line to a missing card is not drawn", () => {
   expect(routed(scene([card("a", 0, 0)], [line("a", "gone")])).lines.size).toBe(0);
   expect(routed(scene([], [])).lines.size).toBe(0);
 });

@@ -81,7 +81,7 @@ test("a bent line passes its waypoints in their order, level or upright, and no 
   );
 });
 
-test("what is not bent has no fault that it had not before", () => {
+test("bending some lines adds no fault to the other lines", () => {
   fc.assert(
     fc.property(seed, direction, (seed, direction) => {
       const random = seeded(seed);
@@ -92,7 +92,7 @@ test("what is not bent has no fault that it had not before", () => {
   );
 });
 
-test("the same bent lines are found again, and kept while nothing moves", () => {
+test("the same scene gives the same bent lines, and they are kept while nothing moves", () => {
   fc.assert(
     fc.property(seed, direction, (seed, direction) => {
       const random = seeded(seed);
@@ -124,7 +124,7 @@ test("a waypoint bends a line that would be straight, and its pill stays where i
   expect(line?.points.some(([, y]) => y === line.waypoints[0]?.[1])).toBe(true);
 });
 
-test("a line goes back where its waypoint is behind it, and arrives from before its card", () => {
+test("a line leads back to a waypoint behind it, and still enters its card from the front", () => {
   const cards = [card("a", 0, 0), card("b", 480, 0)];
   const line = lineOf(scene(cards, [[-96, 144]]));
   expect(line?.simple).toBe(false);
@@ -132,7 +132,7 @@ test("a line goes back where its waypoint is behind it, and arrives from before 
   expect(line?.points.at(-1)?.[0]).toBe(480);
 });
 
-test("a waypoint on which a card stands now is left out until the card is gone", () => {
+test("a waypoint below a card is left out until the card is moved", () => {
   const cards = [card("a", 0, 0), card("b", 600, 0)];
   const there = scene([...cards, card("c", 280, 140)], [[360, 176]]);
   const first = routed(there);
@@ -142,12 +142,12 @@ test("a waypoint on which a card stands now is left out until the card is gone",
   expect(passed(line?.points ?? [], line?.waypoints ?? [])).not.toContain(null);
 });
 
-test("a waypoint worlds apart leaves all other lines routed", () => {
+test("all other lines are routed although one waypoint is very far away", () => {
   const cards = [card("a", 0, 0), card("b", 480, 0)];
   expect(lineOf(scene(cards, [[9e6, 9e6]]))?.simple).toBe(false);
 });
 
-test("simple lines pass the waypoints, too", () => {
+test("simple lines pass their waypoints, too", () => {
   fc.assert(
     fc.property(seed, direction, (seed, direction) => {
       const random = seeded(seed);

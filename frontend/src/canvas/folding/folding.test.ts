@@ -83,7 +83,7 @@ function gripping() {
   return { doc, graph: graphIn(doc), drive, look, grip, say, frame, into, within, out };
 }
 
-test("a folded frame is one block, in its place, and what lies in it is not drawn", () => {
+test("a folded frame is one block in its place, and its contents are not drawn", () => {
   const { graph, frame, drive, look, grip, say } = gripping();
   const { nodes } = drawn(graph, new Set([frame]));
   const ids = nodes.map(({ id }) => id);
@@ -97,7 +97,7 @@ test("a folded frame is one block, in its place, and what lies in it is not draw
   });
 });
 
-test("arrows end or begin at the block, stay the arrows they are, and their outcomes one line", () => {
+test("arrows start or end at the block and keep their ids and their shared lines", () => {
   const { graph, frame, drive, say, into, out } = gripping();
   const { edges, scene } = drawn(graph, new Set([frame]));
   const ends = (id: string) =>
@@ -115,7 +115,7 @@ test("arrows end or begin at the block, stay the arrows they are, and their outc
   expect(scene.cards.find(({ key }) => key === frame)).toMatchObject({ x: 360, width: 620 });
 });
 
-test("an arrow wholly inside is not drawn, nor one between the block and an end that lies on it", () => {
+test("an arrow within the block is not drawn, nor one to an entry or exit on it", () => {
   const { doc, frame, look, within } = gripping();
   setEntry(doc, look);
   moveActions(doc, new Map([[ENTRY, [500, 250]]] as [Key, Position][]));
@@ -125,14 +125,14 @@ test("an arrow wholly inside is not drawn, nor one between the block and an end 
   expect(edges.filter(({ source, target }) => source === ENTRY && target === frame)).toEqual([]);
 });
 
-test("only the end of an arrow that is seen can be taken and led elsewhere", () => {
+test("only the visible end of an arrow can be moved", () => {
   const { graph, frame, into, out } = gripping();
   const { edges } = drawn(graph, new Set([frame]));
   const takes = (id: string) => edges.find(({ data }) => data?.relation === id)?.reconnectable;
   expect([takes(into), takes(out)]).toEqual(["source", "target"]);
 });
 
-test("of a folded frame in a folded frame nothing is seen", () => {
+test("a folded frame within a folded frame is not drawn", () => {
   const { doc, look, grip, frame } = gripping();
   const inner = frameAt(doc, [380, 60], [240, 200], "Looking");
   const graph = graphIn(doc);
@@ -151,7 +151,7 @@ test("of a folded frame in a folded frame nothing is seen", () => {
 });
 const NO = new Map();
 
-test("states are counted by their words, the worst first, and what is not known stays so", () => {
+test("states are counted by their words, the worst first, and unknown stays unknown", () => {
   const say = (...states: [Tone, string][]) =>
     statesOf(states.map(([tone, word]) => progressIn(tone, word))).map(
       ({ count, word, tone }) => `${count} ${word} (${tone})`,
@@ -175,7 +175,7 @@ test("states are counted by their words, the worst first, and what is not known 
   ]);
 });
 
-test("the block has the state and the problems of what it hides, and of nothing else", () => {
+test("a block has the states and problems of its contents only", () => {
   const { graph, frame, drive, look, within, into } = gripping();
   const mark = (wrong: number, reasons: string) => ({ wrong, fillIn: 1, warnings: 0, reasons });
   const progress = new Map([
@@ -235,7 +235,7 @@ function made({ cards, ends, arrows, frames, folded }: Given): [Graph, Set<strin
 }
 type Given = typeof graphs extends fc.Arbitrary<infer T> ? T : never;
 
-test("nothing hidden is drawn, all else is, and every arrow is drawn or wholly inside", () => {
+test("exactly the elements that are not hidden are drawn, and every other arrow lies within a block", () => {
   fc.assert(
     fc.property(graphs, (given) => {
       const [graph, folded] = made(given);
@@ -263,7 +263,7 @@ test("nothing hidden is drawn, all else is, and every arrow is drawn or wholly i
   );
 });
 
-test("without folded frames everything is drawn by the same elements as ever", () => {
+test("without folded frames all elements are the same as without folding", () => {
   fc.assert(
     fc.property(graphs, (given) => {
       const [graph] = made(given);
@@ -280,7 +280,7 @@ test("without folded frames everything is drawn by the same elements as ever", (
   );
 });
 
-test("unfolding what hides something shows it, and unfolds nothing else", () => {
+test("unfolding the frames that hide an element shows it, and unfolds no others", () => {
   fc.assert(
     fc.property(graphs, fc.nat(6), (given, which) => {
       const [graph, folded] = made(given);
@@ -296,7 +296,7 @@ test("unfolding what hides something shows it, and unfolds nothing else", () => 
   );
 });
 
-test("a block that others move or resize is where they put it", () => {
+test("a block that others move or resize is drawn at its new place", () => {
   const { doc, frame } = gripping();
   changeNote(doc, frame, { at: [340, 20], size: [700, 320] });
   const { scene } = drawn(graphIn(doc), new Set([frame]));

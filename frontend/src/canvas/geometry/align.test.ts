@@ -8,14 +8,14 @@ const blocks: readonly Block[] = [
   { key: "c", x: 180, y: 300, width: 100, height: 80 },
 ];
 
-test("aligned things share an edge or a middle, and the outermost decides which", () => {
+test("aligned cards share an edge or a middle, which the outermost card sets", () => {
   expect([...align(blocks, "left").values()].map(([x]) => x)).toEqual([0, 0, 0]);
   expect([...align(blocks, "right").values()].map(([x]) => x)).toEqual([270, 310, 270]);
   expect([...align(blocks, "center").values()].map(([x]) => x)).toEqual([135, 155, 135]);
   expect([...align(blocks, "bottom").values()].map(([, y]) => y)).toEqual([340, 340, 300]);
 });
 
-test("distributed things have equal gaps, keep their order, and the ends stay", () => {
+test("distributed cards have equal gaps and keep their order; the outermost stay", () => {
   const block = fc.record({
     x: fc.integer({ min: -900, max: 900 }),
     y: fc.integer({ min: -900, max: 900 }),

@@ -24,7 +24,7 @@ const after = new Map([
   ["c", [600, 0]],
 ] as const);
 
-test("a frame goes round what lay in it, with the air that it had", () => {
+test("a frame surrounds its former contents with its former margins", () => {
   const frame = note("g/f", "frame", [-30, 170], [260, 370]);
   expect(notesAfter([frame], before, after, sizes, "right").get("g/f")).toEqual({
     at: [270, -30],
@@ -32,7 +32,7 @@ test("a frame goes round what lay in it, with the air that it had", () => {
   });
 });
 
-test("a note goes along with the card that it is near, and covers none", () => {
+test("a note moves along with the nearest card, and covers none", () => {
   const beside = note("g/n", "note", [240, 420], [180, 60]);
   expect(notesAfter([beside], before, after, sizes, "right").get("g/n")?.at).toEqual([840, 20]);
   const between = note("g/m", "note", [10, 110], [180, 60]);

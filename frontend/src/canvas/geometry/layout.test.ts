@@ -57,7 +57,7 @@ function nearest(graph: Graph, places: ReadonlyMap<Key, readonly [number, number
   return least;
 }
 
-test("cards that are laid out are at least 32 px apart, whatever leads where", async () => {
+test("cards that are laid out are at least 32 px apart for any arrows", async () => {
   await fc.assert(
     fc.asyncProperty(graphs, async (graph) => {
       const places = await laidOut(graph);
@@ -71,7 +71,7 @@ test("cards that are laid out are at least 32 px apart, whatever leads where", a
 });
 
 test.each(["right", "down"] as const)(
-  "the cards of a chain stand level, to the %s",
+  "the cards of a chain stand in line, direction %s",
   async (direction) => {
     const places = await laidOut(chain(4, direction));
     const across = ["a0", "a1", "a2", "a3"].map(
@@ -81,7 +81,7 @@ test.each(["right", "down"] as const)(
   },
 );
 
-test("what stands without the layout overlaps nothing either", () => {
+test("cards of the simple layout do not overlap either", () => {
   fc.assert(
     fc.property(graphs, (graph) => {
       expect(nearest(graph, arrange(graph))).toBeGreaterThanOrEqual(32);
@@ -89,7 +89,7 @@ test("what stands without the layout overlaps nothing either", () => {
   );
 });
 
-test("an action without a place finds one that is free, and moves nothing", () => {
+test("an action without a place gets a free one, and moves nothing", () => {
   fc.assert(
     fc.property(graphs, fc.nat(13), (graph, some) => {
       const places = arrange(graph);
@@ -118,7 +118,7 @@ const short = graphs
   })
   .filter((graph) => Math.max(...ranksOf(graph).values()) < 5);
 
-test("what follows stands in the direction of the graph, the entry first and the exit last", async () => {
+test("actions are placed in the direction of the graph, the entry first and the exit last", async () => {
   await fc.assert(
     fc.asyncProperty(short, async (graph) => {
       const [places, sizes] = [await laidOut(graph), estimatedSizes(graph)];
@@ -138,7 +138,7 @@ test("what follows stands in the direction of the graph, the entry first and the
   );
 });
 
-test("a loop leads back and does not turn round what it repeats", async () => {
+test("a loop leads back, and the order of its actions stays", async () => {
   const graph = graphOf(3, [
     [ENTRY, "a0"],
     ["a0", "a1"],
@@ -159,7 +159,7 @@ test.each(["right", "down"] as const)("a long chain is wrapped: %s", async (dire
   expect([right, low].every((length) => length < 1_900)).toBe(true);
 });
 
-test("the same graph is laid out the same, whatever its keys are", async () => {
+test("equal graphs are laid out equally, whatever their keys are", async () => {
   await fc.assert(
     fc.asyncProperty(graphs, async (graph) => {
       const renamed = (key: Key) =>

@@ -11,14 +11,14 @@ const room = { width: 800, height: 640 };
 const AIR = 28;
 const tall = { x: 100, y: -50, width: 600, height: 2000 };
 
-test("the whole is shown where its text can be read", () => {
+test("a graph is shown whole if its text is readable", () => {
   const small = { x: 0, y: 0, width: 300, height: 300 };
   const view = firstViewport(small, room, [150, 0], 0.75, "down");
   expect(view).toEqual(wholeViewport(small, room));
   expect(view.zoom).toBe(1);
 });
 
-test("of a tall graph the top is shown, in the middle, and readable", () => {
+test("a tall graph is shown from its top, centred and readable", () => {
   const view = firstViewport(tall, room, [400, -40], 0.75, "down");
   expect(view.zoom).toBe(0.75);
   expect(tall.y * view.zoom + view.y).toBe(AIR);
@@ -33,14 +33,14 @@ test("a graph that is too wide is centred on its entry, never beyond its edges",
   expect(wide.x * edge.zoom + edge.x).toBe(AIR);
 });
 
-test("from left to right a graph begins at its left, at the height of its entry", () => {
+test("a graph that runs right is shown from its left, at the height of its entry", () => {
   const large = { x: -100, y: 0, width: 4000, height: 3000 };
   const view = firstViewport(large, room, [-60, 1500], 0.9, "right");
   expect(large.x * view.zoom + view.x).toBe(AIR);
   expect(1500 * view.zoom + view.y).toBeCloseTo((room.height - 44) / 2, 0);
 });
 
-test("the whole fits, however tall it is, beside bars and drawers", () => {
+test("the whole graph fits beside bars and drawers, however tall it is", () => {
   const view = wholeViewport(tall, room);
   expect((tall.y + tall.height) * view.zoom + view.y).toBeLessThanOrEqual(room.height - 44);
   const covered = { left: 0, top: 40, right: 300, bottom: 60 };
@@ -49,7 +49,7 @@ test("the whole fits, however tall it is, beside bars and drawers", () => {
   expect((tall.x + tall.width) * beside.zoom + beside.x).toBeLessThanOrEqual(room.width - 300);
 });
 
-test("what is in view already moves nothing", () => {
+test("showing a visible box does not move the view", () => {
   const card = { x: 100, y: 100, width: 208, height: 100 };
   expect(viewportShowing(card, room, { x: 0, y: 0, zoom: 1 })).toBeNull();
   const view = viewportShowing({ ...card, y: 1500 }, room, { x: 0, y: 0, zoom: 1 });
@@ -58,7 +58,7 @@ test("what is in view already moves nothing", () => {
   expect(1600 + (view?.y ?? 0)).toBeLessThan(room.height - 44);
 });
 
-test("the box is round everything, with sizes where they are known", () => {
+test("the bounds surround everything, with measured sizes where known", () => {
   const places = new Map([
     ["a", [0, 0]],
     ["b", [300, 400]],
@@ -77,7 +77,7 @@ test("two views that look the same are alike", () => {
   expect(isSameViewport({ x: 0, y: 0, zoom: 1 }, { x: 9, y: 0, zoom: 1 })).toBe(false);
 });
 
-test("what is shown whole has its lines in view, which may run beyond all cards", () => {
+test("showing the whole graph includes lines beyond all cards", () => {
   const places = new Map([["a", [0, 0] as const]]);
   const points = [
     [-40, 20],

@@ -26,19 +26,19 @@ test("a problem of an arrow marks the arrow, one of an action its card, one of t
   expect([...marks.keys()]).toEqual(["a>b", "b"]);
 });
 
-test("a problem marks every place of which the same is said", () => {
+test("a problem marks every place to which it refers", () => {
   const also = [{ relation: "b>c" }];
   const marks = marksOf([{ ...problem("H12", "warning", { relation: "a>b" }), also }]);
   expect([...marks.keys()]).toEqual(["a>b", "b>c"]);
 });
 
-test("what is so with nearly every graph on an engine marks no arrow", () => {
+test("a note that applies to nearly every graph marks no arrow", () => {
   const also = [{ relation: "b>c" }];
   const marks = marksOf([{ ...problem("H3", "warning", { relation: "a>b" }), also }]);
   expect([...marks.keys()]).toEqual([]);
 });
 
-test("a mark names every reason with its code last, what is wrong first", () => {
+test("a mark lists every reason with its code, errors first", () => {
   const mark = marksOf([
     problem("slow", "warning", { aid: "a" }),
     problem("type-empty", "error", { aid: "a" }),

@@ -17,7 +17,7 @@ const shown = (text: string) =>
     </NoteLinksContext>,
   );
 
-test("notes are Markdown, and a line stays a line", () => {
+test("notes are Markdown that keeps line breaks", () => {
   expect(shown("**wait** for *light*\nthen `go`")).toContain(
     "<p><strong>wait</strong> for <em>light</em>\nthen <code>go</code></p>",
   );
@@ -26,7 +26,7 @@ test("notes are Markdown, and a line stays a line", () => {
   expect(shown("    as it was")).toContain("<p>as it was</p>");
 });
 
-test("links lead to the web and to mail, in a page that cannot reach back", () => {
+test("links lead to web and mail addresses only, and the opened page cannot access this one", () => {
   expect(shown("[a](https://x.test/y)")).toContain(
     '<a class="nodrag" href="https://x.test/y" target="_blank" rel="noopener noreferrer"',
   );
@@ -45,7 +45,7 @@ test("links lead to the web and to mail, in a page that cannot reach back", () =
   }
 });
 
-test("links to actions have their name of today; those that lead nowhere are words", () => {
+test("links to actions show their current name; links without an action are text", () => {
   expect(shown("do [[Old 1#aaaaaaaaaaaa]]")).toMatch(/<button[^>]*>Grip 0<\/button>/);
   expect(shown("do [[Other 1]]")).toMatch(
     /<span class="[^"]*" title="No action.*">Other 1<\/span>/,
@@ -57,7 +57,7 @@ test("links to actions have their name of today; those that lead nowhere are wor
 const ALLOWED =
   /<\/?(?:div|p|strong|em|code|pre|br|hr|blockquote|ul|ol|li|a|button|span)(?: (?:class|data-heading|start|href|target|rel|title|type)="[^"<>]*")*\/?>/g;
 
-test("whatever is written, nothing but plain elements comes of it, and no script", () => {
+test("any text is rendered as plain elements, never as a script", () => {
   const hostile = fc.constantFrom(
     "<img src=x onerror=alert(1)>",
     "<script>alert(1)</script>",
@@ -90,7 +90,7 @@ test("whatever is written, nothing but plain elements comes of it, and no script
 });
 
 test.each(["> ", "*", "[", "![", "`", "- ", "<", "_a", "[[", "[a](", "&", "\\", "1. "])(
-  "a note that is nothing but %s is shown, not waited for",
+  "a note that is only %s is shown without delay",
   (piece) => {
     const html = shown(piece.repeat(5000 / piece.length));
     expect(html.length).toBeGreaterThan(0);

@@ -13,7 +13,7 @@ test("the arrows of one relation are selected together", () => {
   expect([...again]).toEqual(["a>b"]);
 });
 
-test("a selection that stays the same is the same", () => {
+test("an unchanged selection is the identical object", () => {
   const before = new Set(["a"]);
   expect(selectionAfter(before, [select("a", true)])).toBe(before);
 });
@@ -30,7 +30,7 @@ const person = (
   presence: { selection: [], ...(drag ? { drag } : {}) },
 });
 
-test("what somebody drags moves for everybody, and one's own drag wins", () => {
+test("drags of others move their elements, and one's own drag wins", () => {
   const rest = new Map([
     ["a", [0, 0]],
     ["b", [10, 10]],
@@ -48,7 +48,7 @@ test("a person with two windows has one face", () => {
   ]);
 });
 
-test("the search offers what fits, best first, and a new action of that name", () => {
+test("the search offers matches, best first, and a new action of that name", () => {
   const known = [{ name: "PreDrive" }, { name: "DriveTo" }, { name: "Say" }];
   expect(candidates(known, "drive").map(({ name }) => name)).toEqual([
     "DriveTo",
@@ -59,7 +59,7 @@ test("the search offers what fits, best first, and a new action of that name", (
   expect(candidates(known, "").length).toBe(3);
 });
 
-test("a graph comes after a new action of what was typed, unless that is its name", () => {
+test("graphs come after the new action, unless the text is their exact name", () => {
   const known = [{ name: "fetch_tool", ofGraph: true } as const, { name: "FetchBox" }];
   expect(candidates(known, "Fetch").map(({ name }) => name)).toEqual([
     "FetchBox",

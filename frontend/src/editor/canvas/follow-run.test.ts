@@ -9,11 +9,11 @@ const frame = { width: 900, height: 500 };
 const card = (x: number, y: number) => ({ x, y, width: CARD.width, height: CARD.height });
 const zoomed = (zoom: number) => ({ x: 0, y: 0, zoom });
 
-test("what runs near the middle leaves the view where it is", () => {
+test("an action that runs near the middle does not move the view", () => {
   expect(followingViewport(card(300, 200), frame, zoomed(1))).toBeNull();
 });
 
-test("what leaves the middle is brought back with room ahead of it, at the same zoom", () => {
+test("an action that runs outside of the middle is brought into view at the same zoom, with room ahead", () => {
   const next = followingViewport(card(2_000, 200), frame, zoomed(0.8));
   expect(next?.zoom).toBe(0.8);
   const left = 2_000 * 0.8 + (next?.x ?? 0);
@@ -21,7 +21,7 @@ test("what leaves the middle is brought back with room ahead of it, at the same 
   expect(left + CARD.width * 0.8).toBeLessThan(frame.width / 2 + 20);
 });
 
-test("wherever a card stands, one motion is enough", () => {
+test("one motion of the view is enough for a card at any place", () => {
   const place = fc.integer({ min: -5_000, max: 5_000 });
   const zoom = fc.double({ min: 0.1, max: 1.5, noNaN: true });
   fc.assert(
@@ -33,7 +33,7 @@ test("wherever a card stands, one motion is enough", () => {
   );
 });
 
-test("of several that run all are shown where they fit, else the latest", () => {
+test("all running actions are shown if they fit, else the latest", () => {
   const places = new Map<string, readonly [number, number]>([
     ["a", [0, 0]],
     ["b", [300, 0]],
@@ -45,7 +45,7 @@ test("of several that run all are shown where they fit, else the latest", () => 
   expect(box(["gone"])).toBeNull();
 });
 
-test("what runs in a folded frame is followed to its block", () => {
+test("an action that runs in a folded frame is followed at its block", () => {
   const runs = (since: number): Progress => ({
     ...{ tone: "run", word: "running", since, took: null, atMost: null },
     ...{ visits: 1, inferred: false, message: null },
@@ -65,7 +65,7 @@ test("what runs in a folded frame is followed to its block", () => {
 
 const Nothing = () => null;
 
-test("what runs on a card with a graph in it is followed there, and not the whole card", () => {
+test("an action in an expanded graph is followed at its place, not the whole card", () => {
   const places = new Map([["a", [1_000, 500] as const]]);
   const sizes = new Map([["a", { width: 900, height: 400 }]]);
   const part = (path: string, x: number, tone: string, expanded = false) =>

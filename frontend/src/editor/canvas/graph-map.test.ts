@@ -14,14 +14,14 @@ const card = (x: number, y: number, actor = "") =>
     data: { action: { actor }, progress: null },
   }) as unknown as CanvasNode;
 
-test("cards of one colour are one path, and what has no size is left out", () => {
+test("cards of one colour are one path, and cards without a size are left out", () => {
   const unknown = { ...card(5000, 5000), measured: {} } as CanvasNode;
   const { paths, area } = mapMarks([card(0, 0), card(300, 50), card(0, 200, "Ada"), unknown]);
   expect(paths.map(([, path]) => path.split("M").length - 1)).toEqual([2, 1]);
   expect(area).toEqual({ x: 0, y: 0, width: 500, height: 300 });
 });
 
-test("the map shows all of the graph and all that is seen, its middle in its middle", () => {
+test("the map shows the whole graph and the visible part, centred", () => {
   const seen = seenArea({ x: -1000, y: -20, zoom: 2 }, { width: 2000, height: 400 });
   expect(seen).toEqual({ x: 500, y: 10, width: 1000, height: 200 });
   const frame = mapFrame({ x: 0, y: 0, width: 600, height: 220 }, seen);
@@ -32,7 +32,7 @@ test("the map shows all of the graph and all that is seen, its middle in its mid
   expect(frame.width / frame.height).toBeCloseTo(142 / 102);
 });
 
-test("a map of nothing shows what is seen", () => {
+test("the map of an empty graph shows the visible part", () => {
   const seen = seenArea({ x: -40, y: -30, zoom: 1 }, { width: 132, height: 92 });
   expect(mapFrame(mapMarks([]).area, seen)).toEqual({
     x: 35,
@@ -43,7 +43,7 @@ test("a map of nothing shows what is seen", () => {
   });
 });
 
-test("a map is needed as soon as anything is out of sight", () => {
+test("the map is needed if any part of the graph is out of sight", () => {
   const seen = { x: 0, y: 0, width: 800, height: 600 };
   const at = (x: number, y: number) => ({ x, y, width: 200, height: 100 });
   expect(isWithin(at(0, 0), seen)).toBe(true);
@@ -57,7 +57,7 @@ test("a map is needed as soon as anything is out of sight", () => {
     expect(isWithin(at(x, y), seen)).toBe(false);
 });
 
-test("of a card with a graph in it the map shows what is in it, in the colours of their states", () => {
+test("the map shows the actions of an expanded graph in the colours of their states", () => {
   const action = { actor: "" } as Action;
   const part = (x: number, expanded: boolean, progress: unknown) =>
     ({ path: "p", x, y: 40, width: 50, height: 20, action, expanded, progress }) as PartOnCard;

@@ -59,19 +59,19 @@ const enter = () =>
   fire(found("input"), new KeyboardEvent("keydown", { key: "Enter", bubbles: true }));
 const names = () => graphNow(doc).actions.map(({ name }) => name);
 
-test("Enter takes what the keys chose, also when the list opens under a pointer at rest", () => {
+test("Enter takes the option chosen by keys, also when the list opens under a resting pointer", () => {
   fire(found("[role=option]:last-child"), new Event("pointerover", { bubbles: true }));
   enter();
   expect(names()).toEqual(["Drive"]);
 });
 
-test("a pointer that moves over the list chooses", () => {
+test("moving the pointer over the list chooses an option", () => {
   fire(found("[role=option]:last-child"), new Event("pointermove", { bubbles: true }));
   enter();
   expect(names()).toEqual(["Say"]);
 });
 
-test("Enter that ends a word of an input method adds nothing, the next one does", () => {
+test("Enter that ends a composition adds nothing, the next one does", () => {
   const composing = { key: "Enter", bubbles: true, isComposing: true };
   fire(found("input"), new KeyboardEvent("keydown", composing));
   // Safari tells of it after the composition has ended, by this number alone.

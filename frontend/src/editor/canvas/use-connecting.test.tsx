@@ -48,7 +48,7 @@ function underPointer(key: string): Element {
 const click = (target: Element) =>
   act(() => void connecting.onClick({ target, clientX: 0, clientY: 0 } as unknown as MouseEvent));
 
-test("who taps an outcome and then draws an arrow by dragging is not asked what follows any more", () => {
+test("drawing an arrow by dragging cancels an outcome that was tapped before", () => {
   const [a, b, c] = ["A", "B", "C"].map((name) => addAction(context.doc, { name }));
   if (!a || !b || !c) throw new Error("no actions");
   click(underPointer(a));

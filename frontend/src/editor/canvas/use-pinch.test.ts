@@ -6,7 +6,7 @@ const under = (view: { x: number; y: number; zoom: number }, x: number, y: numbe
   (y - view.y) / view.zoom,
 ];
 
-test("what lies between two fingers stays between them", () => {
+test("a pinch keeps the same part of the canvas between the fingers", () => {
   const view = { x: 40, y: -20, zoom: 0.8 };
   const from = { middle: [300, 400], apart: 200 } as const;
   const to = { middle: [350, 380], apart: 300 } as const;

@@ -48,7 +48,7 @@ afterEach(() => {
   document.body.replaceChildren();
 });
 
-test("what leads into a folded frame unfolds it, and what leads beside it does not", () => {
+test("showing an action in a folded frame unfolds it; showing another one does not", () => {
   const inside = addAction(doc, { name: "Look", position: [50, 50] });
   const outside = addAction(doc, { name: "Grip", position: [900, 50] });
   show();
@@ -58,7 +58,7 @@ test("what leads into a folded frame unfolds it, and what leads beside it does n
   expect(fold).toHaveBeenCalledWith([frame], false);
 });
 
-test("what is chosen and moved into a folded frame is not lost from sight", () => {
+test("a selected action that is moved into a folded frame unfolds it", () => {
   const moved = addAction(doc, { name: "Look", position: [900, 50] });
   show(moved);
   moveActions(doc, new Map([[moved, [50, 50] as const]]));
@@ -66,7 +66,7 @@ test("what is chosen and moved into a folded frame is not lost from sight", () =
   expect(fold).toHaveBeenCalledWith([frame], false);
 });
 
-test("a frame that is folded round what is chosen stays folded", () => {
+test("a frame that is folded around the selection stays folded", () => {
   const inside = addAction(doc, { name: "Look", position: [50, 50] });
   folded = new Set();
   show(inside);

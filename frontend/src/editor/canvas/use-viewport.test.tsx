@@ -24,7 +24,7 @@ function draw(): void {
   vi.advanceTimersByTime(50);
 }
 
-test("a card that is drawn some frames later gets the focus of the search that closed", () => {
+test("a card that is rendered some frames later gets the focus after the search has closed", () => {
   found("#search").focus();
   focusCard(found("main"), "a", 12);
   found("#search").remove();
@@ -32,7 +32,7 @@ test("a card that is drawn some frames later gets the focus of the search that c
   expect(document.activeElement).toBe(found("[data-id=a]"));
 });
 
-test("a card that is drawn late takes no focus from a field that somebody went to meanwhile", () => {
+test("a card that is rendered late takes no focus from a field focused meanwhile", () => {
   found("#search").focus();
   focusCard(found("main"), "a", 12);
   found("#search").remove();

@@ -2,7 +2,7 @@ import fc from "fast-check";
 import { expect, test } from "vitest";
 import { pagesOf } from "./graph-print";
 
-test("a picture that fits is one page, and is never blown up", () => {
+test("a picture that fits is one page, and is never enlarged", () => {
   expect(pagesOf(600, 300)).toEqual({
     pages: [{ x: 0, y: 0, width: 600, height: 300 }],
     scale: 1,
@@ -13,7 +13,7 @@ test("a picture that fits is one page, and is never blown up", () => {
   expect(pagesOf(500, 4000).pages.length).toBeGreaterThan(1);
 });
 
-test("every spot of a picture of any size is on some page, and pages are not without end", () => {
+test("pages cover a picture of any size, and their number is bounded", () => {
   const length = fc.integer({ min: 1, max: 200_000 });
   fc.assert(
     fc.property(

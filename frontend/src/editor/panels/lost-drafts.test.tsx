@@ -96,7 +96,7 @@ function press(label: string): void {
   act(() => button.click());
 }
 
-test("what somebody types in an action that a colleague deletes is offered, and restored with it", () => {
+test("text typed in an action that another person deletes is offered and can be restored with it", () => {
   type("Drives to the dock");
   removeActions(colleague, [drive]);
   hear();
@@ -108,7 +108,7 @@ test("what somebody types in an action that a colleague deletes is offered, and 
   ]);
 });
 
-test("text that was written a moment before is offered, too, as long as its field was not left", () => {
+test("text that was just written is offered, too, while its field has the focus", () => {
   type("Drives");
   act(() => void window.dispatchEvent(new Event("pagehide")));
   expect(graphIn(doc).actions[0]?.description).toBe("Drives");
@@ -120,7 +120,7 @@ test("text that was written a moment before is offered, too, as long as its fiel
   expect(graphIn(doc).actions[0]?.description).toBe("Drives");
 });
 
-test("who typed nothing there is not disturbed by a deletion", () => {
+test("a person who typed nothing gets no notice of a deletion", () => {
   removeActions(colleague, [drive]);
   hear();
   expect(shown()).not.toContain("deleted");
@@ -138,7 +138,7 @@ test("a comment that is not sent is offered when its action is deleted", () => {
   expect(graphIn(doc).actions).toHaveLength(1);
 });
 
-test("who renamed what a colleague deleted is told, and can restore it", async () => {
+test("a person who has renamed a deleted action is told and can restore it", async () => {
   act(() => void rename(doc, drive, "DriveFast"));
   removeActions(colleague, [drive]);
   hear();
