@@ -14,6 +14,7 @@ export interface SuggestedRename {
   readonly graphs: number;
 }
 
+/** Return a text that identifies a rename. */
 export const keyOfRename = ({ side, from, to }: Omit<SuggestedRename, "graphs">): string =>
   `${side} ${from} ${to}`;
 
@@ -91,6 +92,7 @@ export function clashes(
   );
 }
 
+/** Return the chosen renames as the server takes them. */
 export function renamesOf(ticked: ReadonlySet<string>, all: readonly SuggestedRename[]): Renames {
   const of = (side: ParameterSide) =>
     all

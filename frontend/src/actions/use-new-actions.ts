@@ -16,6 +16,7 @@ function isTaken(error: unknown): boolean {
   return error instanceof Refusal && error.details.status === 409;
 }
 
+/** Return the functions that add and delete actions, with their state. */
 export function useNewActions() {
   const client = useQueryClient();
   const { runner } = useLive();

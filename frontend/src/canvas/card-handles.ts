@@ -79,6 +79,7 @@ export function expectedCard(
   }));
 }
 
+/** Return the size and the handle of the entry or exit. */
 export function expectedEnd(key: typeof ENTRY | typeof EXIT, direction: Direction): Known {
   return remembered(`${direction} ${key}`, () => {
     const measured = pillSize(direction);

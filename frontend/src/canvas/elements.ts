@@ -287,6 +287,7 @@ export interface CardSurroundings {
   readonly names: Names;
 }
 
+/** Return the names of all cards; the identical `before` if none has changed. */
 export function surroundingsOf(graph: Graph, before: CardSurroundings | null): CardSurroundings {
   const names = namesOf(graph);
   return before !== null && alikeMaps(before.names, names) ? before : { names };
@@ -342,6 +343,7 @@ function arrowsOf(relation: Relation, options: ArrowOptions, { names }: CardSurr
   });
 }
 
+/** Return one arrow for each outcome with a response, without arrows to missing cards. */
 export function edgesOf(
   { relations }: Pick<Graph, "relations">,
   options: ArrowOptions,

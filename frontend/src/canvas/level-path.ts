@@ -13,6 +13,7 @@ export interface Level {
 const MOST = 20; // levels; on a longer way, for example in a cycle, the outermost are dropped
 const LEVEL = /^([\w-]{1,64})~([\w-]{1,64})$/;
 
+/** Return the levels in the search part of an address; invalid ones are left out. */
 export function levelsOf(search: string): Level[] {
   return new URLSearchParams(search).getAll("in").flatMap((text) => {
     const [, graph, action] = LEVEL.exec(text) ?? [];

@@ -212,6 +212,7 @@ interface GlyphsProps {
   untaken: readonly Outcome[];
 }
 
+/** Shows the signs of outcomes in their colours. */
 export function Glyphs({ outcomes, untaken }: GlyphsProps) {
   return outcomes.map((outcome) => (
     <span
@@ -238,6 +239,7 @@ function DraggedLine({ from, dragged }: { from: Point; dragged: DraggedOutcome }
   );
 }
 
+/** The colours of lines and arrow heads by what they show. */
 export const TIPS = {
   edge: "var(--edge)",
   ignore: "var(--ink4)",

@@ -25,6 +25,7 @@ const SLACK = 0.001;
 
 const ORDER: readonly Detail[] = ["sign", "far", "middle", "near"];
 
+/** Return how much is drawn at a zoom. `before`: the detail drawn so far; null at first. */
 export function detailAt(zoom: number, before: Detail | null): Detail {
   const [now = "sign"] = FROM.find(([, from]) => zoom >= from - SLACK) ?? [];
   if (before === null || ORDER.indexOf(now) <= ORDER.indexOf(before)) return now;
@@ -54,6 +55,7 @@ export const STATE_LETTER: Readonly<Record<Tone, string>> = {
   unknown: "?",
 };
 
+/** Writes the detail and the size of a screen pixel to the canvas element whenever the zoom changes. */
 export function ZoomDetail() {
   const store = useStoreApi();
   useLayoutEffect(() => {

@@ -25,6 +25,7 @@ function saveBlob(blob: Blob, name: string): void {
   setTimeout(() => URL.revokeObjectURL(url), 10_000);
 }
 
+/** Download the graph in a format; a failed picture is reported as a notification. */
 export async function exportGraph(context: EditorContext, format: ExportFormat): Promise<void> {
   const name = fileName(context.graph.name);
   if (format === "umrf") {

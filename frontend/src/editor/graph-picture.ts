@@ -27,6 +27,7 @@ async function rasterised(svg: string, width: number, height: number): Promise<B
   }
 }
 
+/** Return the picture of the canvas in the colours of the page. */
 export async function graphPicture(context: EditorContext, format: "svg" | "png"): Promise<Blob> {
   const colors = getComputedStyle(document.documentElement);
   const picture = svgPictureOf(context.graph, context.positions(), context.sizes(), (token) =>

@@ -60,6 +60,7 @@ export function runAnnouncement(graph: Graph, key: Key, { name, word }: Progress
   return `${isDrawn || name === undefined ? endName(graph, key) : name}: ${word}`;
 }
 
+/** Announces every action whose state in a run changes. */
 export function useRunAnnouncements(graph: Graph, progress: ReadonlyMap<Key, Progress>): void {
   const before = useRef(progress);
   useEffect(() => {

@@ -176,6 +176,10 @@ function canvasOf(handle: RefObject<CanvasHandle>) {
   };
 }
 
+/**
+ * Return the state of an editor. `onPanel`: called when an edit action opens a panel; `past`: the
+ * moment shown.
+ */
 export function useEditor(
   id: string,
   onPanel: (panel: Panel) => void,

@@ -9,6 +9,7 @@ import { focusField } from "../ui/focus-field";
 
 const SETTLED = 160; // ms after which the canvas has measured its cards and shown the graph
 
+/** Follows the address. `begun`: the graph has arrived and has places. */
 export function useGraphLink(context: EditorContext, begun: boolean): void {
   // Moments of the past are in the address, too, and point at no element.
   const search = withPast(useSearch(), null);

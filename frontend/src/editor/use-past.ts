@@ -36,6 +36,7 @@ interface PastState {
   readonly seen: SeenPast | null;
 }
 
+/** Return the moment of the past that is shown, and keep it in the address. */
 export function usePast(): Past {
   const [{ place, seen }, setState] = useState<PastState>(() => ({
     place: pastOf(window.location.search),

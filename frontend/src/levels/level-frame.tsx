@@ -55,6 +55,7 @@ export interface StateSource {
   readonly outermost: string;
 }
 
+/** Return the states of a level's actions; empty while nothing runs or the level is not loaded. */
 export function progressOf(
   level: LevelGraph,
   { dryRun, run, outermost }: StateSource,

@@ -10,6 +10,7 @@ import style from "./levels.module.css";
 export const MOST = 100;
 
 type LevelWay = NonNullable<FlatteningReason["at"]>;
+/** Return the full names of the actions on a way, such as `Outer_0 › Inner_0`. */
 export const wayWords = (way: LevelWay): string => way.map(({ action }) => action).join(" › ");
 
 interface Props {

@@ -137,6 +137,7 @@ export function roomFor(
   return { graph: drawn, sizes: larger, toView, toDocument };
 }
 
+/** Return the drawn places of places in the document. */
 export const placesIn = ({ toView }: Roomy, places: Positions): Positions =>
   new Map([...places].map(([key, at]) => [key, toView(at)]));
 

@@ -139,6 +139,7 @@ const ASIDE = 1e6;
  */
 type Docking = "straight" | "centred" | "bare";
 
+/** Chooses the docks of all lines of a scene: first where lines enter cards, then where they leave them. */
 export class DockPlan {
   private readonly ends = new Map<string, End>();
   private readonly cards = new BoxIndex<FlowBox & { key: string }>();

@@ -8,6 +8,7 @@ import type { RoutedLine } from "./simple-lines";
 
 const RADIUS = 10; // px
 
+/** Return points as an SVG path whose corners have the radius where there is room. */
 export function pathOf(points: readonly Point[], radius = RADIUS): string {
   const parts: string[] = [];
   for (const [i, point] of points.entries()) {

@@ -215,6 +215,7 @@ function sameScene(a: Scene, b: Scene): boolean {
   );
 }
 
+/** The lines of the surrounding canvas. */
 export const LineContext = createContext<LineStore>(new LineStore());
 
 /** Return the line of a bundle; null while it is unknown. */
@@ -243,4 +244,5 @@ export interface LineEditing {
   nameOf(bundle: Bundle): string;
 }
 
+/** Functions to change lines; null where lines are read-only. */
 export const LineEditingContext = createContext<LineEditing | null>(null);

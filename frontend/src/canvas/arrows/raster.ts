@@ -33,6 +33,7 @@ const isNear = ({ u0, v0 }: FlowBox, bounds: FlowBox) =>
 const fits = ({ u0, u1, v0, v1 }: FlowBox) =>
   ((u1 - u0) / STEP + 50) * ((v1 - v0) / STEP + 50) < MOST_CELLS;
 
+/** The grid of one scene as flat arrays, indexed row by row. */
 export class Raster {
   readonly width: number;
   readonly height: number;

@@ -24,6 +24,7 @@ interface Leg {
 const ALONG = 0;
 const WHOLE: Leg = { way: ALONG, inner: false, next: null };
 
+/** Finds ways over one raster; its arrays are used again for each search. */
 export class Router {
   readonly raster: Raster;
   private readonly price: Float32Array;

@@ -52,12 +52,14 @@ export interface FlowBox {
   readonly v1: number;
 }
 
+/** Return an area in coordinates along and across the direction. */
 export function boxOf({ x, y, width, height }: Area, direction: Direction): FlowBox {
   return direction === "right"
     ? { u0: x, u1: x + width, v0: y, v1: y + height }
     : { u0: y, u1: y + height, v0: x, v1: x + width };
 }
 
+/** Return the canvas point of coordinates along and across the direction. */
 export const pointOf = (u: number, v: number, direction: Direction): Point =>
   direction === "right" ? [u, v] : [v, u];
 
@@ -87,6 +89,7 @@ export interface GridPoint {
   readonly row: number;
 }
 
+/** Return the point of the grid that is nearest to a canvas point. */
 export function gridPoint([x, y]: Point, { direction, offset }: Scene): GridPoint {
   const [u, v] = direction === "right" ? [x, y] : [y, x];
   return { column: Math.round(u / STEP), row: Math.round((v - offset) / STEP) };

@@ -34,15 +34,18 @@ export interface RoutedLine {
 
 export type LineMap = ReadonlyMap<string, RoutedLine>;
 
+/** Return a text that identifies the ends and waypoints of a line, and the grid of its scene. */
 export function endsOf({ start, end, line }: Dock, scene: Scene): string {
   const from = `${start.column},${start.row}`;
   const waypoints = (line.waypoints ?? []).map((point) => ` ${point}`).join("");
   return `${scene.direction} ${scene.offset} ${from} ${end.column},${end.row}${waypoints}`;
 }
 
+/** Return the waypoints of a line on the grid. */
 export const waypointsOf = ({ line }: Dock, scene: Scene): GridPoint[] =>
   (line.waypoints ?? []).map((point) => gridPoint(point, scene));
 
+/** Return the canvas points of points of the grid. */
 export const canvasPoints = (points: readonly GridPoint[], plan: DockPlan, scene: Scene): Point[] =>
   points.map(({ column, row }) => canvasPoint(plan, scene.direction, column, row));
 
@@ -113,13 +116,16 @@ function* simplyThrough(
   }
 }
 
+/** Return the canvas point of a column and row of the grid. */
 export const canvasPoint = (plan: DockPlan, direction: Direction, column: number, row: number) =>
   pointOf(column * STEP, plan.v(row), direction);
 
+/** Return the canvas point in the middle of a box. */
 export function middleOf({ u0, u1, v0, v1 }: FlowBox, direction: Direction): Point {
   return pointOf((u0 + u1) / 2, (v0 + v1) / 2, direction);
 }
 
+/** Return the first points of a line, from the side of its card to the row of its pill. */
 export function departure({ from, start }: Dock, plan: DockPlan, direction: Direction): Point[] {
   const v = plan.v(start.row);
   const first = pointOf(from.u, from.v, direction);
@@ -129,6 +135,7 @@ export function departure({ from, start }: Dock, plan: DockPlan, direction: Dire
     : [first, pointOf(from.u + LINK, from.v, direction), pointOf(from.u + LINK, v, direction)];
 }
 
+/** Return the last point of a line, at the side of the card that it enters. */
 export const arrival = ({ to }: Dock, direction: Direction): Point =>
   pointOf(to.u, to.v, direction);
 

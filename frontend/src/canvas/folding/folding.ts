@@ -33,6 +33,7 @@ export interface Folding {
 
 const areaOf = ({ size: [width, height] }: Note) => width * height;
 
+/** Return the frames of a graph. */
 export const framesOf = (graph: Graph): Note[] =>
   notesOf(graph).filter(({ kind }) => kind === "frame");
 

@@ -48,6 +48,7 @@ const AS_IT_STANDS = {
   ...{ expanded: undefined, toView: same, toDocument: same, placesOf: same, sizesOf: same },
 };
 
+/** Return the graph as it is drawn; without expanded cards that is the graph itself. */
 export function useSpread({ graph, rest, folding, flow }: StandingGraph): Spread {
   const spread = useWatched(spreading);
   return useMemo(

@@ -15,6 +15,7 @@ export type Align = "left" | "center" | "right" | "top" | "middle" | "bottom";
 const right = (block: Block) => block.x + block.width;
 const bottom = (block: Block) => block.y + block.height;
 
+/** Return the places of blocks that share an edge or a middle, which the outermost block sets. */
 export function align(blocks: readonly Block[], how: Align): Positions {
   const left = Math.min(...blocks.map(({ x }) => x));
   const top = Math.min(...blocks.map(({ y }) => y));

@@ -34,6 +34,7 @@ const HEIGHT = { plain: 68, low: 58, least: 88, lines: 4, line: 18 } as const;
 /** px kept free between cards that have not been laid out. */
 const GAP = { along: 108, across: 56 } as const;
 
+/** Return the size of the entry and exit of a graph. */
 export const pillSize = (direction: Direction): Size => (direction === "right" ? SHORT_PILL : PILL);
 
 /** Cached numbers of rows; in a large graph few actions change at once. */

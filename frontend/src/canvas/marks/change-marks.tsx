@@ -66,6 +66,7 @@ export function ChangeMarked({ marks, children }: ChangeMarkedProps) {
 
 export const CHANGE_SIGNS = { added: "+", removed: "−", changed: "△" } as const;
 
+/** Return the mark of an action or note (by key) or of a relation (by id); undefined without one. */
 export function useChangeMark(key: string): ChangeMark | undefined {
   return useWatched(use(ChangeMarksContext), (marks) => marks.get(key));
 }

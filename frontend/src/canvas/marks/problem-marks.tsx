@@ -16,6 +16,7 @@ export type ProblemMarks = ReadonlyMap<string, ProblemMark>;
 
 export const NO_PROBLEM_MARKS: ProblemMarks = new Map();
 
+/** Return the marks of all places on the canvas to which problems refer. */
 export function problemMarksOf(told: readonly ToldProblem[]): ProblemMarks {
   const places = new Map<string, ToldProblem[]>();
   for (const each of told) {
@@ -42,6 +43,7 @@ export function problemMarkWords(mark: ProblemMark | null | undefined): string {
   return `. ${countWords(mark).join(", ")}. ${mark.reasons.replaceAll("\n", " ")}`;
 }
 
+/** Shows the counts of a mark, with all messages as a tooltip and for screen readers. */
 export function ProblemBadge({ mark, on }: { mark: ProblemMark; on: "card" | "arrow" }) {
   const { wrong, fillIn, warnings } = mark;
   return (

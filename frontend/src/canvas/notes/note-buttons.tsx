@@ -19,6 +19,7 @@ export interface NoteLinks {
 
 export const NoteLinksContext = createContext<NoteLinks | null>(null);
 
+/** Shows a link to an action by its current name; a click selects and shows the action. */
 export function ActionLink({ link }: { link: NoteLink }) {
   const links = use(NoteLinksContext);
   if (links === null) return link.name;
@@ -51,6 +52,7 @@ type FoldFrame = (key: string, folded: boolean) => void;
 
 export const FoldFrameContext = createContext<FoldFrame | null>(null);
 
+/** The button in the title of a frame that folds or unfolds it. */
 export function FoldButton({ note, folded }: { note: Note; folded: boolean }) {
   const fold = use(FoldFrameContext);
   if (fold === null) return null;

@@ -30,6 +30,7 @@ export interface NoteEditing {
 
 export const NoteEditingContext = createContext<NoteEditing | null>(null);
 
+/** The field in which the text of a note or the title of a frame is edited. */
 export function NoteField({ note, notes }: { note: Note; notes: NoteEditing }) {
   const field = useRef<HTMLTextAreaElement>(null);
   useEffect(() => {
@@ -80,6 +81,7 @@ interface ToolsProps {
   above?: number;
 }
 
+/** The colours and the delete button above a selected note. */
 export function NoteTools({ note, notes, above = 10 }: ToolsProps) {
   return (
     <NodeToolbar

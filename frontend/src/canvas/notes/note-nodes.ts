@@ -8,6 +8,7 @@ import type { ProblemCounts } from "../../graph/problems/problem-kinds";
 import type { Tone } from "../../status/progress";
 import type { Positions } from "../geometry/arrange";
 
+/** Style tokens of the colours, which fit both themes. */
 export const noteColor: Readonly<Record<NoteColor, string>> = {
   grey: "var(--ink3)",
   amber: "var(--false)",
@@ -81,6 +82,7 @@ export function noteNodes(graph: Graph, options: Options) {
   };
 }
 
+/** Return the places of all notes and frames. */
 export function notePlaces(graph: Graph): Positions {
   return new Map(notesOf(graph).map(({ key, at }) => [key, at]));
 }

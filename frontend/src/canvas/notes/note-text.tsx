@@ -15,6 +15,7 @@ export function isMarkedUp(text: string): boolean {
   return !PLAIN.test(text) || LISTED.test(text) || ADDRESSED.test(text);
 }
 
+/** Shows a note as plain text until the Markdown renderer is loaded. */
 export function NoteText({ text }: { text: string }) {
   const plain = <p className={style.plain}>{spokenNote(text)}</p>;
   if (!isMarkedUp(text)) return plain;
@@ -30,6 +31,7 @@ const LinkCompletion = lazyPart(() =>
 );
 const nothing = () => null;
 
+/** Completes links in a field once that part is loaded. */
 export function LinkNames(props: ComponentProps<typeof LinkCompletion>) {
   return (
     <PartBoundary frame={nothing} waiting={null}>

@@ -3,6 +3,7 @@ import type { Position } from "../../graph/model";
 
 type Pointed = { clientX: number; clientY: number } | { changedTouches: TouchList };
 
+/** Return the place of a mouse or touch event on the screen. */
 export function pointOf(event: Pointed): Position {
   if ("changedTouches" in event) {
     const touch = event.changedTouches[0];

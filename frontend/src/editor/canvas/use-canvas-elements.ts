@@ -332,6 +332,7 @@ function useFolding(
   return { folding, known };
 }
 
+/** Return the elements of the canvas, their places and sizes, and the handlers of React Flow's changes. */
 export function useCanvasElements(given: CanvasElementsInput) {
   const { graph, selection, select, progress, marks, laidOut, folded } = given;
   const here = usePeople();

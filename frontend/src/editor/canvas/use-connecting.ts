@@ -17,6 +17,7 @@ export interface Pending {
   readonly outcome: Precondition;
 }
 
+/** Return the outcome of a handle by its id; the handle of the entry counts as `on_true`. */
 export function outcomeOf(handle: string | null | undefined): Precondition {
   return handle === "on_false" || handle === "on_error" || handle === "on_stopped"
     ? handle
@@ -33,6 +34,10 @@ function outcomeHit(target: EventTarget): Pending | null {
 
 type AddAt = (screen: Position, from: Pending | null) => void;
 
+/**
+ * Return the handlers that draw and move arrows. `openAddAt`: opens the search for a new action at
+ * a place.
+ */
 export function useConnecting(context: EditorContext, openAddAt: AddAt) {
   const { doc, select, mayEdit } = context;
   const [pending, setPending] = useState<Pending | null>(null);

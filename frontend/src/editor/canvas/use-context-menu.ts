@@ -15,6 +15,7 @@ function openMenuAt(context: EditorContext, screen: Position): void {
   context.openOverlay({ kind: "menu", screen });
 }
 
+/** Return the event handlers that open the menu. */
 export function useContextMenu(context: EditorContext) {
   const now = useRef(context);
   now.current = context;

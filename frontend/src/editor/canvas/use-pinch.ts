@@ -39,6 +39,7 @@ function pairOf(fingers: ReadonlyMap<number, Position>): Pair {
   return { middle: [(x0 + x1) / 2, (y0 + y1) / 2], apart: Math.hypot(x1 - x0, y1 - y0) };
 }
 
+/** Return the event handlers of the pinch. `onPanned`: called when it starts. */
 export function usePinch(context: EditorContext, onPanned: () => void) {
   const flow = useReactFlow();
   const store = useStoreApi();

@@ -130,6 +130,7 @@ export function focusCard(room: HTMLElement, key: Key, tries: number): void {
   look(tries);
 }
 
+/** Return the functions that move the view, and how it follows the run. */
 export function useViewport(given: ViewportInput) {
   const { flow, frame, places, sizes, lines, direction, phone, progress, run, pointer } = given;
   const { blockOf, unfoldRound, toView } = given;

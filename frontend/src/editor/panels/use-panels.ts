@@ -24,6 +24,7 @@ function useFoldedList() {
   return { folded, setFolded };
 }
 
+/** Return which panels are open, and the functions that open and close them. */
 export function usePanels() {
   const [left, setLeft] = useState(false);
   const [right, setRight] = useState(false);
