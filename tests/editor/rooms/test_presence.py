@@ -34,7 +34,7 @@ def owner(name: str) -> PresenceOwner:
 
 def test_the_server_says_who_it_is() -> None:
     room, ada = RoomPresence(), PresenceOwner(Person("ada", "Ada"), "#d110bc")
-    told = room.receive(ada, (entry(7, cursor=[1, 2], user={"id": "bob", "name": "Bob"}),))
+    told = room.update(ada, (entry(7, cursor=[1, 2], user={"id": "bob", "name": "Bob"}),))
     user = {"id": "ada", "name": "Ada", "color": "#d110bc"}
     assert said(told) == {7: {"cursor": [1, 2], "user": user}}
 
@@ -42,7 +42,7 @@ def test_the_server_says_who_it_is() -> None:
 def test_names_of_any_script_arrive_whole() -> None:
     room = RoomPresence()
     person = Person("x", "Ülle 🤖 اسم 名前")
-    told = room.receive(PresenceOwner(person), (entry(1, editing="ключ"),))
+    told = room.update(PresenceOwner(person), (entry(1, editing="ключ"),))
     frame = messages.presence(told)
     parsed = messages.parse(frame)
     assert isinstance(parsed, messages.Presence)
@@ -52,19 +52,19 @@ def test_names_of_any_script_arrive_whole() -> None:
 
 def test_nobody_speaks_for_others() -> None:
     room, ada, eve = RoomPresence(), owner("ada"), owner("eve")
-    room.receive(ada, (entry(1, cursor=[0, 0]),))
-    assert room.receive(eve, (entry(1, 9, cursor=[6, 6]),)) == []
-    assert room.receive(eve, (PresenceEntry(1, 9, b"null"),)) == []
-    room.receive(eve, (entry(2),))
-    assert room.receive(eve, (entry(1, 9, cursor=[6, 6]), entry(3))) == []
+    room.update(ada, (entry(1, cursor=[0, 0]),))
+    assert room.update(eve, (entry(1, 9, cursor=[6, 6]),)) == []
+    assert room.update(eve, (PresenceEntry(1, 9, b"null"),)) == []
+    room.update(eve, (entry(2),))
+    assert room.update(eve, (entry(1, 9, cursor=[6, 6]), entry(3))) == []
     assert said(list(room.everyone()))[1]["cursor"] == [0, 0]
     assert set(said(list(room.everyone()))) == {1, 2}
 
 
 def test_who_reconnects_takes_over_from_the_socket_before() -> None:
     room, old, new = RoomPresence(), owner("ada"), owner("ada")
-    room.receive(old, (entry(1, 5),))
-    assert len(room.receive(new, (entry(1, 6, cursor=[1, 1]),))) == 1
+    room.update(old, (entry(1, 5),))
+    assert len(room.update(new, (entry(1, 6, cursor=[1, 1]),))) == 1
     assert room.leave(old) == []
     assert said(list(room.everyone()))[1]["cursor"] == [1, 1]
     assert room.leave(new) == [PresenceEntry(1, 6, b"null")]
@@ -73,19 +73,19 @@ def test_who_reconnects_takes_over_from_the_socket_before() -> None:
 
 def test_another_window_of_the_same_person_is_left_alone_by_an_echo() -> None:
     room, one, two = RoomPresence(), owner("ada"), owner("ada")
-    room.receive(one, (entry(1),))
-    room.receive(two, (entry(2),))
-    assert room.receive(two, (entry(1, 7),)) == []
+    room.update(one, (entry(1),))
+    room.update(two, (entry(2),))
+    assert room.update(two, (entry(1, 7),)) == []
     assert room.leave(two) == [PresenceEntry(2, 1, b"null")]
     assert set(said(list(room.everyone()))) == {1}
 
 
 def test_who_takes_itself_away_is_gone_and_may_come_back() -> None:
     room, ada = RoomPresence(), owner("ada")
-    room.receive(ada, (entry(1, 1),))
-    assert room.receive(ada, (PresenceEntry(1, 2, b"null"),)) == [PresenceEntry(1, 2, b"null")]
+    room.update(ada, (entry(1, 1),))
+    assert room.update(ada, (PresenceEntry(1, 2, b"null"),)) == [PresenceEntry(1, 2, b"null")]
     assert room.everyone() == ()
-    assert len(room.receive(ada, (entry(1, 3),))) == 1
+    assert len(room.update(ada, (entry(1, 3),))) == 1
 
 
 def test_what_is_no_state_is_not_passed_on() -> None:
@@ -93,7 +93,7 @@ def test_what_is_no_state_is_not_passed_on() -> None:
     wrong = [b"", b"5", b"[]", b"{", b'{"a": ' + b"[" * 5000, b"\xff", b'"x"']
     wrong.append(json.dumps({"a": "x" * STATE_LIMIT}).encode())
     for state in wrong:
-        assert room.receive(owner("eve"), (PresenceEntry(1, 1, state),)) == []
+        assert room.update(owner("eve"), (PresenceEntry(1, 1, state),)) == []
     assert room.everyone() == ()
 
 
@@ -105,7 +105,7 @@ def test_whatever_is_said_entries_belong_to_seats_that_said_them(
     owners = [owner(f"p{n}") for n in range(4)]
     for who, client, gone in words:
         state = b"null" if gone else b"{}"
-        for told in room.receive(owners[who], (PresenceEntry(client, 1, state),)):
+        for told in room.update(owners[who], (PresenceEntry(client, 1, state),)):
             assert told.client == client
             if not gone:
                 assert json.loads(told.state)["user"]["id"] == f"p{who}"
@@ -173,12 +173,12 @@ def test_numbers_that_a_page_cannot_read_are_not_passed_on() -> None:
     room = RoomPresence()
     for client, clock in ((2**53 - 1, 1), (1, 2**53 - 1), (2**53, 1), (1, 2**64 - 1)):
         for state in (b"{}", b"null"):
-            assert room.receive(owner("eve"), (PresenceEntry(client, clock, state),)) == []
+            assert room.update(owner("eve"), (PresenceEntry(client, clock, state),)) == []
     assert room.everyone() == ()
     eve = owner("eve")
     largest = PresenceEntry(MOST_NUMBER, MOST_NUMBER, b"{}")
-    assert len(room.receive(eve, (largest,))) == 1  # the clock after it can be read as well
-    assert room.receive(eve, (PresenceEntry(MOST_NUMBER, 2**60, b"null"),)) == []
+    assert len(room.update(eve, (largest,))) == 1  # the clock after it can be read as well
+    assert room.update(eve, (PresenceEntry(MOST_NUMBER, 2**60, b"null"),)) == []
     assert room.leave(eve) == [PresenceEntry(MOST_NUMBER, MOST_NUMBER, b"null")]
 
 
@@ -199,7 +199,7 @@ def test_numbers_that_a_page_cannot_read_are_not_passed_on() -> None:
 )
 def test_what_a_page_could_not_read_as_json_is_not_passed_on(state: bytes) -> None:
     room = RoomPresence()
-    assert room.receive(owner("eve"), (PresenceEntry(1, 1, state),)) == []
+    assert room.update(owner("eve"), (PresenceEntry(1, 1, state),)) == []
     assert room.everyone() == ()
 
 
