@@ -21,8 +21,8 @@ from action_assistant.editor.rooms.broadcast import UpdateBroadcast
 from action_assistant.editor.rooms.member import Member
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.editor.rooms.room import Room
+from action_assistant.journal import commit_metrics
 from action_assistant.journal.events import nothing
-from action_assistant.journal.health import quick_commits
 from action_assistant.journal.journal import Journal
 from action_assistant.journal.sqlite import SqliteSession
 from action_assistant.web.auth.keys import Person
@@ -153,7 +153,7 @@ async def _speak(pipe: Pipe, member: Member, trap: Trap) -> None:
 def main(folder: Path) -> None:
     # From the second commit on, and as often as there are any. They are Final to all but this process,
     # which is to die in commits on the loop as often as in those of the thread.
-    quick_commits._KNOWN, quick_commits._SHARE = 1, 2  # type: ignore[misc]
+    commit_metrics._KNOWN, commit_metrics._SHARE = 1, 2  # type: ignore[misc]
     for line, at_once in zip(sys.stdin, itertools.cycle((False, True)), strict=False):
         stream, count, point = line.rstrip("\n").split(" ", 2)
         (folder / "socket").unlink(missing_ok=True)

@@ -13,9 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from action_assistant.errors import Unavailable
+from action_assistant.journal import commit_metrics
 from action_assistant.journal.chain import link
 from action_assistant.journal.events import Addition, Draft, Event, nothing
-from action_assistant.journal.health import quick_commits
 from action_assistant.journal.journal import Journal
 from action_assistant.journal.sqlite import SqliteSession
 from support.doses import examples
@@ -62,9 +62,9 @@ async def watched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncItera
     journal = await Journal.open(url, branch="editor", fold=nothing, at_once=True)
     watched = Watched(journal)
     monkeypatch.setattr(SqliteSession, "store", watched.store(SqliteSession.store))
-    monkeypatch.setattr(quick_commits, "_SLOW_S", 0.5)  # on a busy machine, too
-    monkeypatch.setattr(quick_commits, "_FAR_TOO_SLOW_S", 1.0)
-    monkeypatch.setattr(quick_commits, "_SHARE", 2)  # nothing but commits happens here
+    monkeypatch.setattr(commit_metrics, "_SLOW_S", 0.5)  # on a busy machine, too
+    monkeypatch.setattr(commit_metrics, "_FAR_TOO_SLOW_S", 1.0)
+    monkeypatch.setattr(commit_metrics, "_SHARE", 2)  # nothing but commits happens here
     yield watched
     await journal.close()
 

@@ -14,6 +14,7 @@ from sqlalchemy import Connection, delete, insert, select
 
 from action_assistant.errors import Conflict, Unavailable
 from action_assistant.journal.chain import Damage, Inspector
+from action_assistant.journal.commit_metrics import CommitMetrics
 from action_assistant.journal.copies.before_upgrade import keep_copy
 from action_assistant.journal.database import (
     Before,
@@ -26,8 +27,7 @@ from action_assistant.journal.database import (
 from action_assistant.journal.databases import database_of
 from action_assistant.journal.events import Addition, Draft, Event, Fold
 from action_assistant.journal.follower import Follower
-from action_assistant.journal.health.commits import CommitMetrics
-from action_assistant.journal.health.probe import JournalProbe
+from action_assistant.journal.probe import JournalProbe
 from action_assistant.journal.reader import JournalReader, body_of, following, seal_of
 from action_assistant.journal.removal import STREAM, StreamRemoved, delete_some, taken_out
 from action_assistant.journal.writer import Job, JobOutcomes, Transaction, Writer

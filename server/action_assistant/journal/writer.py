@@ -13,9 +13,9 @@ from sqlalchemy.exc import DBAPIError, IntegrityError
 
 from action_assistant.errors import BadInput, Conflict, Unavailable
 from action_assistant.journal.chain import NOTHING, Head, link
+from action_assistant.journal.commit_metrics import CommitMetrics
 from action_assistant.journal.database import Database, WriterSession, cause_of
 from action_assistant.journal.events import Addition, Event, Fold
-from action_assistant.journal.health.commits import CommitMetrics
 from action_assistant.schema import editor_tables
 
 log: Final = logging.getLogger(__name__)

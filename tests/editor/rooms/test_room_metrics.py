@@ -4,7 +4,6 @@ from prometheus_client import CollectorRegistry
 
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.rooms.open_rooms import Rooms
-from action_assistant.journal.health.thread_histogram import ThreadHistogram
 from action_assistant.journal.journal import Journal
 from editor.client import STREAM, Client, settle
 
@@ -35,17 +34,3 @@ async def test_each_edit_is_counted_once_refused_or_acknowledged(journal: Journa
     assert (rooms.metrics.opened, rooms.metrics.unloaded) == (1, 0)
     await rooms.close()
     assert rooms.metrics.unloaded == 1
-
-
-def test_a_histogram_of_one_thread_adds_up_as_others_do() -> None:
-    histogram = ThreadHistogram("x_seconds", "x", (0.1, 1))
-    histogram.observe([0.05, 0.1, 0.5, 7])
-    registry = CollectorRegistry()
-    registry.register(histogram)
-    found = {
-        le: registry.get_sample_value("x_seconds_bucket", {"le": le})
-        for le in ("0.1", "1.0", "+Inf")
-    }
-    assert found == {"0.1": 2, "1.0": 3, "+Inf": 4}
-    assert registry.get_sample_value("x_seconds_count") == 4
-    assert registry.get_sample_value("x_seconds_sum") == 7.65

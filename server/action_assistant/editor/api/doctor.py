@@ -11,7 +11,7 @@ from litestar import get
 from litestar.types import ControllerRouterHandler
 
 from action_assistant.errors import Refused, Unavailable
-from action_assistant.journal.health.shared_check import SharedCheck
+from action_assistant.kit.shared_check import SharedCheck
 from action_assistant.settings import EditorSettings
 from action_assistant.system.diagnostics import Diagnostic
 from action_assistant.web.auth.access import Needs

@@ -5,11 +5,10 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from prometheus_client import Metric
+from prometheus_client import Histogram, Metric
 from prometheus_client.registry import Collector
 
 from action_assistant.editor.rooms.batch import Objection, SubmittedEdit
-from action_assistant.journal.health.thread_histogram import ThreadHistogram
 
 _BUCKETS: Final = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 30)
 
@@ -22,16 +21,18 @@ class RoomMetrics(Collector):
         self.unloaded = 0
         self.refused: Final[Counter[str]] = Counter()  # edits, by reason
         self.closed: Final[Counter[int]] = Counter()  # sockets, by close code
-        self._acks = ThreadHistogram(
+        self._acks = Histogram(
             "action_assistant_ack_seconds",
             "Time from an edit's arrival at its room until it was durable and acknowledged.",
-            _BUCKETS,
+            buckets=_BUCKETS,
+            registry=None,
         )
 
     def acknowledged(self, edits: Sequence[SubmittedEdit]) -> None:
         """Observe how long edits waited that are durable now, or that changed nothing."""
         now = time.perf_counter()
-        self._acks.observe([now - edit.at for edit in edits])
+        for edit in edits:
+            self._acks.observe(now - edit.at)
 
     def objected(self, error: Objection) -> None:
         """Count an edit that was refused for this reason."""

@@ -8,7 +8,7 @@ from typing import Final, TypeAlias
 import msgspec
 from anyio import to_thread
 
-from action_assistant.journal.health.shared_check import SharedCheck
+from action_assistant.kit.shared_check import SharedCheck
 
 #: What each part of a process lacks; None where it works.
 Parts: TypeAlias = Mapping[str, str | None]

@@ -3,16 +3,16 @@
 import pytest
 from prometheus_client import CollectorRegistry
 
+from action_assistant.journal import commit_metrics
+from action_assistant.journal.commit_metrics import CommitMetrics
 from action_assistant.journal.events import Event
-from action_assistant.journal.health import commits
-from action_assistant.journal.health.commits import CommitMetrics
 
 EVENT = Event("a", 1, "kind", "ada", 0, b"", 1)
 
 
 def test_commits_are_counted_by_how_long_they_took(monkeypatch: pytest.MonkeyPatch) -> None:
     now = 0.0
-    monkeypatch.setattr(commits.time, "monotonic", lambda: now)
+    monkeypatch.setattr(commit_metrics.time, "monotonic", lambda: now)
     metrics, registry = CommitMetrics(), CollectorRegistry()
     registry.register(metrics)
     for took in (0.0005, 0.3, 40.0):  # at a bound, between two, and beyond all

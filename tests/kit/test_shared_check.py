@@ -4,7 +4,7 @@ import asyncio
 
 import pytest
 
-from action_assistant.journal.health.shared_check import SharedCheck
+from action_assistant.kit.shared_check import SharedCheck
 
 
 async def test_the_last_answer_is_there_at_once_while_it_is_asked_again() -> None:

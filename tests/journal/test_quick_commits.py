@@ -2,8 +2,8 @@
 
 import pytest
 
-from action_assistant.journal.health import quick_commits
-from action_assistant.journal.health.quick_commits import QuickCommits
+from action_assistant.journal import commit_metrics
+from action_assistant.journal.commit_metrics import QuickCommits
 
 
 class Clock:
@@ -19,7 +19,7 @@ class Clock:
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     clock = Clock()
-    monkeypatch.setattr(quick_commits, "time", clock)
+    monkeypatch.setattr(commit_metrics, "time", clock)
     return clock
 
 

@@ -7,8 +7,8 @@ from sqlalchemy import Connection, delete, insert, select
 
 from action_assistant.errors import Unavailable
 from action_assistant.journal.database import Branch
-from action_assistant.journal.health.shared_check import SharedCheck
 from action_assistant.journal.migrate import revisions_of
+from action_assistant.kit.shared_check import SharedCheck
 from action_assistant.schema.branches import VERSIONS
 from action_assistant.schema.editor_tables import editor_snapshot
 

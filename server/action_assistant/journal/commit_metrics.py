@@ -1,16 +1,18 @@
-"""What the writer of a journal has done, as numbers. Written by whoever commits, read by whoever asks."""
+"""Metrics of the commits of a journal, and whether commits are quick enough for the event loop (decision 94).
+
+Updated by the thread that commits, read by the loop.
+"""
 
 import time
+from collections import deque
 from collections.abc import Iterator, Sequence
 from typing import Final
 
-from prometheus_client import Metric
+from prometheus_client import Histogram, Metric
 from prometheus_client.core import CounterMetricFamily
 from prometheus_client.registry import Collector
 
 from action_assistant.journal.events import Event
-from action_assistant.journal.health.quick_commits import QuickCommits
-from action_assistant.journal.health.thread_histogram import ThreadHistogram
 
 _BUCKETS: Final = (
     0.0005,
@@ -30,6 +32,48 @@ _BUCKETS: Final = (
     30,
 )
 
+_REMEMBERED: Final = 100  # commits
+_KNOWN: Final = 20  # of them, before anything follows from how long they took
+_SLOW_S: Final = 0.02  # of which nobody sees anything
+_MOST_SLOW: Final = 5  # of those remembered
+_FAR_TOO_SLOW_S: Final = 0.1
+#: Of the time, that commits may take: a loop that does more than that has better things to do meanwhile.
+_SHARE: Final = 1 / 6
+
+
+class QuickCommits:
+    """Decides from the last hundred commits whether a commit may run on the event loop.
+
+    At most five of them may have taken longer than 20 ms and none longer than 100 ms, and all
+    together at most a sixth of the time in which they came. The first twenty commits never run
+    there.
+    """
+
+    def __init__(self) -> None:
+        self._last: deque[tuple[float, float]] = deque(maxlen=_REMEMBERED)  # seconds, and when
+        self._all = 0.0  # seconds
+        self._slow = self._far_too_slow = 0
+
+    def took(self, seconds: float) -> None:
+        """Note the duration of a commit in seconds."""
+        if len(self._last) == _REMEMBERED:
+            self._count(self._last[0][0], -1)
+        self._last.append((seconds, time.monotonic()))
+        self._count(seconds, 1)
+
+    def _count(self, seconds: float, by: int) -> None:
+        self._all += by * seconds
+        if seconds > _SLOW_S:
+            self._slow += by
+            self._far_too_slow += by * (seconds > _FAR_TOO_SLOW_S)
+
+    @property
+    def are_quick(self) -> bool:
+        """Return whether the next commit may run on the event loop."""
+        if len(self._last) < _KNOWN or self._slow > _MOST_SLOW or self._far_too_slow:
+            return False
+        return self._all <= _SHARE * (time.monotonic() - self._last[0][1])
+
 
 class CommitMetrics(Collector):
     """A collector for a registry of Prometheus. `failing`: why the newest transaction was not stored;
@@ -40,11 +84,11 @@ class CommitMetrics(Collector):
         self.quick: Final = QuickCommits()
         self._submitted = self._done = 0  # jobs; each is counted by one thread
         self._busy_since: float | None = None
-        # Not the library's instruments: these were a fifth of the Python of a small commit.
-        self._seconds = ThreadHistogram(
+        self._seconds = Histogram(
             "action_assistant_commit_seconds",
             "Time that a transaction took, from its first statement to the end of its commit.",
-            _BUCKETS,
+            buckets=_BUCKETS,
+            registry=None,
         )
         self._events = self._failures = 0
         self._last = 0.0  # seconds since 1970
@@ -62,7 +106,7 @@ class CommitMetrics(Collector):
         all were, nothing was written, and nothing is known of the disk."""
         if stored and self._busy_since is not None:
             took = time.monotonic() - self._busy_since
-            self._seconds.observe((took,))
+            self._seconds.observe(took)
             self.quick.took(took)
             self.failing = None
             self._last = time.time()
