@@ -1,4 +1,4 @@
-"""Graph files of shapes in which a careless algorithm takes the square of their size."""
+"""Graph files of shapes for which a careless algorithm takes the square of their size."""
 
 from collections.abc import Callable
 from typing import Any
@@ -25,7 +25,7 @@ def _names(count: int) -> list[str]:
 
 
 def chain(count: int, **fields: Any) -> dict[str, Any]:
-    """One after the other."""
+    """Return a graph of actions in sequence."""
     names = _names(count)
     actions = [
         _action(n, names[max(0, i - 1) : i], names[i + 1 : i + 2], **fields)
@@ -35,7 +35,7 @@ def chain(count: int, **fields: Any) -> dict[str, Any]:
 
 
 def spontaneous_chain(count: int) -> dict[str, Any]:
-    """All spontaneous, with a loop at the end."""
+    """Return a chain of spontaneous actions with a loop at its end."""
     file = chain(count, type="spontaneous")
     actions = file["actions"]
     actions[-1]["children"] = [{"name": actions[-2]["name"]}]
@@ -44,7 +44,7 @@ def spontaneous_chain(count: int) -> dict[str, Any]:
 
 
 def dead_chain(count: int) -> dict[str, Any]:
-    """A way back that is required, and all that waits behind it."""
+    """Return a chain with an arrow back that is required, and the actions that wait for it."""
     file = chain(count)
     actions = file["actions"]
     actions[1]["parents"].append({"name": actions[2]["name"], "conditions": SAFE})
@@ -86,18 +86,18 @@ def all_ends(count: int) -> dict[str, Any]:
 
 
 def twins(count: int) -> dict[str, Any]:
-    """All called alike."""
+    """Return a graph whose actions have one name."""
     return _file([_action("A", ["A"], ["A"]) for _ in range(count)], ["A"], ["A"])
 
 
 def ghosts(count: int) -> dict[str, Any]:
-    """Two actions and many that do not exist."""
+    """Return a graph of two actions that refer to many which do not exist."""
     names = _names(count)
     return _file([_action("First", names, names), _action("Last", names, names)], names, names)
 
 
 def repeated(count: int) -> dict[str, Any]:
-    """One pair, many times; the exit too."""
+    """Return a graph in which one pair of actions, and the exit, is related many times."""
     actions = [_action("A", [], ["B"] * count), _action("B", ["A"] * count, [])]
     return _file(actions, ["A"] * count, ["A"] * count)
 
@@ -238,7 +238,7 @@ def everybody(count: int, usual: list[str]) -> dict[str, Any]:
 
 
 def tree(count: int, usual: list[str]) -> dict[str, Any]:
-    """Each starts two."""
+    """Return a graph in which each action starts two others."""
     return _drawn(count, [_then((n - 1) // 2, n) for n in range(1, count)], count - 1, usual)
 
 

@@ -1,4 +1,4 @@
-"""Uses of an action are brought to what the library says, and nothing else is touched."""
+"""Uses of an action get the parameters of the library, and nothing else changes."""
 
 import msgspec
 from hypothesis import given

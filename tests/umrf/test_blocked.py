@@ -36,7 +36,7 @@ def blocked(path: Path, facts: Any = PINNED) -> list[str]:
 
 
 def behaviour(path: Path) -> str:
-    """What the engine does with a graph, by the rules that the recordings confirm."""
+    """Return how the engine treats a graph, by the rules that the recordings confirm."""
     reading = read(path.read_bytes())
     states: list[str] = []
     begun = 0
@@ -99,7 +99,7 @@ def test_graphs_of_several_actors_are_blocked_only_where_engines_do_not_synchron
 
 
 def went_well(folder: Path, name: str) -> bool:
-    """Whether all runs of a recording ended without a crash, a hang or a refusal."""
+    """Return whether all runs of a recording ended without a crash, a hang or a refusal."""
     return not any(
         line["kind"] in BAD_ENDS or line.get("rc") in (-6, -11)
         for run in runs_of(folder, name)

@@ -1,4 +1,4 @@
-"""That no shape of a graph makes reading, writing, checking or simulating it explode."""
+"""No shape of a graph makes reading, writing, checking or simulating it explode."""
 
 import json
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""What `check` says about graphs."""
+"""Problems that `check` reports for graphs."""
 
 import json
 from collections.abc import Callable
@@ -55,7 +55,7 @@ def problems(value: Any, library: dict[str, Signature] | None = None) -> list[Pr
 
 
 def found(value: Any, library: dict[str, Signature] | None = None) -> dict[str, str]:
-    """Codes with their severity."""
+    """Return the codes of problems with their severity."""
     return {problem.code: problem.severity for problem in problems(value, library)}
 
 

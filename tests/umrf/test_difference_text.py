@@ -1,4 +1,4 @@
-"""A difference as text: what a robot notices, line by line, and what only looks otherwise apart."""
+"""A difference as text: changes for a robot line by line, and changes of the drawing apart."""
 
 import json
 from typing import Any

@@ -1,4 +1,4 @@
-"""What the digest tells apart, and what it does not."""
+"""The digest changes with the meaning of a graph only."""
 
 from random import Random
 

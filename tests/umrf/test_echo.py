@@ -1,4 +1,4 @@
-"""What an engine gives back of a graph."""
+"""The echo of a graph is the graph that an engine gives back."""
 
 import json
 

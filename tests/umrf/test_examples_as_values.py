@@ -32,7 +32,7 @@ def values_of(graph: Graph) -> dict[str, Any]:
 
 
 def offered(graph: Graph) -> list[str]:
-    """Where the fix is offered."""
+    """Return the places at which the fix is offered."""
     return [p.where.path for p in check(graph) if p.fix == "take-example"]
 
 

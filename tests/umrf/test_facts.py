@@ -1,4 +1,4 @@
-"""What a robot's profile says of its engine."""
+"""Facts of a robot's profile are read and checked."""
 
 import pytest
 

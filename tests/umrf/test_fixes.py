@@ -1,4 +1,4 @@
-"""Fixes mend what they promise, and nothing else."""
+"""A fix removes its problem and changes nothing else."""
 
 import json
 from typing import Any

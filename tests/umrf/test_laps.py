@@ -1,4 +1,4 @@
-"""What arrows rule out is never seen in a simulation of them."""
+"""Repeated runs that the arrows exclude never happen in a simulation."""
 
 import itertools
 from collections import Counter

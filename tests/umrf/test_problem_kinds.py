@@ -1,4 +1,4 @@
-"""What people are told of problems, and how many things: vectors that the page reads, too."""
+"""Kinds and counts of problems agree with the vectors that the page reads, too."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Graphs as the actions that stand for them."""
+"""Actions that stand for graphs."""
 
 from hypothesis import given
 

@@ -35,7 +35,7 @@ GO = Conditions(on_true="run", on_false="run", on_error="run")
 
 
 def seen(before: SeenAfter, state: str, nodes: Mapping[str, str]) -> SeenAfter:
-    """One more look."""
+    """Return the observation `before` with one more look at a graph."""
     if state not in LEFT:
         return before
     return SeenAfter(
@@ -115,7 +115,7 @@ def line(*conditions: Conditions, extra: tuple[Relation, ...] = ()) -> Graph:
 
 
 def told(graph: Graph, state: str, nodes: str, after: SeenAfter = SeenAfter()) -> tuple[str, ...]:  # noqa: B008 - frozen
-    """Who may be loading, where each letter is the state of an action."""
+    """Return the actions that may be loading; each letter is the state of an action."""
     states = {"F": "FINISHED", "E": "ERROR", ".": "UNINITIALIZED", "I": "INITIALIZED"}
     shown = {f"{name}_0": states[each] for name, each in zip("ABC", nodes, strict=True)}
     return may_be_loading(triggers_of(graph, exits_known=True), state, shown, after)

@@ -1,4 +1,5 @@
-"""H4, H5 and H12 are told of what can happen, all of it, and of nothing else; one thing is told once."""
+"""H4, H5 and H12 are reported for everything that can happen and for nothing else, each thing
+once."""
 
 import json
 from typing import Any

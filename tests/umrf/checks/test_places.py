@@ -1,4 +1,5 @@
-"""Where findings stand: each names a place of the text that was given, which has what it quotes."""
+"""Every finding has a place in the given text, and that place has the text that the finding
+quotes."""
 
 import json
 import re
@@ -27,7 +28,7 @@ SLOW = [HealthCheck.too_slow, HealthCheck.data_too_large]
 
 
 def said(text: bytes) -> Iterator[tuple[str, Where]]:
-    """Everything that is said of a file, with its places."""
+    """Return every problem and note about a file, with its place."""
     reading = read(text)
     if reading.dialect in ("D0", "D3-action"):
         action = read_action(text)
@@ -41,7 +42,7 @@ def said(text: bytes) -> Iterator[tuple[str, Where]]:
 
 
 def value_at(value: Any, path: str) -> Any:
-    """What stands at a pointer; fails if nothing does."""
+    """Return the value at a pointer; fails if there is none."""
     for key in path.split("/")[1:]:
         key = key.replace("~1", "/").replace("~0", "~")
         value = value[int(key)] if isinstance(value, list) else value[key]
@@ -86,7 +87,8 @@ def plain(text: str) -> str:
 
 
 def has(quoted: str, path: str, value: Any) -> bool:
-    """Whether a place has a text: as it is, as a full name (`Go_1`), or as a flat name (`a::b`)."""
+    """Return whether a place has a text: as it is, as a full name (`Go_1`), or as a flat name
+    (`a::b`)."""
     keys = [plain(key.replace("~1", "/").replace("~0", "~")) for key in path.split("/")]
     texts = {plain(str(each)) for each in leaves(value)} | {plain(path), *keys}
     if any(quoted in text for text in texts):
@@ -164,7 +166,7 @@ def spoil(draw: st.DrawFn, item: Any) -> None:
 
 
 def as_ros_1(file: dict[str, Any]) -> dict[str, Any]:
-    """The same in the words of 2020, as far as it can be said."""
+    """Return the graph in the dialect of 2020, as far as it can express it."""
     old = {key: value for key, value in file.items() if not key.startswith("graph_e")}
     old["umrf_actions"] = [older(action) for action in old.pop("actions")]
     for action in old["umrf_actions"]:
@@ -232,7 +234,7 @@ def test_the_problems_of_a_graph_have_their_places_in_its_canonical_text(graph: 
 
 
 def places(file: Any) -> dict[str, str]:
-    """Codes with their places."""
+    """Return the codes of problems with their places."""
     return {p.code: p.where.path for p in check_reading(reading_of(file))}
 
 

@@ -1,4 +1,4 @@
-"""Every single deviation is tried, at any size, and found to end as the engine's own rules say."""
+"""Every single deviation is tried, at any size, and ends as the simulated engine says."""
 
 import json
 import time
@@ -32,7 +32,8 @@ from umrf.shapes import GROWING
 
 
 def told(outcome: Outcome) -> Outcome:
-    """What is said of it: who asked last, and whether it was followed to the end, is another thing."""
+    """Return the part of an outcome that is reported, without who asked last and how far the course
+    was followed."""
     if outcome.kind != "stuck":
         return Outcome(outcome.kind, outcome.early)
     return outcome._replace(cut=False, last=-1)
@@ -43,7 +44,7 @@ def told(outcome: Outcome) -> Outcome:
 def test_a_deviation_ends_as_when_the_engine_goes_through_all_of_it(
     graph: Graph, slower_first: bool, backwards: bool
 ) -> None:
-    """In whichever order they are tried: what one comes to is remembered for the others."""
+    """In either order of trials: outcomes that one trial finds are remembered for the others."""
     net = Network(graph, slower_first=slower_first)
     course = BaselineCourse(net)
     assume(not course.tied)

@@ -56,7 +56,8 @@ class EveryCall:
 
 
 def played(graph: Graph, ends: tuple[tuple[int, str], ...]) -> tuple[list[Trace], list[int]]:
-    """What happens when calls end so, one after the other, and the calls that go on then."""
+    """Return the trace when calls end like this, one after the other, and the calls that are open
+    then."""
     performer = EveryCall()
     engine = Engine(facts=SIMULATED, performer=performer)
     try:

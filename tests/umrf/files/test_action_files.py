@@ -23,12 +23,12 @@ Verdicts: TypeAlias = list[tuple[str, bool, str]]
 
 
 def found(file: Any) -> dict[str, str]:
-    """Codes with their places."""
+    """Return the codes of problems with their places."""
     return {p.code: p.where.path for p in check_action(read_action(json.dumps(file)))}
 
 
 def recorded() -> Verdicts:
-    """What the engine's parser said of files of actions that were made for it."""
+    """Return the answers of the engine's parser to action files that were made for it."""
     cases = lines(family("engine") / "validation.jsonl")
     return [
         (c["case"], c["accepted"], c["input"]) for c in cases if c["case"].startswith("action:")
@@ -36,7 +36,7 @@ def recorded() -> Verdicts:
 
 
 def real() -> Verdicts:
-    """What it said of those in repositories."""
+    """Return the answers of the engine's parser to action files of repositories."""
     verdicts = lines(CORPUS / "verdicts.jsonl")
     return [
         (v["file"], v["accepted"], path.read_text(errors="replace"))

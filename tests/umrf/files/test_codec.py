@@ -1,4 +1,4 @@
-"""What reading and writing UMRF files promises."""
+"""Graphs survive reading and writing, and unreadable texts are refused with their place."""
 
 import json
 from collections.abc import Callable

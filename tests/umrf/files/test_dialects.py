@@ -1,4 +1,4 @@
-"""Older files, and what becomes of them."""
+"""Older files are recognised and translated."""
 
 import json
 from pathlib import Path

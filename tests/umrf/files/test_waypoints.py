@@ -1,4 +1,4 @@
-"""Waypoints of arrows in files: by names, so that they outlive keys."""
+"""Waypoints in files refer to actions by name, so that they survive new keys."""
 
 import json
 from typing import Any
@@ -28,7 +28,7 @@ def having(*waypoints: object, **fields: object) -> str:
 
 
 def said(graph: Graph) -> dict[str, object]:
-    """What is said of each line, by the names of its ends."""
+    """Return the waypoints of each arrow, by the names of its ends."""
     names = {action.key: action.full_name for action in graph.actions}
     return {
         f"{names.get(r.parent, r.parent)}>{names.get(r.child, r.child)};{r.listing} {response}": (

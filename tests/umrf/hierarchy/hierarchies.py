@@ -1,4 +1,4 @@
-"""Hierarchies as hypothesis draws them, and their courses: nested, and flat."""
+"""Hierarchies that hypothesis draws, and their courses: nested, and flat."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -178,7 +178,7 @@ class Drawn:
         )
 
     def _tweak(self, keys: list[Key]) -> None:
-        """Something a little otherwise: much of it can still be made flat, and little is sound."""
+        """Change one thing: many such hierarchies can still be made flat, and few are sound."""
         draw = self.draw
         pair = draw(st.sampled_from(sorted(self.relations)))
         relation = self.relations[pair]
@@ -281,8 +281,11 @@ class Watched(Engine):
 
 
 class Course(NamedTuple):
-    """What happens to actions that are no sub-graphs: at each instant, and to each in order; how the
-    top graph fares; whether two actions ended at one instant."""
+    """The events of actions that are no sub-graphs, by instant and by action, and the states of the
+    top graph.
+
+    `tied`: two actions ended at one instant.
+    """
 
     instants: dict[float, Counter[tuple[str, str]]]
     own: dict[str, list[tuple[float, str]]]
@@ -344,7 +347,8 @@ def _told(
 
 
 def nested_names(found: Flattened) -> dict[str, tuple[str, str]]:
-    """Where each action of a flat graph runs in the hierarchy: running graph, and full name there."""
+    """Return the place in the hierarchy of each action of a flat graph: running graph, and full
+    name there."""
     places = {}
     for origin in found.origins:
         running = found.graph.name

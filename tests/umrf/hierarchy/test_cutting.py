@@ -1,4 +1,4 @@
-"""What the two graphs look like that are made of one: names, drawing, unknown fields, interface."""
+"""The two graphs of an extraction: names, drawing, unknown fields and interface."""
 
 import pytest
 from msgspec.structs import replace

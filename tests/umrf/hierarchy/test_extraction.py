@@ -1,4 +1,4 @@
-"""Actions made a graph of their own do what they did; what cannot be so is told."""
+"""Extracted actions behave as before; differences are reported."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping

@@ -1,4 +1,4 @@
-"""What a flat graph looks like: names, origins, places, unknown fields; and real files."""
+"""The contents of a flat graph: names, origins, positions and unknown fields; and real files."""
 
 import json
 from itertools import pairwise

@@ -1,4 +1,4 @@
-"""What can be made flat; what cannot, each with its reason and its place, and that it would go otherwise."""
+"""Hierarchies that can be flattened, and those that cannot, with each reason and its place."""
 
 from random import Random
 

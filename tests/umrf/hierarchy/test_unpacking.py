@@ -1,4 +1,4 @@
-"""A sub-graph unpacked again is what it was made of."""
+"""An unpacked sub-graph is the graph from which it was made."""
 
 from collections import Counter
 

@@ -92,7 +92,8 @@ def laid_out(files: Mapping[str, bytes], folder: Path) -> Path:
 
 
 def compile_errors(package: Path, *options: str) -> str:
-    """What a strict compiler says of all sources: the unit test includes the others."""
+    """Return the errors of a strict compiler over all sources: the unit test includes the
+    others."""
     if shutil.which("g++") is None:
         pytest.skip("g++ is not here")
     strict = ["-std=c++20", "-fsyntax-only", "-Wall", "-Wextra", "-Werror", *options]
@@ -113,7 +114,7 @@ def compile_errors(package: Path, *options: str) -> str:
 
 
 def layout_faults(sources: Iterable[str]) -> str:
-    """What clang-format would change, by the style that lies beside the sources."""
+    """Return the changes that clang-format would make, by the style file beside the sources."""
     program = Path(sys.executable).with_name("clang-format")
     answer = subprocess.run(
         [str(program), "--style=file", "--fallback-style=none", "--dry-run", *sources],

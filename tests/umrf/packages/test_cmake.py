@@ -1,4 +1,4 @@
-"""What the real CMake makes of a package: it sees the text of a description, and no command in it."""
+"""The real CMake reads a package with any description as text, and runs no command of it."""
 
 import os
 import shutil
@@ -44,7 +44,7 @@ FOUND = {
 
 
 def cmake(*arguments: str, folder: Path) -> str:
-    """What CMake says; raises AssertionError if it fails."""
+    """Return the output of CMake; raises AssertionError if it fails."""
     if shutil.which("cmake") is None:
         pytest.skip("cmake is not here")
     clean = {name: value for name, value in os.environ.items() if not name.startswith("CMAKE")}

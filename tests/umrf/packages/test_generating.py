@@ -1,4 +1,4 @@
-"""What is in an action package, against packages that people have looked at."""
+"""The contents of an action package, compared with packages that people have reviewed."""
 
 import json
 from pathlib import Path

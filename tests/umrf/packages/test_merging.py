@@ -1,4 +1,5 @@
-"""Merging by lines: what is apart comes together, what overlaps is told, nothing is lost or guessed."""
+"""Merging by lines: separate changes are combined, overlapping ones are conflicts, and no line is
+lost."""
 
 import re
 
@@ -88,7 +89,7 @@ def test_an_edited_line_does_not_stand_for_the_deletion_of_what_it_was() -> None
 
 
 def lines(text: bytes) -> set[bytes]:
-    """All of a text, each with its end."""
+    """Return the lines of a text, each with its end."""
     return {line for line in re.split(rb"(?<=\n)", text) if line}
 
 

@@ -1,4 +1,4 @@
-"""Which names actions, their packages and their libraries can have."""
+"""Names that actions, their packages and their libraries can have."""
 
 import pytest
 from hypothesis import given

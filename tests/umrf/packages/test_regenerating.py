@@ -1,4 +1,4 @@
-"""What a new generation does to a package, without any disk; and how the base of it is kept."""
+"""Changes of a package by a new generation, without any disk, and its base file."""
 
 import pytest
 from hypothesis import given, settings

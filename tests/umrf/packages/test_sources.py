@@ -1,4 +1,4 @@
-"""Whatever a description says: its package compiles, and says nothing that the templates do not."""
+"""A package compiles with any description, and contains nothing but what the templates say."""
 
 import sys
 import tempfile

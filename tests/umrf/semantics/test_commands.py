@@ -1,4 +1,5 @@
-"""Commands to the simulated engine: stop, pause, resume, and starts of what is there already."""
+"""Commands to the simulated engine: stop, pause, resume, and starts of a graph that it already
+has."""
 
 import pytest
 

@@ -28,7 +28,7 @@ LAST = {"final", "final_hang", "final_throw", "destroy"}
 
 
 class Seen(NamedTuple):
-    """What one run shows, without times: sequences by what they belong to."""
+    """The events of one run without times: sequences by the thing to which they belong."""
 
     sequences: dict[tuple[str, ...], tuple[str, ...]]
     crashed: bool
@@ -70,7 +70,7 @@ def seen_in(lines: list[dict[str, Any]]) -> Seen:
 
 
 def script_of(name: str, graphs: list[Graph]) -> Script:
-    """What the recorded actions do, by their parameters."""
+    """Return the behaviours of the recorded actions, by their parameters."""
     behaviours: dict[str, tuple[Behaviour, ...]] = {}
     for graph in graphs:
         for action in graph.actions:

@@ -1,4 +1,4 @@
-"""What kills or blocks the simulated engine, and what it refuses."""
+"""Graphs that kill or block the simulated engine, or that it refuses."""
 
 import msgspec
 import pytest

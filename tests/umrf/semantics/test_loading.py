@@ -139,7 +139,7 @@ def test_a_loading_time_is_seconds_that_are_not_negative(seconds: object) -> Non
 
 
 def failing_start(following: Conditions) -> Graph:
-    """When A fails, B is run and C is bypassed. D answers C with `following`."""
+    """Return a graph in which a failing A runs B and bypasses C. D answers C with `following`."""
     graph = graph_of(
         "entry>A", "A>B", "A>C", "C>D", "B>exit", "D>exit",
         AB=Conditions("run", "run", "run"), AC=Conditions("run", "run", "bypass"), CD=following,
@@ -148,7 +148,7 @@ def failing_start(following: Conditions) -> Graph:
 
 
 def test_an_error_that_starts_one_action_and_halts_the_graph_by_a_bypass_is_told() -> None:
-    """However long B loads: the same end that triggers it halts the graph."""
+    """The end that triggers B also halts the graph, however long B loads."""
     graph = failing_start(Conditions("run", "run"))
     calls = script(A=[Behaviour(result="on_error")], B=[Behaviour(load_s=0.01)])
     assert "H14" in hazards(list(simulate(graph, script=calls)))

@@ -1,4 +1,4 @@
-"""Actions that somebody performs: the engine says what is done, and hears how it ended."""
+"""Actions of a performer: the engine calls it, and hears the results."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""The recordings in this repository, and that those of any other folder can be compared too."""
+"""The recordings of this repository are complete, and those of any other folder can be compared."""
 
 import os
 import re
@@ -65,7 +65,7 @@ def test_an_archive_says_the_same_whoever_packed_it(tmp_path: Path) -> None:
 
 
 def compared(recordings: Path) -> str:
-    """What the conformance suite says of a folder of recordings."""
+    """Return the result of the conformance suite for a folder of recordings."""
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", str(CONFORMANCE)]
     environment = os.environ | {"UMRF_RECORDINGS": str(recordings)}
     environment.pop("PYTEST_XDIST_WORKER", None)

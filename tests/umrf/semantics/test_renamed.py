@@ -1,4 +1,4 @@
-"""Which outputs reach which inputs: vectors that the page reads, too."""
+"""Outputs reach inputs as in the vectors that the page reads, too."""
 
 import json
 from pathlib import Path

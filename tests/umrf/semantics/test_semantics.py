@@ -118,7 +118,8 @@ def test_a_sub_graph_runs_under_the_name_of_its_place() -> None:
 
 
 def test_in_a_sub_graph_whose_pause_hangs_the_last_action_never_ends() -> None:
-    """Whoever asks the engine meanwhile waits for the pause, and holds what the end would need."""
+    """A get that comes meanwhile waits for the pause, and holds the lock that the end would
+    need."""
     inner = msgspec.structs.replace(graph_of("entry>X", "X>exit"), name="B")
     outer = graph_of("entry>B", "B>exit")
     traces = list(simulate(outer, library={"B": inner}, commands=[(500, "pause", None)]))

@@ -1,4 +1,4 @@
-"""Graphs in one line, and what a trace of the simulated engine says of them."""
+"""Graphs in one line, and summaries of traces of the simulated engine."""
 
 import msgspec
 
@@ -38,7 +38,7 @@ def graph_of(*arrows: str, **conditions: Conditions) -> Graph:
 
 
 def optional(graph: Graph, *arrows: str) -> Graph:
-    """The same graph, where these relations are not required."""
+    """Return the graph with these relations not required."""
     changed = tuple(
         msgspec.structs.replace(r, required=f"{r.parent}>{r.child}" not in arrows)
         for r in graph.relations
