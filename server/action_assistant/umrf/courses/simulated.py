@@ -67,7 +67,7 @@ def simulated_outcome(
     seen = _TraceReader(net)
     try:
         traces = engine.start(graph, 0.0)
-    except GraphRefused:  # nothing of it begins, whoever ends how
+    except GraphRefused:  # the graph does not begin, however its actions end
         return Outcome("never", seen.early, cut=False), 0
     events = len(traces)
     kind = seen.take(traces)

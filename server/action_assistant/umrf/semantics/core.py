@@ -194,7 +194,9 @@ class Core(Clock):
             message = "The graph is FINISHED while actions still run; a stop does not reach them."
             self._hazard(graph, "H12", "goes on", message)
         if self.locked and not self.serial and graph.above is not None:
-            graph.blocked = last  # commands that wait for the pause hold what it would tell it by
+            graph.blocked = (
+                last  # commands that wait for the pause hold the lock that its report needs
+            )
             return
         self._soon(partial(self._sub_ended, graph, result))
 
@@ -257,7 +259,11 @@ class Core(Clock):
             self._begin(graph, node)
 
     def _run_unloaded(self, graph: Running, node: Node) -> None:
-        if node.state in ("INITIALIZED", "FINISHED", "ERROR"):  # from others it is not begun at all
+        if node.state in (
+            "INITIALIZED",
+            "FINISHED",
+            "ERROR",
+        ):  # from other states it does not begin
             self._state(graph, node, "RUNNING")
         message = "The file carried a state, so the action was never loaded: the engine aborts."
         self._crash(graph, "H1", message, node)
