@@ -326,12 +326,12 @@ async def _lived(folder: Path, actions: int, took: float) -> tuple[Place, int]:
         nonlocal sent
         answer = await asked()
         sent += sum(map(len, answer.texts.values()))
-        recordings.heard("Robin", answer)
+        recordings.record_answer("Robin", answer)
         return answer
 
     def hear(report: Any) -> None:
         if hasattr(report, "snapshots"):
-            recordings.fed("Robin", report)
+            recordings.record_feedback("Robin", report)
 
     link.get = get
     async with place.network.running() as tasks:

@@ -26,7 +26,7 @@ Real = tuple[int, int | None]
 
 
 class NetworkFaults(msgspec.Struct, frozen=True, kw_only=True):
-    """What gets lost, and how late things are."""
+    """The rates at which messages get lost, and their delays."""
 
     loss: float = 0.0
     get_loss: float = 0.0
@@ -184,7 +184,8 @@ async def _started(place: Place, graph: Graph) -> str:
 def _real(
     graph: str, name: str, traces: list[NodeStateEvent], script: dict[str, Any]
 ) -> list[Real]:
-    """When the code of an action ran. One that ignores stop goes on after the engine has given up."""
+    """Return when the code of an action ran. Code that ignores a stop goes on after the engine has
+    given it up."""
     found: list[Real] = []
     state = ""
     for trace in (each for each in traces if (each.graph, each.node) == (graph, name)):
@@ -204,7 +205,7 @@ def _real(
 
 
 def fits(visit: Visit, real: Real) -> bool:
-    """Whether a visit may be this execution: nothing of it lies outside of the bounds."""
+    """Return whether a visit may be this execution: all of it lies within the bounds."""
     begun, over = real
     if not visit.not_before <= begun <= visit.start:
         return False

@@ -28,5 +28,5 @@ def workspace(folder: Path, *, merged: bool = False, package: str = "lift_box") 
 
 
 def changed(folder: Path, file: str, package: str = "lift_box") -> None:
-    """Somebody has changed a file of the source since."""
+    """Touch a file of the source, as after a change."""
     os.utime(folder / "src" / package / file, (BUILT + 1, BUILT + 1))

@@ -45,7 +45,7 @@ class FakeLink:
 
     @property
     def standing(self) -> Standing:
-        """As discovery shows it now."""
+        """The standing that discovery shows now."""
         network = self._network
         servers = network.servers(self._path)
         if len(servers) == 1:
@@ -64,7 +64,7 @@ class FakeLink:
         )
 
     async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
-        """Publish one start."""
+        """Publish one start message."""
         if self.standing.generation == "older":
             raise NotSent("its messages are another generation")
         if not self._network.servers(self._path):
@@ -84,17 +84,17 @@ class FakeLink:
             raise NotSent("nobody listens")
 
     async def pause(self, graph_name: str) -> None:
-        """Publish one pause."""
+        """Publish one pause message."""
         message = Pause(graph_name=graph_name, targets=(self._name,))
         await self._network.outlets.pause.send(lambda: message)
 
     async def resume(self, graph_name: str, continue_from: str = "") -> None:
-        """Publish one resume."""
+        """Publish one resume message."""
         message = Resume(graph_name=graph_name, targets=(self._name,))
         await self._network.outlets.resume.send(lambda: message)
 
     async def modify(self, order: Order, continue_from: str = "") -> None:
-        """Publish one modify."""
+        """Publish one modify message."""
         message = Modify(
             graph_name=order.graph.name,
             targets=(self._name,),
@@ -104,7 +104,7 @@ class FakeLink:
         await self._network.outlets.modify.send(lambda: message)
 
     async def get(self) -> Answer:
-        """Ask the one server."""
+        """Send a get to the one server. Raises NoAnswer."""
         before, asked_at = self._network.servers(self._path), clock_us()
         if len(before) != 1:
             raise NoAnswer(self.standing.why)
@@ -159,8 +159,8 @@ class FakeLink:
                 pass
 
     def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:
-        """Everything that concerns this robot."""
+        """Call `hear` with every report that concerns this robot."""
         return self._subscribers.listening(hear)
 
     async def aclose(self) -> None:
-        """Nothing of its own."""
+        """Do nothing: it has no resources of its own."""

@@ -87,21 +87,21 @@ class Node:
 
     @property
     def hears(self) -> bool:
-        """Whether messages reach it."""
+        """True when messages reach it."""
         return not self.robot.gone and now() >= self.matched_at
 
     @property
     def seen(self) -> bool:
-        """Whether discovery shows it, rightly or not."""
+        """True when discovery shows it, rightly or not."""
         return self.seen_at <= now() < self.unseen_at
 
     @property
     def serves(self) -> bool:
-        """Whether it answers gets, as far as discovery knows."""
+        """True when it answers gets, as far as discovery knows."""
         return self.seen and now() >= self.serves_at
 
     def end(self, of: str) -> Endpoint:
-        """One of its ends."""
+        """Return the endpoint of this node that is called so."""
         return Endpoint(
             gid=f"{self.process}/{of}",
             process=self.process,
@@ -127,7 +127,7 @@ class Outlet:
 
 
 class Outlets:
-    """Everything that our commands leave by."""
+    """The publishers that our commands leave by."""
 
     def __init__(self, network: "FakeNetwork") -> None:
         self.start, self.stop, self.pause = Outlet(network), Outlet(network), Outlet(network)
@@ -208,7 +208,7 @@ class FakeNetwork:
         return node
 
     def kill(self, node: Node) -> None:
-        """It dies, and discovery learns it much later."""
+        """Kill a node; discovery learns that much later."""
         node.robot.kill()
         node.unseen_at = min(node.unseen_at, now() + LEASE_S)
 
@@ -307,7 +307,7 @@ class FakeNetwork:
         self.tell(Shown(actor=actor, snapshots=seen))
 
     def tell(self, value: RosValue) -> None:
-        """Everybody who listens hears it."""
+        """Hand a value to all listeners."""
         self._subscribers.tell(value)
 
     def _later(self, wait_s: float, work: Callable[[], None]) -> None:
@@ -342,23 +342,23 @@ class FakeNetwork:
         )
 
     def client(self, path: str) -> None:
-        """Nothing has to be made."""
+        """Do nothing: this network needs no clients."""
 
     def servers(self, path: str) -> tuple[Endpoint, ...]:
-        """Who answers on a path, as far as discovery knows."""
+        """Return the nodes that answer on a path, as far as discovery knows."""
         return tuple(each.end("get") for each in self.nodes if each.serves and each.path == path)
 
     def listeners(self, topic: str) -> tuple[Endpoint, ...]:
-        """Who listens, as far as discovery knows."""
+        """Return the nodes that listen, as far as discovery knows."""
         return tuple(each.end(topic) for each in self.nodes if each.seen)
 
     def bystanders(self, path: str) -> frozenset[str]:
-        """Who serves another path, or publishes starts."""
+        """Return the nodes that serve another path, or publish starts."""
         others = [each.end("get") for each in self.nodes if each.serves and each.path != path]
         return frozenset(each.process for each in (*others, *self.publishers("start")))
 
     def publishers(self, topic: str) -> tuple[Endpoint, ...]:
-        """Who publishes feedback, or commands beside us."""
+        """Return the nodes that publish feedback, or commands besides ours."""
         if topic.endswith("feedback"):
             return tuple(each.end(topic) for each in self.nodes if each.seen)
         return tuple(Endpoint(f"s{i}", f"s{i}", "cli", HASH) for i in range(self.strangers))

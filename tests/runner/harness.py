@@ -70,7 +70,7 @@ class _Jumping(selectors.SelectSelector):
         self.now = 0.0
 
     def select(self, timeout: float | None = None) -> Any:
-        """What is ready now; otherwise the clock goes on."""
+        """Return what is ready now; without anything, advance the clock."""
         found = super().select(0)
         if not found:
             if timeout is None:
@@ -87,7 +87,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         super().__init__(self._jumping)
 
     def time(self) -> float:
-        """Virtual seconds."""
+        """Return virtual seconds."""
         return self._jumping.now
 
 
@@ -108,7 +108,7 @@ def virtual(test: Callable[..., Awaitable[None]]) -> Callable[..., None]:
 
 
 def clock_us() -> int:
-    """Virtual microseconds UTC."""
+    """Return virtual microseconds UTC."""
     return EPOCH + round(asyncio.get_running_loop().time() * 1e6)
 
 
@@ -134,7 +134,7 @@ class MemoryJournal:
     async def append(
         self, stream: str, drafts: Sequence[Draft], *, expected: int | None = None
     ) -> int:
-        """As the journal's."""
+        """Append as `Journal.append`, unless it is down."""
         await anyio.sleep(self.slow)
         if self.down:
             raise Unavailable("no space left on device")
@@ -163,30 +163,30 @@ class MemoryJournal:
     async def read(
         self, stream: str, *, after: int = 0, upto: int | None = None, limit: int | None = None
     ) -> list[Event]:
-        """As the journal's."""
+        """Read as `Journal.read`, unless it is down."""
         events = self.streams.get(stream, [])[after:upto]
         return events if limit is None else events[:limit]
 
     async def bare(self, stream: str, usual: str, *, after: int, upto: int) -> list[BareEvent]:
-        """As the journal's."""
+        """Read as `Journal.bare`, unless it is down."""
         return bare(self.streams.get(stream, [])[after:upto], usual)
 
     async def newest(self, stream: str) -> int:
-        """As the journal's."""
+        """Return the last seq as `Journal.newest`, unless it is down."""
         return len(self.streams.get(stream, []))
 
     async def query(self, statement: Select[Any]) -> list[Row[Any]]:
-        """As the journal's."""
+        """Query the real tables, unless it is down."""
         await anyio.lowlevel.checkpoint()
         with self._engine.connect() as connection:
             return list(connection.execute(statement).all())
 
     async def snapshot(self, stream: str) -> StreamSnapshot | None:
-        """As the journal's."""
+        """Return the stored snapshot of a stream."""
         return self.snapshots.get(stream)
 
     async def keep_snapshot(self, stream: str, seq: int, state: bytes) -> None:
-        """As the journal's."""
+        """Store the snapshot of a stream."""
         self.snapshots[stream] = StreamSnapshot(stream, seq, state)
 
     def told(self, run: str) -> list[RunEvent]:
@@ -256,7 +256,7 @@ class Robot:
             await self._feed()
 
     async def _feed(self) -> None:
-        """What a real engine tells by itself as it begins to stop: that its actions are STOPPING."""
+        """Send the feedback of a real engine that begins to stop: its actions are STOPPING."""
         answer = await self.engine.get()
         seen = tuple(
             msgspec.structs.replace(each, source="feedback", asked_at=None)
@@ -267,20 +267,20 @@ class Robot:
             self.subscribers.tell(Feedback(actor="", snapshots=seen))
 
     async def pause(self, graph_name: str) -> None:
-        """Arrives."""
+        """Let a pause message arrive."""
         await self.engine.pause(graph_name)
 
     @property
     def standing(self) -> Standing:
-        """The engine's."""
+        """The standing of the simulated engine."""
         return self.engine.standing
 
     async def modify(self, order: Order, continue_from: str = "") -> None:
-        """Obeys."""
+        """Let the engine obey a change."""
         await self.engine.modify(order, continue_from)
 
     async def resume(self, graph_name: str, continue_from: str = "") -> None:
-        """Arrives."""
+        """Let a resume message arrive."""
         await self.engine.resume(graph_name, continue_from)
 
     async def get(self) -> Answer:
@@ -310,7 +310,7 @@ class Robot:
         return self.subscribers.listening(hear)
 
     async def aclose(self) -> None:
-        """The engine goes on."""
+        """Do nothing: the engine goes on."""
 
     async def moving(self, graph: str) -> bool:
         """The truth: whether the code of one of its actions goes on, whatever the engine says."""
@@ -321,7 +321,7 @@ class Robot:
 
 
 def engine(script: dict[str, Any] | None = None) -> SimulatorLink:
-    """A simulated engine."""
+    """Return a simulated engine that follows a script."""
     chosen = script_from({"behaviours": script}) if script else Script()
     return SimulatorLink(Engine(facts=SIMULATED, script=chosen), clock_us=clock_us)
 
@@ -412,6 +412,6 @@ async def until(true: Callable[[], bool], patience: float = 60.0) -> None:
 
 
 async def ended(control: ExecutionService, run: str) -> str:
-    """How a run has ended, once it has. Times are virtual."""
+    """Wait for the end of a run and return its state. Times are virtual."""
     await until(lambda: run not in control.open, 3600)
     return (await control.find(run)).state

@@ -33,7 +33,7 @@ class RunnerProcess:
 
     @property
     def pid(self) -> int:
-        """Of the process."""
+        """The id of the process."""
         assert self._process is not None
         return self._process.pid
 
@@ -66,14 +66,14 @@ class RunnerProcess:
             return False
 
     def kill(self) -> None:
-        """kill -9."""
+        """Kill the process with SIGKILL."""
         assert self._process is not None
         self._process.send_signal(signal.SIGKILL)
         self._process.wait()
         self._process = None
 
     def end(self) -> None:
-        """Ask it to end."""
+        """Ask the process to end."""
         if self._process is not None:
             self._process.terminate()
             self._process.wait(20)
@@ -86,7 +86,7 @@ class RunnerProcess:
         )
 
     def live(self) -> ClientConnection:
-        """A live socket."""
+        """Open a live socket."""
         return connect(
             f"ws://127.0.0.1:{self.port}/api/live",
             additional_headers=BEARER,
@@ -106,7 +106,7 @@ def body(asked: StartRequest) -> bytes:
 
 
 def started(client: httpx.Client, asked: StartRequest) -> dict[str, Any]:
-    """Start; the run."""
+    """Start a run and return it."""
     answer = client.post("/api/runs", content=body(asked))
     assert answer.status_code == 201, answer.text
     run: dict[str, Any] = answer.json()

@@ -1,4 +1,4 @@
-"""What happens in a random history: graphs, scripts, and steps drawn by chance."""
+"""Random histories: graphs, scripts, and steps that are drawn by chance."""
 
 import random
 from collections.abc import Awaitable, Callable, Iterable
@@ -42,7 +42,7 @@ Step = tuple[str, Any]
 
 
 def random_steps(chance: random.Random) -> list[Step]:
-    """What happens, by chance: (how often, what, with what)."""
+    """Draw steps: (repetitions, step, value)."""
     steps: list[tuple[float, str, Callable[[], Any]]] = [
         (12, "wait", lambda: chance.choice([0.01, 0.05, 0.2, 1.0, 4.0])),
         (7, "start", lambda: chance.choice(list(GRAPHS))),
@@ -68,7 +68,7 @@ def random_steps(chance: random.Random) -> list[Step]:
 
 
 def opening(chance: random.Random) -> list[Step]:
-    """How it begins: in one of the ways in which things have gone wrong before, or just so."""
+    """Draw the first steps: one of the histories that went wrong before, or none."""
     name = chance.choice(list(GRAPHS))
     a_moment = ("wait", chance.choice([0.05, 0.2, 0.5, 1.0]))
     match chance.choice(["twins", "late", "loading", "any", "any"]):

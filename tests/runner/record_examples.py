@@ -98,7 +98,7 @@ class Stage:
         self.control: ExecutionService
 
     def robot(self) -> Node:
-        """The engine comes up."""
+        """Add a robot whose engine comes up."""
         robot = EmulatedEngine(
             ROBOT,
             script=self.script,
@@ -110,7 +110,7 @@ class Stage:
         return self.network.join(robot)
 
     async def start(self, task: Graph, *codes: str, reason: str = "") -> str:
-        """Ada starts it."""
+        """Let Ada start the graph."""
         override = {"override": Override(codes=codes, reason=reason)} if codes else {}
         asked = order(task, engine=ROBOT, graph=None, version="example", request_id=task.name)
         asked = msgspec.structs.replace(asked, **override)
@@ -129,7 +129,7 @@ async def wrong_parameter(stage: Stage) -> None:
 
 
 async def missing_action(stage: Stage) -> None:
-    """Nobody installed Search."""
+    """The robot has no action Search."""
     task = graph("search_shelf", *line("Look", "Search", "Report"))
     await stage.start(task, "unknown-action", reason="It was installed this morning.")
     await all_over(stage.control)
@@ -158,7 +158,7 @@ async def engine_restart(stage: Stage) -> None:
 
 
 async def foreign_start(stage: Stage) -> None:
-    """Somebody at a terminal starts a graph of the same name."""
+    """Another person starts a graph of the same name at a terminal."""
     task = graph("inspect", *line("Walk", "Scan"))
     await stage.start(task)
     await anyio.sleep(9)
@@ -220,7 +220,7 @@ def _named(name: str) -> Iterator[None]:
 
 
 def recorded() -> dict[str, bytes]:
-    """All of them by the name of their file."""
+    """Return all examples by the name of their file."""
     files: dict[str, bytes] = {}
     for place, story in enumerate(STORIES):
         name = story.__name__

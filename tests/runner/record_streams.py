@@ -46,7 +46,7 @@ from runner.robots_in_network import all_over, confirm_lost
 
 
 class Line(msgspec.Struct, frozen=True):
-    """One stored event."""
+    """One stored event of a file."""
 
     kind: str
     author: str
@@ -65,7 +65,7 @@ class Place:
         self.control: ExecutionService
 
     def robot(self, name: str) -> None:
-        """An engine comes up."""
+        """Add a robot whose engine comes up."""
         engine = EmulatedEngine(
             name,
             script=self.script,
@@ -77,7 +77,7 @@ class Place:
         self.network.join(engine, f"/{name}")
 
     async def start(self, graph: Graph, engine: str = "Robin", **more: Any) -> str:
-        """Ann starts it."""
+        """Let Ann start the graph."""
         asked = order(graph, engine=engine, graph=None, request_id=graph.name, **more)
         return (await self.control.start(asked, ANN)).run.id
 
@@ -103,7 +103,7 @@ async def laps(place: Place) -> None:
 
 
 async def stopped(place: Place) -> None:
-    """Stopped by somebody else."""
+    """A person who did not start it stops the run."""
     run = await place.start(sequence("stopped", 3))
     await anyio.sleep(6)
     await place.control.stop(run, BEN)
@@ -128,7 +128,7 @@ async def engine_lost(place: Place) -> None:
 
 
 async def foreign(place: Place) -> None:
-    """Somebody else starts a graph of the same name."""
+    """Another person starts a graph of the same name."""
     plan = sequence("foreign", 2)
     await place.start(plan)
     await anyio.sleep(4)
@@ -163,7 +163,7 @@ async def simulated(place: Place) -> None:
 
 
 async def together(place: Place) -> None:
-    """Two robots at once."""
+    """Two robots start together."""
     one = order(sequence("together", 2), graph=None, request_id="together")
     fields = {name: getattr(one, name) for name in ("version", "digest", "umrf", "request_id")}
     await place.control.start_group(GroupRequest(engines=("Marian", "Robin"), **fields), ANN)
@@ -209,7 +209,7 @@ async def told(story: Story) -> list[list[Event]]:
 
 
 def expected(events: list[Event]) -> Any:
-    """What the fold makes of a stream."""
+    """Return the fold of a stream as plain values."""
     run = replay(decode(each.kind, each.body) for each in events)
     assert run is not None
     return as_told(run)
@@ -221,7 +221,7 @@ def as_told(run: Run) -> Any:
 
 
 def recorded() -> Iterator[tuple[str, list[Event]]]:
-    """All streams by name."""
+    """Return all streams by name."""
     for story in STORIES:
         with _same_every_time(story.__name__):
             streams = run_in_virtual_time(lambda s=story: told(s))
@@ -239,7 +239,7 @@ def _same_every_time(name: str) -> Iterator[None]:
 
 
 def main() -> None:
-    """Write them."""
+    """Write the files of all streams."""
     folder = Path(sys.argv[1])
     folder.mkdir(parents=True)
     for name, events in recorded():

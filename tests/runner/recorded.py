@@ -42,14 +42,14 @@ LETTERS = {
 
 
 class Told(NamedTuple):
-    """What the index says of one graph: letters of states by node. `whole`: all nodes are named."""
+    """The index's line on one graph: letters of states by node. `whole`: all nodes are named."""
 
     nodes: dict[str, str]
     whole: bool
 
 
 class Index(NamedTuple):
-    """What the index says of one recording. `last`: the graphs of the last get; None: no answer."""
+    """The index of one recording. `last`: the graphs of the last get; None: no answer."""
 
     feedback: dict[str, Told]
     get: dict[str, Told]
@@ -129,7 +129,7 @@ class Recording:
         return snapshot(text, at=clock_us(), source=source, asked_at=clock_us())
 
     def _ours(self) -> bool:
-        """Whether what is shown now was started by us: somebody may have started it again."""
+        """True while what is shown was started by us: another client may have started it again."""
         return not self._again or self.now_ms() < self._again[0]
 
     def now_ms(self) -> float:
@@ -152,7 +152,7 @@ class Recording:
         return Standing(state="answering", incarnation=self._incarnation, servers=1)
 
     async def get(self) -> Answer:
-        """What the next recorded get was answered."""
+        """Return the answer to the next recorded get."""
         for asked, answered, running in self._gets:
             if asked >= self.now_ms() - 0.001:
                 await anyio.sleep(max(0.0, answered - self.now_ms()) / 1_000)
@@ -182,30 +182,31 @@ class Recording:
             self._subscribers.tell(Feedback(actor=line["actor"], snapshots=shown))
 
     def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:
-        """Everything that came by itself."""
+        """Call `hear` with every recorded report."""
         return self._subscribers.listening(hear)
 
     async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
-        """It was."""
+        """Do nothing: the start was recorded."""
 
     async def stop(self, graph_name: str) -> None:
-        """It was, when it was."""
+        """Do nothing: the stop was recorded at its time."""
 
     async def pause(self, graph_name: str) -> None:
-        """Nobody does that here."""
+        """Do nothing: recordings have no pause."""
 
     async def resume(self, graph_name: str, continue_from: str = "") -> None:
-        """Nobody does that here."""
+        """Do nothing: recordings have no resume."""
 
     async def modify(self, order: Order, continue_from: str = "") -> None:
-        """Nobody does that here."""
+        """Do nothing: recordings have no modify."""
 
     async def aclose(self) -> None:
         """The engine is no more."""
 
 
 def _is_first(line: dict[str, Any]) -> bool:
-    """Of several clients that heard the same we are the one without a name."""
+    """Return whether a line is of the client without a name: of several clients that heard the
+    same, we are that one."""
     return "who" not in line
 
 

@@ -46,7 +46,7 @@ class Open(Robot):
 
     @property
     def standing(self) -> Standing:
-        """As the engine stands, and who else is there."""
+        """The standing of the engine, with the others that are there."""
         return msgspec.structs.replace(
             self.engine.standing, others=self.others, servers=self.servers
         )
@@ -62,11 +62,11 @@ class Open(Robot):
         )
 
     def tell(self, report: Report) -> None:
-        """Report something."""
+        """Report a value to all listeners."""
         self.subscribers.tell(report)
 
     def command(self, command: Command, graph: str, umrf: str = "") -> None:
-        """Somebody else publishes something."""
+        """Report a command that somebody else published."""
         self.tell(
             ForeignCommand(at=clock_us(), command=command, graph=graph, umrf=umrf, sender="them")
         )
@@ -97,15 +97,15 @@ class RegisteredRobots:
         return self.robots[registration.name]
 
     async def sighting(self) -> Sighting:
-        """Whatever is in sight."""
+        """Return the engines in sight."""
         return Sighting(self.sight, self.left_s)
 
     async def candidates(self) -> tuple[Candidate, ...]:
-        """Whatever is in sight."""
+        """Return the engines in sight."""
         return self.sight
 
     async def aclose(self) -> None:
-        """Nothing is shared."""
+        """Do nothing: robots share no resources."""
 
 
 def given(graph: Graph, name: str) -> Graph:

@@ -1,4 +1,4 @@
-"""What goes aside goes to another process: it is a function of a module, never one that is made on the way."""
+"""Work for other processes is a function of a module, never one that is made on the way."""
 
 import ast
 from pathlib import Path

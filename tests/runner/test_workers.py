@@ -1,4 +1,4 @@
-"""What is worked on in another process: it never holds up this one, and nothing of it is left over."""
+"""Work in another process never blocks this one, and leaves nothing behind."""
 
 import os
 import signal

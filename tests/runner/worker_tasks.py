@@ -1,4 +1,4 @@
-"""What tests have workers do; a worker has to be able to import it."""
+"""Tasks that tests give to workers, in a module that a worker can import."""
 
 import os
 import signal

@@ -190,9 +190,8 @@ def create_app(settings: RunnerSettings) -> ASGIApp:
     if settings.behaviours is not None:
         BehaviourFolder.opened(settings.behaviours)
     for robot, folder in settings.index_folders.items():
-        if why := folder_trouble(
-            robot, folder
-        ):  # concerns this robot only: the folder may appear later
+        # This concerns one robot only, and the folder may appear later: the runner starts.
+        if why := folder_trouble(robot, folder):
             log.warning("%s Graphs cannot be written there until it can be read.", why)
     Journal.prepare(_database(settings), "runner", copies=settings.data / before_upgrade.FOLDER)
     revoked = Revocations(settings.data)

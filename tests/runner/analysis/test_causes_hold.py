@@ -100,7 +100,7 @@ def _event(step: tuple[str, Any, Any], at: int) -> RunEvent:
 
 
 class Evidence:
-    """What the events of a history show, read without the fold."""
+    """The facts that the events of a history show, read without the fold."""
 
     def __init__(self, told: Sequence[RunEvent]) -> None:
         self.stop = next((each.at for each in told if isinstance(each, StopRequested)), None)

@@ -40,13 +40,13 @@ ROUNDED = 0.0005
 
 
 def holds(took: DurationBounds, us: float) -> bool:
-    """Whether so many microseconds lie between the bounds."""
+    """Return whether so many microseconds lie between the bounds."""
     s = us / 1e6
     return took.least - ROUNDED <= s <= (s if took.most is None else took.most) + ROUNDED
 
 
 def durations(told: Lived) -> dict[str, int]:
-    """How long the code of each action really took, of those that ended."""
+    """Return how long the code of each action that ended really took."""
     return {
         name: end - begun
         for name, real in told.real.items()
@@ -75,7 +75,7 @@ def graph_of(told: Lived) -> Graph:
 
 
 def shown_spans(run: Run) -> Iterator[tuple[str, float, float]]:
-    """What the page shows of each visit that is over: of which action, least and most seconds."""
+    """Return what the page shows of each visit that is over: action, least and most seconds."""
     for name, shown in views.run_view(run).actions.items():
         for visit in shown.visits:
             if visit.until is not None and visit.not_after is not None:

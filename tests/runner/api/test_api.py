@@ -56,7 +56,7 @@ def test_the_list_can_be_filtered_and_leafed_through(process: RunnerProcess) -> 
 
 
 def test_what_a_start_has_become_is_told_by_its_request(process: RunnerProcess) -> None:
-    """Whoever did not get the answer looks it up, and sends no second start."""
+    """A client that got no answer asks for the outcome, and sends no second start."""
     with process.client() as client:
         asked = order(sequence(actions=1), script=FAST, request_id="quitelost123")
         before = client.get("/api/starts/quitelost123").json()
@@ -126,7 +126,7 @@ def test_a_malformed_start_is_told_where(
 
 
 def as_text(content: bytes) -> bytes:
-    """The same body with its graph as a string, as the page sends it."""
+    """Return the same body with its graph as a string, as the page sends it."""
     fields = msgspec.json.decode(content, type=dict[str, msgspec.Raw])
     text = msgspec.json.encode(bytes(fields["umrf"]).decode())
     return msgspec.json.encode(fields | {"umrf": msgspec.Raw(text)})

@@ -24,7 +24,7 @@ def index(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def client(tmp_path_factory: pytest.TempPathFactory, index: Path) -> Iterator[httpx.Client]:
-    """Of a runner that may write for David, whom it knows."""
+    """A client of a runner that knows David and may write for it."""
     data = tmp_path_factory.mktemp("writes") / "data"
     process = RunnerProcess(data, "--index-folder", f"David={index}").start()
     with process.client() as found:

@@ -1,4 +1,4 @@
-"""What ran three levels deep, over HTTP: why it failed, how often, and what was otherwise in another run."""
+"""A run three levels deep, over HTTP: why it failed, how often, and how another run differed."""
 
 from typing import Any
 

@@ -1,4 +1,5 @@
-"""What is old is put away, proven before it is deleted, and can be looked at as before."""
+"""Old runs and messages are archived, verified before they are deleted, and can be read as
+before."""
 
 import asyncio
 import multiprocessing

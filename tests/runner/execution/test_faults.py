@@ -99,7 +99,7 @@ def test_a_link_that_breaks_while_a_graph_of_somebody_else_is_stopped_ends_nothi
             assert control.robots.foreign_stops.trouble("David", "cleaning")
             assert control.open[run.id].run.state == "running"
             setattr(david, fault, False)
-            await until(lambda: not control.robots.foreign_stops.going("David"))
+            await until(lambda: not control.robots.foreign_stops.is_stopping("David"))
             assert not await david.moving("cleaning")
 
     lived()
@@ -176,7 +176,7 @@ def test_a_file_that_somebody_put_beside_recordings_ends_nothing(tmp_path: Path)
                 said = Answer(
                     asked_at=at, at=at, incarnation="life", graphs=(), texts={"a": f"{at}"}
                 )
-                recordings.heard("David", said)
+                recordings.record_answer("David", said)
                 await anyio.sleep(5)
             tasks.cancel_scope.cancel()
         assert len(await recordings.listed("David")) == 2

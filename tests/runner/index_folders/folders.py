@@ -52,7 +52,7 @@ def add(folder: Path, path: str, graph: Graph) -> Path:
 
 
 def held(folder: Path) -> dict[str, bytes | str]:
-    """Everything below a folder by its path: bytes of files, and where links lead."""
+    """Return everything below a folder by its path: bytes of files, and targets of links."""
     found: dict[str, bytes | str] = {}
     for below, _, files in os.walk(folder):
         for name in files:

@@ -1,4 +1,4 @@
-"""Which files an engine would read is known, and what cannot be read is said."""
+"""The files that an engine would read are found, and those that cannot be read are named."""
 
 import os
 from pathlib import Path

@@ -136,7 +136,7 @@ _STEPS: Final[tuple[tuple[Any, str], ...]] = (
 
 
 def copies(data: Path, target: Path) -> Iterator[Path]:
-    """The same folder again and again."""
+    """Yield copies of the same folder."""
     for number in range(1, sys.maxsize):
         copy = target / str(number)
         (copy / "recordings" / "David").mkdir(parents=True)

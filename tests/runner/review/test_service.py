@@ -1,4 +1,4 @@
-"""What has run can be found, marked, summed up, handed over and expected again: over HTTP."""
+"""Stored runs can be found, marked, summed up, exported and expected again: over HTTP."""
 
 import csv
 import io

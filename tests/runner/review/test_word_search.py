@@ -61,7 +61,8 @@ def added(
 
 
 def asked(connection: Connection, wanted: str) -> tuple[list[Any], list[Any], bool]:
-    """What a search finds by the index and by reading all runs; whether the index was of use."""
+    """Return what a search finds by the index and by reading all runs, and whether the index was
+    used."""
 
     async def rows(statement: Select[Any]) -> list[Row[Any]]:
         return list(connection.execute(statement).all())

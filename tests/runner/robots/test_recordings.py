@@ -1,4 +1,4 @@
-"""What engines said is kept as they said it, for a while."""
+"""Messages of engines are recorded unchanged, for a while."""
 
 import gzip
 from pathlib import Path
@@ -31,9 +31,9 @@ def kept(folder: Path, *said: Answer | Feedback, **limits: int) -> Recordings:
             for each in said:
                 match each:
                     case Answer():
-                        recordings.heard("David", each)
+                        recordings.record_answer("David", each)
                     case Feedback():
-                        recordings.fed("David", each)
+                        recordings.record_feedback("David", each)
                 await anyio.sleep(5)
             tasks.cancel_scope.cancel()
 

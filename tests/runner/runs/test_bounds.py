@@ -1,4 +1,4 @@
-"""What really happened lies inside of what is said of it, however much is lost or late."""
+"""Bounds of visits contain what really happened, however much is lost or late."""
 
 import os
 from typing import Any

@@ -1,4 +1,5 @@
-"""How often an action ran is a lower bound where visits may have been missed, and arrows force some of it."""
+"""Counts of visits are lower bounds where visits may have been missed, and arrows force some of
+them."""
 
 from action_assistant.runner.analysis import annotations, exports
 from action_assistant.runner.analysis.comparison import SentTree, compare

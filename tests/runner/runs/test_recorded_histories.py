@@ -1,4 +1,4 @@
-"""What real engine nodes sent folds into histories that agree with what the recordings' index says.
+"""Recordings of real engine nodes fold into histories that agree with the recordings' index.
 
 `$UMRF_RECORDINGS` names the recordings, see `support/recordings.py`; a few small ones of the same
 form, made up after them, are always folded.
@@ -29,7 +29,7 @@ _TAKEN, _SHORT, _REFUSED = (
 
 
 def check(run: Run, told: Index, name: str) -> None:
-    """Whether the history says what the index says, and nothing beyond it."""
+    """Compare a history with the index, in both directions."""
     check_end(run, told, name)
     for graph in told.feedback.keys() | told.get.keys():
         check_nodes(run, graph, told)
@@ -87,7 +87,8 @@ def check_nodes(run: Run, graph: str, told: Index) -> None:
 
 
 def _laps(letters: str) -> int:
-    """How often it began, at least: each beginning shows as R, or as an end that nothing preceded."""
+    """Return how often an action began at least: each begin shows as R, or as an end without
+    one."""
     began, moving = 0, False
     for letter in letters:
         if letter in _MOVES:

@@ -29,7 +29,7 @@ class Knowing(RobotsInNetwork):
     """Robots that know one action, and not that of patrols."""
 
     def robot(self, name: str) -> Node:
-        """An engine comes up."""
+        """Add a robot whose engine comes up."""
         stand_in = EmulatedEngine(
             name,
             index=EmulatedIndex(actions={"Wave": Signature()}),
@@ -206,7 +206,7 @@ async def test_words_that_somebody_else_may_have_caused_end_nothing_after_a_rest
 
 @virtual
 async def test_a_start_that_was_refused_and_yet_shows_something_moving_is_an_alarm() -> None:
-    """What the log says and what is shown contradict each other: what moves is believed."""
+    """The log and the engine's state contradict each other: motion is believed."""
     david = Open(NEVER)
     async with fleet(Harness(), David=david) as control:
         run = (await control.start(order(PATROL, engine="David"), ANN)).run

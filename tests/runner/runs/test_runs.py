@@ -125,7 +125,7 @@ def answer(at: int, state: str, **nodes: str) -> Snapshot:
 
 
 def feedback(at: int, state: str, **nodes: str) -> Snapshot:
-    """It came then; how old it is nobody knows."""
+    """Return a snapshot of feedback that came at `at`, of unknown age."""
     return Snapshot(
         at=at, graph="patrol", state=state, nodes=nodes, run="r1", source="feedback", since_asked=0
     )

@@ -29,7 +29,8 @@ LOWER, UPPER = ("not_before", "until"), ("from", "not_after")
 
 
 def assert_tells(now: Any, then: Any, place: str = "") -> None:
-    """Everything that was told then is told now; more may be, and bounds may be further apart."""
+    """Check that the fold tells at least what it told then: there may be more, and bounds may be
+    further apart."""
     match then:
         case str() if place.rpartition("/")[2] in LOWER and "/visits/" in place:
             assert now <= then, place

@@ -1,4 +1,4 @@
-"""What is known already is not stored again, and nothing else is left out."""
+"""Observations that repeat what is known are not stored again, and no other is left out."""
 
 from functools import partial
 from typing import Any

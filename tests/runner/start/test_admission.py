@@ -1,4 +1,4 @@
-"""What may be started, and what is said to those who may not."""
+"""Rules of admission: which starts are refused, and with which words."""
 
 from typing import Any
 

@@ -93,7 +93,7 @@ async def test_a_change_of_what_runs_is_asked_for_like_a_start() -> None:
         modified: tuple[Order, ...] = ()
 
         async def modify(self, order: Order, continue_from: str = "") -> None:
-            """Remember it."""
+            """Remember the order instead of sending it."""
             self.modified = (*self.modified, order)
 
     david, first, second = Pausing(NEVER), sequence(), sequence(actions=4)
@@ -134,7 +134,7 @@ async def test_a_yes_is_kept_once_and_after_a_restart() -> None:
     events = await harness.journal.read(STREAM)
     assert [event.kind for event in events] == [ApprovalGiven.kind] * 2
     again = Approvals(harness.journal, clock_us)
-    assert [each.author for each in await again.of(digest)] == [BEN, CARL]
+    assert [each.author for each in await again.given_for(digest)] == [BEN, CARL]
 
 
 @given(st.sampled_from(["yes", 1, None, []]))

@@ -1,4 +1,5 @@
-"""What a robot lacks inside of a graph is written where it looks, once that is recorded, and is then allowed."""
+"""Graphs inside that a robot lacks are written into its index folder, after that was recorded; then
+the start is accepted."""
 
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
@@ -150,7 +151,7 @@ async def test_what_stands_in_the_way_is_told_before_anybody_tries(tmp_path: Pat
 async def test_what_fails_half_way_is_told_and_recorded_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Somebody else's file comes under the name between the look and the write."""
+    """Another program writes a file of the same name between check and write."""
     harness = Harness()
     mine = add(tmp_path, "z.graph.json", sequence("round", 3))
 

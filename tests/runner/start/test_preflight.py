@@ -97,8 +97,8 @@ async def test_a_graph_of_somebody_else_is_in_the_way_until_it_is_stopped() -> N
         assert verdicts(look)["quiet"] == "blocked"
         (same,) = await control.look(group(sequence("cleaning"), "David"))
         assert same.never
-        assert control.robots.silence(BEN, lambda _: ()) == ["David: cleaning"]
-        await until(lambda: not control.robots.foreign_stops.going("David"))
+        assert control.robots.stop_foreign_graphs(BEN, lambda _: ()) == ["David: cleaning"]
+        await until(lambda: not control.robots.foreign_stops.is_stopping("David"))
         assert not await david.moving("cleaning")
         told = [event for _, event in await control.robots.robot_log.newest("David", 9)]
         assert isinstance(told[-1], StopWasProven)
@@ -135,7 +135,7 @@ async def test_the_simulator_that_plays_a_robot_refuses_what_the_robot_would() -
 
 @virtual
 async def test_a_robot_that_has_an_action_as_it_was_before_is_not_started() -> None:
-    """Its index says so: the graph has a parameter that the robot's file of the action does not."""
+    """The graph has a parameter that the robot's file of the action lacks."""
     david, graph = Open(), sequence()
     newer = tuple(
         msgspec.structs.replace(

@@ -40,7 +40,7 @@ def admitted(*problems: Problem) -> Admitted:
 
 
 def proof(**standing: Any) -> Item:
-    """What is said about whether a stop could be proven."""
+    """Return the item about the proof of a Stop for an engine of this standing."""
     fields = {"state": "answering", "generation": "current", "servers": 1} | standing
     sight = EngineView(
         name="David",

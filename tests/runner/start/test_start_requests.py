@@ -1,4 +1,4 @@
-"""What a start says beside its graph, and how large that may be."""
+"""The fields of a start besides its graph, and their limits."""
 
 import msgspec
 import pytest

@@ -104,7 +104,8 @@ async def test_what_needs_no_looking_up_is_started_as_often_as_one_likes() -> No
 
 @virtual
 async def test_a_name_that_somebody_else_has_used_is_held_as_well() -> None:
-    """Also a graph that the engine then has in its index no more, and one without sub-graphs."""
+    """The same holds for a graph that has left the engine's index since, and for one without
+    sub-graphs."""
     network = scene()
     async with network.played() as control:
         text = codec.write(sequence("outer"))
@@ -189,14 +190,15 @@ async def test_an_engine_that_looks_them_up_again_is_let_do_so() -> None:
 
 
 def test_a_change_with_a_sub_graph_in_it_is_not_sent() -> None:
-    """Not even where the run has it already: the engine takes the change without looking it up."""
+    """The engine takes a change without looking it up, even where the run has the sub-graph
+    already."""
 
     class Pausing(Open):
         pauses = True
         sent = 0
 
         async def modify(self, order: Order, continue_from: str = "") -> None:
-            """What must not happen."""
+            """Fail the test: this must not be called."""
             self.sent += 1
 
     @virtual

@@ -180,13 +180,13 @@ async def test_the_stop_of_a_graph_of_others_follows_the_same_rule() -> None:
     async with here.played() as control:
         text = codec.write(PATROL)
         here.network.carry(Start(graph_name="patrol", targets=("David",), graph_json=text), "cli")
-        await until(lambda: control.robots.silence(BEN, lambda _: ()) != [])
+        await until(lambda: control.robots.stop_foreign_graphs(BEN, lambda _: ()) != [])
         stops = control.robots.foreign_stops
         await anyio.sleep(3)
         assert stops.trouble("David", "patrol") == NAME
         await until(lambda: here.nodes["David"].robot.moving == ("patrol",))
-        assert stops.going("David")
-        await until(lambda: not stops.going("David"))
+        assert stops.is_stopping("David")
+        await until(lambda: not stops.is_stopping("David"))
         assert here.nodes["David"].robot.moving == ()
         await until(lambda: not control.robots.robot_log.waiting)
         heard = [each for _, each in await control.robots.robot_log.newest("David", 9)]

@@ -68,8 +68,8 @@ def _in_words(cause: Cause, run: Run) -> str:
         case RefusalCause(quote=quote, sent=sent):
             return _refusal_in_words(run.engine, quote, sent=sent)
         case Silence(quote=quote):
-            told = f" {quote}" if quote else ""
-            return f"What happened after this moment is unknown.{told}"
+            reason = f" {quote}" if quote else ""
+            return f"What happened after this moment is unknown.{reason}"
         case Stalled(quote=quote) | Warned(quote=quote):
             return quote
         case _:

@@ -283,7 +283,7 @@ def of_dry_run(wanted: Expect, name: str, author: Author, now: int) -> Expected:
     )
 
 
-def shown(saved: Expected) -> Expectation:
+def expectation_view(saved: Expected) -> Expectation:
     """Return an expectation as programs see it."""
     return Expectation(
         name=saved.name,

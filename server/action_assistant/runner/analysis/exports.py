@@ -137,14 +137,14 @@ class _Track:
         }
         self._count = 0
 
-    def see(self, event: Event, told: Any, before: Run | None, after: Run) -> None:
-        """Write the messages of one event; `told` is its decoded body."""
-        at = getattr(told, "at", event.at)
+    def see(self, event: Event, decoded: Any, before: Run | None, after: Run) -> None:
+        """Write the messages of one event; `decoded` is its decoded body."""
+        at = getattr(decoded, "at", event.at)
         if before is None or before.state != after.state or before.desired != after.desired:
             body = {"state": after.state, "desired": after.desired, "result": after.result}
             self._write("run", "/run", at, {**body, "event": event.kind})
-        if isinstance(told, Observed):
-            for item in told.seen:
+        if isinstance(decoded, Observed):
+            for item in decoded.seen:
                 self._seen(item)
         self._ended(at, before, after)
         self._said(before, after)

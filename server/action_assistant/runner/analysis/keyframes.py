@@ -189,12 +189,12 @@ class KeyframeStore:
         return _whole(await self._journal.read(stream, after=after, upto=upto))
 
     async def _stored(self, stream: str) -> RunKeyframes | None:
-        kept = await self._journal.snapshot(stream)
-        if kept is None:
+        stored = await self._journal.snapshot(stream)
+        if stored is None:
             return None
         try:
             keyframes = await self.run_in_worker(
-                lambda: msgspec.msgpack.decode(kept.state, type=RunKeyframes)
+                lambda: msgspec.msgpack.decode(stored.state, type=RunKeyframes)
             )
         except msgspec.DecodeError:
             return None
@@ -230,14 +230,14 @@ def fold(
     """Fold events, going on from `run`; call `see` after each with the event, its decoded body, and
     the run before and after it."""
     for event in events:
-        told = decode(event.kind, event.body)
+        decoded = decode(event.kind, event.body)
         before = run
         if run is not None:
-            run = follow(run, told)
-        elif isinstance(told, Requested):
-            run = begin(told)
+            run = follow(run, decoded)
+        elif isinstance(decoded, Requested):
+            run = begin(decoded)
         if run is not None:
-            see(event, told, before, run)
+            see(event, decoded, before, run)
     return run
 
 
@@ -259,28 +259,28 @@ def _marks_of(part: _Part) -> list[ReplayMark]:
     for seq, (body, kind, at) in [each for each in numbered if each[1][1] is not None]:
         if kind is None or kind == Observed.kind:
             continue
-        told = decode(kind, body)
-        by, text = author_and_text(told)
-        since = told.since if isinstance(told, Silent) else None
-        marks.append(ReplayMark(seq, getattr(told, "at", at or 0), kind, by, text, since))
+        decoded = decode(kind, body)
+        by, text = author_and_text(decoded)
+        since = decoded.since if isinstance(decoded, Silent) else None
+        marks.append(ReplayMark(seq, getattr(decoded, "at", at or 0), kind, by, text, since))
     return marks
 
 
-def author_and_text(told: RunEvent) -> tuple[str, str]:
+def author_and_text(decoded: RunEvent) -> tuple[str, str]:
     """Return the name of the person behind an event, and its text, "" where there is none."""
-    match told:
+    match decoded:
         case Requested():
-            return told.author.name, told.override.reason if told.override else ""
+            return decoded.author.name, decoded.override.reason if decoded.override else ""
         case PauseRequested() | ResumeRequested() | ModifyRequested() | StopRequested():
-            return told.author.name, ""
+            return decoded.author.name, ""
         case StopSent():
-            return "", told.failed or f"attempt {told.attempt}"
+            return "", decoded.failed or f"attempt {decoded.attempt}"
         case Silent() | ModifyRefused():
-            return "", told.why
+            return "", decoded.why
         case AlarmRaised() | MovesAgain():
-            return "", told.text
+            return "", decoded.text
         case Ended():
-            return "", told.detail
+            return "", decoded.detail
         case _:
             return "", ""
 
@@ -297,13 +297,13 @@ def _following(last: Keyframe | None, part: _Part, room: int) -> list[Keyframe]:
 
 
 def _next(last: Keyframe | None, part: _Part) -> Keyframe:
-    told = decode_all(Observed.kind, part.events)
-    run = replay(told, last.run if last is not None else None)
+    decoded = decode_all(Observed.kind, part.events)
+    run = replay(decoded, last.run if last is not None else None)
     if run is None:
         raise NotFound("There is no such run.")
     try:
-        at = max(map(_AT, told))
+        at = max(map(_AT, decoded))
     except AttributeError:  # an event of a kind that this version does not know
         stored = (each[2] or 0 for each in part.events)
-        at = max(getattr(one, "at", own) for one, own in zip(told, stored, strict=True))
+        at = max(getattr(one, "at", own) for one, own in zip(decoded, stored, strict=True))
     return Keyframe(part.seqs[-1], max(at, last.at) if last is not None else at, run)

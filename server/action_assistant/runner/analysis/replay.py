@@ -130,20 +130,19 @@ def _frames(run: Run | None, events: Sequence[Event]) -> list[ReplayFrame]:
     frames: list[ReplayFrame] = []
     at = 0
 
-    def see(event: Event, told: RunEvent, before: Run | None, after: Run) -> None:
+    def see(event: Event, decoded: RunEvent, before: Run | None, after: Run) -> None:
         nonlocal at
-        at = max(
-            at, getattr(told, "at", event.at)
-        )  # a clock may be set back, but the times of a replay do not go back
-        frames.append(frame(event, told, before, after, at))
+        # A clock may be set back, but the times of a replay do not go back.
+        at = max(at, getattr(decoded, "at", event.at))
+        frames.append(frame(event, decoded, before, after, at))
 
     fold(run, events, see)
     return frames
 
 
-def frame(event: Event, told: RunEvent, before: Run | None, after: Run, at: int) -> ReplayFrame:
-    """Return the changes by one event. `told` is its decoded body."""
-    by, text = author_and_text(told)
+def frame(event: Event, decoded: RunEvent, before: Run | None, after: Run, at: int) -> ReplayFrame:
+    """Return the changes by one event. `decoded` is its decoded body."""
+    by, text = author_and_text(decoded)
     old = before.alarms if before is not None else ()
     return ReplayFrame(
         seq=event.seq,

@@ -133,8 +133,8 @@ def statistics(
 
 
 def _point(row: Row[Any]) -> RunPoint:
-    kept = row.summary.get("took")
-    span = None if kept is None else DurationBounds(least=kept["least"], most=kept["most"])
+    stored = row.summary.get("took")
+    span = None if stored is None else DurationBounds(least=stored["least"], most=stored["most"])
     took = None if span is None else span.exact
     return RunPoint(row.id, row.number, row.state, row.result, took, span)
 
@@ -191,12 +191,12 @@ def _action(place: LevelPlace, rows: Sequence[Row[Any]]) -> ActionStatistics:
     )
 
 
-def _took(kept: Any) -> DurationBounds:
+def _took(stored: Any) -> DurationBounds:
     """Return the bounds of a stored duration. Older versions stored a lower bound in
     microseconds."""
-    if isinstance(kept, list):
-        return DurationBounds(least=kept[0], most=kept[1])
-    return duration_bounds(kept, None)
+    if isinstance(stored, list):
+        return DurationBounds(least=stored[0], most=stored[1])
+    return duration_bounds(stored, None)
 
 
 def _exact(span: DurationBounds | None) -> float | None:

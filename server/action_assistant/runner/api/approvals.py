@@ -35,7 +35,7 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
     async def approvals(
         digest: Annotated[str, Parameter(min_length=64, max_length=64)],
     ) -> list[Approval]:
-        return [_view(each) for each in await services.control.approvals.of(digest)]
+        return [_view(each) for each in await services.control.approvals.given_for(digest)]
 
     @post(
         "/api/approvals",

@@ -155,7 +155,7 @@ class Hub:
             for run, opened in self.control.open.items()
             if opened.watch.seen_at is not None
         }
-        heard = {name: views.time(at) for name, at in self.control.robots.heard().items()}
+        heard = {name: views.time(at) for name, at in self.control.robots.last_answers().items()}
         return _text(Heartbeat(views.time(self.clock_us()), seen, heard))
 
     def _changed(self, opened: OpenRun) -> None:

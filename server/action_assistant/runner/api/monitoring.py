@@ -87,12 +87,12 @@ class RunMetrics(Collector):
 
     def _run_families(self) -> Iterator[Family]:
         opened = tuple(self._control.open.values())
-        going = [each.run for each in opened if each.run.end is None]
+        open_runs = [each.run for each in opened if each.run.end is None]
         yield Family("runs_open", "Runs that are not over, or not stored yet.", len(opened))
         yield Family(
             "runs",
             "Runs that are not over, by engine and state.",
-            Counter((run.engine, run.state) for run in going),
+            Counter((run.engine, run.state) for run in open_runs),
             ("engine", "state"),
         )
         yield Family(
@@ -113,21 +113,21 @@ class RunMetrics(Collector):
     @property
     def unconfirmed(self) -> Counter[str]:
         """The number of STOP UNCONFIRMED that the page shows, by engine."""
-        going = (each.run for each in self._control.open.values() if each.run.end is None)
+        open_runs = (each.run for each in self._control.open.values() if each.run.end is None)
         found = Counter(
             run.engine
-            for run in going
+            for run in open_runs
             if run.lost or any(alarm.code == _UNCONFIRMED for alarm in run.alarms)
         )
-        for robot, why in self._control.robots.foreign_stops.all_going():
+        for robot, why in self._control.robots.foreign_stops.pending():
             found[robot] += bool(why)
         return found
 
     def _stop_families(self) -> Iterator[Family]:
-        going = (each.run for each in self._control.open.values() if each.run.end is None)
+        open_runs = (each.run for each in self._control.open.values() if each.run.end is None)
         engines = [SIMULATOR, *self._control.robots.names]
-        stopping = Counter(run.engine for run in going if run.desired == "stopped")
-        stopping.update(robot for robot, _ in self._control.robots.foreign_stops.all_going())
+        stopping = Counter(run.engine for run in open_runs if run.desired == "stopped")
+        stopping.update(robot for robot, _ in self._control.robots.foreign_stops.pending())
         unconfirmed = self.unconfirmed
         yield Family(
             "stops_pending",
@@ -153,7 +153,7 @@ class RunMetrics(Collector):
         yield Family(
             "engine_last_answer_timestamp_seconds",
             "When an engine answered last; missing where it never did.",
-            {(name,): at / 1e6 for name, at in robots.heard().items()},
+            {(name,): at / 1e6 for name, at in robots.last_answers().items()},
             ("engine",),
         )
 
@@ -178,7 +178,7 @@ class WatchedRunner(Watched):
     def activity(self) -> Activity:
         """Return how many pages, runs and unconfirmed Stops there are, and the state of each
         robot."""
-        heard = self._control.robots.heard()
+        heard = self._control.robots.last_answers()
         robots = [
             RobotLink(
                 each.name,

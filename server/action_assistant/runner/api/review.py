@@ -167,8 +167,10 @@ def _one_run(services: ReviewServices) -> list[ControllerRouterHandler]:
     @get("/api/runs/{run:str}/raw", summary="The places of the raw messages from the time of a run")
     async def raw(run: str) -> Response[RawMessages]:
         found = await services.control.find(run)
-        kept = services.control.robots.recordings
-        here = [] if found.simulated or kept is None else await kept.listed(found.engine)
+        recordings = services.control.robots.recordings
+        here = (
+            [] if found.simulated or recordings is None else await recordings.listed(found.engine)
+        )
         text = await services.worker_queries.text(
             ReviewService.raw, run, here, time.time_ns() // 1000
         )

@@ -249,7 +249,7 @@ def _one_robot(services: RobotServices) -> list[ControllerRouterHandler]:
     async def held(name: str, graph: str) -> Response[bytes]:
         """The graph comes without its run state: one that carries a state must not be sent
         again."""
-        return await _umrf(services, services.control.robots.held(name, graph))
+        return await _umrf(services, services.control.robots.held_graph(name, graph))
 
     @get(
         "/api/robots/{name:str}/recordings",
@@ -257,8 +257,8 @@ def _one_robot(services: RobotServices) -> list[ControllerRouterHandler]:
     )
     async def recorded(name: str) -> list[Recording]:
         services.control.robots.registration(name)
-        kept = services.control.robots.recordings
-        return [] if kept is None else await kept.listed(name)
+        recordings = services.control.robots.recordings
+        return [] if recordings is None else await recordings.listed(name)
 
     @get(
         "/api/robots/{name:str}/recordings/{file:str}",
@@ -267,10 +267,10 @@ def _one_robot(services: RobotServices) -> list[ControllerRouterHandler]:
     )
     async def recording(name: str, file: str) -> Response[bytes]:
         services.control.robots.registration(name)
-        kept = services.control.robots.recordings
-        if kept is None:
+        recordings = services.control.robots.recordings
+        if recordings is None:
             raise NotFound("Nothing is recorded here.")
-        return Response(await kept.file(name, file), media_type="application/gzip")
+        return Response(await recordings.file(name, file), media_type="application/gzip")
 
     @post(
         "/api/robots/{name:str}/stop",

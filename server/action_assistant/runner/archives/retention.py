@@ -168,12 +168,12 @@ class Retention:
     # --- raw messages -------------------------------------------------------------------------
 
     async def _sweep_raw(self, days: float) -> SweepResult:
-        kept = self._recordings
-        if kept is None:
+        recordings = self._recordings
+        if recordings is None:
             return SweepResult()
         problems: list[str] = []
         done = 0
-        for path in await self._run_in_worker(lambda: kept.due(days)):
+        for path in await self._run_in_worker(lambda: recordings.due(days)):
             try:
                 await self._archive_raw(path)
                 done += 1

@@ -476,9 +476,9 @@ class Monitor:
 
     async def _tell_stall(self, run: Run, run_in_worker: RunInWorker) -> Finding:
         try:
-            text = await run_in_worker(stall.told_of, stall.packed(run), self.umrf)
+            text = await run_in_worker(stall.packed_alarm_text, stall.packed(run), self.umrf)
         except Refused:  # nobody can read the graph now; what is known must be said all the same
-            text = stall.told(run, None)
+            text = stall.alarm_text(run, None)
         if not self._standstill.lasts:
             return Finding()
         return Finding(stall.STALLED, text, only_open=True)

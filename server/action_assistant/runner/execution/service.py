@@ -172,12 +172,12 @@ class ExecutionService:
         """Want everything stopped; what this concerns. Never waits."""
         self._stops.note("", author, stop_id)
         runs = [run for run in tuple(self.open) if self._stop(run, author, stop_id)]
-        self.robots.silence(author, self._runs.on)
+        self.robots.stop_foreign_graphs(author, self._runs.on)
         return StoppedAll(runs, self.robots.foreign_stops.graphs(), self.robots.unheard())
 
     def stop_robot(self, name: str, author: Author) -> tuple[list[str], list[str]]:
         """Want whatever a robot runs stopped: runs of ours, graphs of others. Raises NotFound."""
-        graphs = self.robots.silence(author, self._runs.on, name)
+        graphs = self.robots.stop_foreign_graphs(author, self._runs.on, name)
         self._stops.note(name, author)
         return [run for run in self._runs.on(name) if self._stop(run, author, "")], graphs
 
@@ -274,7 +274,7 @@ class ExecutionService:
                 f"Run {run.number} goes on {robot}; stop it first. Its Stop would get lost.",
                 where={"path": "/name", "run": run.id},
             )
-        if self.robots.foreign_stops.going(robot):
+        if self.robots.foreign_stops.is_stopping(robot):
             raise Conflict(
                 f"Something is being stopped on {robot}; wait until it is.", where={"path": "/name"}
             )

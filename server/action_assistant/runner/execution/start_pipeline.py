@@ -283,7 +283,7 @@ class StartPipeline:
         await self._approvals.require(robot.registration, ready.tree_digest, starter)
         overridden = request.override.codes if request.override else ()
         preflight.require_clear([self._free_item(request.engine, ready.name)], overridden)
-        if self._robots.foreign_stops.going(request.engine):
+        if self._robots.foreign_stops.is_stopping(request.engine):
             raise Conflict(
                 f"Something is being stopped on {request.engine}; a start would be stopped with it.",
                 where={"path": "/engine", "item": "quiet"},

@@ -125,7 +125,7 @@ def _is_same(graph: Graph, file: DefiningFile, facts: EngineFacts) -> bool:
 def _state_of_other(name: str, file: DefiningFile) -> FileState:
     if file.linked:
         return Hindered(
-            f"{file.shown} defines another {name} and is a link, or behind one: what it leads to is not "
+            f"{file.display_path} defines another {name} and is a link, or behind one: what it leads to is not "
             "touched."
         )
     return Differing(file)
@@ -133,4 +133,4 @@ def _state_of_other(name: str, file: DefiningFile) -> FileState:
 
 def _listed(files: tuple[DefiningFile, ...]) -> str:
     more = f" and {len(files) - _NAMED} more" if len(files) > _NAMED else ""
-    return f"{', '.join(each.shown for each in files[:_NAMED])}{more}"
+    return f"{', '.join(each.display_path for each in files[:_NAMED])}{more}"

@@ -30,7 +30,7 @@ class DefiningFile(msgspec.Struct, frozen=True):
     text: bytes
 
     @property
-    def shown(self) -> str:
+    def display_path(self) -> str:
         """The path as people read it, in one line."""
         return shown_path(self.path)
 

@@ -46,9 +46,7 @@ class SumUpLoop:
         self._clock_us = clock_us
         self._summed = summed
         self._ended = anyio.Event()
-        self._summed_up: int | None = (
-            None  # microseconds UTC: all runs that had ended by then are summed up
-        )
+        self._summed_up: int | None = None  # all runs that had ended by then have their sums
         self._tried: Counter[str] = Counter()  # how often the sum of a run ended its worker
         ongoing.watch(self._saw)
 
@@ -115,11 +113,11 @@ class SumUpLoop:
         await self._journal.append(annotations.stream_about(run_id), [annotations.draft(summed)])
 
 
-def due_after(kept: int) -> int:
-    """Return how many keyframes a run has to have until they are stored again, after `kept` of
+def due_after(stored: int) -> int:
+    """Return how many keyframes a run has to have until they are stored again, after `stored` of
     them. All are written each time, so the longer a run, the later the next time: 100,000 events
     write some 70 MB in all, not 200."""
-    return kept + max(1, kept // _UNKEPT_PART)
+    return stored + max(1, stored // _UNKEPT_PART)
 
 
 class KeyframeLoop:
@@ -154,9 +152,9 @@ class KeyframeLoop:
                 try:
                     await self._make(run)
                 except Refused as refused:  # they are made together with the next ones
-                    log.warning("no keyframes of run %s were kept: %s", run, refused.detail)
+                    log.warning("no keyframes of run %s were stored: %s", run, refused.detail)
                 except Exception:  # keyframes are a cache: without them the runner goes on
-                    log.exception("no keyframes of run %s were kept", run)
+                    log.exception("no keyframes of run %s were stored", run)
 
 
 class Deriving(Protocol):

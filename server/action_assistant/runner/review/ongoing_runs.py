@@ -38,7 +38,7 @@ class OngoingRuns(Protocol):
         ...
 
 
-async def settled(opened: OngoingRun) -> None:
+async def wait_until_stored(opened: OngoingRun) -> None:
     """Wait until the events of a run that were shown are stored, for two seconds at most."""
     with anyio.move_on_after(_SETTLED_S):
         await opened.recorder.flushed()

@@ -28,7 +28,7 @@ from action_assistant.runner.archives.raw_messages import (
 )
 from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.review.background_loops import KeyframeLoop, SumUpLoop
-from action_assistant.runner.review.ongoing_runs import OngoingRuns, settled
+from action_assistant.runner.review.ongoing_runs import OngoingRuns, wait_until_stored
 from action_assistant.runner.robots.recordings import Recording, hours
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.events import Author, Observed, decode, said_in
@@ -116,21 +116,26 @@ class ReviewService:
             tasks.start_soon(self._sums.run)
             tasks.start_soon(self._keyframes.run)
 
+    async def _answer(
+        self,
+        question: Callable[Concatenate["ReviewService", P], Awaitable[T]],
+        *args: P.args,
+        **kw: P.kwargs,
+    ) -> T:
+        """Return what a method returns, computed in a worker where there is one."""
+        if self._asked is None:
+            return await question(self, *args, **kw)
+        return await self._asked.value(question, *args, **kw)
+
     async def _make_keyframes(self, run_id: str) -> int:
-        return await (
-            self.made_keyframes(run_id)
-            if self._asked is None
-            else self._asked.value(ReviewService.made_keyframes, run_id)
-        )
+        return await self._answer(ReviewService.made_keyframes, run_id)
 
     async def made_keyframes(self, run_id: str) -> int:
         """Make the keyframes of a run; return the seq of the last one. Raises NotFound."""
         return (await self.keyframe_store.keyframes(run_id)).keys[-1].seq
 
     async def _summed(self, run_id: str) -> annotations.SummedUp:
-        if self._asked is None:
-            return await self.summed(run_id, self._clock_us())
-        return await self._asked.value(ReviewService.summed, run_id, self._clock_us())
+        return await self._answer(ReviewService.summed, run_id, self._clock_us())
 
     async def summed(self, run_id: str, now: int) -> annotations.SummedUp:
         """Return the sum of a run that is over. `now`: microseconds UTC. Raises NotFound."""
@@ -349,14 +354,11 @@ class ReviewService:
         if opened is not None:
             if opened.run.end is None:
                 raise Conflict("The run is not over yet.")
-            await settled(opened)
-        if self._asked is None:
-            saved = await self.expected(wanted, name, author, now)
-        else:
-            saved = await self._asked.value(ReviewService.expected, wanted, name, author, now)
+            await wait_until_stored(opened)
+        saved = await self._answer(ReviewService.expected, wanted, name, author, now)
         draft = Draft(saved.kind, author.id, msgspec.json.encode(saved))
         await self._journal.append(expected_runs.STREAM, [draft])
-        return expected_runs.shown(saved)
+        return expected_runs.expectation_view(saved)
 
     async def expected(
         self,
@@ -377,7 +379,7 @@ class ReviewService:
 
     async def expectations(self) -> list[expected_runs.Expectation]:
         """Return all expected courses, by name."""
-        return [expected_runs.shown(saved) for saved in await self._all_saved()]
+        return [expected_runs.expectation_view(saved) for saved in await self._all_saved()]
 
     async def checked_courses(
         self, graph: str, umrf: bytes, subgraphs: Sequence[SentSubgraph] = ()

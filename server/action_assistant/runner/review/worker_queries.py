@@ -18,7 +18,7 @@ from action_assistant.journal.events import Draft, StreamSnapshot
 from action_assistant.journal.reader import FileJournalReader
 from action_assistant.runner.analysis.keyframes import SnapshotJournal
 from action_assistant.runner.archives.archive_store import ArchiveStore
-from action_assistant.runner.review.ongoing_runs import OngoingRun, settled
+from action_assistant.runner.review.ongoing_runs import OngoingRun, wait_until_stored
 from action_assistant.runner.review.service import ReviewService
 from action_assistant.runner.runs.history import RunHistory, RunnerJournal
 from action_assistant.runner.runs.recorder import stream_of
@@ -46,13 +46,13 @@ class WorkerQueries:
     def __init__(
         self,
         run_in_worker: RunInWorker,
-        place: StoragePaths,
+        paths: StoragePaths,
         journal: SnapshotJournal,
         tasks: BackgroundTasks,
     ) -> None:
         self.opened: Mapping[str, OngoingRun] = {}
         self._run_in_worker = run_in_worker
-        self._place = place
+        self._paths = paths
         self._journal = journal
         self._tasks = tasks
 
@@ -65,10 +65,10 @@ class WorkerQueries:
         """Return what a method of `ReviewService` returns. Raises what that raises, Unavailable,
         TooMany."""
         await self._settled(args)
-        found, kept = await self._run_in_worker(
-            answered, self._place, partial(question, **kw) if kw else question, args
+        found, snapshots = await self._run_in_worker(
+            answered, self._paths, partial(question, **kw) if kw else question, args
         )
-        self._keep(kept)
+        self._keep(snapshots)
         value: T = found
         return value
 
@@ -80,10 +80,10 @@ class WorkerQueries:
     ) -> bytes:
         """Return what a method of `ReviewService` returns, as JSON that the worker encoded."""
         await self._settled(args)
-        found, kept = await self._run_in_worker(
-            encoded, self._place, partial(question, **kw) if kw else question, args
+        found, snapshots = await self._run_in_worker(
+            encoded, self._paths, partial(question, **kw) if kw else question, args
         )
-        self._keep(kept)
+        self._keep(snapshots)
         text: bytes = found
         return text
 
@@ -101,16 +101,16 @@ class WorkerQueries:
         for each in args:
             opened = self.opened.get(each) if isinstance(each, str) else None
             if opened is not None:
-                await settled(opened)
+                await wait_until_stored(opened)
 
-    def _keep(self, kept: Sequence[StreamSnapshot]) -> None:
-        if kept:
-            self._tasks.start_soon(self._store, kept)
+    def _keep(self, snapshots: Sequence[StreamSnapshot]) -> None:
+        if snapshots:
+            self._tasks.start_soon(self._store, snapshots)
 
-    async def _store(self, kept: Sequence[StreamSnapshot]) -> None:
+    async def _store(self, snapshots: Sequence[StreamSnapshot]) -> None:
         """Store snapshots. They are a cache: a failure ends nothing, and they are made again
         later."""
-        for each in kept:
+        for each in snapshots:
             try:
                 await self._journal.keep_snapshot(each.stream, each.seq, each.state)
             except Refused as why:
@@ -120,20 +120,20 @@ class WorkerQueries:
 
 
 def answered(
-    place: StoragePaths, question: Callable[..., Awaitable[Any]], args: Sequence[Any]
+    paths: StoragePaths, question: Callable[..., Awaitable[Any]], args: Sequence[Any]
 ) -> tuple[Any, list[StreamSnapshot]]:
     """Answer a question in the worker; return the answer and the snapshots to store."""
-    review_service, file = _reading(place)
+    review_service, file = _reading(paths)
     found = asyncio.run(_asked(question, review_service, args))
     return found, file.given()
 
 
 def encoded(
-    place: StoragePaths, question: Callable[..., Awaitable[Any]], args: Sequence[Any]
+    paths: StoragePaths, question: Callable[..., Awaitable[Any]], args: Sequence[Any]
 ) -> tuple[bytes, list[StreamSnapshot]]:
     """Answer a question in the worker, as JSON; return it and the snapshots to store."""
-    found, kept = answered(place, question, args)
-    return msgspec.json.encode(found), kept
+    found, snapshots = answered(paths, question, args)
+    return msgspec.json.encode(found), snapshots
 
 
 async def _asked(
@@ -143,9 +143,9 @@ async def _asked(
 
 
 @lru_cache(maxsize=1)
-def _reading(place: StoragePaths) -> "tuple[ReviewService, _ReadOnlyJournal]":
-    file = _ReadOnlyJournal(place.database)
-    archive_store = ArchiveStore(file, place.archive, _in_this_thread)
+def _reading(paths: StoragePaths) -> "tuple[ReviewService, _ReadOnlyJournal]":
+    file = _ReadOnlyJournal(paths.database)
+    archive_store = ArchiveStore(file, paths.archive, _in_this_thread)
     return ReviewService(
         _NoOngoingRuns(archive_store), archive_store, _in_this_thread, _no_clock
     ), file

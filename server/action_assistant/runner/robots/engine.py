@@ -165,9 +165,8 @@ class KnownEngine:
             self._silent(why)
             raise NoAnswer(why) from error
         except anyio.get_cancelled_exc_class():
-            if (
-                anyio.current_time() - began >= 0.9 * _GET_S
-            ):  # the deadline of this get, not the end of its task
+            # Cancelled by the deadline of this get, not at the end of its task?
+            if anyio.current_time() - began >= 0.9 * _GET_S:
                 self._silent("")
             raise
         self._heard(answer, anyio.current_time() - began)
@@ -210,12 +209,12 @@ class KnownEngine:
     async def _look_around(self) -> None:
         """Announce changes of the link's standing, such as other publishers, which the engine does
         not report."""
-        told = self._link.standing
+        known = self._link.standing
         while True:
             await anyio.sleep(_AROUND_S)
             now = self._link.standing
-            if now != told:
-                told = now
+            if now != known:
+                known = now
                 self._changed()
 
     async def _ask(self) -> None:
@@ -268,7 +267,7 @@ class KnownEngine:
             case EngineChanged():
                 self._look.set()
             case Feedback() if self._recordings is not None:
-                self._recordings.fed(self.registration.name, report)
+                self._recordings.record_feedback(self.registration.name, report)
             case ForeignCommand():
                 self._foreign(self, report)
                 self._look.set()  # the engine may obey after that answer: ask again later
@@ -278,7 +277,7 @@ class KnownEngine:
 
     def _heard(self, answer: Answer, took: float) -> None:
         if self._recordings is not None:
-            self._recordings.heard(self.registration.name, answer)
+            self._recordings.record_answer(self.registration.name, answer)
         known = self.answer
         now = anyio.current_time()
         lives = {answer.incarnation} | ({known.incarnation} if known is not None else set())
@@ -294,8 +293,8 @@ class KnownEngine:
     def _silent(self, why: str) -> None:
         standing = self._link.standing
         gone = standing.state == "gone"
-        said = why or standing.why or "It is there, but does not answer a get within a second."
-        self._turn("gone" if gone else "busy", said)
+        reason = why or standing.why or "It is there, but does not answer a get within a second."
+        self._turn("gone" if gone else "busy", reason)
 
     def _turn(self, state: EngineState, why: str) -> None:
         if (state, why) == (self.state, self.why):
@@ -349,8 +348,8 @@ def read_index(actions: tuple[str, ...], graphs: tuple[str, ...]) -> EngineIndex
     return EngineIndex(actions=known, described=described, graphs=whole, unread=unread)
 
 
-def foreign_graphs(answer: Answer, going: Collection[str]) -> list[str]:
-    """Return the graphs that an engine runs and that are no runs of this runner (`going`: their
+def foreign_graphs(answer: Answer, own_runs: Collection[str]) -> list[str]:
+    """Return the graphs that an engine runs and that are no runs of this runner (`own_runs`: their
     ids). A graph counts as running also before its first action, and between two actions. A
     sub-graph counts for its graph."""
     held = {each.graph for each in answer.graphs}
@@ -358,7 +357,7 @@ def foreign_graphs(answer: Answer, going: Collection[str]) -> list[str]:
         each.graph
         for each in answer.graphs
         if (each.active or (each.state == "RUNNING" and not _within(each.graph, held)))
-        and (each.run is None or each.run not in going)
+        and (each.run is None or each.run not in own_runs)
     }
     return sorted(name for name in tops if not _within(name, tops))
 

@@ -79,7 +79,7 @@ class Recordings:
         self._waiting: deque[tuple[str, int, bytes]] = deque(maxlen=_WAITING)
         self._texts: dict[str, dict[str, str]] = {}
 
-    def heard(self, robot: str, answer: Answer) -> None:
+    def record_answer(self, robot: str, answer: Answer) -> None:
         """Record the graphs of an answer that have changed."""
         before = self._texts.get(robot, {})
         changed = {name: text for name, text in answer.texts.items() if before.get(name) != text}
@@ -90,7 +90,7 @@ class Recordings:
         line = GetLine(answer.at, answer.asked_at, answer.incarnation, changed, gone)
         self._waiting.append((robot, answer.at, msgspec.json.encode(line)))
 
-    def fed(self, robot: str, feedback: Feedback) -> None:
+    def record_feedback(self, robot: str, feedback: Feedback) -> None:
         """Record feedback; a message without snapshots is left out."""
         if feedback.snapshots:
             at = feedback.snapshots[-1].at
@@ -142,13 +142,6 @@ class Recordings:
                 due.append(path)
                 total -= sizes[path]
         return due
-
-    async def of(self, robot: str, since: int, until: int) -> list[Recording]:
-        """Return the files of a robot that may hold messages from between these moments
-        (microseconds UTC)."""
-        first, last = hours(since, until)
-        found = await self.listed(robot)
-        return [each for each in found if first <= each.name.removesuffix(_ENDING) <= last]
 
     async def listed(self, robot: str) -> list[Recording]:
         """Return the files of a robot, newest first."""

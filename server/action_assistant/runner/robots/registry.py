@@ -62,7 +62,7 @@ class ForeignStops(Protocol):
         is wanted."""
         ...
 
-    def going(self, robot: str) -> bool:
+    def is_stopping(self, robot: str) -> bool:
         """Return whether a graph is being stopped there."""
         ...
 
@@ -70,7 +70,7 @@ class ForeignStops(Protocol):
         """Return the graphs that are being stopped, by robot."""
         ...
 
-    def all_going(self) -> Iterator[tuple[str, str]]:
+    def pending(self) -> Iterator[tuple[str, str]]:
         """Yield the robot of each graph that is being stopped, and why that is not proven yet."""
         ...
 
@@ -252,11 +252,11 @@ class Robots:
             raise RuntimeError("the registry is not open")
         return self._foreign_stops
 
-    def silence(
-        self, author: Author, going: Callable[[str], Collection[str]], name: str | None = None
+    def stop_foreign_graphs(
+        self, author: Author, own_runs: Callable[[str], Collection[str]], name: str | None = None
     ) -> list[str]:
         """Begin to stop all foreign graphs, on one robot or on all of them, and return each as
-        "robot: graph". `going(robot)`: ids of this runner's open runs there. Never waits. Raises
+        "robot: graph". `own_runs(robot)`: ids of this runner's open runs there. Never waits. Raises
         NotFound."""
         if name is not None:
             self.registration(name)
@@ -264,7 +264,7 @@ class Robots:
         for robot, engine in self._engines.items():
             if name in {None, robot}:
                 answer = engine.answer
-                for graph in [] if answer is None else foreign_graphs(answer, going(robot)):
+                for graph in [] if answer is None else foreign_graphs(answer, own_runs(robot)):
                     self.foreign_stops.stop(engine, graph, author)
                     stopped.append(f"{robot}: {graph}")
         return stopped
@@ -313,7 +313,7 @@ class Robots:
         """The names of all registered robots, sorted."""
         return sorted(self._registered)
 
-    def heard(self) -> dict[str, int]:
+    def last_answers(self) -> dict[str, int]:
         """Return when each robot last answered, microseconds UTC; robots that never did are left
         out."""
         return {
@@ -363,7 +363,7 @@ class Robots:
             else await engine.index(self._open_context().run_in_worker)
         )
 
-    def held(self, name: str, graph: str) -> str:
+    def held_graph(self, name: str, graph: str) -> str:
         """Return a graph as the engine wrote it in its last answer. Raises NotFound."""
         self.registration(name)
         engine = self._engines.get(name)

@@ -356,9 +356,7 @@ def observe(run: Run, seen: Iterable[Seen]) -> Run:
     actions = dict(run.actions)
     main = run.graph_name
     run = replace(run, actions=actions)  # the loop below fills the new dict
-    going: int | None = (
-        None  # newest sight of motion, noted once for a row: copying a run is expensive
-    )
+    going: int | None = None  # when motion was seen last; noted once for a row of sights
     for item in seen:
         match item:
             case NodeState():

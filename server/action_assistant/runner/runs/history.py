@@ -54,8 +54,8 @@ class RunHistory:
         events could be read; damaged ones are skipped."""
         events = await self._journal.read(stream_of(run))
         read = [_decoded(each) for each in events]
-        told = [event for event in read if event is not None]
-        return replay(told), events[-1].seq if events else 0, len(told) == len(read)
+        events_read = [event for event in read if event is not None]
+        return replay(events_read), events[-1].seq if events else 0, len(events_read) == len(read)
 
     async def run(self, run: str) -> Run:
         """Return a run as people are shown it. Raises NotFound."""

@@ -40,10 +40,10 @@ class StartLog:
     def __init__(self, run: Run) -> None:
         self._graph = run.graph_name
         self._next = False  # the next line tells whether the start was refused
-        told = next((each for each in run.alarms if each.code == REFUSED), None)
+        alarm = next((each for each in run.alarms if each.code == REFUSED), None)
         self._over = True
         others = any(each.code in _STARTED_BY_OTHERS for each in run.alarms)
-        self.words = "" if told is None or others else _between_quotes(told.text)
+        self.words = "" if alarm is None or others else _between_quotes(alarm.text)
 
     def begins(self) -> None:
         """Take the start as handed over: lines from here on may be about it."""

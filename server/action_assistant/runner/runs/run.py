@@ -84,12 +84,10 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     actions: dict[str, ActionRun] = {}
     inner: dict[str, Laps] = {}  # which actions of graphs inside run once, by the graphs' own names
     needs: tuple[tuple[str, str, int], ...] = ()  # as `Laps.needs`
-    looked: dict[
-        str, int
-    ] = {}  # by graph: when the newest answer that showed it in this state was asked for
-    reshaped: bool = (
-        False  # its arrows rule nothing out any more: it was modified, or others set it going
-    )
+    #: By graph: when the newest answer was asked for that showed the graph as it is here.
+    looked: dict[str, int] = {}
+    #: The graph was modified, or others set it going: its arrows rule nothing out any more.
+    reshaped: bool = False
     failed: bool = False  # an action has failed, or may have in a sub-graph
     stoppable: bool = False  # an arrow or a person may have stopped an action
     result: str | None = None

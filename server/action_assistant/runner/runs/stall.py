@@ -106,7 +106,7 @@ class Standstill:
 
 
 def packed(run: Run) -> bytes:
-    """Encode the part of a run that `told_of` needs: a whole large run takes long to send to a
+    """Encode the part of a run that `packed_alarm_text` needs: a whole large run takes long to send to a
     worker."""
     actions = {
         name: replace(each, visits=each.visits[-1:], messages=())
@@ -115,9 +115,9 @@ def packed(run: Run) -> bytes:
     return msgspec.msgpack.encode(replace(run, actions=actions, log=(), alarms=()))
 
 
-def told_of(run: bytes, umrf: str | None) -> str:
+def packed_alarm_text(run: bytes, umrf: str | None) -> str:
     """Return the alarm text of a packed run and its graph as it was sent. For workers."""
-    return told(msgspec.msgpack.decode(run, type=Run), None if umrf is None else _read(umrf))
+    return alarm_text(msgspec.msgpack.decode(run, type=Run), None if umrf is None else _read(umrf))
 
 
 def lacking_in_words(umrf: str) -> str:
@@ -248,9 +248,8 @@ class _Stalled:
         if known is not None:
             return {arrow.conditions.answer(known)}
         is_part = _part(self._run.graph_name, name) in self._run.parts
-        possible = (
-            PRECONDITIONS[:3] if is_part else PRECONDITIONS[:2]
-        )  # a sub-graph may have failed
+        # A sub-graph may have failed, too.
+        possible = PRECONDITIONS[:3] if is_part else PRECONDITIONS[:2]
         return {arrow.conditions.answer(outcome) for outcome in possible}
 
     def _unanswered(self, name: str | None, fired: list[Relation]) -> Iterator[Wait]:
@@ -348,7 +347,7 @@ def in_words(wait: Wait) -> str:
             assert_never(wait)
 
 
-def told(run: Run, graph: Graph | None) -> str:
+def alarm_text(run: Run, graph: Graph | None) -> str:
     """Return the alarm text of a run that stands still. It is the same for as long as the reasons
     are."""
     found = waits(run, graph) if graph is not None else ()

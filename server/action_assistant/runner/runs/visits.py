@@ -168,15 +168,13 @@ def after_transition(
     if state in ACTIVE:
         if not is_open(action):
             visits, older = _kept(visits, older, Visit(start=at, not_before=at, inputs=inputs))
-        elif (
-            inputs is not None and visits[-1].inputs is None
-        ):  # an answer has shown this visit before
+        elif inputs is not None and visits[-1].inputs is None:
+            # An answer has shown this visit before, without inputs.
             visits = _and(visits[:-1], replace(visits[-1], inputs=inputs))
     elif is_open(action):
         result = visits[-1].result or _implied(action.state, state)
-        after = (
-            None if state == "ERROR" and action.state == "STOPPING" else at
-        )  # its code may go on
+        may_go_on = state == "ERROR" and action.state == "STOPPING"
+        after = None if may_go_on else at
         visits = _and(visits[:-1], replace(visits[-1], until=at, not_after=after, result=result))
     elif state == "ERROR" and action.state != "ERROR":  # it threw before it ran
         visit = Visit(start=at, not_before=at, until=at, not_after=at, result="error")
@@ -272,8 +270,8 @@ def _is_no_news(action: ActionRun, state: str, sight: SnapshotEvidence) -> bool:
     if sight.asked is not None:
         overtaken = action.by == "feedback" and sight.asked < action.changed_at
         return overtaken and not sight.once and state != action.state
-    told = sight.followed and action.by == "get" and FAR.get(action.state, 0) > 0
-    return told and not sight.once and state not in ACTIVE
+    is_superseded = sight.followed and action.by == "get" and FAR.get(action.state, 0) > 0
+    return is_superseded and not sight.once and state not in ACTIVE
 
 
 def _goes_back(action: ActionRun, state: str) -> bool:
@@ -301,9 +299,8 @@ def _opened(action: ActionRun, sight: SnapshotEvidence, inputs: dict[str, str] |
 
 def _closed(action: ActionRun, state: str, sight: SnapshotEvidence) -> ActionRun:
     last = action.visits[-1]
-    if (
-        action.by == "get" and sight.asked is None and not sight.once
-    ):  # of this visit, or an older one
+    if action.by == "get" and sight.asked is None and not sight.once:
+        # The feedback may be of this visit, or of an older one.
         before = min(last.not_before, max(action.rests.by(sight.at - _OLD_US), sight.begun))
         last, action = replace(last, not_before=before), replace(action, going=before)
     implied = last.result or _implied(action.state, state)
@@ -343,8 +340,8 @@ def _missed(action: ActionRun, state: str, sight: SnapshotEvidence) -> ActionRun
 
 def _not_before(action: ActionRun, sight: SnapshotEvidence) -> int:
     """Return the earliest moment at which the new visit can have begun."""
-    told = sight.once or sight.asked is not None
-    rest = action.rests.newest if told else action.rests.by(sight.at - _OLD_US)
+    is_reliable = sight.once or sight.asked is not None
+    rest = action.rests.newest if is_reliable else action.rests.by(sight.at - _OLD_US)
     return min(sight.at, max(rest, sight.begun))
 
 

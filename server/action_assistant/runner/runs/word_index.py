@@ -36,7 +36,7 @@ class Piece(msgspec.Struct, frozen=True):
 def holds(run_id: str, *texts: str) -> Sequence[Executable]:
     """Return the statements that put the words of these texts into the index, for the transaction
     that stores the texts."""
-    words = sorted({each for told in texts for each in _WORD.findall(_lower(told))})
+    words = sorted({each for part in texts for each in _WORD.findall(_lower(part))})
     if not words:
         return ()
     listed = msgspec.json.encode(words).decode()
@@ -114,5 +114,5 @@ def _place(begins: bool, ends: bool) -> Literal["all", "end", "begin", "within"]
     return "end" if ends else "within"
 
 
-def _lower(told: str) -> str:
-    return told.encode("utf-8", "replace").lower().decode()
+def _lower(value: str) -> str:
+    return value.encode("utf-8", "replace").lower().decode()

@@ -67,7 +67,7 @@ class Approvals:
         BadInput, Unavailable."""
         if not _DIGEST.issuperset(request.digest):
             raise BadInput("This is no digest of a graph.", where={"path": "/digest"})
-        for known in await self.of(request.digest):
+        for known in await self.given_for(request.digest):
             if known.author.id == author.id:
                 return known
         given = ApprovalGiven(
@@ -83,7 +83,7 @@ class Approvals:
         await self._journal.append(STREAM, [draft])
         return given
 
-    async def of(self, digest: str) -> tuple[ApprovalGiven, ...]:
+    async def given_for(self, digest: str) -> tuple[ApprovalGiven, ...]:
         """Return the approvals of a graph, in order of time."""
         async with self._reading:
             while events := await self._journal.read(STREAM, after=self._seq, limit=500):
@@ -100,7 +100,7 @@ class Approvals:
         of this request."""
         if robot.profile.get(SECOND_PERSON) is not True:
             return None
-        named = [each for each in await self.of(digest) if each.author.id != starter]
+        named = [each for each in await self.given_for(digest) if each.author.id != starter]
         here = caller.device()
         others = [each.author for each in named if not here or each.device != here]
         if not others:

@@ -123,7 +123,7 @@ def planned(
                 graphs_to_write.append(AskedGraph(name, digests[name]))
             case Differing(file):
                 new.append(NewFile(name, text, file.path, sha(file.text)))
-                graphs_to_write.append(AskedGraph(name, digests[name], file.shown))
+                graphs_to_write.append(AskedGraph(name, digests[name], file.display_path))
             case Present() | Hindered():
                 continue
     there = tuple(name for name, state in states.items() if isinstance(state, Present))
@@ -148,7 +148,7 @@ def _require_free(states: Mapping[str, FileState], replace: Sequence[str], folde
     then. Raises Conflict."""
     hindered = {name: each.why for name, each in states.items() if isinstance(each, Hindered)}
     others = {
-        name: each.file.shown
+        name: each.file.display_path
         for name, each in states.items()
         if isinstance(each, Differing) and name not in replace
     }
@@ -209,9 +209,8 @@ class IndexWriter:
             )
             outcome = WritingOutcome(())
             if plan.files:
-                with anyio.CancelScope(
-                    shield=True
-                ):  # a write that has begun is recorded, also when its client has gone
+                # A write that has begun is recorded, also when its client has gone.
+                with anyio.CancelScope(shield=True):
                     outcome = await self._written(robot, folder, plan, author)
         if outcome.failed:
             done = ", ".join(each.path for each in outcome.written)

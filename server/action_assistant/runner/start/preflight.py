@@ -553,7 +553,7 @@ def _with_folder(item: Item, view: EngineView, pinned: Mapping[str, Graph]) -> I
             case Lacking():
                 writable.append(WritableGraph(name))
             case Differing(file):
-                writable.append(WritableGraph(name, file.shown))
+                writable.append(WritableGraph(name, file.display_path))
             case Hindered(why):
                 hindered[name] = why
     if writable and not os.access(folder, os.W_OK | os.X_OK):

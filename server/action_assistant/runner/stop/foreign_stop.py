@@ -100,7 +100,7 @@ class ForeignStopLoop:
         found = self._going.get((robot, graph))
         return None if found is None else found.why
 
-    def going(self, robot: str) -> bool:
+    def is_stopping(self, robot: str) -> bool:
         """Whether something is being stopped there."""
         return any(name == robot for name, _ in self._going)
 
@@ -111,7 +111,7 @@ class ForeignStopLoop:
             found.setdefault(robot, []).append(graph)
         return found
 
-    def all_going(self) -> Iterator[tuple[str, str]]:
+    def pending(self) -> Iterator[tuple[str, str]]:
         """The robot of each graph that is being stopped, and why that is not proven yet."""
         return ((each.robot, each.why) for each in self._going.values())
 
