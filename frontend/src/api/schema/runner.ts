@@ -253,9 +253,8 @@ export interface RunnerApi {
     };
     /**
      * BehaviourList
-     * @description The behaviours that there are. `names`: in snake case, as the files are called without `.py`;
-     *     `refused`: those that cannot be run, and why. `problem`: why the folder cannot be read; "" if it
-     *     can.
+     * @description The list of behaviours in a folder. `names` are in snake case, as the files without `.py`; `refused` are
+     *     those that cannot be run, with the reason; `problem` is why the folder cannot be read, "" if it can.
      */
     BehaviourList: {
         names: string[];
