@@ -75,7 +75,7 @@ function ParameterTable({ title, none, parameters, free = "" }: ParameterTablePr
 
 interface UsedInProps {
   usedIn: readonly string[];
-  /** Those of these graphs in which the action has other parameters. */
+  /** Graphs of `usedIn` in which the action has other parameters. */
   differs: readonly string[];
   /** Copies the parameters of a graph's action to the library; absent where that is not allowed. */
   onTake?: (graph: string, name: string) => void;

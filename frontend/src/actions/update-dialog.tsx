@@ -109,7 +109,7 @@ function useUpdate(id: string) {
     busy,
     wrong,
     done,
-    /** Whether the preview is outdated, because other renames are chosen or it is being loaded. */
+    /** True if the preview is outdated, because other renames are chosen or it is being loaded. */
     renewing: found.isPlaceholderData || found.isFetching,
     update: () => (found.data ? update(found.data) : Promise.resolve()),
   };

@@ -70,7 +70,7 @@ export type Arrow = Edge<
     came: Precondition | null;
     /** The parent has ended with an outcome that is not in this bundle. */
     passed: boolean;
-    /** It starts at a folded frame, which has no handles for single outcomes. */
+    /** True if it starts at a folded frame, which has no handles for single outcomes. */
     portless?: boolean;
   },
   "outcome"

@@ -23,7 +23,7 @@ interface GraphsInside {
   readonly names: ReadonlyMap<string, string>;
   /** Ids of the other graphs by the name of the actions that stand for them. */
   readonly byName: ReadonlyMap<string, string>;
-  /** Whether actions with this graph's name stand for it, and not for an older graph of the same name. */
+  /** True if actions with this graph's name stand for it, and not for an older graph of the same name. */
   readonly isNamed: boolean;
   /**
    * Opens the graph for which an action stands. `path`: keys of the expanded actions down to it,
@@ -82,7 +82,7 @@ export interface LevelFrameProps {
   readonly progress: Progress | null;
 }
 
-/** Something drawn on the card of an action; its place is relative to the card's upper left corner. */
+/** An action drawn on the card of another; its place is relative to the card's upper left corner. */
 export interface PartOnCard extends Size {
   /** Keys of the actions that lead there, joined by "/". */
   readonly path: string;

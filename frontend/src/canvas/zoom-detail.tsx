@@ -5,7 +5,7 @@ import { useLayoutEffect } from "react";
 import type { Tone } from "../status/progress";
 import "./zoom-detail.css";
 
-/** How much of a card is drawn. `sign`: names would be too small, only the state is shown. */
+/** The amount that is drawn of a card. `sign`: names would be too small, only the state is shown. */
 type Detail = "near" | "middle" | "far" | "sign";
 
 /** The least zoom of each detail; below the last one only signs are shown. */

@@ -212,7 +212,7 @@ function Inside(props: Props) {
 }
 
 const NOTHING: ReadonlyMap<Key, Progress> = new Map();
-/** While the past is shown there is neither a run nor a check of it. */
+/** Replaces run and problems while the past is shown, which has neither. */
 const NOTHING_RUNS = { progress: NOTHING, marks: NO_PROBLEM_MARKS, run: null };
 
 /**

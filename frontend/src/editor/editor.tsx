@@ -166,7 +166,7 @@ export interface EditorSummary {
   compact: boolean;
   /** Phone layout: one part at a time. */
   phone: boolean;
-  /** Whether the strip shows only its head; null on a phone, where it has a pane of its own. */
+  /** True if the strip shows only its head; null on a phone, where it has a pane of its own. */
   folded: boolean | null;
   fold: (folded: boolean) => void;
 }

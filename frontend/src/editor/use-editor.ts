@@ -55,7 +55,7 @@ export interface EditorState {
   readonly adding: AddRequest | null;
   readonly overlay: Overlay | null;
   readonly canvasHandle: RefObject<CanvasHandle>;
-  /** Whether the search within the graph is open. */
+  /** True while the search within the graph is open. */
   readonly isFindOpen: boolean;
   closeAdd(): void;
   closeOverlay(): void;

@@ -53,7 +53,7 @@ interface ExpansionInput {
   readonly id: string;
   readonly graph: Graph;
   readonly idOf: KnownGraphs["idOf"];
-  /** Nothing is expanded, for example while the past is shown. */
+  /** True if nothing can be expanded, for example while the past is shown. */
   readonly off: boolean;
   enter(path: string): void;
 }

@@ -20,11 +20,11 @@ export interface Bundle {
   readonly source: Key;
   readonly target: Key;
   readonly response: Response;
-  /** In the fixed order of outcomes; empty if the relation ignores all of them. */
+  /** The outcomes in their fixed order; empty if the relation ignores all of them. */
   readonly outcomes: readonly Precondition[];
   /** The target does not wait for it. */
   readonly optional: boolean;
-  /** It starts at the entry, which has no outcomes. */
+  /** True if the bundle starts at the entry, which has no outcomes. */
   readonly entry: boolean;
   /** Places through which people have led the line. */
   readonly waypoints: readonly Position[];

@@ -10,7 +10,7 @@ import { type Point, type Scene, STEP } from "./scene";
 import { type RoutedLine, simpleLines } from "./simple-lines";
 
 /**
- * With more lines than MANY, lines are updated after the cards and take only this share of the
+ * Limits for large graphs: with more lines than MANY, lines are updated after the cards and take only this share of the
  * time: else twenty people who move cards of a large graph would delay every frame.
  */
 const MANY = 300;

@@ -11,7 +11,7 @@ const MOST_STEPS = 400_000;
 interface Leg {
   /** The direction in which it starts. */
   readonly way: number;
-  /** It starts at a waypoint, where the line may turn although the waypoint lies on the line itself. */
+  /** True if it starts at a waypoint, where the line may turn although the waypoint lies on the line itself. */
   readonly inner: boolean;
   /** The next goal if the piece ends at a waypoint; null: it ends along the direction of the graph. */
   readonly next: { readonly cell: number; readonly last: boolean } | null;

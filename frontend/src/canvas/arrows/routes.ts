@@ -63,7 +63,7 @@ const LOOSE_GAPS: readonly (readonly [number, number])[] = [
   [3, 1],
 ];
 
-/** How often lines that lie on other lines are searched again. */
+/** Rounds in which lines that lie on other lines are searched again. */
 const ROUNDS = 4;
 
 class Routing {

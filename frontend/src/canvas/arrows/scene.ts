@@ -28,14 +28,14 @@ export interface SceneLine {
   readonly waypoints?: readonly Point[];
 }
 
-/** Everything in it can be sent to a worker. */
+/** The input of one routing; it can be sent to a worker. */
 export interface Scene {
   /** Lines leave cards at this side and enter them at the opposite one. */
   readonly direction: Direction;
   /** The start of the grid across the direction, 0 to 11 px. */
   readonly offset: number;
   readonly cards: readonly SceneCard[];
-  /** In the order in which lines of one card lie beside each other if nothing else decides. */
+  /** The lines; their order decides how lines of one card lie beside each other if nothing else does. */
   readonly lines: readonly SceneLine[];
 }
 

@@ -20,7 +20,7 @@ export interface RoutedLine {
   readonly direction: Direction;
   /** Identifies the ends between which it was routed: while they stay the same, so may the line. */
   readonly ends: string;
-  /** From the side of one card to the side of the other. */
+  /** The corners of the line, from the side of one card to the side of the other. */
   readonly points: readonly Point[];
   /** The middle of its pill; null if it has none or there is no room. */
   readonly pill: Point | null;
@@ -28,7 +28,7 @@ export interface RoutedLine {
   readonly docked: boolean;
   /** Its waypoints on the grid; the line leaves out those that are blocked. */
   readonly waypoints: readonly Point[];
-  /** It was not routed: its cards stand too close or too far apart. */
+  /** True if the line was not routed, because its cards stand too close or too far apart. */
   readonly simple: boolean;
 }
 

@@ -21,7 +21,7 @@ export interface StandingGraph {
   readonly flow: Flow;
 }
 
-/** The same graph as it is drawn, with room for expanded cards. */
+/** A graph as it is drawn, with room for expanded cards. */
 export interface Spread {
   /** The graph with its waypoints and frames as they are drawn. */
   readonly graph: Graph;

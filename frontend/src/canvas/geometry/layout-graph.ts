@@ -20,7 +20,7 @@ import {
 const ROWS = 44;
 const LAYERS = 40;
 /**
- * With more actions than this, the thorough placement and the edges that only hold entry and exit
+ * A limit in actions: beyond it the thorough placement and the edges that only hold entry and exit
  * take too long.
  */
 const THOROUGH = 90;
@@ -29,7 +29,7 @@ const LONGEST = { right: 1_850, down: 1_250 } as const;
 /** The width of a wrapped graph relative to its height. */
 const ASPECT = 1.5;
 
-/** px between ports. */
+/** The distance between ports, px. */
 const APART = 4;
 
 const OPTIONS: LayoutOptions = {

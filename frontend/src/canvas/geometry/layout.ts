@@ -11,7 +11,7 @@ import {
   type Sizes,
 } from "./arrange";
 
-/** The layout was cancelled. */
+/** Signals that a layout was cancelled. */
 export class LayoutLeft extends Error {}
 
 interface Running {

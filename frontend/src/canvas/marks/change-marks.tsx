@@ -52,7 +52,7 @@ function keepEqualMarks(before: ChangeMarks, marks: ChangeMarks): ChangeMarks {
 const ChangeMarksContext = createContext(new Watched(NO_MARKS));
 
 interface ChangeMarkedProps {
-  /** Null: nothing is compared. */
+  /** The marks; null while nothing is compared. */
   marks: ChangeMarks | null;
   children: ReactNode;
 }

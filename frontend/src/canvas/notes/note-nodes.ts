@@ -27,7 +27,7 @@ export interface StateCount {
   readonly count: number;
 }
 
-/** What the block of a folded frame shows of the frame's contents. */
+/** The contents of a folded frame, as its block shows them. */
 export interface FrameBlock {
   readonly actions: number;
   /** The worst state first; empty if nothing has run. */

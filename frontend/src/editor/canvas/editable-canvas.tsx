@@ -59,7 +59,7 @@ interface Props {
   context: EditorContext;
   canvas: ReturnType<typeof useCanvasElements>;
   me: string;
-  /** Whether there is room for a map. */
+  /** True if there is room for a map. */
   map: boolean;
   /** Called when the person has moved the view. */
   onPanned: () => void;

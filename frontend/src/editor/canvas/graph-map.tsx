@@ -135,7 +135,7 @@ export function mapFrame(marks: MapArea | null, seen: MapArea): MapFrame {
 const REST = 500; // ms between two updates of the map
 const LINE = 25; // px
 const PER_PX = 0.002; // zoom steps of factor 2 per px
-/** On a Mac, a pinch on a trackpad sends wheel events with Ctrl in smaller steps. */
+/** Factor for a pinch on the trackpad of a Mac, which sends smaller wheel events with Ctrl. */
 const PINCH = 10;
 
 const Marks = memo(function Marks({ paths }: Pick<ReturnType<typeof mapMarks>, "paths">) {

@@ -8,8 +8,7 @@ import { placeFirst } from "../../graph/edit";
 import { usePeople } from "../../sync/use-room";
 
 /**
- * Of several pages that open the graph at once, one writes first; each later one waits this much
- * longer. All would write the same places.
+ * Time between pages that open the graph at once: one writes first, each later one waits this much longer. All would write the same places.
  */
 const TURN_MS = 800;
 

@@ -28,7 +28,7 @@ interface PrintPages {
   readonly pages: readonly PageView[];
   /** The common scale of all pages. */
   readonly scale: number;
-  /** Whether the paper is in landscape format; portrait is chosen only if it shows the picture larger. */
+  /** True if the paper is in landscape format; portrait is chosen only if it shows the picture larger. */
   readonly across: boolean;
 }
 

@@ -35,7 +35,7 @@ interface Wish {
   readonly keys: string;
   /** The reason why the keys cannot be assigned at once. */
   readonly problem: string;
-  /** Whether the other actions that have these keys can lose them. */
+  /** True if the other actions that have these keys can lose them. */
   readonly others: boolean;
 }
 

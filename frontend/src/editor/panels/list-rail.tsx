@@ -79,7 +79,7 @@ function usePutAway(open: boolean, putAway: () => void, opener: () => HTMLElemen
 interface RailButtonProps {
   name: string;
   icon: ReactNode;
-  /** Whether its list is open; undefined for a button that opens no list. */
+  /** True if its list is open; undefined for a button that opens no list. */
   open?: boolean;
   /** Text after the name, such as counts. */
   more?: string;
