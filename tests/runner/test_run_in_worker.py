@@ -5,7 +5,7 @@ from pathlib import Path
 
 import action_assistant.runner
 
-#: They run in a worker already, or only wait for disks.
+#: Modules that run in a worker already, or only wait for disks.
 AT_HOME = {
     "review/service.py",
     "analysis/replay.py",
@@ -16,7 +16,7 @@ AT_HOME = {
 }
 
 
-def test_nothing_that_cannot_travel_is_sent_to_workers() -> None:
+def test_no_lambda_is_sent_to_workers() -> None:
     folder = Path(action_assistant.runner.__file__).parent
     found = [
         f"{path.name}:{node.lineno}"

@@ -88,7 +88,7 @@ async def test_memory_is_bounded() -> None:
         assert await run_in_worker(max, 1, 2) == 2
 
 
-async def test_what_takes_too_long_is_given_up() -> None:
+async def test_work_that_takes_too_long_is_cancelled() -> None:
     async with lane() as run_in_worker:
         await run_in_worker(pid)
         run_in_worker._patience = 0.2
@@ -109,7 +109,7 @@ async def test_a_frozen_worker_takes_nobody_along() -> None:
         assert await run_in_worker(pid) != worker
 
 
-async def test_what_nobody_waits_for_ends() -> None:
+async def test_work_that_nobody_waits_for_is_cancelled() -> None:
     async with lane() as run_in_worker:
         worker = psutil.Process(await run_in_worker(pid))
         with anyio.move_on_after(0.2):
@@ -161,7 +161,7 @@ async def test_a_background_task_outlives_the_request_in_which_it_began(
         assert answers == [4]
 
 
-async def test_nobody_waits_behind_the_many_requests_of_somebody_else() -> None:
+async def test_many_requests_of_one_person_do_not_delay_others() -> None:
     async with lane() as run_in_worker:
         done: list[str] = []
 
@@ -179,7 +179,7 @@ async def test_nobody_waits_behind_the_many_requests_of_somebody_else() -> None:
             assert "modest" in done
 
 
-async def test_of_one_person_only_so_much_waits() -> None:
+async def test_waiting_requests_of_one_person_are_bounded() -> None:
     async with lane() as run_in_worker:
         refused = 0
 

@@ -103,7 +103,7 @@ FORK = graph("task", ("entry", "A"), ("entry", "B"), ("A", "Join"), ("B", "Join"
 LINE = graph("task", *line("A", "B"))
 
 
-def test_nothing_is_named_of_a_run_that_went_well_or_of_which_nothing_is_recorded() -> None:
+def test_a_good_run_and_an_unrecorded_one_have_no_cause() -> None:
     assert found(LINE, Ended(9, "finished", "on_true")) == []
     assert found(LINE, Ended(9, "halted")) == []
     assert found(LINE) == []
@@ -128,7 +128,7 @@ def test_a_stop_is_explained_by_who_pressed_it_and_what_ran_then() -> None:
         ]
 
 
-def test_what_was_only_seen_running_before_a_stop_is_not_said_to_have_run_for_certain() -> None:
+def test_an_action_only_seen_running_before_a_stop_is_not_certain_to_have_run_then() -> None:
     told = Observed(4, (state(3, "A_0", "RUNNING"),))
     assert found(LINE, told, StopRequested(2 * S, ANN)) == [
         "Ann pressed Stop while A ran (2.0 s), as far as was seen."
@@ -226,7 +226,7 @@ def test_an_alarm_that_later_events_contradict_is_no_cause() -> None:
     assert not any("UNCONFIRMED" in each for each in found(LINE, *told))
 
 
-def test_what_was_never_sent_is_not_said_to_be_refused_by_the_robot() -> None:
+def test_a_start_that_was_never_sent_was_not_refused_by_the_robot() -> None:
     run = replay([begun(LINE), Ended(3, "refused", None, "Its turn did not come.")])
     assert run is not None
     assert [cause_sentence(each, run) for each in causes(run, LINE)] == [
@@ -271,7 +271,7 @@ def test_examples_are_taken_in_once_marked_and_tell_their_cause(
         assert client.get("/api/runs/nowhere/causes").status_code == 404
 
 
-def test_what_is_no_recorded_run_is_refused() -> None:
+def test_a_file_that_is_no_recorded_run_is_refused() -> None:
     for text in (b"", b"{}\n", b'{"kind":"run.ended.v1","author":"","at":1,"body":{}}\n'):
         with pytest.raises(Exception, match="no recorded run"):
             recorded_runs.read(text)
@@ -308,7 +308,7 @@ def inside(at: int, graph: str, node: str, result: str, said: str | None = None)
     )
 
 
-def test_what_failed_inside_is_named_with_the_way_to_it() -> None:
+def test_a_failure_inside_is_named_with_the_actions_around_it() -> None:
     told = (
         state(3, "A_0", "RUNNING"),
         part(3, "task__A__0", "Pick_1", "RUNNING"),
@@ -337,7 +337,7 @@ def test_a_run_that_ended_false_goes_back_to_the_last_that_ended_false_inside() 
     ]
 
 
-def test_what_was_made_good_inside_is_not_the_cause_of_what_failed_after_it() -> None:
+def test_an_error_that_was_recovered_inside_is_not_the_cause_of_a_later_failure() -> None:
     told = (
         state(3, "A_0", "RUNNING"),
         *inside(4, "task__A__0", "Grip_0", "error", "slipped"),
@@ -353,7 +353,7 @@ def test_what_was_made_good_inside_is_not_the_cause_of_what_failed_after_it() ->
     ]
 
 
-def test_of_a_stop_only_what_went_on_inmost_is_told() -> None:
+def test_the_cause_of_a_stop_names_the_innermost_actions() -> None:
     told = (state(3, "A_0", "RUNNING"), part(3, "task__A__0", "Grip_0", "RUNNING"))
     assert found(LINE, Observed(4, told), StopRequested(6, ANN), Ended(7, "stopped")) == [
         "Ann pressed Stop while A › Grip ran (0.0 s), as far as was seen."

@@ -94,7 +94,7 @@ def test_an_action_that_only_one_run_reached_is_where_they_part() -> None:
 
 
 @pytest.mark.parametrize("slower", [500_000, 2_000_000])
-def test_where_one_action_stands_for_another_they_part_at_that_of_this_run(slower: int) -> None:
+def test_runs_with_different_actions_part_at_the_action_of_run_b(slower: int) -> None:
     """The order of their begins does not matter: only the graph of `b` is shown."""
     good = went(1, ("Work_0", "true"), ("Old_0", "true"))
     found = compared(good, went(2, ("Work_0", "true"), ("New_0", "error"), Work_0=slower))

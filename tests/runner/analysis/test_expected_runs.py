@@ -34,7 +34,7 @@ def test_an_action_of_the_newest_version_does_what_it_did_under_its_old_name() -
     assert found.doubts == []
 
 
-def test_what_the_run_cannot_tell_about_the_newest_version_is_said() -> None:
+def test_doubts_of_a_script_for_the_newest_version_are_listed() -> None:
     newest = sequence(actions=3)
     fewer = msgspec.structs.replace(newest, actions=newest.actions[1:])
     found = fitted(recorded(RUN), RUN, fewer)

@@ -163,7 +163,7 @@ def test_a_run_took_as_long_as_it_moved_and_not_until_that_was_proven() -> None:
     assert told.run.over_at <= told.run.ended_at
 
 
-def test_what_ended_unseen_and_what_was_seen_to_go_on_are_not_the_same() -> None:
+def test_an_unseen_end_and_an_open_visit_differ() -> None:
     done = lived("line", {"*": [{"after_s": 1.0}]}, NetworkFaults(), None)
     other = lived("line", {"*": [{"never": True, "ignores_stop": True}]}, NetworkFaults(), None)
     texts = [

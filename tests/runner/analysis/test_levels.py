@@ -50,7 +50,7 @@ def recorded() -> dict[str, list[Path]]:
 
 
 @pytest.mark.parametrize("name", sorted(recorded()))
-def test_what_an_engine_told_of_graphs_inside_stands_below_their_actions(name: str) -> None:
+def test_actions_of_graphs_inside_stand_below_the_actions_around_them(name: str) -> None:
     for path in recorded()[name]:
         events = [json.loads(line) for line in path.read_text().splitlines()]
         told = {(e["graph"], e["node"]) for e in events if e["kind"] == "node_state"}

@@ -161,7 +161,7 @@ async def test_keyframes_are_a_cache_that_may_vanish_or_be_of_another_fold() -> 
 
 
 @virtual
-async def test_of_a_run_that_goes_on_each_whole_multiple_is_kept_and_gone_on_from() -> None:
+async def test_keyframes_of_an_open_run_are_stored_at_each_multiple_and_continued() -> None:
     events = long_run(3 * APART)
     journal = await stored(events[: APART - 1])
     followed = KeyframeStore(journal, at_once)

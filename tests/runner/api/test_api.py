@@ -55,7 +55,7 @@ def test_the_list_can_be_filtered_and_leafed_through(process: RunnerProcess) -> 
         assert client.get("/api/runs", params=lost).json() == []
 
 
-def test_what_a_start_has_become_is_told_by_its_request(process: RunnerProcess) -> None:
+def test_the_runs_of_a_start_are_found_by_its_request_id(process: RunnerProcess) -> None:
     """A client that got no answer asks for the outcome, and sends no second start."""
     with process.client() as client:
         asked = order(sequence(actions=1), script=FAST, request_id="quitelost123")
@@ -197,7 +197,7 @@ def test_escapes_of_a_text_do_not_make_a_body_too_large(process: RunnerProcess) 
 
 
 @pytest.mark.parametrize("content", [b"", b"{", b"[]", b"\xff", b"[" * 100_000])
-def test_what_is_no_start_at_all_is_refused(process: RunnerProcess, content: bytes) -> None:
+def test_a_body_that_is_no_start_is_refused(process: RunnerProcess, content: bytes) -> None:
     with process.client() as client:
         problem(client.post("/api/runs", content=content), 400)
 
@@ -275,7 +275,7 @@ def test_pause_and_resume(process: RunnerProcess) -> None:
         ("GET", "/api/robots/nobody/known/Work"),
     ],
 )
-def test_what_is_not_there_is_not_found(process: RunnerProcess, method: str, path: str) -> None:
+def test_unknown_resources_are_not_found(process: RunnerProcess, method: str, path: str) -> None:
     with process.client() as client:
         problem(client.request(method, path), 404)
 

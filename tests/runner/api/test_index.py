@@ -34,7 +34,7 @@ def client(tmp_path_factory: pytest.TempPathFactory, index: Path) -> Iterator[ht
     process.end()
 
 
-def test_it_is_written_replaced_when_that_is_said_and_shown_in_the_robot_s_log(
+def test_a_graph_is_written_replaced_on_request_and_shown_in_the_robot_s_log(
     client: httpx.Client, index: Path
 ) -> None:
     add(index, "mine.graph.json", sequence("round", 3))
@@ -107,7 +107,7 @@ def test_a_folder_that_is_missing_is_the_trouble_of_its_robot_alone(tmp_path: Pa
         (["David=/a:/b"], "is written ROBOT=DIR"),
     ],
 )
-def test_what_names_no_folder_is_refused(folders: list[str], why: str) -> None:
+def test_a_command_line_without_a_folder_is_refused(folders: list[str], why: str) -> None:
     with pytest.raises(CannotStart, match=why):
         index_folders(folders)
 

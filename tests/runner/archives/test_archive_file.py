@@ -38,7 +38,7 @@ BODIES = st.one_of(
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(BODIES, min_size=1, max_size=12))
-def test_what_was_written_is_read_byte_for_byte(tmp_path: Path, bodies: list[bytes]) -> None:
+def test_an_archive_is_read_byte_for_byte_as_written(tmp_path: Path, bodies: list[bytes]) -> None:
     path = tmp_path / "one.jsonl.gz"
     assert written(path, bodies) == list(archive_file.read(path))
 

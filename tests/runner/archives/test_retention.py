@@ -108,7 +108,7 @@ async def test_an_archive_that_is_gone_or_damaged_is_named(data: Path) -> None:
     await journal.close()
 
 
-async def test_what_cannot_be_written_stays_and_is_told(data: Path) -> None:
+async def test_a_run_that_cannot_be_archived_stays_and_is_reported(data: Path) -> None:
     (data / "archive").mkdir()
     (data / "archive" / "runs").write_text("in the way")
     (data / "archive" / "raw").write_text("in the way")

@@ -47,7 +47,7 @@ def test_links_are_followed_and_told_and_what_leads_nowhere_defines_nothing(
     assert found.unread == ()
 
 
-def test_what_is_too_large_or_not_there_is_said(tmp_path: Path) -> None:
+def test_files_that_are_too_large_or_missing_are_reported(tmp_path: Path) -> None:
     with (tmp_path / "large.graph.json").open("wb") as large:
         large.truncate(9 << 20)
     assert scanned(tmp_path, {"leg"}).unread == ("large.graph.json (larger than 8 MB)",)

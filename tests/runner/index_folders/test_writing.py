@@ -35,7 +35,7 @@ def is_there(folder: Path, graph: Graph) -> bool:
     return file_state(graph, files, PINNED, actions=(), graphs={}) == Present()
 
 
-def test_what_is_lacking_is_written_and_what_is_there_is_not_touched(tmp_path: Path) -> None:
+def test_lacking_graphs_are_written_and_present_ones_not_touched(tmp_path: Path) -> None:
     kept = add(tmp_path, "package/mine.graph.json", sequence("leg", 2))
     before = kept.stat()
     outcome = put(tmp_path, sequence("leg", 2), sequence("round"))
@@ -69,7 +69,7 @@ def test_another_file_of_that_name_is_replaced_only_where_that_is_said(tmp_path:
 
 
 @pytest.mark.parametrize(("folder", "file"), [(0o755, 0o644), (0o700, 0o600), (0o775, 0o664)])
-def test_whoever_reads_the_folder_reads_the_file(tmp_path: Path, folder: int, file: int) -> None:
+def test_readers_of_the_folder_can_read_the_file(tmp_path: Path, folder: int, file: int) -> None:
     tmp_path.chmod(folder)
     before = os.umask(0o077)  # as a service of systemd has it
     try:
@@ -90,7 +90,7 @@ def test_a_file_of_an_older_form_is_none_that_an_engine_reads(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("replace", [(), ("leg",)])
-def test_where_an_engine_would_take_either_of_two_nothing_is_written(
+def test_with_two_definitions_of_a_name_nothing_is_written(
     tmp_path: Path, replace: tuple[str, ...]
 ) -> None:
     add(tmp_path, "a/leg.graph.json", sequence("leg", 2))
@@ -120,7 +120,7 @@ def test_an_engine_that_looks_elsewhere_is_not_written_for_in_vain(tmp_path: Pat
     assert put(tmp_path, sequence("leg", 3), index=known).written == ()
 
 
-def test_what_cannot_be_read_could_define_it_so_nothing_is_written(tmp_path: Path) -> None:
+def test_with_an_unreadable_file_nothing_is_written(tmp_path: Path) -> None:
     with (tmp_path / "large.graph.json").open("wb") as large:
         large.truncate(9 << 20)
     with pytest.raises(Conflict, match=r"is not known: large\.graph\.json"):
@@ -155,7 +155,7 @@ def test_a_file_that_somebody_has_changed_since_is_left(tmp_path: Path) -> None:
     assert held(tmp_path) == {}
 
 
-def test_what_somebody_writes_at_the_same_time_is_never_lost(tmp_path: Path) -> None:
+def test_a_file_written_at_the_same_time_is_never_lost(tmp_path: Path) -> None:
     mine, ends = tmp_path / "leg.graph.json", threading.Event()
     saved: list[bytes] = []
 
@@ -194,7 +194,7 @@ def little_space() -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
-def test_where_there_is_no_space_nothing_is_written_and_the_place_is_told(tmp_path: Path) -> None:
+def test_without_space_nothing_is_written_and_the_path_is_reported(tmp_path: Path) -> None:
     add(tmp_path, "leg.graph.json", sequence("leg", 3))
     before = held(tmp_path)
     files = (

@@ -38,7 +38,7 @@ class Ongoing:
 
 
 @virtual
-async def test_they_are_asked_for_at_whole_multiples_and_not_once_a_run_is_over() -> None:
+async def test_keyframes_are_made_at_multiples_and_not_after_the_end() -> None:
     ongoing: Any = Ongoing()
     asked: list[str] = []
 
@@ -67,7 +67,7 @@ async def test_they_are_asked_for_at_whole_multiples_and_not_once_a_run_is_over(
         tasks.cancel_scope.cancel()
 
 
-def test_what_is_left_to_fold_is_an_eighth_and_what_is_written_some_times_the_whole() -> None:
+def test_an_eighth_is_left_to_fold_and_the_writes_stay_bounded() -> None:
     kept, written = 0, 0
     while kept < 1_000:
         due = due_after(kept)

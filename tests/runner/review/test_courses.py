@@ -89,7 +89,7 @@ def test_a_run_is_expected_of_its_graph_like_a_dry_run(empty: httpx.Client) -> N
     assert (found["run"], found["same"]) == (run["id"], True)
 
 
-def test_what_no_expected_course_takes_is_told_and_a_course_that_fails_covers_nothing(
+def test_uncovered_arrows_are_listed_and_a_failing_course_covers_none(
     empty: httpx.Client,
 ) -> None:
     plan = sequence()
@@ -127,7 +127,7 @@ def test_a_proposed_test_takes_the_arrow_that_none_took(empty: httpx.Client) -> 
     assert covered["taken"] == covered["arrows"]
 
 
-def test_what_nothing_can_take_is_called_so(empty: httpx.Client) -> None:
+def test_an_arrow_that_no_script_can_take_is_unreachable(empty: httpx.Client) -> None:
     plan = without_last_arrow(sequence())
     last = plan.actions[-1].key
     arrow = {"parent": last, "child": "exit", "outcome": "on_true"}
@@ -145,7 +145,7 @@ def test_what_nothing_can_take_is_called_so(empty: httpx.Client) -> None:
         ({"graph": 7}, "/graph"),
     ],
 )
-def test_what_cannot_be_expected_is_refused_with_its_place(
+def test_an_invalid_expectation_is_refused_with_its_place(
     empty: httpx.Client, change: dict[str, Any], path: str
 ) -> None:
     body = {"name": "x", "graph": "g1", "umrf": text_of(sequence()), "script": FAST} | change

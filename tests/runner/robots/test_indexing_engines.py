@@ -64,7 +64,7 @@ async def test_an_idle_engine_that_indexes_is_asked_rarely(tmp_path: Path) -> No
 
 
 @virtual
-async def test_nobody_asks_an_engine_while_it_reads_what_was_just_written(tmp_path: Path) -> None:
+async def test_no_get_is_sent_while_an_engine_reads_new_files(tmp_path: Path) -> None:
     david = Counted()
     async with runner(tmp_path, david) as control:
         folders = {"David": tmp_path}

@@ -47,7 +47,7 @@ def lines(folder: Path) -> list[GetLine | FeedbackLine]:
     return [decoder.decode(x) for f in files for x in gzip.decompress(f.read_bytes()).splitlines()]
 
 
-def test_of_answers_only_what_changed_is_kept(tmp_path: Path) -> None:
+def test_only_changed_graphs_of_answers_are_recorded(tmp_path: Path) -> None:
     kept(tmp_path, answer(1, a="1"), answer(2, a="1"), answer(3, a="1", b="2"), answer(4, b="2"))
     assert lines(tmp_path) == [
         GetLine(1, 1, "life", {"a": "1"}),

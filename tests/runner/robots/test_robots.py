@@ -50,7 +50,7 @@ async def test_each_beat_tells_when_an_idle_robot_answered_although_nothing_has_
 
 
 @virtual
-async def test_somebody_who_joins_the_domain_is_shown_without_a_word_of_the_engine() -> None:
+async def test_a_new_publisher_is_shown_without_a_word_of_the_engine() -> None:
     david = Open()
     async with fleet(Harness(), David=david) as control:
         told: list[int] = []
@@ -108,7 +108,7 @@ async def test_a_changed_profile_makes_another_link_and_a_removed_robot_is_unkno
         (Registration(name="David", profile={"wings": 2}), "/profile/wings"),
     ],
 )
-def test_what_cannot_be_registered_is_refused_with_its_place(
+def test_an_invalid_registration_is_refused_with_its_place(
     registration: Registration, path: str
 ) -> None:
     @virtual

@@ -93,7 +93,7 @@ def test_an_action_of_three_seconds_is_not_said_to_have_taken_none() -> None:
         assert 1_000_000 <= visit.least <= 3_000_000 <= visit.most <= 5_000_000
 
 
-def test_what_outlasts_a_stop_has_no_end() -> None:
+def test_an_action_that_outlasts_a_stop_has_no_end() -> None:
     script = {"*": [{"never": True, "ignores_stop": True}]}
     told = lived("line", script, CALM, 2.0)
     (visit,) = told.run.actions["Work_0"].visits

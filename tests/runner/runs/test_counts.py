@@ -64,7 +64,7 @@ def test_a_child_in_a_loop_did_not_run_again_without_its_parent() -> None:
     assert counts["Work_0"] == VisitCount(least=5, at_least=True, seen=1)
 
 
-def test_what_transitions_told_and_what_runs_once_is_counted_exactly() -> None:
+def test_visits_by_transitions_and_of_actions_that_run_once_are_counted_exactly() -> None:
     told = [
         Observed(at, (NodeState(at, "loop", "Work_0", state),))
         for at, state in ((3, "RUNNING"), (4, "FINISHED"), (5, "RUNNING"), (6, "FINISHED"))

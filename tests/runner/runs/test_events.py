@@ -9,6 +9,6 @@ from action_assistant.runner.runs.events import decode
 
 
 @pytest.mark.parametrize("body", [b"{", b"\xff", 5, 1.5, None])
-def test_what_is_no_body_is_told_as_such_whatever_a_database_gives_out(body: Any) -> None:
+def test_a_value_that_is_no_body_raises_a_decode_error(body: Any) -> None:
     with pytest.raises(msgspec.DecodeError):
         decode("run.observed.v1", body)

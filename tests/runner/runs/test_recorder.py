@@ -87,7 +87,7 @@ async def test_telling_never_waits_for_a_slow_journal() -> None:
 
 
 @virtual
-async def test_what_waits_when_it_is_ended_is_still_stored() -> None:
+async def test_events_that_wait_at_cancellation_are_still_stored() -> None:
     journal = MemoryJournal()
     journal.streams[stream_of("r")] = []
     recorder = RunRecorder(journal, "r", -1)

@@ -127,7 +127,7 @@ async def test_without_a_word_an_engine_that_does_not_show_the_run_has_refused_n
 
 
 @virtual
-async def test_where_two_engines_speak_nobodys_words_are_taken_for_a_refusal() -> None:
+async def test_with_two_engines_no_log_line_counts_as_a_refusal() -> None:
     scene = Knowing(6, "David", "Carol")
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run
@@ -223,7 +223,7 @@ async def test_a_start_that_was_refused_and_yet_shows_something_moving_is_an_ala
 
 
 @virtual
-async def test_where_several_engines_answer_one_that_lacks_the_run_proves_nothing() -> None:
+async def test_of_several_engines_one_that_lacks_the_run_proves_nothing() -> None:
     david = Open(NEVER)
     async with fleet(Harness(), David=david) as control:
         run = (await control.start(order(PATROL, engine="David"), ANN)).run
@@ -239,7 +239,7 @@ async def test_where_several_engines_answer_one_that_lacks_the_run_proves_nothin
         assert await ended(control, run.id) == "stopped"
 
 
-def test_what_map_at_means_is_said_with_it() -> None:
+def test_the_error_map_at_is_explained() -> None:
     assert "library of an action is not there" in why_refused("David", "map::at")
     assert why_refused("David", "No") == "David refused the start: No."
 

@@ -145,7 +145,7 @@ def test_answers_bound_a_visit_by_when_they_were_asked_for() -> None:
     assert visit.result is None
 
 
-def test_what_comes_in_one_message_of_feedback_has_no_bound_at_its_arrival() -> None:
+def test_visits_in_one_message_of_feedback_have_no_bound_at_its_arrival() -> None:
     run = run_of(
         answer(10 * S, "RUNNING", Go_0="UNINITIALIZED", Grip_0="UNINITIALIZED"),
         feedback(12 * S, "RUNNING", Go_0="RUNNING", Grip_0="UNINITIALIZED"),
@@ -172,7 +172,7 @@ def test_two_sights_of_an_action_that_may_run_again_are_not_one_long_visit() -> 
     assert visit.least > 6 * S
 
 
-def test_what_ran_before_a_pause_is_all_that_is_known_to_have_run() -> None:
+def test_a_visit_is_only_known_to_have_run_until_a_pause() -> None:
     paused_ = PauseRequested(12 * S, ANN)
     seen = [
         Observed(11 * S, (answer(11 * S, "RUNNING", Go_0="RUNNING"),)),
@@ -251,7 +251,7 @@ def test_the_state_follows_from_the_events(events: tuple[RunEvent, ...], state: 
     assert run.state == state
 
 
-def test_nothing_takes_a_stop_back() -> None:
+def test_a_stop_is_never_taken_back() -> None:
     run = replay([*STARTED, StopRequested(6, ANN), ResumeRequested(7, ANN), PauseRequested(8, ANN)])
     assert run is not None
     assert run.desired == "stopped"

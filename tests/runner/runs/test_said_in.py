@@ -35,7 +35,5 @@ REQUESTED = events.Requested(
         (events.Observed(at=4, seen=()), set()),
     ],
 )
-def test_what_people_said_or_were_told_is_found_and_ids_are_not(
-    event: RunEvent, texts: set[str]
-) -> None:
+def test_texts_for_people_are_found_and_ids_are_not(event: RunEvent, texts: set[str]) -> None:
     assert set(said_in(event)) - {""} == texts

@@ -75,7 +75,7 @@ async def stalled(control: ExecutionService, graph: Graph, seconds: float = 25.0
     ],
 )
 @virtual
-async def test_what_a_run_in_which_nothing_moves_waits_for_is_said_once_and_is_its_cause(
+async def test_the_reason_of_a_stall_is_one_alarm_and_the_cause_of_the_run(
     graph: Graph, waits: str
 ) -> None:
     scene = RobotsInNetwork(1, script=QUICK)

@@ -79,7 +79,7 @@ def test_there_is_a_stream_of_every_kind_of_run() -> None:
     assert {"runner_restarted", "together1", "together2", "laps", "simulated"} <= names
 
 
-def test_what_is_written_now_shows_no_visit_twice() -> None:
+def test_new_streams_show_no_visit_twice() -> None:
     for name, events in recorded():
         told = expected(events)
         assert told["state"] in ENDED

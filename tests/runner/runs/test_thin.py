@@ -66,7 +66,7 @@ def test_a_thinned_history_is_the_same_history(items: list[Any], together: int) 
         assert views.run_view(thinned) == views.run_view(full)
 
 
-def test_what_a_run_of_a_large_graph_stores_grows_with_what_happens_in_it() -> None:
+def test_the_stored_size_of_a_run_grows_with_its_events_not_its_graph() -> None:
     def stored(actions: int) -> int:
         names = [f"Work_{i}" for i in range(actions)]
         asked = msgspec.structs.replace(REQUESTED, actions={name: name for name in names})

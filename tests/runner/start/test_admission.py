@@ -128,7 +128,7 @@ def with_inner(inner: Graph) -> StartRequest:
     return msgspec.structs.replace(order(outer), subgraphs=(sent,))
 
 
-def test_what_nobody_overrides_is_final_inside_of_a_sub_graph_too() -> None:
+def test_problems_that_cannot_be_overridden_are_final_inside_a_sub_graph_too() -> None:
     good = sequence("inner")
     assert admit(with_inner(good), PINNED).inside.keys() == {"inner"}
     odd = msgspec.structs.replace(good.actions[0], name="50%")
@@ -204,7 +204,7 @@ def test_a_script_is_for_the_simulator_and_never_instant() -> None:
 
 
 @pytest.mark.parametrize("text", [b"1", b"[]", b"{}", b'{"graph_name":"a","graph_name":"b"}'])
-def test_what_is_no_graph_is_refused(text: bytes) -> None:
+def test_a_body_that_is_no_graph_is_refused(text: bytes) -> None:
     asked = msgspec.structs.replace(order(sequence()), umrf=msgspec.Raw(text))
     with pytest.raises((NotUmrf, Conflict)):
         admit(asked, SIMULATED)

@@ -45,7 +45,7 @@ def yes(digest: str) -> ApprovalRequest:
 
 
 @virtual
-async def test_nothing_starts_before_somebody_else_has_said_yes() -> None:
+async def test_no_start_before_a_second_person_has_approved() -> None:
     david, graph = Open(NEVER), sequence()
     async with careful(Harness(), david) as control:
         asked = order(graph, engine="David")

@@ -25,7 +25,7 @@ def test_a_source_that_was_changed_after_the_build_is_named(tmp_path: Path, merg
 
 
 @pytest.mark.parametrize("file", ["test/lift_box_test.cpp", "lift_box.umrf.json", "CMakeLists.txt"])
-def test_what_no_library_is_compiled_of_does_not_count(tmp_path: Path, file: str) -> None:
+def test_files_that_no_library_is_compiled_from_do_not_count(tmp_path: Path, file: str) -> None:
     prefix = workspace(tmp_path)
     changed(tmp_path, file)
     assert older_libraries(GRAPH, [prefix]) == []
@@ -38,7 +38,7 @@ def test_the_library_that_a_loader_finds_first_counts(tmp_path: Path) -> None:
     assert len(older_libraries(GRAPH, [under, over])) == 1
 
 
-def test_where_nothing_can_be_told_nothing_is_said(tmp_path: Path) -> None:
+def test_without_build_information_no_library_is_reported(tmp_path: Path) -> None:
     prefix = workspace(tmp_path)
     changed(tmp_path, "src/lift_box.cpp")
     (tmp_path / "build" / "lift_box" / "CMakeCache.txt").unlink()

@@ -51,7 +51,7 @@ async def test_a_start_that_is_under_way_says_so_until_its_runs_are_there() -> N
 
 
 @virtual
-async def test_nothing_of_a_group_starts_when_one_robot_is_not_fit() -> None:
+async def test_no_start_of_a_group_when_one_robot_is_not_fit() -> None:
     david, eve = Open(), Open()
     async with fleet(Harness(), David=david, Eve=eve) as control:
         eve.silent = True

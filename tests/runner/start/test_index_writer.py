@@ -113,7 +113,7 @@ async def test_a_write_is_recorded_with_its_author_before_and_after(tmp_path: Pa
 
 
 @virtual
-async def test_what_cannot_be_recorded_is_not_written(tmp_path: Path) -> None:
+async def test_a_write_that_cannot_be_recorded_does_not_happen(tmp_path: Path) -> None:
     harness = Harness()
     async with runner(harness, tmp_path, David=Open()) as (_, writer):
         harness.journal.down = True
@@ -124,7 +124,7 @@ async def test_what_cannot_be_recorded_is_not_written(tmp_path: Path) -> None:
 
 
 @virtual
-async def test_what_stands_in_the_way_is_told_before_anybody_tries(tmp_path: Path) -> None:
+async def test_hindrances_are_shown_before_a_write(tmp_path: Path) -> None:
     david = Open()
     async with runner(Harness(), tmp_path, David=david, Carol=Open()) as (control, writer):
         assert (await item_of(control, robot="Carol")).folder is None
@@ -148,7 +148,7 @@ async def test_what_stands_in_the_way_is_told_before_anybody_tries(tmp_path: Pat
 
 
 @virtual
-async def test_what_fails_half_way_is_told_and_recorded_so(
+async def test_a_write_that_fails_half_way_is_reported_and_recorded(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Another program writes a file of the same name between check and write."""

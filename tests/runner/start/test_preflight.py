@@ -43,7 +43,7 @@ async def test_a_sound_robot_passes_every_item_and_the_look_sends_nothing() -> N
         ("actors", True),
     ],
 )
-def test_what_stands_in_the_way_is_shown_and_refused_alike(
+def test_items_that_block_are_shown_and_refused_alike(
     code: str, *, overridable: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if code == "built":

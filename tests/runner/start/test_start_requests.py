@@ -11,7 +11,7 @@ from runner.harness import order, sequence
 from runner.start.test_admission import one_sided
 
 
-def test_what_a_start_says_beside_the_graph_is_looked_at_with_its_place() -> None:
+def test_other_fields_of_a_start_are_checked_and_refused_with_their_place() -> None:
     blank = order(one_sided(), override=Override(codes=(), reason="  "))
     with pytest.raises(BadInput, match="Say why") as refused:
         admit(blank, PINNED)

@@ -96,7 +96,7 @@ async def test_another_name_or_another_life_of_the_engine_is_the_way_out() -> No
 
 
 @virtual
-async def test_what_needs_no_looking_up_is_started_as_often_as_one_likes() -> None:
+async def test_a_graph_without_lookups_can_be_started_any_number_of_times() -> None:
     async with scene().played() as control:
         for _ in range(3):
             assert await run(control, sequence("patrol")) == "finished"
@@ -120,7 +120,7 @@ async def test_a_name_that_somebody_else_has_used_is_held_as_well() -> None:
 
 
 @virtual
-async def test_nothing_of_a_group_starts_when_one_of_its_engines_would_not_survive() -> None:
+async def test_no_start_of_a_group_when_one_of_its_engines_would_not_survive() -> None:
     network = Indexed(
         1, "David", "Carol", quirks=EngineTraits(loss=0.0), script={"*": [{"after_s": 0.2}]}
     )

@@ -47,7 +47,7 @@ def start(*inside: SentSubgraph, **more: Any) -> StartRequest:
     return order(whole, **(fields | more))
 
 
-def test_what_is_inside_is_what_was_approved() -> None:
+def test_graphs_inside_have_the_approved_digests() -> None:
     ready = prepared(start(sent(sequence("round"))), SIMULATED, "r1")
     (kept,) = ready.subgraphs
     assert (kept.name, kept.version, kept.graph) == ("round", "v2", "g2")
@@ -72,7 +72,7 @@ def test_another_graph_inside_is_refused(change: dict[str, Any], path: str) -> N
     assert str((refused.value.where or {})["path"]).startswith(path)
 
 
-def test_all_together_are_what_was_approved() -> None:
+def test_the_tree_has_the_approved_digest() -> None:
     whole = start(sent(sequence("round")), sent(sequence("more")))
     assert admit(whole, SIMULATED).inside.keys() == {"round", "more"}
     for inside in (whole.subgraphs[:1], ()):
@@ -85,12 +85,12 @@ def test_all_together_are_what_was_approved() -> None:
         admit(start(sent(sequence("round")), sent(sequence("round"))), SIMULATED)
 
 
-def test_what_is_inside_counts_for_the_bound_of_a_start() -> None:
+def test_graphs_inside_count_for_the_size_limit_of_a_start() -> None:
     with pytest.raises(TooLarge, match="at most 200 graphs"):
         admit(start(*[sent(sequence(f"g{n}", 1)) for n in range(201)]), SIMULATED)
 
 
-def test_what_is_wrong_inside_stands_in_the_way_of_the_start() -> None:
+def test_problems_of_graphs_inside_block_the_start() -> None:
     graph = sequence("round")
     endless = msgspec.structs.replace(graph, relations=graph.relations[:-1])
     with pytest.raises(Conflict, match="ends HALTED") as refused:
@@ -196,7 +196,7 @@ async def test_a_second_person_says_yes_to_what_is_inside_too() -> None:
 
 
 @virtual
-async def test_of_a_robot_that_names_nothing_it_cannot_be_said() -> None:
+async def test_sub_graphs_of_a_robot_without_an_index_are_unknown() -> None:
     david = Open()
     david.known_actions = ()
     async with fleet(Harness(), David=david) as control:
