@@ -13,7 +13,7 @@ export function tick(): number {
 
 const KEPT = 10; // stamps: a clock of the server that is set anew is followed within so many messages
 
-/** How far the server's clock is before `tick()`, measured by stamps in what the server sends. */
+/** Measures the offset of the server's clock to `tick()`, by stamps in what the server sends. */
 export class ServerOffset {
   /** By each of the newest exact stamps: the true offset is this and the time under way. */
   #least: number[] = [];

@@ -1,4 +1,4 @@
-/** What people say about an action, or about any: threads with answers, done or open. */
+/** The panel of comments on an action, or on all: threads with answers, done or open. */
 
 import { Button, NativeSelect } from "@mantine/core";
 import { IconMessageCircle } from "@tabler/icons-react";

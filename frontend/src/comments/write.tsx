@@ -1,4 +1,4 @@
-/** Where somebody writes a comment or an answer. */
+/** The form in which a person writes a comment or an answer. */
 import { Button, Textarea } from "@mantine/core";
 import type { ReactNode } from "react";
 import { usePerson } from "../api/use-person";
@@ -8,7 +8,7 @@ import { keyOf } from "../ui/keys";
 import style from "./comments.module.css";
 
 interface WriteProps {
-  /** Where the text waits until it is sent: the graph and what it is about. */
+  /** The key under which the text is kept until it is sent: the graph and what it is about. */
   place: readonly [graph: string, about: string];
   label: string;
   button: string;

@@ -31,7 +31,7 @@ import {
 } from "./editor-context";
 import { layOutGraph, layOutSome } from "./layout";
 
-/** Everything chosen that stands somewhere: actions, ends, notes. */
+/** Returns the boxes of all chosen things that have a place: actions, ends, notes. */
 function blocks(context: EditorContext): Block[] {
   const [places, sizes] = [context.positions(), context.sizes()];
   return [...context.selection].flatMap((key) => {

@@ -17,7 +17,7 @@ import { type EditorContext, selectedActions } from "./editor-context";
 import { freshPlaces } from "./layout";
 
 export interface CopiedContent {
-  /** What the system's clipboard got. */
+  /** The text that was given to the system's clipboard. */
   readonly text: string;
   readonly clip: Clip;
 }
@@ -26,7 +26,7 @@ const STORAGE_KEY = "aa.clipboard";
 const MOST = 2_000_000; // characters that are kept for other tabs
 let latest: CopiedContent | null = null;
 
-/** What is chosen, as it goes to the clipboard. Notes alone are their own text. */
+/** Returns the selection for the clipboard. Notes alone are copied as their own text. */
 export function copiedSelection(context: EditorContext): CopiedContent {
   const places = context.positions();
   const clip = clipOf(context.doc, context.selection, places);
@@ -56,7 +56,7 @@ function isHeld(value: unknown): value is CopiedContent {
   return typeof text === "string" && maps.every((map) => typeof map === "object" && map !== null);
 }
 
-/** What was copied last in this browser. */
+/** Returns what was copied last in this browser. */
 function lastCopied(): CopiedContent | null {
   try {
     const kept: unknown = JSON.parse(localStorage.getItem(STORAGE_KEY) ?? "null");
@@ -90,7 +90,7 @@ function failed(message: string): void {
   notifications.show({ color: "red", title: "Nothing pasted", message, autoClose: 12_000 });
 }
 
-/** The same with places for what has none: files often come without. */
+/** Returns the clip with places for things that have none: files often come without. */
 async function placed(context: EditorContext, clip: Clip): Promise<Clip> {
   const graph = { ...readGraph(mapsFrom(clip)), direction: context.graph.direction };
   if (graph.actions.every(({ position }) => position !== null)) return clip;

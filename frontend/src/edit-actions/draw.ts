@@ -247,7 +247,7 @@ export const selectNone: EditAction = {
   },
 };
 
-/** Where a chain goes on: at the end of the one arrow that is selected, as after drawing it. */
+/** Returns the action from which a chain goes on: the end of the one arrow that is selected, as after drawing it. */
 function drawnLast(context: EditorContext): Key | null {
   const [arrow, ...others] = selectedRelations(context);
   if (arrow === undefined || others.length > 0) return null;

@@ -13,24 +13,24 @@ export interface EditAction {
   /** `Mod` is Ctrl, and ⌘ on a Mac. The first is shown; all work. */
   readonly shortcuts: readonly string[];
   readonly icon: Icon;
-  /** Whether it changes the graph, which not everybody may. */
+  /** True if it changes the graph, which not everybody may do. */
   readonly changes: boolean;
   /** The browser raises an event of its own for its shortcut, and gives the clipboard with it. */
   readonly event?: "copy" | "cut" | "paste";
   /** Other words that people look for it by. */
   readonly also?: string;
   enabled(context: EditorContext): boolean;
-  /** What is said to who asks for it by its key while there is nothing to do. */
+  /** The message for a person who presses its key while it has nothing to do. */
   readonly idle?: string;
   run(context: EditorContext): void;
 }
 
-/** Whether it can be done now, by this person. */
+/** Returns true if this person can do it now. */
 export function isEnabled(editAction: EditAction, context: EditorContext): boolean {
   return (!editAction.changes || context.mayEdit) && editAction.enabled(context);
 }
 
-/** What it is called, and why it is off when that is not to be seen on the canvas. */
+/** Returns its label, with the reason why it is off where the canvas does not show that. */
 export function labelOf(editAction: EditAction, context: EditorContext): string {
   return editAction.changes && !context.mayEdit
     ? `${editAction.label} (view only)`
@@ -46,7 +46,7 @@ export interface Pressed extends KeyPress {
   readonly altKey: boolean;
 }
 
-/** Whether a key press is this shortcut. */
+/** Returns true if a key press is this shortcut. */
 export function isPressed(
   shortcut: string,
   event: Pressed,
@@ -68,7 +68,7 @@ export function isPressed(
   return letter && mod === parts.includes("Mod") && !other && alt && shift;
 }
 
-/** Whether a shortcut is one printed character without Mod or Alt: such keys can be switched off. */
+/** Returns true if a shortcut is one printed character without Mod or Alt: such keys can be switched off. */
 function isSingleKey(shortcut: string): boolean {
   const parts = shortcut.split("+");
   const last = parts.at(-1) ?? "";

@@ -1,4 +1,4 @@
-/** What edit actions work on: the open graph, what is selected, and the view of it. */
+/** The context of edit actions: the open graph, the selection, and the view. */
 import { createContext, use } from "react";
 import type * as Y from "yjs";
 import { CARD, freeSpot, placeAfter, unplaced } from "../canvas/geometry/arrange";
@@ -25,11 +25,11 @@ import {
   type Relation,
 } from "../graph/model";
 
-/** Where the search for an action opens, and what it is tied to once chosen. */
+/** The place where the search for an action opens, and the thing to which the chosen action is connected. */
 export interface AddRequest {
-  /** On the screen, px. */
+  /** The place on the screen, px. */
   readonly screen: Position;
-  /** On the canvas. */
+  /** The place on the canvas. */
   readonly at: Position;
   readonly from: { readonly key: Key; readonly outcome: Precondition } | null;
   /** The arrow that takes the action in. */
@@ -47,7 +47,7 @@ export type Panel =
   | "problems";
 export type Tool = "pan" | "select";
 
-/** What opens over the editor, one at a time. */
+/** The parts that open over the editor, one at a time. */
 export type Overlay =
   | { readonly kind: "arrow"; readonly from: Key | null; readonly to: Key | null }
   | {
@@ -85,18 +85,18 @@ export interface PastPlace {
   readonly with: "own" | "good" | "nothing" | "now" | number | `run/${string}`;
 }
 
-/** What a graph can be taken away as. */
+/** The formats in which a graph can be exported. */
 export type ExportFormat = "umrf" | "svg" | "png";
 
 export const GRID = 20; // px
 
-/** What the canvas can do with its view. */
+/** The view of the canvas, and how to change it. */
 export interface CanvasView {
-  /** All of it, however small. */
+  /** Shows the whole graph, however small. */
   fit(): void;
-  /** As on opening: all of it where that can be read, else its beginning. */
+  /** Shows what is shown on opening: the whole graph where it can be read, else its beginning. */
   open(): void;
-  /** What was shown on opening or by Fit is shown again, if nobody has moved the view since. */
+  /** Shows again what was shown on opening or by Fit, unless somebody has moved the view since. */
   reopen(): void;
   zoomIn(): void;
   zoomOut(): void;
@@ -107,26 +107,26 @@ export interface CanvasView {
   /** Near the middle of what is seen, on the canvas: where something new is put. */
   middle(): Position;
   screenOf(at: Position): Position;
-  /** Where the pointer rests over the canvas; null when it does not. */
+  /** Returns the place of the pointer over the canvas; null when it is elsewhere. */
   pointer(): { readonly screen: Position; readonly at: Position } | null;
   /** Gives the keyboard to what is drawn under this key. */
   focus(key: Key): void;
 }
 
 export interface EditorContext {
-  /** The graph's own id. */
+  /** The id of the graph. */
   readonly id: string;
   readonly doc: Y.Doc;
   readonly undo: UndoHistory;
   readonly graph: Graph;
   readonly canUndo: boolean;
   readonly canRedo: boolean;
-  /** Whether this person may change what is shown; else everything that changes it is off. */
+  /** True if this person may change what is shown; else every edit action that changes it is off. */
   readonly mayEdit: boolean;
   /** Keys of actions and ends, ids of relations. */
   readonly selection: ReadonlySet<string>;
   readonly tool: Tool;
-  /** Whether what is moved by hand snaps to the grid. */
+  /** True if things that are moved by hand snap to the grid. */
   readonly snap: boolean;
   /** Frames that this person sees folded, on this device: keys that may be gone. */
   readonly folded: ReadonlySet<string>;
@@ -136,7 +136,7 @@ export interface EditorContext {
   /** The graph is shown as it was, to look at; null: as it is now. */
   readonly past: PastPlace | null;
   lookAt(place: PastPlace | null): void;
-  /** Whether this person may change the graph as it is now, which the past is not. */
+  /** True if this person may change the present graph; the past cannot be changed. */
   readonly mayGoBack: boolean;
   /** `from`: a moment of a run, as the record has it; `script`: what actions do to begin with. */
   beginDryRun(from?: DryRunSeed | null, script?: DryRunSeed["behaviours"]): void;
@@ -148,7 +148,7 @@ export interface EditorContext {
   openAdd(request?: AddRequest): void;
   openOverlay(surface: Overlay | null): void;
   openFind(): void;
-  /** Where everything stands, also what has no place of its own. */
+  /** Returns the places of all things, also of those without a place of their own. */
   positions(): ReadonlyMap<Key, Position>;
   sizes(): ReadonlyMap<Key, { readonly width: number; readonly height: number }>;
   download(format?: ExportFormat): void;
@@ -201,7 +201,10 @@ export function selectedRelations(context: EditorContext): Relation[] {
   return context.graph.relations.filter((relation) => context.selection.has(relationId(relation)));
 }
 
-/** Where cards and ends stand: what takes up room. An exit that nobody has placed makes way by itself. */
+/**
+ * Returns the boxes that cards and ends occupy. An exit that nobody has placed is left out, since it moves away by
+ * itself.
+ */
 function takenBoxes(context: EditorContext) {
   const floating = context.graph.exitPosition === null;
   const sizes = context.sizes();

@@ -29,7 +29,7 @@ export function foldFrames(context: EditorContext, keys: readonly string[], fold
   announcer.say(folded ? "Folded" : "Unfolded");
 }
 
-/** Nothing is chosen afterwards: of what was, some may be hidden. */
+/** Folds or unfolds every frame. Folding clears the selection, since parts of it may be hidden. */
 function foldEvery(context: EditorContext, folded: boolean): void {
   const keys = framesThat(context, !folded);
   context.fold(keys, folded);

@@ -1,4 +1,4 @@
-/** Addresses of a graph and of what is in it: an action, an arrow, a problem. */
+/** Writes and reads addresses of a graph, of a thing in it (action, arrow, problem), and of a moment of its history. */
 
 import { pageUrl } from "../api/page-url";
 import { relationId } from "../graph/document-keys";
@@ -40,7 +40,7 @@ export interface LinkTarget {
   readonly field: string | null;
 }
 
-/** What an address points at; null when it names a graph only. */
+/** Returns the thing that an address points at; null when it names a graph only. */
 export function targetOf(search: string): LinkTarget | null {
   const query = new URLSearchParams(search);
   const selection = [...query.getAll("action"), ...query.getAll("arrow")].slice(0, 20);
@@ -48,7 +48,7 @@ export function targetOf(search: string): LinkTarget | null {
   return selection.length === 0 && problem === null ? null : { selection, problem, field };
 }
 
-/** Those that are there; an address may be older than a delete. */
+/** Returns the keys of the selection that exist; an address may be older than a delete. */
 export function present(graph: Graph, selection: readonly string[]): string[] {
   const known = new Set([
     ...graph.actions.map(({ key }) => key),
@@ -60,7 +60,7 @@ export function present(graph: Graph, selection: readonly string[]): string[] {
   return selection.filter((id) => known.has(id));
 }
 
-/** Whether an address asks for what was done to the graph. */
+/** Returns true if an address asks for the history of the graph. */
 export function asksForHistory(search: string): boolean {
   return new URLSearchParams(search).has("history");
 }
@@ -75,7 +75,7 @@ function comparedWith(text: string | null): PastPlace["with"] {
   return SEQ.test(text) ? Number(text) : "own";
 }
 
-/** What an address asks for; null where it asks for the graph as it is. */
+/** Returns the moment or change that an address asks for; null where it asks for the present graph. */
 export function pastOf(search: string): PastPlace | null {
   const query = new URLSearchParams(search);
   const at = query.get("at");

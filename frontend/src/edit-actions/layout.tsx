@@ -24,7 +24,7 @@ function sayNothingArranged(error: unknown): void {
   });
 }
 
-/** How notes follow what they stand beside: loaded with the first layout. */
+/** Loads, with the first layout, the code that moves notes with the things beside them. */
 const followNotes = () =>
   import("../canvas/geometry/follow-notes").catch((error: unknown) => {
     sayNothingArranged(error);
@@ -67,7 +67,7 @@ export async function freshPlaces(
   }
 }
 
-/** What is measured, unless cards will be drawn otherwise in the other direction. */
+/** Returns the measured sizes, or estimated ones where cards will be drawn otherwise in the other direction. */
 function sizesFor(context: EditorContext, graph: Graph): Sizes {
   const measured = context.sizes();
   if (graph.direction !== context.graph.direction) return estimatedSizes(graph);

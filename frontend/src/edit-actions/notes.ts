@@ -115,7 +115,7 @@ const selectorOf = (form: string) =>
 const PATIENCE = 300; // frames, some seconds, for a form that has to be loaded first
 const TYPED_IN = "input, textarea, [contenteditable=true]";
 
-/** Whoever types in another field than `before` by now stays there. */
+/** Gives the focus to the first field of a form, unless the person types in another field than `before` by now. */
 function focusFirst(form: HTMLElement, before: Element | null): void {
   const now = document.activeElement;
   if (now !== before && now?.matches(TYPED_IN)) return;

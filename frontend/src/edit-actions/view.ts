@@ -54,7 +54,7 @@ export const menu: EditAction = {
   run: (context) => context.openOverlay({ kind: "menu", screen: spotOf(context) }),
 };
 
-/** Where on screen the selection is, else the middle of the canvas. */
+/** Returns the place of the selection on the screen; the middle of the canvas without one. */
 function spotOf(context: EditorContext): readonly [number, number] {
   const [key] = [...context.selection].filter((each) => context.positions().has(each));
   const at = key === undefined ? undefined : context.positions().get(key);
@@ -97,7 +97,7 @@ export const zoomSelection: EditAction = {
   run: (context) => context.view.show(shownKeys(context), "whole"),
 };
 
-/** What is chosen, and for arrows what they tie together. */
+/** Returns the selected keys that have a place, with both ends of selected arrows. */
 export function shownKeys(context: EditorContext): Key[] {
   const ends = selectedRelations(context).flatMap(({ parent, child }) => [parent, child]);
   return [...context.selection, ...ends].filter((key) => context.positions().has(key));
@@ -168,7 +168,7 @@ export function neighbour(
   if (from === undefined)
     return relations.find((r) => r.parent === ENTRY)?.child ?? actions[0]?.key ?? null;
   const at = places.get(from) ?? [0, 0];
-  /** Where it stands across the direction. */
+  /** Returns the coordinate of a thing across the direction of drawing. */
   const acrossOf = (key: Key) => places.get(key)?.[right ? 1 : 0] ?? 0;
   const after = (key: Key) => relations.filter((r) => r.parent === key).map((r) => r.child);
   const before = (key: Key) => relations.filter((r) => r.child === key).map((r) => r.parent);
@@ -290,7 +290,7 @@ export const collapseGraphs: EditAction = {
   run: () => graphsInside.now()?.expand.collapseAll(),
 };
 
-/** Of the whole graph, it is listed with what is done to that. */
+/** Makes one graph without graphs inside; listed among the actions on the whole graph. */
 export const flatten: EditAction = {
   ...look,
   group: "Graph",

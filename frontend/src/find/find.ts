@@ -12,9 +12,9 @@ export interface Hit {
   readonly id: string;
   readonly kind: "action" | "arrow";
   readonly title: string;
-  /** What of it says so: `robot arm`. Empty when the title does. */
+  /** The part that matches: `robot arm`. Empty when the title matches. */
   readonly why: string;
-  /** What has to be on the canvas for it to be seen. */
+  /** The keys that must be on the canvas for it to be seen. */
   readonly keys: readonly Key[];
 }
 
@@ -28,7 +28,7 @@ interface SearchEntry extends Omit<Hit, "why"> {
   readonly facts: readonly Fact[];
 }
 
-/** What people may write before a colon. */
+/** The words that people may write before a colon. */
 const FIELDS = [
   "name", "type", "robot", "about", "parameter", "output", "response", "remap", "problem", "field",
 ] as const; // biome-ignore format: one list
@@ -128,7 +128,7 @@ export function find(graph: Graph, problems: readonly Problem[], query: string):
   return hits.sort((a, b) => rank(a) - rank(b));
 }
 
-/** The same of actions that are drawn on cards of the graph: they are found where those cards are. */
+/** Finds actions that are drawn on cards of the graph, at the places of those cards. */
 export function findInside(
   graph: Graph,
   partsOf: ((key: Key) => readonly PartOnCard[]) | undefined,

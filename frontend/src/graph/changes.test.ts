@@ -14,7 +14,7 @@ import {
 import { ENTRY } from "./model";
 import { isEqual } from "./values";
 
-/** What changed from one document to the next, both ways. */
+/** Returns the changed keys between two documents, with the values after and before. */
 function between(then: Maps, here: Maps): { difference: ValuesByRoot; before: ValuesByRoot } {
   const [difference, before] = [mapsFrom({}), mapsFrom({})] as unknown as Record<
     (typeof ROOTS)[number],

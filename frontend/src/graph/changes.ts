@@ -26,7 +26,7 @@ export interface ChangedField {
   /** In words; null where there was nothing. */
   readonly before: string | null;
   readonly after: string | null;
-  /** What is there now, if that is neither. */
+  /** The value that stands now; absent where it is one of the two. */
   readonly now?: string | null;
 }
 
@@ -203,7 +203,7 @@ function lineOf(root: Root, key: string, given: ChangesInput, now: Maps): Change
   return other ? { ...line, now: words(root, there) } : line;
 }
 
-/** Where a line is bent is seen on the canvas; said is how often. */
+/** Describes a change of bends by their number; their places are seen on the canvas. */
 function bendsLine(key: string, given: ChangesInput, now: Maps): ChangedField {
   const said = (value: unknown) => {
     const count = typeof value === "string" ? readWaypoints(value).length : 0;

@@ -19,7 +19,7 @@ export function rootOf(doc: Y.Doc, root: Root): Y.Map<unknown> {
   return doc.getMap<unknown>(root);
 }
 
-/** What is in the document now. */
+/** Returns the present content of the document, by root and key. */
 export function mapsOf(doc: Y.Doc): Maps {
   return perRoot((root) => new Map(rootOf(doc, root).entries()));
 }
@@ -111,7 +111,7 @@ export function isAid(text: string): boolean {
   return AID.test(text);
 }
 
-/** A new id. Works without a secure context (plain http on a LAN), unlike `crypto.randomUUID`. */
+/** Returns a new random id of 12 letters and digits (71 bits). Works without a secure context (plain http on a LAN), unlike `crypto.randomUUID`. */
 export function newAid(): string {
   let id = "";
   while (id.length < LENGTH) {

@@ -1,4 +1,4 @@
-/** What a graph says, apart from how it is drawn: equal texts for equal tasks. */
+/** Compares graphs by what they say, apart from how they are drawn: equal texts for equal tasks. */
 
 import { isolated } from "../words/isolated";
 import {
@@ -36,7 +36,7 @@ function parameters(list: readonly Parameter[]): unknown {
 
 type MeaningEntry = readonly [name: string, ...rest: unknown[]];
 
-/** What each action and each arrow says, by the names that the engine knows. */
+/** Returns the content of each action and each arrow, by the names that the engine knows. */
 function said(graph: Graph): { actions: MeaningEntry[]; arrows: MeaningEntry[] } {
   const names = new Map<Key, string>(graph.actions.map((action) => [action.key, fullName(action)]));
   names.set(ENTRY, ">").set(EXIT, "<");
@@ -77,11 +77,11 @@ export function meaning(graph: Graph): string {
 export interface MeaningDifference {
   readonly kind: "added" | "removed" | "changed";
   readonly what: string;
-  /** What of it changes, from what to what: "delay: 0.5 → 0.9". */
+  /** The changed fields, from the old value to the new one: "delay: 0.5 → 0.9". */
   readonly details: readonly string[];
 }
 
-/** What another graph does otherwise, thing by thing; how it is drawn is no difference. */
+/** Returns the differences in what two graphs do, thing by thing; how they are drawn does not count. */
 export function differences(before: Graph, after: Graph): MeaningDifference[] {
   const [old, now] = [said(before), said(after)];
   const ends = (name: string) => (name === ">" ? "Start" : name === "<" ? "End" : name);
@@ -116,7 +116,7 @@ function becomes(what: string, was: string, is: string): string[] {
   return was === is ? [] : [`${what}: ${short(was)} → ${short(is)}`];
 }
 
-/** What of an action is not as it was. */
+/** Returns the changed fields of an action, in words. */
 function inAction(was: Action | undefined, is: Action | undefined): string[] {
   if (was === undefined || is === undefined) return [];
   return [
@@ -148,7 +148,7 @@ function inParameters(was: readonly Parameter[], is: readonly Parameter[], side 
   });
 }
 
-/** What of an arrow is not as it was: responses, whether it is waited for, what it renames. */
+/** Returns the changed parts of an arrow, in words: responses, whether it is waited for, and renamings. */
 function inArrow(was: MeaningEntry, is: MeaningEntry): string[] {
   const responses = (said: MeaningEntry) => said[2] as readonly string[];
   const answers = PRECONDITIONS.flatMap((outcome, i) =>

@@ -1,5 +1,5 @@
 /**
- * What a UMRF graph is, for the page: the twin of `umrf/model.py` with names in camelCase.
+ * The model of a UMRF graph on the page: the twin of `umrf/model.py` with names in camelCase.
  *
  * Values are frozen by type; the reader keeps the identity of whatever did not change, so `===`
  * tells whether an action or a relation has to be drawn again. Actions and relations are referred
@@ -10,7 +10,7 @@ export type Key = string;
 /** JSON as it was written: spelling of numbers and order of members are kept. */
 export type JsonText = string;
 export type Position = readonly [x: number, y: number];
-/** Where what follows is drawn. */
+/** The direction in which the graph is drawn. */
 export type Direction = "right" | "down";
 
 export const ENTRY = "entry";
@@ -21,10 +21,10 @@ export const RESPONSES = ["run", "pause", "restart", "stop", "bypass", "ignore"]
 
 /** An outcome of the parent. */
 export type Precondition = (typeof PRECONDITIONS)[number];
-/** What the child does about it. */
+/** The response of a child to an outcome. */
 export type Response = (typeof RESPONSES)[number];
 
-/** What a child does for each outcome of its parent. */
+/** The response of a child to each outcome of its parent. */
 export type Conditions = Readonly<Record<Precondition, Response>>;
 
 export const IGNORE_ALL: Conditions = {
@@ -33,7 +33,7 @@ export const IGNORE_ALL: Conditions = {
   on_error: "ignore",
   on_stopped: "ignore",
 };
-/** What the engine assumes for a condition that a file leaves out. */
+/** The responses that the engine assumes where a file leaves a condition out. */
 export const ENGINE_DEFAULTS: Conditions = {
   on_true: "run",
   on_false: "run",

@@ -29,7 +29,10 @@ export function linkPieces(text: string): (string | NoteLink)[] {
 
 type Actions = Graph["actions"];
 
-/** What a link leads to. A name alone must be that of one action: `Drive` where there is one, else `Drive 0`. */
+/**
+ * Returns the action that a link leads to. A name alone must be that of one action: `Drive` where there is one,
+ * else `Drive 0`.
+ */
 export function linkedAction(actions: Actions, { name, id }: NoteLink): Action | null {
   if (id !== "") return actions.find(({ key }) => key === id) ?? null;
   const found = actions.filter((action) => nameOf(action) === name || action.name === name);
@@ -61,9 +64,9 @@ export function spokenNote(text: string): string {
 
 /** The link that is being written before the caret. */
 export interface OpenLink {
-  /** Where its `[[` begins. */
+  /** The index at which its `[[` begins. */
   readonly at: number;
-  /** What of the name is written. */
+  /** The part of the name that is written so far. */
   readonly typed: string;
 }
 
@@ -74,10 +77,10 @@ export function openLink(text: string, caret: number): OpenLink | null {
   return at < 0 || typed.length > 200 || /[[\]\n#]/.test(typed) ? null : { at, typed };
 }
 
-/** What follows the caret in a link that was written before. */
+/** Matches the rest, after the caret, of a link that was written before. */
 const REST = /^(?:[^[\]\n]{0,220}\]\]|\]?)/;
 
-/** What a link is written as, and up to where it takes the place of what stands there. */
+/** Returns the text of a link, and the index up to which it replaces the present text. */
 export function linkText(text: string, caret: number, name: string): { text: string; end: number } {
   const closed = REST.exec(text.slice(caret))?.[0].length ?? 0;
   return { text: `[[${name}]]`, end: caret + closed };

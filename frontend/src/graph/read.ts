@@ -62,7 +62,7 @@ export function readGraph(maps: Maps): Graph {
 export interface SteppedGraph {
   /** `undefined`: there is nothing under this key. */
   set(root: Root, key: string, value: unknown): void;
-  /** What did not change since the last time keeps its identity. */
+  /** Returns the graph; parts that did not change since the last call keep their identity. */
   graph(): Graph;
 }
 
@@ -206,7 +206,7 @@ class Reader {
     return this.assembly;
   }
 
-  /** What belongs to the graph itself. */
+  /** Reads the fields of the graph itself. */
   private frame(): Omit<Graph, "actions" | "relations"> {
     return {
       name: asText(this.meta.get("name")) ?? "",

@@ -1,5 +1,5 @@
 /**
- * What an arrow means, in sentences: what the engine would do, not what the words suggest.
+ * Says in sentences what an arrow means: what the engine would do, not what the words suggest.
  *
  * So `restart` is said to do nothing (the engine does nothing), and joins are said as the engine
  * waits: a required parent only has to have ended, and the last one decides.
@@ -18,7 +18,7 @@ import {
   type Response,
 } from "./model";
 
-/** How an action ended, after its name: "Scan ends true". */
+/** Words for how an action ended, after its name: "Scan ends true". */
 const ENDINGS: Readonly<Record<Precondition, string>> = {
   on_true: "ends true",
   on_false: "ends false",
@@ -26,7 +26,7 @@ const ENDINGS: Readonly<Record<Precondition, string>> = {
   on_stopped: "is stopped",
 };
 
-/** How a person calls an end of a relation: with its number only where the name is not enough. */
+/** Returns the name of an end of a relation, with its number only where the name is not enough. */
 export function nameOf(graph: Graph, key: Key): string {
   if (key === ENTRY) return "the start";
   if (key === EXIT) return "the end";
@@ -36,7 +36,7 @@ export function nameOf(graph: Graph, key: Key): string {
   return shared ? fullName(action) : action.name;
 }
 
-/** What one arrow makes of its child, one sentence for each thing that it does. */
+/** Returns what one arrow makes its child do, one sentence for each thing. */
 export function relationWords(graph: Graph, relation: Relation): readonly string[] {
   if (relation.parent === ENTRY) return ["Runs when the graph starts."];
   const parent = nameOf(graph, relation.parent);
@@ -59,7 +59,7 @@ export function ignoredWords(graph: Graph, relation: Relation): string | null {
   return `Nothing happens when ${isolated(nameOf(graph, relation.parent))} ${endings}.`;
 }
 
-/** When an action runs, or the graph ends: all its arrows, and how they wait for each other. */
+/** Returns when an action runs, or the graph ends: by all its arrows, and how they wait for each other. */
 export function startWords(graph: Graph, key: Key): readonly string[] {
   const relations = graph.relations
     .filter((relation) => relation.child === key)
@@ -146,7 +146,7 @@ const list = (word: string) => (items: readonly string[]) =>
     : `${items.slice(0, -1).join(", ")} ${word} ${items[items.length - 1]}`;
 const any = list("or");
 const all = list("and");
-/** How a person calls an end of a relation: with the number only where the name is not enough. */
+/** Returns the name of an end of a relation, with its number only where the name is not enough. */
 
 export function endName(graph: Graph, key: Key): string {
   if (key === ENTRY) return "Entry";

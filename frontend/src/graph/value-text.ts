@@ -2,7 +2,7 @@
 import { memberText } from "./json-members";
 import type { Parameter } from "./model";
 
-/** `pose/position/x` as `pose.position.x`. */
+/** Returns a path as people read it: `pose.position.x` for `pose/position/x`. */
 export function pathWords(path: string): string {
   return path
     .split("/")

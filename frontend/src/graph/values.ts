@@ -1,5 +1,5 @@
 /**
- * What the values of the document mean: total functions from anything to a value or nothing.
+ * Reads values of the document: total functions from anything to a value or nothing.
  *
  * The document can hold whatever some client wrote. A value that does not fit is left where it is
  * and read as if it were absent, here and in `editor/documents/reading.py` alike.
@@ -33,7 +33,7 @@ export function asPosition(value: unknown): Position | undefined {
   return x === undefined || y === undefined ? undefined : [x, y];
 }
 
-/** Where what follows is drawn. Documents that say nothing, or something unknown, were drawn top down. */
+/** Reads the direction of drawing. Documents that say nothing, or something unknown, were drawn top down. */
 export const asDirection = (value: unknown): Direction => (value === "right" ? "right" : "down");
 
 const responses: ReadonlySet<unknown> = new Set(RESPONSES);
@@ -61,7 +61,7 @@ export function asTextList(value: unknown): readonly string[] | undefined {
   }
 }
 
-/** How deep values are nested; stops counting once it is too deep. */
+/** Returns how deep values are nested; stops counting once it is too deep. */
 function depth(value: unknown, above: number): number {
   if (typeof value !== "object" || value === null || above > MAX_DEPTH) return above;
   let deepest = above + 1;
@@ -74,6 +74,7 @@ function depth(value: unknown, above: number): number {
 /** Order of texts by UTF-16 code units, on both sides of the wire. */
 export const byText = (a: string, b: string): number => (a < b ? -1 : a > b ? 1 : 0);
 
+/** Returns true if two plain values (objects, arrays, primitives) are equal. */
 export function isEqual(a: unknown, b: unknown): boolean {
   if (Object.is(a, b)) return true;
   if (typeof a !== "object" || typeof b !== "object" || a === null || b === null) return false;

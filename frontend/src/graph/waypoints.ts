@@ -2,11 +2,11 @@
 import type { JsonText, Key, Position, Relation } from "./model";
 import { asNumber } from "./values";
 
-/** Nobody needs more, and each is a line more to route. */
+/** The most bends of a line: more are not needed, and each is one more line to route. */
 export const MOST_WAYPOINTS = 8;
 const FARTHEST = 1e7; // px, as of cards
 
-/** What a text says, on whole pixels; nothing when it is none of ours, which then stays as it is. */
+/** Reads bends from a text, on whole pixels; empty when the text is none of ours, which then stays as it is. */
 export function readWaypoints(text: JsonText): readonly Position[] {
   let value: unknown;
   try {
@@ -23,7 +23,7 @@ export function readWaypoints(text: JsonText): readonly Position[] {
   return places.length === value.length ? places : [];
 }
 
-/** Whether somebody has bent a line of the relation. */
+/** Returns true if somebody has bent a line of the relation. */
 export const isBent = ({ waypoints }: Relation): boolean =>
   waypoints.some(([, text]) => readWaypoints(text).length > 0);
 
@@ -40,7 +40,7 @@ export function movedTogether(
 export const shifted = (places: readonly Position[], [dx, dy]: Position): Position[] =>
   places.map(([x, y]) => [x + dx, y + dy]);
 
-/** How far what stands somewhere has moved. */
+/** Returns the distance that each thing has moved between two sets of places. */
 export function movesBetween(
   before: ReadonlyMap<Key, Position>,
   after: ReadonlyMap<Key, Position>,

@@ -52,7 +52,7 @@ export function GraphForm() {
   );
 }
 
-/** How to draw, for what one points with. */
+/** Hints on how to draw, for the pointing device in use. */
 function Tips() {
   if (useHasFingersOnly()) {
     return (

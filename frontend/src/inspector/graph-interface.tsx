@@ -1,4 +1,4 @@
-/** What a graph takes and gives where an action of another graph stands for it. */
+/** Shows the inputs and outputs of a graph where an action of another graph stands for it. */
 import { Checkbox, Select } from "@mantine/core";
 import { useMemo } from "react";
 import { useEditorContext } from "../edit-actions/editor-context";
@@ -16,7 +16,7 @@ interface ParameterProps {
   of: InterfaceParameter;
 }
 
-/** It is changed in all actions inside whose it is, as one edit. */
+/** One parameter of the interface. A change goes to all actions inside that have the parameter, as one edit. */
 function InterfaceRow({ side, of: parameter }: ParameterProps) {
   const { doc, graph, mayEdit, select, view } = useEditorContext();
   const { path, type, required, of, mixed } = parameter;

@@ -41,7 +41,7 @@ interface Props {
   seq: number;
   panel: Panel;
   problems: Problems | undefined;
-  /** The same as they are told. */
+  /** The problems as they are shown to people. */
   told: readonly Told[];
   threads: readonly Thread[];
 }

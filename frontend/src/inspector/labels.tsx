@@ -24,7 +24,7 @@ export function graphLabels(graph: Graph): string[] {
   return Array.isArray(value) ? value.filter((label) => typeof label === "string") : [];
 }
 
-/** Everything else that stands in `gui_attributes` stays as it is spelled. */
+/** Sets the labels; all other members of `gui_attributes` stay as they are spelled. */
 export function setLabels(doc: Y.Doc, labels: readonly string[]): void {
   const kept = [...new Set(labels.map((label) => label.trim()).filter(Boolean))];
   const text = withMember(

@@ -12,7 +12,7 @@ import { ParameterList } from "./parameters/parameter-list";
 
 interface Props {
   action: Action;
-  /** What follows from its name. */
+  /** Fields that follow from its name. */
   names: ReactNode;
   told: readonly Told[];
 }

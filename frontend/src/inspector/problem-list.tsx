@@ -1,4 +1,4 @@
-/** What is wrong with the graph, what is still to fill in, and what may go wrong: where, and what mends it. */
+/** Lists the problems of a graph (wrong, to fill in, may go wrong) with their places and fixes. */
 import { ActionIcon, Button } from "@mantine/core";
 import { IconCircleCheck, IconLink, IconStairsDown, IconTool } from "@tabler/icons-react";
 import { useMemo } from "react";
@@ -25,7 +25,7 @@ import { NumberField } from "./parameters/number-rows";
 import { ParameterValueField } from "./parameters/parameter-field";
 import style from "./problem-list.module.css";
 
-/** Where a problem is, as a person would say it; empty for the graph as a whole. */
+/** Returns the place of a problem in words; empty for the graph as a whole. */
 function placeWords(graph: Graph, place: string | null): string {
   if (place === null) return "";
   const relation = graph.relations.find((candidate) => relationId(candidate) === place);
@@ -45,7 +45,7 @@ function jump(context: EditorContext, told: Told, place: string): void {
   focusField(`${place}|${field}`);
 }
 
-/** What is to fill in, to be written right here: numbers of one thing in a row. */
+/** Fields for the missing values of a problem; numbers of one thing stand in a row. */
 function Values({ told }: { told: Told }) {
   const { graph, mayEdit } = useEditorContext();
   const action = graph.actions.find(({ key }) => key === told.place);

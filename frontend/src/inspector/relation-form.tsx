@@ -1,4 +1,4 @@
-/** What an arrow says: a response to each of the four outcomes, and what it carries over. */
+/** The form of an arrow: a response to each of the four outcomes, and the outputs that it carries over. */
 import { Button, Select, Switch } from "@mantine/core";
 import { IconArrowDown, IconTrash } from "@tabler/icons-react";
 import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "../canvas/outcome";

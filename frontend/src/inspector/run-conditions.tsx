@@ -1,4 +1,4 @@
-/** When something runs, as sentences: what the engine would really do. */
+/** Shows when something runs, in sentences: what the engine would really do. */
 
 import { useEditorContext } from "../edit-actions/editor-context";
 import type { Key } from "../graph/model";

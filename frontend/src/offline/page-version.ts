@@ -1,4 +1,4 @@
-/** Which version of the page this is, and whether the server has another one by now. */
+/** Detects that the server has another version of the page than this one. */
 import { serverPath } from "../api/page-url";
 
 const BUILD = /<meta name="build" content="([^"]*)"/;

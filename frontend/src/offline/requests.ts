@@ -1,4 +1,4 @@
-/** What the service worker does with a request: pure, for the worker and its tests. */
+/** Decides what the service worker does with a request: pure, for the worker and its tests. */
 
 /** Beside the page on its origin: answered by the server or by nobody, and never kept. */
 const NOT_THE_PAGE = ["api/", "runner/", "schema", "help", "healthz", "readyz", "metrics"];
@@ -29,7 +29,7 @@ export function handlingOf({ method, mode, url }: AskedFor, scope: string): Hand
   return /^[\w-]+\.(svg|png|webmanifest)$/.test(below) ? "sign" : "pass";
 }
 
-/** Whether a proxy answered for a server that it does not reach. */
+/** Returns true if a proxy answered for a server that it does not reach. */
 export function isServerGone(status: number): boolean {
   return status === 502 || status === 503 || status === 504;
 }

@@ -28,7 +28,7 @@ const worker = globalThis as unknown as Worker;
 const { scope } = worker.registration;
 const STORE = storeName(__VERSION__);
 const PAGE = new URL("./", scope).href;
-/** How long a server may take to answer for the page before what is kept is shown, ms. */
+/** The server has this time to answer for the page before the stored one is shown, ms. */
 const PATIENCE = 4_000;
 
 /** All or nothing: with one part missing the version before stays. */
@@ -52,7 +52,7 @@ async function kept(url: string): Promise<Response | undefined> {
   return (await (await caches.open(STORE)).match(url, any)) ?? caches.match(url, any);
 }
 
-/** What the server has, else what is kept. The page says itself what it does not reach. */
+/** Answers with what the server has, else with the stored copy. The page itself says what it does not reach. */
 async function newest(request: Request, url: string): Promise<Response> {
   const late = new Promise<null>((resolve) => setTimeout(resolve, PATIENCE, null));
   const asked = fetch(request);

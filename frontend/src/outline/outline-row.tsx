@@ -34,16 +34,16 @@ interface Props {
   selected: boolean;
   progress: Progress | null;
   change: RowEditKind | null;
-  /** What the action is called, or that to which the arrow leads. */
+  /** The name of the action, or of the thing to which the arrow leads. */
   name: string;
-  /** Who else has it selected. */
+  /** The other people who have it selected. */
   others: readonly PersonHere[] | undefined;
   mayEdit: boolean;
   /** Always the same object, so that a row draws again only when something of it changes. */
   handlers: RowHandlers;
 }
 
-/** What a row can ask for. */
+/** Calls of a row to the outline. */
 export interface RowHandlers {
   flip(id: string): void;
   focus(id: string): void;
@@ -156,7 +156,7 @@ interface RowActionsProps {
   label: string;
   mayEdit: boolean;
   handlers: RowHandlers;
-  /** What the button shows instead of three dots. */
+  /** The content of the button, instead of three dots. */
   chip?: { readonly look: string; readonly words: ReactNode };
 }
 

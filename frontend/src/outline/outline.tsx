@@ -36,11 +36,11 @@ interface Edited {
 const closed = () => false;
 const NO_BUNDLES: readonly BundleRow[] = [];
 
-/** Whether what is edited is this row, or a bundle that is shown in it. */
+/** Returns true if this row is edited, or a bundle that is shown in it. */
 const isOf = (edited: Edited | null, row: OutlineItem): boolean =>
   edited !== null && (edited.row.id === row.id || edited.row.parent === row.id);
 
-/** Which rows are open: those that a person opened or closed, else by how many there are. */
+/** Keeps which rows are open: as a person opened or closed them, else by the number of actions. */
 function useOpen(actions: number) {
   const [flipped, setFlipped] = useState<ReadonlySet<string>>(new Set());
   const byDefault = actions <= MANY;

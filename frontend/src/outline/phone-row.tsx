@@ -21,12 +21,12 @@ interface Props {
   active: boolean;
   selected: boolean;
   progress: Progress | null;
-  /** What is being changed: this row, or one of its bundles. */
+  /** The edit that is open in this row, or in one of its bundles. */
   edited: { readonly row: OutlineItem; readonly change: RowEditKind } | null;
   names: ReadonlyMap<Key, string>;
-  /** Where each stands in the list: arrows to what stands above lead back. */
+  /** The index of each row in the list: arrows to rows above lead back. */
   order: ReadonlyMap<string, number>;
-  /** Who else has it selected. */
+  /** The other people who have it selected. */
   others: readonly PersonHere[] | undefined;
   mayEdit: boolean;
   handlers: RowHandlers;

@@ -5,14 +5,14 @@ import { useEditorContext } from "../edit-actions/editor-context";
 import { colorOfName } from "../ui/name-colors";
 import style from "./robot-filter.module.css";
 
-/** How many actions each robot has, by name; those for any robot last. */
+/** Returns the number of actions of each robot, by name; those for any robot come last. */
 function robotCounts(actors: readonly string[]): [name: string, actions: number][] {
   const counts = new Map<string, number>();
   for (const actor of actors) counts.set(actor, (counts.get(actor) ?? 0) + 1);
   return [...counts].sort(([a], [b]) => (a === "" ? 1 : b === "" ? -1 : a.localeCompare(b)));
 }
 
-/** Nothing where there is only one robot. */
+/** Buttons that highlight the actions of one robot; not drawn where there is only one robot. */
 export const RobotFilter = memo(function Robots() {
   const { graph } = useEditorContext();
   const robots = useMemo(

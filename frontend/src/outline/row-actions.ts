@@ -1,4 +1,4 @@
-/** What can be done to a row of the outline, with its key. */
+/** Defines the actions on a row of the outline, with their keys. */
 
 import { graphsInside } from "../canvas/graphs-inside";
 import type { EditorContext } from "../edit-actions/editor-context";
@@ -31,7 +31,7 @@ export interface RowAction {
     | "enter"
     | "expand";
   readonly label: string;
-  /** As named by `keyOf`, with `Alt+` before it where needed. */
+  /** The key as `keyOf` names it, with `Alt+` before it where needed. */
   readonly key: string;
   readonly changes: boolean;
 }
@@ -65,7 +65,7 @@ const EXPAND: RowAction = {
   changes: false,
 };
 
-/** What can be done with an action that stands for a graph. */
+/** Returns the actions for a row whose action stands for a graph. */
 const levelActions = ({ name }: Action): readonly RowAction[] =>
   graphsInside.now()?.byName.has(name) ? [EXPAND, ENTER] : [];
 

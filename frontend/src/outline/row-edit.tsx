@@ -1,4 +1,4 @@
-/** What opens under a row of the outline: a new name, another target, another response, an arrow. */
+/** The fields that open under a row of the outline: a new name, another target, another response, an arrow. */
 
 import { Select, Textarea, TextInput } from "@mantine/core";
 import { useState } from "react";

@@ -19,7 +19,7 @@ interface OutlinePosition {
   readonly level: number;
   /** The row above it in the tree; null at the top. */
   readonly parent: string | null;
-  /** Whether what is under it is shown; null: nothing is under it. */
+  /** True if the rows under it are shown; null where there are none. */
   readonly open: boolean | null;
   /** From 1, among its siblings. */
   readonly at: number;
@@ -79,7 +79,7 @@ export function inOrder(graph: Graph, children = childrenOf(graph)): Action[] {
   return [...[...found].flatMap((key) => actions.get(key) ?? []), ...rest];
 }
 
-/** What is drawn on the card of an action. */
+/** Returns the parts that are drawn on the card of an action. */
 type PartsOf = (key: Key) => readonly PartOnCard[];
 
 const nothing: PartsOf = () => [];
@@ -193,7 +193,10 @@ function targets(
 
 export type BundleRow = Extract<OutlineItem, { kind: "target" }>;
 
-/** What follows each action, one row for each arrow and response: outcomes that say the same are one. */
+/**
+ * Returns what follows each action, one row for each arrow and response: outcomes with the same response share a
+ * row.
+ */
 export function bundlesOf(graph: Graph): ReadonlyMap<Key, readonly BundleRow[]> {
   const all = [...childrenOf(graph)];
   return new Map(all.map(([parent, after]) => [parent, bundled(parent, after)]));
@@ -233,7 +236,7 @@ export function leadingNowhere(bundles: readonly BundleRow[]): Precondition[] {
   return (["on_true", "on_false", "on_error"] as const).filter((outcome) => !spoken.has(outcome));
 }
 
-/** What people call every end of the graph: with the number only where the name is not enough. */
+/** Returns the names of all actions and of both ends, with a number only where the name is not enough. */
 export function namesOf(graph: Graph): ReadonlyMap<Key, string> {
   const counts = new Map<string, number>();
   for (const { name } of graph.actions) counts.set(name, (counts.get(name) ?? 0) + 1);
@@ -244,7 +247,7 @@ export function namesOf(graph: Graph): ReadonlyMap<Key, string> {
   return new Map([[ENTRY, "Entry"], [EXIT, "Exit"], ...names]);
 }
 
-/** What is selected in the graph when a row is. */
+/** Returns the key or id that is selected in the graph when a row is selected. */
 export function subjectOf(row: OutlineItem): string {
   switch (row.kind) {
     case "entry":

@@ -1,4 +1,4 @@
-/** Who else is here: faces in the bar, whom one follows, and who is at which card. */
+/** Shows the other people: faces in the bar, the one being followed, and who is at which card. */
 import { ViewportPortal } from "@xyflow/react";
 import type { CSSProperties } from "react";
 import { checkedColor } from "../api/people";

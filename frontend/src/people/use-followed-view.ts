@@ -9,7 +9,7 @@ import { keyOf } from "../ui/keys";
 
 const GLIDE = 120; // ms; views come at most every 50 ms
 
-/** What Esc leaves first. */
+/** Elements that use Esc themselves. */
 const OWN_ESCAPE = "input, textarea, select, [role=dialog], [role=menu], [role=listbox]";
 
 interface ViewSize {
@@ -17,7 +17,7 @@ interface ViewSize {
   readonly height: number;
 }
 
-/** What is seen through a frame of this size, to tell the others. */
+/** Returns the part of the canvas that is seen through a frame of this size, to tell the others. */
 export function viewOf({ x, y, zoom }: Viewport, { width, height }: ViewSize): SharedView {
   return {
     x: Math.round(-x / zoom),
@@ -28,7 +28,7 @@ export function viewOf({ x, y, zoom }: Viewport, { width, height }: ViewSize): S
   };
 }
 
-/** How to look so that all they see is seen in a frame of this size, with their middle in its middle. */
+/** Returns the viewport in which a frame of this size shows all that the other person sees, with the same middle. */
 export function viewportOnto(view: SharedView, { width, height }: ViewSize): Viewport {
   const theirs = { width: view.width ?? width, height: view.height ?? height };
   const zoom = view.zoom * Math.min(1, width / theirs.width, height / theirs.height);

@@ -38,7 +38,7 @@ function open(wins: boolean): void {
   server.accept();
 }
 
-/** Both work while this page is away, and it comes back. */
+/** Lets this page and others work while it is offline, and brings it back. */
 function apart(here: (doc: Y.Doc) => void, there: (doc: Y.Doc) => void): readonly ChangedTwice[] {
   server.last.end(1006);
   here(room.doc);
@@ -181,7 +181,7 @@ test("a value of others that came as collected is the newest one of others that 
 
 // -- who stayed ---------------------------------------------------------------------------------
 
-/** Somebody goes offline now, works by `work`, and comes back when the answer is called. */
+/** Takes a colleague offline who works by `work`; the returned function brings their edits to the server. */
 function away(work: (doc: Y.Doc) => void): () => void {
   const doc = new Y.Doc();
   Y.applyUpdate(doc, Y.encodeStateAsUpdate(server.doc));

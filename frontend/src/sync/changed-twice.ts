@@ -46,17 +46,17 @@ export function asLogged(
   return { ...twice, theirs, writes: { ...writes, theirs: [[root, key, theirs]] } };
 }
 
-/** What somebody else did to one key. */
+/** A change of one key by somebody else, as the page applied it. */
 interface Theirs {
   readonly root: Root;
   readonly key: string;
   /** Null where the value is not known: it was collected, or it is a shared type. */
   readonly held: { readonly value: unknown } | null;
-  /** Whether it is what stands now. */
+  /** True if this value stands now; false if it lost against the value of this page. */
   readonly stands: boolean;
-  /** What was there before, as the page showed it. */
+  /** The value that the page showed before. */
   readonly before: unknown;
-  /** Whether it replaced a stored value of this person that its author had not received. */
+  /** True if it replaced a stored value of this person that its author had not received. */
   readonly unseen: boolean;
 }
 
@@ -84,7 +84,7 @@ class StoredItems {
     return this.clocks.size === 0;
   }
 
-  /** Whether this person made the item and it has been stored for some seconds. */
+  /** Returns true if this person made the item and it was stored at least `AWAY_MS` ago. */
   has({ id }: Y.Item): boolean {
     const before = deviceNow() - AWAY_MS;
     const all = this.clocks.get(id.client) ?? [];
@@ -136,7 +136,7 @@ export class ChangedTwiceStore {
     }
   }
 
-  /** The page is back with these edits, which nobody has seen yet. */
+  /** Called when the page is back, with its own edits that nobody has received yet. */
   back(waiting: readonly UnsavedEdit[]): void {
     this.waiting = new Set(waiting);
     this.own = waiting.length === 0 ? null : strandedEditsIn(this.doc, waiting);
@@ -199,14 +199,14 @@ export class ChangedTwiceStore {
     this.tell(this.found);
   }
 
-  /** Which of the two stands now; null where it is something else by now. */
+  /** Returns the side whose value stands now; null where another value does by now. */
   stands({ root, key, mine, theirs }: ChangedTwice): "mine" | "theirs" | null {
     const now = rootOf(this.doc, root).get(key);
     if (isEqual(now, mine)) return "mine";
     return isEqual(now, theirs) ? "theirs" : null;
   }
 
-  /** The person has seen all of them. */
+  /** Closes the list: the person has seen all choices. */
   dismiss(): void {
     this.tell(NONE);
   }
@@ -261,7 +261,10 @@ function holds({ id, length }: Y.Item, { client, clock }: Y.ID): boolean {
   return id.client === client && clock >= id.clock && clock < id.clock + length;
 }
 
-/** Stored values of this person that edits replaced which had not seen them. */
+/**
+ * Returns choices about stored values of this person that were replaced by edits whose authors had not received
+ * them.
+ */
 function replacedUnseen(
   doc: Y.Doc,
   waiting: DocumentDifference,
@@ -332,7 +335,7 @@ function compared(
   return [...wholes, ...fields];
 }
 
-/** Actions that somebody else deleted and that this person had worked on. */
+/** Returns choices about actions that somebody else deleted and that this person had worked on. */
 function deletedByThem(mine: DocumentDifference, theirs: readonly Theirs[]): Compared[] {
   const worked = new Set(
     ROOTS.flatMap((root) => [...mine[root].keys()].flatMap((key) => ownersOf(root, key))),
@@ -354,7 +357,7 @@ function deletedByThem(mine: DocumentDifference, theirs: readonly Theirs[]): Com
   });
 }
 
-/** Actions that this person deleted and that somebody else had worked on. */
+/** Returns choices about actions that this person deleted and that somebody else had worked on. */
 function deletedHere(
   doc: Y.Doc,
   mine: DocumentDifference,
@@ -381,7 +384,7 @@ function deletedHere(
   });
 }
 
-/** The actions that a key belongs to. */
+/** Returns the ids of the actions that a key belongs to: one, or both ends of an arrow. */
 function ownersOf(root: Root, key: string): readonly string[] {
   if (root === "actions" || root === "positions") return [splitKey(key).head];
   if (root !== "relations") return [];

@@ -1,5 +1,5 @@
 /**
- * A fingerprint of the document, to tell whether the page shows what the server has: compared when nothing has happened for a while.
+ * Compares the page's document with the server's by a fingerprint when nothing has happened for a while.
  *
  * Equal state vectors do not prove equal documents. So of all entries of the shared maps the CRC-32
  * of root, key and value is summed up, which needs no order and no secure context. The server's
@@ -12,16 +12,16 @@ import { type Maps, mapsOf, ROOTS } from "../graph/document-keys";
 import type { Fingerprint } from "./messages";
 import * as messages from "./messages";
 
-/** How long nothing must have happened. */
+/** The comparison waits until nothing has happened for this time. */
 const IDLE_MS = 5_000;
 
-/** What can be compared at the moment: the log up to `seq` and nothing else. */
+/** The state to compare: the document is exactly the log up to `seq`. */
 export interface RestingState {
   readonly seq: number;
   send(frame: Uint8Array<ArrayBuffer>): void;
 }
 
-/** Asks the server once after each change that has come to rest. */
+/** Asks the server once after each change, as soon as the document has been quiet for `IDLE_MS`. */
 export class FingerprintCheck {
   private readonly doc: Y.Doc;
   private readonly atRest: () => RestingState | null;
@@ -33,13 +33,13 @@ export class FingerprintCheck {
     this.atRest = atRest;
   }
 
-  /** Something happened. */
+  /** Restarts the wait for a quiet moment; called after each change. */
   stir(): void {
     clearTimeout(this.timer);
     this.timer = setTimeout(() => this.ask(), IDLE_MS);
   }
 
-  /** Whether the server's answer tells of something else than what was asked about. */
+  /** Reads the server's answer and returns true if its fingerprint differs from the one that was asked about. */
   differs(decoder: decoding.Decoder): boolean {
     const [seq, entries, total] = [0, 0, 0].map(() => decoding.readVarUint(decoder));
     const said = this.said;

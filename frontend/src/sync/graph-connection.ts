@@ -31,7 +31,7 @@ import {
 import type { Room, RoomLink } from "./room";
 import type { PersistenceOptions, RefusalReason, RoomOptions } from "./room-connection";
 
-/** What the page may say softly about a room that follows another. */
+/** An event of the connection that the page shows as a notice, without asking for anything. */
 export type ConnectionNotice = "went-back" | "differed";
 
 export interface GraphConnectionState {
@@ -50,7 +50,7 @@ export interface GraphConnectionOptions {
 interface StrandedEpoch {
   readonly epoch: string;
   readonly stranded: StrandedEdits;
-  /** Whether the device has them, so that they outlive this page. */
+  /** Returns true if the device has stored them, so that they survive this page. */
   isKept(): boolean;
   /** Lets go of them on the device. */
   forget(): Promise<void>;
@@ -62,7 +62,7 @@ const MOST_DIFFERENCES = 3;
 /** Left, with edits that no server and no device has yet. */
 const lingering = new Set<GraphConnection>();
 
-/** Whether edits would be lost if the page were closed now, in this graph or in one that was left. */
+/** Returns true if closing the page now would lose edits of this graph or of one that was left. */
 export function wouldLose(connection: GraphConnection | undefined): boolean {
   return lingering.size > 0 || connection?.wouldLose() === true;
 }
@@ -90,7 +90,7 @@ export class GraphConnection {
     this.current = { open: this.opened, stranded: [], notice: null };
   }
 
-  /** The same object until something of it changes. */
+  /** Returns the state: the same object until a part of it changes. */
   readonly now = (): GraphConnectionState => this.current;
 
   readonly onChange = (listener: () => void): (() => void) => {
@@ -119,19 +119,19 @@ export class GraphConnection {
     await this.lookAside(); // another page may have left some on the same history
   }
 
-  /** The notice was read. */
+  /** Hides the notice that the person has read. */
   dismiss(): void {
     this.notice = null;
     this.say();
   }
 
-  /** Whether closing the page now would lose edits. */
+  /** Returns true if closing the page now would lose edits. */
   wouldLose(): boolean {
     const rooms = [this.opened.room, ...this.refusedRooms];
     return rooms.some(isAtRisk) || this.asides.some((aside) => !aside.isKept());
   }
 
-  /** Where nothing else has the edits that wait, the room stays open until they are stored. */
+  /** Leaves the graph. If waiting edits exist only here, the room stays open until they are stored. */
   leave(): void {
     if (this.left) return;
     this.left = true;
@@ -297,7 +297,7 @@ export class GraphConnection {
     return changed;
   }
 
-  /** The same history under another client id: the same changes, without asking. */
+  /** Makes the waiting edits anew under another client id, in the same history and without asking. */
   private async again(aside: StrandedEpoch): Promise<void> {
     this.asides = [...this.asides, aside];
     await this.apply(aside.stranded, aside.stranded.difference).catch((error: unknown) => {
@@ -348,18 +348,21 @@ function asideOf(
   };
 }
 
-/** Whether it has edits that neither the server nor this device has. */
+/** Returns true if the room has edits that neither the server nor this device has stored. */
 function isAtRisk(room: Room): boolean {
   const { unsaved, kept } = room.link();
   return unsaved > 0 && kept !== true;
 }
 
-/** Whether they may still be stored without anybody looking at the room. */
+/** Returns true if its edits may still be stored without anybody opening the room. */
 function mayBeStored(room: Room): boolean {
   return isAtRisk(room) && room.link().state !== "refused";
 }
 
-/** Where to keep what the server has now: under its name, unless that is the name of what was. */
+/**
+ * Returns the epoch under which the server's present history is kept: its own name, unless the old copy has that
+ * name.
+ */
 function otherEpoch(room: Room): string {
   const { here, theirs } = room.histories();
   return theirs !== "" && theirs !== epochName(here) ? theirs : newEpoch(theirs);

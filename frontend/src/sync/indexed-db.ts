@@ -1,6 +1,6 @@
 /**
- * What IndexedDB keeps of graphs that were open here: a copy to open offline, and the edits that
- * no server has stored yet.
+ * Stores in IndexedDB, for each graph that was open here, a copy to open offline and the edits that no server has
+ * stored yet.
  *
  * Everything is kept per graph, epoch and person, so that on a shared tablet nobody's edits are ever
  * sent, or shown, under another name. IndexedDB works without a secure context; where a browser
@@ -10,7 +10,7 @@
 import { deviceNow } from "../clock/server-clock";
 import type { Root } from "../graph/document-keys";
 
-/** Whose copy of which graph. */
+/** The graph and the person whose copy it is. */
 export interface CopyOwner {
   readonly graph: string;
   readonly person: { readonly id: string; readonly name: string };
@@ -23,9 +23,9 @@ export type ReplacedEntries = readonly (readonly [root: Root, key: string, value
 export interface UnsavedEdit {
   readonly id: string;
   readonly update: Uint8Array;
-  /** Milliseconds since 1970. */
+  /** The time, in milliseconds since 1970. */
   readonly at: number;
-  /** What it replaced; absent where that is not known. */
+  /** The values that it replaced; absent where they are not known. */
   readonly before?: ReplacedEntries;
 }
 
@@ -52,7 +52,7 @@ export interface ChangedTwice {
    * stored, and an edit replaced it whose author had not received it.
    */
   readonly cause: "return" | "unseen";
-  /** What to write for each choice; null where the value is not known any more. */
+  /** The entries to write for each choice; null where the value is not known any more. */
   readonly writes: { readonly mine: ReplacedEntries; readonly theirs: ReplacedEntries | null };
 }
 
@@ -87,7 +87,7 @@ export interface StoreWrite {
   readonly client?: number;
 }
 
-/** Somebody else whose edits wait here until they sign in again. */
+/** Another person, with edits that wait on this device until they sign in again. */
 export interface OtherPerson {
   readonly id: string;
   readonly name: string;
@@ -97,14 +97,14 @@ export interface OtherPerson {
 /** A graph that opens without a server. */
 export interface KeptGraph {
   readonly graph: string;
-  /** Milliseconds since 1970. */
+  /** The time, in milliseconds since 1970. */
   readonly usedAt: number;
-  /** How many edits wait. */
+  /** The number of edits that are not stored by the server. */
   readonly waiting: number;
 }
 
 export interface EditStore {
-  /** What is kept, of all histories, the last used one at the end. */
+  /** Returns the copies of all histories of the graph; the last used one is the last. */
   read(owner: CopyOwner): Promise<readonly StoredCopy[]>;
   write(owner: CopyOwner, epoch: string, batch: StoreWrite): Promise<void>;
   /** Lets go of these edits (by id), and of the copy unless others wait on it: another page's, say. */
@@ -117,7 +117,7 @@ export interface EditStore {
   others(owner: CopyOwner): Promise<readonly OtherPerson[]>;
 }
 
-/** Of a graph whose server has not said yet which history it has. */
+/** The epoch under which a graph is kept until its server has named its history. */
 export const UNNAMED_EPOCH = "0";
 
 /** A place for a document that begins anew although the server calls the history the same. */
@@ -125,7 +125,9 @@ export function newEpoch(name: string): string {
   return `${name || UNNAMED_EPOCH}~${freshId()}`;
 }
 
-/** What the server calls the history that is kept under this epoch; empty when it has not said. */
+/**
+ * Returns the server's name of the history that is kept under this epoch; empty while the server has not named it.
+ */
 export function epochName(epoch: string): string {
   const [name = UNNAMED_EPOCH] = epoch.split("~");
   return name === UNNAMED_EPOCH ? "" : name;

@@ -1,4 +1,4 @@
-/** The graphs that this device keeps, with their names: for a list when no server gives one. */
+/** Lists the graphs that this device keeps, with their names, for the time when no server gives a list. */
 import * as Y from "yjs";
 import { rootOf } from "../graph/document-keys";
 import { browserStore, type EditStore, type KeptGraph } from "./indexed-db";
@@ -8,7 +8,7 @@ export interface NamedGraph extends KeptGraph {
   readonly name: string;
 }
 
-/** Rejects where the browser stores nothing. */
+/** Returns the graphs of which this person has a copy here. Rejects where the browser stores nothing. */
 export async function keptGraphs(
   person: string,
   store: EditStore = browserStore(),
@@ -28,7 +28,7 @@ export async function keptGraphs(
   return named;
 }
 
-/** Whoever signs out leaves no copy behind; edits that no server has stay until they come again. */
+/** Deletes this person's copies when they sign out. Copies with edits or choices that wait stay. */
 export async function leaveDevice(
   person: string,
   store: EditStore = browserStore(),

@@ -9,13 +9,16 @@ import type { RefusalReason } from "./room";
 export const SYNC = 0;
 export const AWARENESS = 1;
 export const QUERY_AWARENESS = 3;
-/** How many document messages of this socket are durable, and up to where it was sent the log. */
+/**
+ * Acknowledgement: how many document messages of this socket are durable, and the entry of the log up to which it
+ * was sent.
+ */
 export const ACK = 100;
-/** A fingerprint of what is shown: the page's, then the server's. */
+/** Comparison: a fingerprint of the document, first the page's, then the server's. */
 export const COMPARE = 101;
-/** A sentence: why nobody may change this document. */
+/** Read only: a sentence that says why nobody may change this document. */
 export const READ_ONLY = 102;
-/** Which history of the graph this is. */
+/** Epoch: the name of the history of the graph. */
 export const EPOCH = 103;
 
 /** Close codes after which coming again by itself is of no use. */
@@ -34,7 +37,7 @@ const FORBIDDEN = 4403;
 /** Two documents with one client id: this one has to take another. */
 const OTHER_CLIENT = "client id of another person";
 
-/** Why the server does not let this page in, if that is what a close says. */
+/** Returns why the server refuses this page, if the close code says so. */
 export function refusalOf(code: number, reason: string): RefusalReason | undefined {
   return code === FORBIDDEN && reason === OTHER_CLIENT ? "other-client" : REFUSED.get(code);
 }
@@ -57,29 +60,29 @@ export interface Fingerprint {
 
 type Bytes = Uint8Array<ArrayBuffer>;
 
-/** Sync step 1: what we have. */
+/** Encodes sync step 1: the state vector of the document. */
 export function syncStep1(doc: Y.Doc): Bytes {
   return message(SYNC, (encoder) => sync.writeSyncStep1(encoder, doc));
 }
 
-/** Sync step 2, what the server lacks. */
+/** Encodes sync step 2: an update with everything that the server lacks. */
 export function syncStep2(update: Uint8Array): Bytes {
   return edit(sync.messageYjsSyncStep2, update);
 }
 
-/** One update. */
+/** Encodes one update of Yjs. */
 export function updateMessage(update: Uint8Array): Bytes {
   return edit(sync.messageYjsUpdate, update);
 }
 
-/** What we show after entry `seq` of the log. */
+/** Encodes the fingerprint of the document as it is after entry `seq` of the log. */
 export function compareMessage(seq: number, { entries, total }: Fingerprint): Bytes {
   return message(COMPARE, (encoder) => {
     for (const number of [seq, entries, total]) encoding.writeVarUint(encoder, number);
   });
 }
 
-/** What we say about ourselves. */
+/** Encodes the awareness state of this page. */
 export function awarenessMessage(awareness: Awareness): Bytes {
   return message(AWARENESS, (encoder) =>
     encoding.writeVarUint8Array(encoder, encodeAwarenessUpdate(awareness, [awareness.clientID])),

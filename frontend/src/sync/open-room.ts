@@ -1,4 +1,4 @@
-/** Everything that belongs to one open graph. */
+/** Opens a graph: its room, and what reads and follows the room (graph, people, undo). */
 
 import type * as Y from "yjs";
 import { undoOf } from "../graph/edit";

@@ -16,7 +16,7 @@ export class Outbox {
   private sent = 0;
   private answeredSync = false;
 
-  /** How many edits are not durable. */
+  /** The number of edits that are not durable. */
   get unsaved(): number {
     return this.waiting.length;
   }
@@ -26,34 +26,34 @@ export class Outbox {
     return this.waiting.map(({ edit }) => edit);
   }
 
-  /** The edits that no message of this socket carries yet. */
+  /** The edits that were not sent on this socket yet. */
   get unsent(): readonly UnsavedEdit[] {
     return this.waiting.filter(({ message }) => message === NOT_SENT).map(({ edit }) => edit);
   }
 
-  /** Whether the room has been given what it lacked, so that single updates may follow. */
+  /** True once step 2 was sent on this socket; single updates may follow then. */
   get answered(): boolean {
     return this.answeredSync;
   }
 
-  /** A new socket. */
+  /** Starts counting anew for a new socket: nothing was sent on it. */
   fresh(): void {
     this.sent = 0;
     this.answeredSync = false;
     for (const each of this.waiting) each.message = NOT_SENT;
   }
 
-  /** The person changed something. */
+  /** Adds an edit that the person made. */
   edited(edit: UnsavedEdit): void {
     this.waiting.push({ edit, message: NOT_SENT });
   }
 
-  /** A message went out that carries a part of an edit; the last part follows. */
+  /** Counts a message that carries a part of an edit; the last part follows. */
   sentPart(): void {
     this.sent += 1;
   }
 
-  /** A message went out that carries everything so far, or nothing. */
+  /** Counts a message that carries all edits so far, or none. */
   sentAll(): void {
     this.sentSome(this.waiting.length);
   }
@@ -67,19 +67,19 @@ export class Outbox {
     }
   }
 
-  /** The first `count` messages of this socket are durable. Answers the edits that are so since. */
+  /** Removes and returns the edits that are durable since the server acknowledged the first `count` messages. */
   durable(count: number): UnsavedEdit[] {
     const done = this.waiting.filter(({ message }) => message <= count);
     if (done.length > 0) this.waiting = this.waiting.filter(({ message }) => message > count);
     return done.map(({ edit }) => edit);
   }
 
-  /** Lets go of these of the edits that wait. */
+  /** Removes these edits without storing them. */
   drop(edits: readonly UnsavedEdit[]): void {
     this.waiting = this.waiting.filter(({ edit }) => !edits.includes(edit));
   }
 
-  /** Lets go of what waits. */
+  /** Removes all edits, stored or not. */
   clear(): void {
     this.waiting = [];
   }

@@ -16,7 +16,7 @@ import {
   type UnsavedEdit,
 } from "./indexed-db";
 
-/** A device that has not answered by then is not waited for. */
+/** The page does not wait longer than this for the device. */
 const PATIENCE_MS = 3_000;
 const KNOWN_LATER_MS = 2_000;
 const AGAIN_MS = 10_000;
@@ -62,12 +62,12 @@ export class Persistence {
     this.onChange = onChange;
   }
 
-  /** Whether all edits that wait are stored on this device. */
+  /** True if all edits that wait are stored on this device. */
   get kept(): boolean {
     return this.opened && !this.failed && this.waits.length === 0;
   }
 
-  /** The server has said which history this is: what was kept without a name moves there. */
+  /** Takes the name that the server gave the history: a copy without a name moves there. */
   name(epoch: string, waiting: () => readonly UnsavedEdit[]): void {
     if (this.epoch === UNNAMED_EPOCH) void this.move(epoch, waiting);
   }
@@ -88,7 +88,10 @@ export class Persistence {
     }
   }
 
-  /** What is kept; `late` is called when the device answers only after we went on without it. */
+  /**
+   * Reads the copy of this device. `late` is called with it when the device answers only after the page went on
+   * without.
+   */
   async load(late: (kept: StoredCopy | null) => void): Promise<StoredCopy | null> {
     let given = false;
     let timer: ReturnType<typeof setTimeout> | undefined;
@@ -123,13 +126,13 @@ export class Persistence {
     }
   }
 
-  /** The person changed something. */
+  /** Stores an edit that the person made. */
   edited(edit: UnsavedEdit): void {
     this.waits.push(edit);
     this.flush();
   }
 
-  /** Something durable came from the server. */
+  /** Stores an update of the server with the next write. */
   learned(update: Uint8Array): void {
     this.known.push(update);
     this.soon();
@@ -145,13 +148,13 @@ export class Persistence {
     if (this.unwritten.size > 0) this.flush();
   }
 
-  /** These edits are stored by the server. */
+  /** Marks edits as stored by the server: they wait no more. */
   stored(edits: readonly UnsavedEdit[]): void {
     this.durable.push(...edits);
     this.flush();
   }
 
-  /** Shows the log up to `seq`; `copy` gives the whole document while it holds nothing that waits. */
+  /** Notes that the page shows the log up to `seq`. `copy` returns the whole document while no edit waits. */
   shows(seq: number, copy: () => Uint8Array | null): void {
     if (seq === this.seq && this.copy !== null) return;
     this.seq = seq;
@@ -159,7 +162,7 @@ export class Persistence {
     this.soon();
   }
 
-  /** Forgets these edits, those that are durable, and the copy unless another page's edits wait on it. */
+  /** Deletes these edits, the durable ones, and the copy unless edits of another page wait on it. */
   async forget(edits: readonly UnsavedEdit[]): Promise<void> {
     clearTimeout(this.timer);
     this.waits = [];
@@ -173,7 +176,7 @@ export class Persistence {
     this.opened = false;
   }
 
-  /** Forgets these of the edits that wait. */
+  /** Deletes these of the waiting edits. */
   async drop(edits: readonly UnsavedEdit[]): Promise<void> {
     const isGone = (edit: UnsavedEdit) => edits.includes(edit);
     this.waits = this.waits.filter((edit) => !isGone(edit));
@@ -182,7 +185,7 @@ export class Persistence {
     if (this.opened) await this.device.forget(this.owner, this.epoch, edits.map(idOf));
   }
 
-  /** Writes what is left to write. */
+  /** Writes the rest and stops. */
   close(): void {
     this.closed = true;
     clearTimeout(this.timer);

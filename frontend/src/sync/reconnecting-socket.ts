@@ -14,7 +14,7 @@ const SILENCE_MS = 30_000;
 const OPENING_MS = 10_000;
 const FIRST_RETRY_MS = 300;
 const LAST_RETRY_MS = 10_000;
-/** Nobody looks at a hidden page; with nothing to save it may take its time. */
+/** A hidden page without unsaved edits waits this long before it tries again. */
 const HIDDEN_RETRY_MS = 60_000;
 /** An answer to a question that any living server answers at once. */
 const PROBE_MS = 5_000;
@@ -23,17 +23,17 @@ const OPEN = 1;
 const BROKEN = 1006;
 
 export interface ReconnectingSocketOptions {
-  /** Where to, as it is at this attempt. */
+  /** Returns the address for this attempt. */
   readonly url: () => string;
   readonly open: (url: string) => Socket;
-  /** 0 … 1. */
+  /** Returns a random number between 0 and 1, for the spread of reconnects. */
   readonly random: () => number;
   readonly admit: AdmissionCheck | null;
 }
 
-/** Who sends and receives over the socket. */
+/** The owner of the socket: it gives what is sent, and takes what comes. */
 export interface SocketHandler {
-  /** Whether something waits to be sent: then a hidden page hurries too. */
+  /** Returns true if edits wait to be sent; then a hidden page does not wait longer. */
   hasWork(): boolean;
   /** A question that any living server answers at once. */
   probe(): Uint8Array<ArrayBuffer>;
@@ -42,9 +42,9 @@ export interface SocketHandler {
   onMessage(data: Uint8Array): void;
   /** The socket is gone, whatever comes next. */
   onDrop(): void;
-  /** It is tried again by itself. */
+  /** The socket was closed, and will be opened again without help. */
   onAway(why: RefusalReason | undefined): void;
-  /** It is not tried again. */
+  /** The server refused the page, and no attempt follows. */
   onRefused(why: RefusalReason): void;
 }
 

@@ -1,4 +1,4 @@
-/** When a room that lost its connection tries again. */
+/** Tests of the times at which a room that lost its connection tries again. */
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import type * as Y from "yjs";
 import { FakeServer, type FakeSocket } from "../testing/fake-server";

@@ -1,5 +1,6 @@
 /**
- * Whether a server's document continues the history that this page knows, and what to do when not.
+ * Detects that a server's document does not continue the history that this page knows, and keeps the waiting edits
+ * as values.
  *
  * A restored backup lacks entries that it had acknowledged or sent. Merging into it blindly would
  * bring them back against the wish of whoever restored it; so the page stops, and the person
@@ -27,12 +28,12 @@ export type DocumentDifference = { readonly [R in Root]: ReadonlyMap<string, unk
 
 /** Edits that wait and that the server does not take as they are. */
 export interface StrandedEdits {
-  /** What the server refused; absent where it has another history now, from a backup. */
+  /** The reason of the server's refusal; absent where the server has another history, from a backup. */
   readonly refused?: "not-accepted" | "full";
   readonly edits: number;
-  /** When the last of them was made, in milliseconds since 1970. */
+  /** The time at which the last of them was made, in milliseconds since 1970. */
   readonly at: number;
-  /** What they changed, by key, with the values that they gave. */
+  /** The values that they gave, by key. */
   readonly difference: DocumentDifference;
   /** The values that the first of them found there, as far as they are known. */
   readonly before: DocumentDifference;
@@ -40,14 +41,14 @@ export interface StrandedEdits {
   readonly here: Maps;
 }
 
-/** Notes what the person's edits replace, while the document still knows it. */
+/** Records the values that the person's edits replace, while the document still has them. */
 export class ReplacedValues {
   private readonly doc: Y.Doc;
   private readonly ignore: unknown;
   private found: [Root, string, unknown][] = [];
   private readonly watched: readonly (readonly [Root, (event: Y.YMapEvent<unknown>) => void])[];
 
-  /** Not of transactions whose origin is `ignore`. */
+  /** Ignores transactions whose origin is `ignore`. */
   constructor(doc: Y.Doc, ignore: unknown) {
     this.doc = doc;
     this.ignore = ignore;
@@ -55,7 +56,7 @@ export class ReplacedValues {
     for (const [root, see] of this.watched) rootOf(doc, root).observe(see);
   }
 
-  /** What was replaced since this was asked last. */
+  /** Returns what was replaced since the last call. */
   take(): ReplacedEntries {
     const found = this.found;
     this.found = [];
@@ -72,7 +73,7 @@ export class ReplacedValues {
   }
 }
 
-/** The edits of a copy that was kept on the device, as `strandedEditsIn`. */
+/** Returns the edits of a copy that was kept on the device, as `strandedEditsIn` does. */
 export function strandedEditsOf({
   known,
   waiting,
@@ -84,7 +85,10 @@ export function strandedEditsOf({
   return strandedEditsIn(doc, waiting, before);
 }
 
-/** Whether a server with this state vector lacks something that was durable when we last heard. */
+/**
+ * Returns true if a server with this state vector lacks something that was durable when the page last heard from
+ * it.
+ */
 export function lacksKnownEdits(
   doc: Y.Doc,
   waiting: readonly UnsavedEdit[],
@@ -100,7 +104,7 @@ export function lacksKnownEdits(
   return [...known].some(([client, clock]) => (theirs.get(client) ?? 0) < clock);
 }
 
-/** What the waiting edits changed in the document. `base`: what it was before all of them. */
+/** Returns what the waiting edits changed in the document. `base` is the document before all of them. */
 export function strandedEditsIn(
   doc: Y.Doc,
   waiting: readonly UnsavedEdit[],
@@ -154,7 +158,7 @@ function note(
   }
 }
 
-/** What has to change so that `before` becomes `after`. */
+/** Returns the values to set or erase so that `before` becomes `after`. */
 export function differenceOf(before: Y.Doc, after: Y.Doc): DocumentDifference {
   const [old, now] = [mapsOf(before), mapsOf(after)];
   const difference = mutable();
@@ -191,7 +195,7 @@ export function applyDifference(doc: Y.Doc, difference: DocumentDifference): num
   return changed;
 }
 
-/** Whether nothing of these changes belongs to an action that is not there. */
+/** Returns true if none of these changes belongs to an action that is missing. */
 export function fitsWhole(doc: Y.Doc, difference: DocumentDifference): boolean {
   const fits = fitting(doc, difference);
   return ROOTS.every((root) =>

@@ -41,7 +41,7 @@ import { piecesOf } from "./split-update";
 
 export * from "./room";
 
-/** Above this, edits that wait travel one by one. */
+/** Above this size, in bytes, waiting edits are sent one by one. */
 const LARGE = 1 << 18;
 
 type LinkChange = Partial<Omit<RoomLink, "why" | "readOnly">> & {
@@ -65,17 +65,22 @@ class Connection implements Room, SocketHandler {
   private readonly fingerprintCheck: FingerprintCheck;
   private readonly socket: ReconnectingSocket;
   private current: RoomLink = { state: "connecting", unsaved: 0, seq: 0 };
-  /** The history that this document belongs to; empty while nobody has said. */
+  /** The name of the history that this document belongs to; empty while unknown. */
   private epoch = "";
   private told = "";
   private closed = false;
-  /** What the server has, while its own edits have not come yet: those are taken before ours are given. */
+  /**
+   * The server's state vector until its step 2 has come: the page takes the server's edits before it sends its
+   * own.
+   */
   private asked: Uint8Array | null = null;
   private learned = false;
-  /** Whether the socket may be dead and has not answered yet. An edit that is given to it would be stored when
-   * the network is back, before this page has taken what others did meanwhile: their value would be gone. */
+  /**
+   * True while the socket may be dead. An edit that is sent then could be stored when the network is back, before
+   * this page has received what others did meanwhile; their value would be lost.
+   */
   private isDoubted = false;
-  /** Whether the page shows more than the entry of the log that the server named last. */
+  /** True while the page shows more of the log than the entry that the server named last. */
   private isAhead = false;
 
   constructor(options: RoomOptions) {
@@ -228,7 +233,7 @@ class Connection implements Room, SocketHandler {
     this.say({ unsaved: this.outbox.unsaved, seq: Math.max(seq, this.current.seq) });
   }
 
-  /** The whole document, when it holds nothing but what is durable. */
+  /** Returns the whole document if everything in it is durable; else null. */
   private readonly copy = (): Uint8Array | null =>
     this.current.state === "live" && this.outbox.unsaved === 0
       ? Y.encodeStateAsUpdate(this.doc)
@@ -275,7 +280,7 @@ class Connection implements Room, SocketHandler {
     this.say({ state: "refused", why });
   }
 
-  /** The others are out of sight until the socket is back. */
+  /** Removes the others from the awareness until the socket is back. */
   onDrop(): void {
     const others = [...this.awareness.meta.keys()].filter((id) => id !== this.doc.clientID);
     removeAwarenessStates(this.awareness, others, this);
@@ -354,7 +359,7 @@ class Connection implements Room, SocketHandler {
     }
   }
 
-  /** The server says which history it has. */
+  /** Takes the name of the server's history. */
   private named(epoch: string): void {
     this.told = epoch;
     if (this.epoch !== "") return;
@@ -362,7 +367,7 @@ class Connection implements Room, SocketHandler {
     this.persistence?.name(epoch, () => this.outbox.edits);
   }
 
-  /** What is shown, when everything of it is the log up to `seq` and nothing else. */
+  /** Returns the entry of the log that the document is exactly at; null while edits wait or the page is offline. */
   private readonly atRest = (): {
     readonly seq: number;
     send(frame: Uint8Array<ArrayBuffer>): void;
@@ -380,7 +385,7 @@ class Connection implements Room, SocketHandler {
 
   // -- what goes out --------------------------------------------------------------------------
 
-  /** The answer to a step 1: what the server lacks, in pieces when that is too much for one. */
+  /** Answers a step 1 with what the server lacks, in pieces when that is too much for one message. */
   private give(state: Uint8Array): void {
     const whole = Y.encodeStateAsUpdate(this.doc, state);
     const edits = this.outbox.edits;
@@ -397,7 +402,7 @@ class Connection implements Room, SocketHandler {
     });
   }
 
-  /** What was edited while the socket was in doubt. */
+  /** Sends the edits that were held back while the socket was in doubt. */
   private giveUnsent(): void {
     const { unsent } = this.outbox;
     if (unsent.length === 0) return;

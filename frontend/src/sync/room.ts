@@ -1,4 +1,4 @@
-/** What a room is to those who use it, and what it needs to be opened. */
+/** The interface of a room, and the options to open one. */
 
 import type { Awareness } from "y-protocols/awareness";
 import type * as Y from "yjs";
@@ -7,7 +7,7 @@ import type { ChangedTwiceStore } from "./changed-twice";
 import type { CopyOwner, EditStore, UnsavedEdit } from "./indexed-db";
 import type { StrandedEdits } from "./replaced-history";
 
-/** Why a room does not let this page in, or let it go. */
+/** The reasons for which the server refuses a page or closes its socket. */
 export type RefusalReason =
   | "session-ended"
   | "other-person"
@@ -26,11 +26,11 @@ export interface RoomLink {
   /** `refused` does not come back by itself: see `why` and `reconnect`. */
   readonly state: "connecting" | "live" | "offline" | "refused";
   readonly why?: RefusalReason;
-  /** Edits of this person that are not durable yet. */
+  /** The number of edits of this person that are not durable yet. */
   readonly unsaved: number;
-  /** Whether those edits survive closing this page. Absent for a room that keeps nothing. */
+  /** True if those edits survive closing this page. Absent for a room that keeps nothing. */
   readonly kept?: boolean;
-  /** Why nobody may change this graph now, in a sentence of the server's; absent when one may. */
+  /** A sentence of the server that says why nobody may change this graph now; absent when it may be changed. */
   readonly readOnly?: string;
   /** The page shows the log up to this entry, plus what is `unsaved`. 0 before the first sync. */
   readonly seq: number;
@@ -39,20 +39,23 @@ export interface RoomLink {
 export interface Room {
   readonly doc: Y.Doc;
   readonly awareness: Awareness;
-  /** What both this person, while away, and somebody else have changed. */
+  /** Choices between values that this person and others set without receiving each other's edit. */
   readonly changedTwice: ChangedTwiceStore;
-  /** The same object until something of it changes. */
+  /** Returns the state of the connection: the same object until a part of it changes. */
   link(): RoomLink;
   onLink(listener: () => void): () => void;
   /** Resolves with `seq` once everything is stored; rejects when the room closes or `signal` aborts. */
   settled(signal?: AbortSignal): Promise<number>;
-  /** Tries at once, also after a refusal (the person signed in again, say). */
+  /** Connects at once, also after a refusal (when the person has signed in again, for example). */
   reconnect(): void;
-  /** Which history is kept here, and which one the server named last; empty when none is known. */
+  /**
+   * Returns the name of the history that is kept here, and of the one that the server named last; empty when
+   * unknown.
+   */
   histories(): { readonly here: string; readonly theirs: string };
-  /** The edits that are not durable, in the order in which they were made. */
+  /** Returns the edits that are not durable, in the order in which they were made. */
   waiting(): readonly UnsavedEdit[];
-  /** The edits that are not durable, as values; null when there are none. */
+  /** Returns the edits that are not durable as values; null when there are none. */
   stranded(): StrandedEdits | null;
   /**
    * Forgets these of the edits that wait, all of them unless it is said which; with the last of them what
@@ -76,7 +79,7 @@ export interface Socket {
 }
 
 export interface RoomOptions {
-  /** `wss://host/api/graphs/ID/room`; `roomUrl` makes it. */
+  /** The address `wss://host/api/graphs/ID/room`, see `roomUrl`. */
   readonly url: string;
   readonly doc?: Y.Doc;
   /** Opens a socket; the browser's by default. */
@@ -86,9 +89,9 @@ export interface RoomOptions {
   /** Keeps the graph and the edits that wait on this device, for this person only. */
   readonly keep?: PersistenceOptions;
   /**
-   * Asked before each attempt: why not to come in, or null. A browser cannot tell a refused upgrade
-   * from a dead server, nor whose cookie an upgrade carries. `again` after an attempt or a connection broke off.
-   * Throwing means that nobody answers.
+   * Called before each attempt; returns a reason not to enter, or null. A browser cannot tell a refused upgrade
+   * from a dead server, nor whose cookie an upgrade carries. `again` is true after an attempt or a connection
+   * broke off. Rejects when nobody answers.
    */
   readonly admit?: AdmissionCheck;
 }
@@ -102,7 +105,7 @@ export interface PersistenceOptions extends CopyOwner {
   readonly epoch?: string;
 }
 
-/** The address of a graph's room on the server that the page came from. */
+/** Returns the address of a graph's room on the server that the page came from. */
 export function roomUrl(graph: string, from: string | URL = window.location.href): string {
   const url = new URL(serverPath(`/api/graphs/${encodeURIComponent(graph)}/room`), from);
   url.protocol = url.protocol === "https:" ? "wss:" : "ws:";

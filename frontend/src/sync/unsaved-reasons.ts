@@ -1,10 +1,10 @@
-/** Why edits are not saved, in sentences for people. */
+/** Says why edits are not saved, in sentences for people. */
 
 import { isolated } from "../words/isolated";
 import type { OtherPerson } from "./indexed-db";
 import type { RefusalReason, RoomLink } from "./room-connection";
 
-/** What is with the edits that wait, or with the room; null when everything is saved. */
+/** Returns why edits wait, or what is wrong with the room; null when everything is saved. */
 export function unsavedReason(link: RoomLink): string | null {
   const edits = changes(link.unsaved);
   const keeps = link.unsaved === 0 ? "" : ` ${where(link)}`;
@@ -23,7 +23,7 @@ export function unsavedReason(link: RoomLink): string | null {
   }
 }
 
-/** Whose edits wait on this device until they sign in again; null when nobody's do. */
+/** Returns whose edits wait on this device until they sign in again; null when there are none. */
 export function otherPeopleWait(others: readonly OtherPerson[]): string | null {
   if (others.length === 0) return null;
   const parts = others.map(

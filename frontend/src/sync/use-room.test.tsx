@@ -75,7 +75,7 @@ const show = (url = "ws://host/room") =>
       </StrictMode>,
     ),
   );
-/** What the server sends is drawn with the next frame. */
+/** Runs a step and waits for the next frame, in which the page draws what the server sent. */
 const heard = (step: () => void) =>
   act(async () => {
     step();

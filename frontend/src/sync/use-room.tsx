@@ -29,7 +29,7 @@ import type { PersistenceOptions, RoomLink } from "./room-connection";
 
 export type { OpenRoom } from "./open-room";
 
-/** What there is to decide about edits that wait on a history which the server has left. */
+/** The person's decision about edits that wait on a history which the server has left. */
 export interface StrandedEditsChoice {
   readonly stranded: StrandedEdits;
   /** Makes these of the changes in the graph as it is now, and lets go of the rest once stored. */
@@ -95,7 +95,7 @@ function useBeforeLeaving(roomContext: RoomContextValue | null): void {
   }, [connection]);
 }
 
-/** The same object as long as graph and person are the same; the name in it is the newest. */
+/** Returns the same options as long as graph and person are the same, with the newest name in them. */
 function useStablePersistence(
   keep: PersistenceOptions | undefined,
 ): PersistenceOptions | undefined {
@@ -150,7 +150,7 @@ export function useGraphPart<T>(part: (graph: Graph) => T): T {
   return useSyncExternalStore(source.subscribe, get, get);
 }
 
-/** How the page stands with the server, and how many edits are not stored yet. */
+/** Returns the state of the connection and the number of edits that are not stored yet. */
 export function useLink(): RoomLink {
   const { room, onLink } = useRoom();
   return useSyncExternalStore(onLink, room.link);
@@ -175,8 +175,8 @@ export function usePeople(): readonly Participant[] {
 }
 
 /**
- * What colour each person is shown in: nobody else's who is here. Another function only when somebody
- * came or went, however much their cursors move. `ids`: people who may be long gone.
+ * Returns a function from a person to a colour that no other person here has. It is another function only when
+ * somebody came or went, however much cursors move. `ids` are people who may have left long ago.
  */
 export function usePersonColors(ids: readonly string[] = NO_IDS): (id: string) => string {
   const { presence } = useRoom();
@@ -206,12 +206,12 @@ export function useColorsAfterReturn(): void {
 
 const NO_IDS: readonly string[] = [];
 
-/** Somebody else, as far as lists show them. */
+/** Another person in the room, with what lists show of them. */
 export type PersonHere = Pick<Participant, "id" | "name" | "color">;
 
 type Chosen = readonly (readonly [key: string, person: PersonHere])[];
 
-/** Who has what selected, by key; another map only when somebody selects something else. */
+/** Returns for each key the people who have it selected; another map only when a selection changes. */
 export function useSelectedByOthers(): ReadonlyMap<string, readonly PersonHere[]> {
   const { presence } = useRoom();
   const last = useRef<Chosen>([]);
@@ -235,7 +235,7 @@ export function useSelectedByOthers(): ReadonlyMap<string, readonly PersonHere[]
   }, [chosen]);
 }
 
-/** Somebody at a field: who they are, and nothing that changes while they are there. */
+/** A person who is at a field, without what changes while they are there. */
 export type FieldEditor = Pick<Participant, "client" | "id" | "name">;
 
 const NO_EDITORS: readonly FieldEditor[] = [];
@@ -262,7 +262,7 @@ export function useFollowing() {
   return { whom, follow };
 }
 
-/** What there is to decide about edits that wait on another history; null when nothing is. */
+/** Returns the decision about edits that wait on another history; null when there is none. */
 export function useStrandedEdits(): StrandedEditsChoice | null {
   const { connection, connectionState } = useRoomContext();
   const [stranded] = connectionState.stranded;
@@ -276,13 +276,13 @@ export function useStrandedEdits(): StrandedEditsChoice | null {
   }, [connection, stranded]);
 }
 
-/** What both this person, while away, and somebody else have changed, until they have seen it. */
+/** Returns the choices between values that this person and others set, until the person has seen them. */
 export function useChangedTwice(): readonly ChangedTwice[] {
   const { changedTwice } = useRoom().room;
   return useSyncExternalStore(changedTwice.onChange, changedTwice.now);
 }
 
-/** What may be said softly about this room, until it was read. */
+/** Returns the notice of this room until the person has read it. */
 export function useNotice(): { readonly notice: ConnectionNotice; dismiss(): void } | null {
   const { connection, connectionState } = useRoomContext();
   const { notice } = connectionState;
@@ -297,7 +297,7 @@ const NOBODY: readonly OtherPerson[] = [];
 /** The others whose edits of this graph wait on this device until they sign in again. */
 export interface OthersWaiting {
   readonly others: readonly OtherPerson[];
-  /** What somebody changed, to save it as a file; never to send it. */
+  /** Returns the changes of another person, to save them as a file; they are never sent. */
   read(id: string): Promise<readonly StrandedEdits[]>;
   /** Lets go of somebody's edits for good. */
   forget(id: string): Promise<void>;
@@ -339,7 +339,7 @@ export function useOthersWaiting(): OthersWaiting {
   }, [keep, device, others]);
 }
 
-/** Whether there is something to undo or redo. */
+/** Returns whether undo and redo have a step to take. */
 export function useUndo(): { readonly canUndo: boolean; readonly canRedo: boolean } {
   const { undo } = useRoom();
   const [can, setCan] = useState({ canUndo: false, canRedo: false });

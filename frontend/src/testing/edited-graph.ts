@@ -25,7 +25,7 @@ export function docWith(...names: string[]): [Y.Doc, ...Key[]] {
   return [doc, ...names.map((name) => addAction(doc, { name }))];
 }
 
-/** A colleague's copy. */
+/** Returns a copy of the document, as a colleague has it. */
 export function copyOf(doc: Y.Doc): Y.Doc {
   const copy = new Y.Doc();
   Y.applyUpdate(copy, Y.encodeStateAsUpdate(doc));

@@ -92,7 +92,7 @@ export class FakeEditStore implements EditStore {
     this.entries.splice(0, this.entries.length, ...stay);
   }
 
-  /** How many edits wait here. */
+  /** The number of edits that wait on the device. */
   get waiting(): number {
     return this.entries.reduce((sum, entry) => sum + entry.waiting.size, 0);
   }

@@ -51,7 +51,7 @@ export class FakeSocket implements Socket {
   }
 }
 
-/** As rule R4 has it. */
+/** The largest update that rule R4 allows, in bytes. */
 const MESSAGE_LIMIT = 1 << 20;
 
 export class FakeServer {
@@ -62,9 +62,9 @@ export class FakeServer {
   /** The close code with which an update is refused; null for one that is taken. */
   refuses: (update: Uint8Array) => number | null = (update) =>
     update.length > MESSAGE_LIMIT ? 1009 : null;
-  /** Which history this is; empty for a server that does not say. */
+  /** The name of the history; empty for a server that does not name it. */
   epoch: string;
-  /** How many comparisons did not fit. */
+  /** The number of comparisons that did not match. */
   divergences = 0;
   readonly sockets: FakeSocket[] = [];
   private readonly log: { socket: FakeSocket; update: Uint8Array }[] = [];
@@ -134,7 +134,7 @@ export class FakeServer {
     this.ack(socket);
   }
 
-  /** Everything that came is durable now. */
+  /** Commits and acknowledges everything that came. */
   commit(): void {
     for (const { socket, update } of this.log.splice(0)) {
       const before = Y.encodeStateVector(this.doc).toString() + this.doc.store.pendingStructs;
@@ -146,12 +146,12 @@ export class FakeServer {
     }
   }
 
-  /** What came and was not committed is gone. */
+  /** Drops what came and was not committed. */
   lose(): void {
     this.log.length = 0;
   }
 
-  /** A colleague's edit. */
+  /** Makes an edit as a colleague and sends it to the newest socket. */
   broadcast(work: (doc: Y.Doc) => void): void {
     const before = Y.encodeStateVector(this.doc);
     work(this.doc);
@@ -163,7 +163,7 @@ export class FakeServer {
     this.ack(this.last);
   }
 
-  /** Says who is there. */
+  /** Sends an awareness state of another client. */
   presence(client: number, clock: number, state: unknown): void {
     const inner = encoding.createEncoder();
     encoding.writeVarUint(inner, 1);

@@ -1,4 +1,4 @@
-/** What is wrong with the lines of a scene, counted: for tests and the benchmark. Pure. */
+/** Counts the faults of the lines in a scene, for tests and the benchmark. Pure. */
 
 import type { Area, Point, Scene } from "../canvas/arrows/scene";
 import type { LineMap } from "../canvas/arrows/simple-lines";
@@ -54,7 +54,7 @@ function enters({ a, b }: Piece, { x, y, width, height }: Area): boolean {
 const meet = (a: Area, b: Area) =>
   a.x < b.x + b.width && b.x < a.x + a.width && a.y < b.y + b.height && b.y < a.y + a.height;
 
-/** How far two pieces lie on each other. */
+/** Returns the length over which two pieces lie on each other. */
 function sharedLength(p: Piece, q: Piece): number {
   if (level(p) !== level(q)) return 0;
   const way = level(p) ? 0 : 1;

@@ -1,4 +1,4 @@
-/** How long routing takes: a whole scene, and after one card has moved. `make bench ARGS=arrows`. */
+/** Measures how long routing takes: a whole scene, and after one card has moved. `make bench ARGS=arrows`. */
 import { bench, describe } from "vitest";
 import { routed } from "../canvas/arrows/routes";
 import { simpleLines } from "../canvas/arrows/simple-lines";

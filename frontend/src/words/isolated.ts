@@ -1,9 +1,9 @@
 /** Names within sentences: a name is written by anybody, and its letters may turn the words around it. */
 
-/** What is written from right to left, or says in which direction to write. */
+/** Matches text that is written from right to left, or that sets a direction. */
 const TURNS =
   /[\u0590-\u08ff\u200e\u200f\u202a-\u202e\u2066-\u2069\ufb1d-\ufdff\ufe70-\ufefc]|[\u{10800}-\u{10fff}\u{1e800}-\u{1efff}]/u;
-/** What begins or ends an isolate: within one it would end that one too early, or never. */
+/** Matches characters that begin or end an isolate: within one they would end it too early, or never. */
 const ISOLATES = /[\u2066-\u2069]/g;
 
 /**

@@ -14,7 +14,7 @@ export type OwnShortcuts = Readonly<Record<string, readonly string[]>>;
 
 const MODIFIERS = ["Control", "Shift", "Alt", "Meta", "AltGraph", "CapsLock", "Dead", "Process"];
 
-/** What is pressed, as a shortcut; null as long as it is only modifiers. */
+/** Returns the pressed keys as a shortcut; null as long as only modifiers are pressed. */
 export function shortcutOf(event: Pressed, mac = onMac): string | null {
   const key = keyOf(event);
   if (MODIFIERS.includes(key) || (mac ? event.ctrlKey : event.metaKey)) return null;
@@ -38,7 +38,7 @@ function plain(shortcut: string): string {
 
 const same = (a: string, b: string) => plain(a) === plain(b);
 
-/** What browsers do before a page hears of it, or what people would miss most. */
+/** Shortcuts that browsers use before a page receives them, or that people would miss most. */
 const BROWSERS = new Set(
   [
     "t",
@@ -74,11 +74,11 @@ const BROWSERS = new Set(
       "Alt+Space",
     ]),
 );
-/** How forms, lists and the canvas are walked. */
+/** Matches keys that move within forms, lists and the canvas. */
 const WALKING = /^(?:Shift\+)?(?:Tab|Enter|Escape|Space|Home|End|PageUp|PageDown|Arrow\w+|\/)$/;
 const READERS = /^(?:Insert|Mod\+Alt\+.*|.*(?:Insert|NumLock|ScrollLock|Pause))$/;
 
-/** Why nobody can have these keys; null when they are free for it. */
+/** Returns why these keys cannot be chosen; null when they are free. */
 export function refusalOf(shortcut: string): string | null {
   const keys = plain(shortcut);
   const printed = printedKeys(keys).join(" ");
@@ -89,7 +89,7 @@ export function refusalOf(shortcut: string): string | null {
   return null;
 }
 
-/** Which of the edit actions have these keys, but for `name` itself. */
+/** Returns the edit actions that have these keys, other than `name` itself. */
 export function takenBy(
   editActions: readonly EditAction[],
   name: string,
@@ -112,7 +112,10 @@ export function withOwn(
   });
 }
 
-/** What comes with the clipboard's own event keeps its keys: browsers raise it for those alone. */
+/**
+ * Returns true if the keys can be changed. Those of the clipboard's own events cannot: browsers raise the events
+ * for these keys alone.
+ */
 export const isChangeable = (editAction: EditAction): boolean => editAction.event === undefined;
 
 /** Gives an edit action these keys, and nobody else. What is as it came is not kept. */
@@ -134,7 +137,7 @@ export function assigned(
   return next;
 }
 
-/** What was kept, as far as it can hold. */
+/** Reads the stored shortcuts, without those that are no longer possible. */
 export function readOwn(editActions: readonly EditAction[], kept: unknown): OwnShortcuts {
   if (typeof kept !== "object" || kept === null) return {};
   let own: OwnShortcuts = {};

@@ -10,7 +10,7 @@ import { type EditAction, editActionFor, isEnabled } from "../edit-action";
 import type { EditorContext } from "../editor-context";
 import { useOwnShortcuts, withOwn } from "./own-shortcuts";
 
-/** Whether single letters are shortcuts: speech input types letters by itself. */
+/** Returns whether single letters are shortcuts, and a setter; speech input types letters by itself. */
 export function useSingleKeys() {
   return useLocalStorage({
     key: "aa.single-keys",
@@ -21,7 +21,7 @@ export function useSingleKeys() {
 
 const FIELDS = "input, textarea, select, [role=dialog], [role=menu], [role=listbox]";
 
-/** Whether keys belong to what has the focus. */
+/** Returns true if the focused element uses the keys itself. */
 function isTaken(target: EventTarget | null): boolean {
   if (!(target instanceof HTMLElement)) return false;
   return target.isContentEditable || target.closest(FIELDS) !== null;

@@ -47,7 +47,7 @@ export interface NewAction {
   readonly outputs?: readonly Parameter[];
   readonly position?: Position;
   readonly extra?: Extra;
-  /** It stands for a whole graph of that name; nothing that is written. */
+  /** True if the action stands for a whole graph of that name. It is not stored. */
   readonly ofGraph?: true;
 }
 
@@ -137,7 +137,7 @@ function heal(doc: Y.Doc, key: Key): void {
   }
 }
 
-/** What leads into an action, and what follows its success (or, if nothing does, any outcome). */
+/** Returns the arrows into an action, and those that follow its success (or, where none does, any outcome). */
 function around(graph: Graph, key: Key): { before: Relation[]; next: Relation[] } {
   const others = graph.relations.filter((relation) => relation.parent !== relation.child);
   const runs = others.filter(
@@ -180,7 +180,7 @@ function writeNumber(doc: Y.Doc, key: Key, number: number): void {
   eraseKeys(doc, "relations", ...odd);
 }
 
-/** Whether a key keeps an imported number that refers to the action and did not fit. */
+/** Returns true if a key keeps an imported number that refers to the action and did not fit. */
 function saysNumberOf(field: string, key: Key): boolean {
   const { head, rest } = splitKey(field);
   const ends = endsOf(head);

@@ -34,10 +34,13 @@ export interface Clip {
   readonly positions: ClipValues;
 }
 
-/** Where pasted things stand: moved by so much, or with their upper left corner at a place. */
+/** The place of pasted things: moved by so much, or with their upper left corner at a place. */
 export type PastePosition = { readonly by: Position } | { readonly at: Position };
 
-/** What is chosen, with the arrows inside; `places` says where things stand that have no place. */
+/**
+ * Copies the chosen things with the arrows among them. `places` gives the positions of things that have none of
+ * their own.
+ */
 export function clipOf(
   doc: Y.Doc,
   chosen: ReadonlySet<string>,
@@ -125,7 +128,7 @@ const BLANK = {
   extra: [],
 } as const;
 
-/** What a file said of numbers that did not fit would be wrong of the copies. */
+/** Fields with imported numbers that did not fit. Copies have other numbers, so these fields are left out. */
 const NUMBERS = new Set<string>(
   (["parents", "children"] satisfies RelationSide[]).map((side) => `x/${side}/instance_id`),
 );

@@ -1,5 +1,5 @@
 /**
- * What people say about actions: threads in the document, one key for each message.
+ * Reads and writes comments on actions: threads in the document, with one key for each message.
  *
  * `comments` holds `<thread>/<message>` → JSON text. The first message of a thread names the action
  * that it is about, and the parameter if it is about one: apart, so that a page which knows of none
@@ -98,7 +98,7 @@ export function readThreads(comments: Iterable<readonly [string, unknown]>): Thr
   return found.sort((a, b) => newest(b) - newest(a) || (a.id < b.id ? -1 : 1));
 }
 
-/** How many threads are open about each action. */
+/** Returns the number of open threads for each action. */
 export function openThreadCounts(threads: readonly Thread[]): Map<Key, number> {
   const counts = new Map<Key, number>();
   for (const { about, resolved } of threads) {
@@ -140,7 +140,7 @@ export function resolve(
   write(doc, thread, { author, at, resolved });
 }
 
-/** Takes a message back. */
+/** Deletes one message of a thread. */
 export function deleteMessage(doc: Y.Doc, thread: string, message: string): void {
   const key = `${thread}/${message}`;
   const first = said(key, rootOf(doc, "comments").get(key));

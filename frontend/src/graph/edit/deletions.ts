@@ -31,15 +31,15 @@ interface Entry {
 }
 
 export interface Deleted {
-  /** Of the action or note. */
+  /** The key of the action or note. */
   readonly key: Key;
-  /** What people call it. */
+  /** The name that people see. */
   readonly name: string;
 }
 
-/** Of each the newest are remembered. */
+/** At most this many deletions are remembered; the oldest go first. */
 const MOST = 500;
-/** How long the page that renamed an action has to take away what a deletion has left over, ms. */
+/** The page that renamed an action has this time to remove what a deletion left over, ms. */
 const TURN_MS = 2_000;
 /** Not among `OWN_EDITS`: it is no step of anybody's undo. */
 const CLEARING: unique symbol = Symbol("what a deletion has left over");
@@ -89,7 +89,7 @@ export class Deletions {
     return () => this.halfListeners.delete(listener);
   }
 
-  /** What is known of something that is gone; null when it is there, or unknown. */
+  /** Returns what is known about a deleted action or note; null when it exists, or is unknown. */
   of(key: Key): Deleted | null {
     const entries = this.known.get(key);
     return entries === undefined || this.isThere(key) ? null : { key, name: nameIn(key, entries) };
@@ -206,7 +206,7 @@ export class Deletions {
     if (deleted !== null) tell(this.halfListeners, deleted);
   }
 
-  /** What the document has of an action, its arrows and its place. */
+  /** Returns the entries that the document still has of an action: its fields, arrows and place. */
   private leftOf(key: Key): Entry[] {
     const of = (root: Root, fits: (head: string) => boolean): Entry[] =>
       [...rootOf(this.doc, root).entries()]
@@ -245,7 +245,7 @@ function ownersOf(entries: readonly Entry[]): Map<Key, Entry[]> {
   return owners;
 }
 
-/** Whether this is the key by which an action or a note exists; places of actions have the same. */
+/** Returns true if this entry is the one by which an action or a note exists; an action's place has the same key. */
 const isExistence = ({ root, key }: Entry, of: Key): boolean =>
   key === of && root === (isAid(of) ? "actions" : "positions");
 

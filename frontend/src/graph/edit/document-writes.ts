@@ -1,4 +1,4 @@
-/** How edits write: one transaction each, only what differs, under one origin that undo knows. */
+/** Writes edits: one transaction each, only what differs, under one origin that undo knows. */
 
 import * as Y from "yjs";
 import {
@@ -134,7 +134,7 @@ export function eraseWaypoints(doc: Y.Doc, id: string): void {
   eraseKeys(doc, "positions", ...keys);
 }
 
-/** All of a relation: what it says, and the bends of its lines. */
+/** Erases a relation: its fields, and the bends of its lines. */
 export function eraseRelation(doc: Y.Doc, id: string): void {
   eraseKeys(doc, "relations", ...keysOfOwner(doc, "relations", id));
   eraseWaypoints(doc, id);

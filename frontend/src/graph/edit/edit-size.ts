@@ -1,4 +1,7 @@
-/** What one value of an edit may have: a larger one is refused before it is sent, and nothing of its edit is written. */
+/**
+ * Limits the size of one value of an edit: an edit with a larger one is refused before it is sent, and none of it
+ * is written.
+ */
 
 import type * as Y from "yjs";
 import { ROOTS, type Root, rootOf } from "../document-keys";

@@ -17,7 +17,7 @@ import {
   undoOf,
 } from ".";
 
-/** Which actions the end waits for. */
+/** Returns the names of the actions that the end waits for. */
 const waitedFor = (doc: Y.Doc): string[] =>
   graphIn(doc)
     .relations.filter(({ child, required }) => child === EXIT && required)

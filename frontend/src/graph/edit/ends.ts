@@ -1,5 +1,5 @@
 /**
- * What the end of a graph waits for, so that what is drawn ends on the engine.
+ * Sets which arrows and outputs the end of a graph waits for, so that what is drawn ends on the engine.
  *
  * The engine's exit waits for every arrow that is required, and for the outputs of the last action
  * that leads to it and has any. Where one thing happens after the other, whatever reaches the end
@@ -31,7 +31,7 @@ export function keepingEnds<T>(doc: Y.Doc, work: () => T): T {
   return done;
 }
 
-/** Nobody waits for the outputs of this action: the end of the graph does not need them. */
+/** Makes all outputs of this action optional, so that the end of the graph does not wait for them. */
 export function setOutputsOptional(doc: Y.Doc, key: Key): boolean {
   const action = graphNow(doc).actions.find((candidate) => candidate.key === key);
   const waited = action?.outputs.filter(({ text }) => isWaitedFor(text)) ?? [];
@@ -56,7 +56,7 @@ function isWaitedFor(text: string): boolean {
   );
 }
 
-/** Whether more than one action leads to the end, without reading the whole graph. */
+/** Returns true if more than one action leads to the end, without reading the whole graph. */
 function severalEnds(doc: Y.Doc): boolean {
   const parents = new Set<Key>();
   for (const key of rootOf(doc, "relations").keys()) {
@@ -67,7 +67,7 @@ function severalEnds(doc: Y.Doc): boolean {
   return false;
 }
 
-/** Whether a failed action may end the graph: it has no outputs then. */
+/** Returns true if a failed action may end the graph; it has no outputs then. */
 function failureEnds(doc: Y.Doc): boolean {
   const map = rootOf(doc, "relations");
   for (const key of map.keys()) {
@@ -81,7 +81,7 @@ function failureEnds(doc: Y.Doc): boolean {
 const ends = (graph: Graph): string[] =>
   graph.relations.filter(({ child }) => child === EXIT).map(relationId);
 
-/** Whether two things may run at one time, for all that arrows say. */
+/** Returns true if two actions may run at the same time, judged by the arrows alone. */
 function sideBySide(graph: Graph): boolean {
   if (graph.actions.some(({ type }) => type === "spontaneous")) return true;
   const asked = new Set<string>();
@@ -96,7 +96,7 @@ function sideBySide(graph: Graph): boolean {
   return false;
 }
 
-/** Whether there is a way from the start to everything that leads to the end. */
+/** Returns true if there is a way from the start to every action that leads to the end. */
 function allReached(graph: Graph): boolean {
   const next = new Map<Key, Key[]>();
   for (const { parent, child } of graph.relations) {

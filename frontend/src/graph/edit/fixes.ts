@@ -27,16 +27,16 @@ export const FIXES = [
 ] as const;
 export type Fix = (typeof FIXES)[number];
 
-/** What of a problem a fix needs. */
+/** The parts of a problem that a fix needs. */
 export interface Fixable {
   readonly where: { readonly aid?: string; readonly relation?: string; readonly path?: string };
   readonly fix?: string | null;
 }
 
-/** What a button says, and whether the fix may be done along with others, unread. */
+/** The words of a fix's button, and whether the fix may be applied with others, unread. */
 interface About {
   readonly words: string;
-  /** It loses nothing that somebody has drawn or written. */
+  /** True if the fix loses nothing that somebody has drawn or written. */
   readonly safe: boolean;
 }
 
@@ -107,7 +107,7 @@ export function applyFix(doc: Y.Doc, problem: Fixable): boolean {
   });
 }
 
-/** Those that lose nothing, each by what it is about: two problems may have one fix. */
+/** Returns the problems whose fixes lose nothing, one for each thing that is fixed: two problems may have one fix. */
 export function safeFixes<P extends Fixable>(problems: readonly P[]): P[] {
   const seen = new Set<string>();
   return problems.filter((problem) => {
@@ -125,7 +125,7 @@ export function applySafeFixes(doc: Y.Doc, problems: readonly Fixable[]): number
   return asOneEdit(doc, () => safeFixes(problems).filter((one) => applyFix(doc, one)).length);
 }
 
-/** Those that take an example as value. */
+/** Returns the problems whose fix takes an example as the value. */
 export function exampleFixes<P extends Fixable>(problems: readonly P[]): P[] {
   return problems.filter((problem) => fixOf(problem) === "take-example");
 }
@@ -184,7 +184,10 @@ function typeSync(doc: Y.Doc, key: Key): boolean {
   return action?.type === "" && setField(doc, key, "type", "sync");
 }
 
-/** What the `pvf_example` of a parameter without a value would be as its value; null for none. */
+/**
+ * Returns the `pvf_example` of a parameter without a value, as the value that it would be; null where there is
+ * none that fits.
+ */
 export function exampleOf(parameter: JsonText): JsonText | null {
   if (!parameter.trimStart().startsWith("{")) return null;
   if (memberText(parameter, "pvf_value") !== null) return null;
@@ -204,7 +207,7 @@ function parsed(text: string | null): unknown {
   return text === null || asJsonText(text) === undefined ? undefined : JSON.parse(text);
 }
 
-/** Whether the engine can read a value of a native type; of other types it reads none. */
+/** Returns true if the engine can read this value as one of a native type; it reads none of other types. */
 function fits(kind: string, value: unknown): boolean {
   switch (kind) {
     case "string":

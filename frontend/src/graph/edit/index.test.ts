@@ -299,7 +299,7 @@ test("undoing an edit does not take back what a colleague wrote over it", () => 
 
 type Step = readonly [person: number, edit: number, x: number, y: number];
 
-/** One of the edits, aimed at whatever the person sees. */
+/** Makes one edit, aimed at something that the person sees. */
 function act(doc: Y.Doc, undo: UndoHistory, [, edit, x, y]: Step): void {
   const { actions, relations } = graphIn(doc);
   const key = (n: number) => actions[n % Math.max(1, actions.length)]?.key ?? "nobodynobody";

@@ -71,12 +71,12 @@ export function moveActions(doc: Y.Doc, positions: Iterable<readonly [Key, Posit
 /** The origin of what the page places by itself: no step of anybody's undo. */
 const FIRST_LAYOUT: unique symbol = Symbol("places that nobody has asked for");
 
-/** As `moveActions`, for a graph that nobody has placed yet: undo has nothing to take back. */
+/** Places actions like `moveActions`, in a graph that nobody has placed yet: undo does not take it back. */
 export function placeFirst(doc: Y.Doc, positions: Iterable<readonly [Key, Position]>): void {
   doc.transact(() => moveActions(doc, positions), FIRST_LAYOUT);
 }
 
-/** Whether nobody has drawn anything that runs: no action, and no arrow from the entry. */
+/** Returns true if the graph has nothing that runs: no action, and no arrow from the entry. */
 export function isUndrawn(doc: Y.Doc): boolean {
   return rootOf(doc, "actions").size === 0 && rootOf(doc, "relations").size === 0;
 }

@@ -24,7 +24,7 @@ export interface DocumentChange {
 
 const isRoot = (root: string): root is Root => ROOTS.some((known) => known === root);
 
-/** Those of the changes that would write over what somebody wrote since they were worked out. */
+/** Returns the changes that would overwrite what somebody wrote since they were computed. */
 export function collisions(doc: Y.Doc, changes: readonly DocumentChange[]): DocumentChange[] {
   return changes.filter(({ root, key, before, after }) => {
     if (!isRoot(root)) return false;
@@ -45,8 +45,10 @@ export function applyChanges(doc: Y.Doc, changes: readonly DocumentChange[]): vo
   });
 }
 
-/** As `collisions`, of changes that take actions away: places do not count, and what leads to an action
- * that goes, or was filled in there, does, unless it goes too. */
+/**
+ * Like `collisions`, for changes that delete actions. Places do not count; arrows to a deleted action and fields
+ * that were added to it do, unless they are deleted, too.
+ */
 export function collisionsOfActions(
   doc: Y.Doc,
   changes: readonly DocumentChange[],
@@ -98,7 +100,7 @@ export function applyActionChanges(doc: Y.Doc, changes: readonly DocumentChange[
   );
 }
 
-/** What the keys belong to, each once, as a person calls it. */
+/** Returns the names of what the changes belong to, each once, as a person calls it. */
 export function places(graph: Graph, changes: readonly DocumentChange[]): string[] {
   const names = new Set<string>();
   for (const change of changes) names.add(placeOf(graph, change));

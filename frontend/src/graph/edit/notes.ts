@@ -33,7 +33,7 @@ function pair(value: unknown): Position | null {
   return finite(x) && finite(y) ? [x, y] : null;
 }
 
-/** What a text says; null when it is no note of ours, which then stays as it is. */
+/** Reads a note from its text; null when it is no note of ours, which then stays as it is. */
 export function readNote(key: string, text: JsonText): Note | null {
   let value: unknown;
   try {
@@ -103,7 +103,7 @@ interface Sized {
   readonly height: number;
 }
 
-/** Everything whose middle lies in a frame; a frame in a frame with all that is in it. */
+/** Returns the keys of all things whose middle lies in a frame, a smaller frame with all that is in it. */
 export function inFrame(
   frame: Note,
   places: ReadonlyMap<string, Position>,
@@ -120,7 +120,7 @@ export function inFrame(
   });
 }
 
-/** What moves when these move: with each frame what lies in it, by the same way. */
+/** Returns the new places of what moves, with the things inside of moved frames moved by the same distance. */
 export function withContents(
   graph: Graph,
   moved: ReadonlyMap<string, Position>,

@@ -112,7 +112,7 @@ function needs(doc: Y.Doc, id: string, side: "parents" | "children"): void {
   if (only !== undefined && only !== side) eraseKeys(doc, "relations", `${id}|only`);
 }
 
-/** What the child does after one outcome. An entry says `run` and nothing else. */
+/** Sets the response of the child to one outcome. An entry has `run` and no other response. */
 export function setResponse(
   doc: Y.Doc,
   id: string,
@@ -131,7 +131,7 @@ function answer(doc: Y.Doc, id: string, outcome: Precondition, response: Respons
   });
 }
 
-/** Whether the child waits until this parent has reported. */
+/** Sets whether the child waits until this parent has reported. */
 export function setRequired(doc: Y.Doc, id: string, required: boolean): boolean {
   return edit(doc, id, () => {
     if (required) eraseKeys(doc, "relations", `${id}|required`);

@@ -248,7 +248,7 @@ test("a shared type that another client wrote into an action survives a deletion
 interface Person {
   readonly doc: Y.Doc;
   readonly undo: ReturnType<typeof undoOf>;
-  /** What others set, by place: when it came, and the value. */
+  /** The values that others set, by place, with the time at which they came. */
   readonly others: Map<string, { at: number; value: unknown }[]>;
   /** The places that show what somebody else did last. */
   readonly theirs: Set<string>;

@@ -18,23 +18,23 @@ import * as Y from "yjs";
 import { endsOf, ROOTS, type Root, rootOf, splitKey } from "../document-keys";
 import { isEqual } from "../values";
 
-/** What a key held for a while. Two of them are the same only if nobody set the key in between. */
+/** The content of a key for a while. Two of them are the same object only if the key was not set in between. */
 interface KeyState {
-  /** Nothing where the key was not there. */
+  /** Null where the key was missing. */
   readonly held: { readonly value: unknown } | null;
 }
 
 interface KeyStep {
   readonly root: Root;
   readonly key: string;
-  /** What to go back to. */
+  /** The state that undo restores. */
   back: KeyState;
-  /** What the step left. */
+  /** The state after the step. */
   readonly left: KeyState;
 }
 
 export class UndoStep {
-  /** Of whoever makes the step. */
+  /** Data that the maker of the step keeps with it. */
   readonly meta = new Map<unknown, unknown>();
   readonly keys = new Map<string, KeyStep>();
 }
@@ -60,7 +60,7 @@ export class UndoHistory extends ObservableV2<{
   readonly redoStack: UndoStep[] = [];
   private readonly doc: Y.Doc;
   private readonly own: unknown;
-  /** What the keys of all steps hold now. */
+  /** The present states of the keys of all steps. */
   private readonly states = new Map<string, KeyState>();
   private made: UndoStep | null = null;
   private lastChange = 0;
@@ -120,7 +120,7 @@ export class UndoHistory extends ObservableV2<{
     }
   }
 
-  /** The person changed something. */
+  /** Records an edit of the person as a step. */
   private note(root: Root, event: Y.YMapEvent<unknown>): void {
     for (const [key, { action, oldValue }] of event.changes.keys) {
       const place = placeOf(root, key);
@@ -134,7 +134,10 @@ export class UndoHistory extends ObservableV2<{
     }
   }
 
-  /** Somebody else set or erased a key of some step, or set it at the same time as the person and lost. */
+  /**
+   * Takes note that somebody else set or erased a key of some step, or set it at the same time as the person and
+   * lost.
+   */
   private heed(root: Root, key: string, event: Y.YMapEvent<unknown>): void {
     const place = placeOf(root, key);
     if (event.changes.keys.has(key)) {
@@ -217,7 +220,10 @@ export class UndoHistory extends ObservableV2<{
     return changed;
   }
 
-  /** Those of the actions which these steps take away in which something of somebody else's would go with them. */
+  /**
+   * Returns the actions that these steps would remove although somebody else put something into them or drew an
+   * arrow to them.
+   */
   private sharedActions(steps: ReadonlyMap<string, KeyStep>): ReadonlySet<string> {
     const going = new Set<string>();
     for (const { root, key, back, left } of steps.values()) {
@@ -251,11 +257,14 @@ function actionOf(root: Root, key: string): string {
 interface LostValue {
   /** Null where the value is not known any more. */
   readonly held: { readonly value: unknown } | null;
-  /** Whether it would be seen now if the person had not set the key. */
+  /** True if it would be seen now, had the person not set the key. */
   readonly isNewest: boolean;
 }
 
-/** What somebody else set here at the same time as the person, and lost. */
+/**
+ * Returns the value that somebody else set here at the same time as the person, and that lost; null where there is
+ * none.
+ */
 export function lostValue(event: Y.YMapEvent<unknown>, key: string): LostValue | null {
   const { transaction, target } = event;
   let isNewest = true;

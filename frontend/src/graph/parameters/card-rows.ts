@@ -1,4 +1,4 @@
-/** What a card says of its inputs: a row for each, or for a whole point or pose. Pure. */
+/** Computes the rows that a card shows of its inputs: one for each, or one for a whole point or pose. Pure. */
 import { flatName } from "../document-keys";
 import type { Parameter } from "../model";
 import { pathWords } from "../value-text";
@@ -51,7 +51,7 @@ function rowOf(
   return { name, kind: "value", text: values.map((value) => value ?? "?").join(" ") };
 }
 
-/** Those with a value or a giver first, then those that still wait for one. */
+/** Returns the rows of a card: first inputs with a value or a giver, then those that still need one. */
 export function cardRows(
   inputs: readonly Parameter[],
   givers?: InputGivers,

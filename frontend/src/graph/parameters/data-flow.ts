@@ -1,4 +1,4 @@
-/** Which outputs reach which inputs, by every arrow that hands something over. Pure. */
+/** Computes which outputs reach which inputs, by every arrow that hands something over. Pure. */
 import { flatName, relationId } from "../document-keys";
 import {
   type Action,
@@ -17,17 +17,17 @@ export interface InputGiver {
   readonly relation: string;
   readonly parent: Key;
   readonly parentName: string;
-  /** Its flat name there. */
+  /** The flat name of the output. */
   readonly output: string;
-  /** Brought under another name. */
+  /** True if the arrow renames it. */
   readonly renamed: boolean;
-  /** Why the engine does not take it; null when it does. */
+  /** The reason why the engine does not take it; null when it does. */
   readonly misfit: string | null;
 }
 
 /** The givers of each input, by the input's path; inputs that nobody gives are left out. */
 export type InputGivers = ReadonlyMap<string, readonly InputGiver[]>;
-/** The same for every action that has any. */
+/** The givers of inputs, by action, for every action that has any. */
 export type DataFlow = ReadonlyMap<Key, InputGivers>;
 
 const values = new WeakMap<Parameter, ParameterValue>();
@@ -39,13 +39,13 @@ export function readValue(parameter: Parameter): ParameterValue {
   return known;
 }
 
-/** Whether the engine hands outputs over along an arrow: unless it ignores or bypasses every end. */
+/** Returns true if the engine hands outputs over along an arrow: unless the arrow ignores or bypasses every end. */
 export function handsOver({ conditions, only, listing, parent }: Relation): boolean {
   if (only !== null || listing > 0 || parent === ENTRY) return false;
   return PRECONDITIONS.some((end) => conditions[end] !== "ignore" && conditions[end] !== "bypass");
 }
 
-/** Why an input does not take an output of its name; null when it does. */
+/** Returns why an input does not take an output of its name; null when it does. */
 export function misfitOf(from: ParameterValue, to: ParameterValue): string | null {
   if (from.type !== to.type) return `takes ${to.type ?? "no type"}, not ${from.type ?? "no type"}`;
   return to.locked ? "is locked" : null;
@@ -59,7 +59,7 @@ interface Read {
 const read = new WeakMap<Action, Read>();
 const NOTHING: InputGivers = new Map();
 
-/** What reaches the inputs of one action; the same object while nothing of it changes. */
+/** Returns the outputs that reach the inputs of one action: the same object while none of them changes. */
 function giversOf(
   action: Action,
   arrows: readonly Relation[],
@@ -103,7 +103,7 @@ function giversOf(
 
 const flows = new WeakMap<Graph["actions"], { relations: Graph["relations"]; flow: DataFlow }>();
 
-/** What reaches whom in a graph; worked out once for each state of it. */
+/** Returns the data flow of a graph; computed once for each state of it. */
 export function dataFlowOf({ actions, relations }: Pick<Graph, "actions" | "relations">): DataFlow {
   const known = flows.get(actions);
   if (known?.relations === relations) return known.flow;

@@ -1,4 +1,7 @@
-/** What a graph takes and gives where an action of another one stands for it: as `signature_of_graph` on the server. Pure. */
+/**
+ * Computes the inputs and outputs of a graph where an action of another graph stands for it, like
+ * `signature_of_graph` on the server. Pure.
+ */
 import { ENTRY, EXIT, type Graph, type Key, type Parameter } from "../model";
 import { parameterValueOf } from "./values";
 

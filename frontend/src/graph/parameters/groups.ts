@@ -5,7 +5,7 @@ import { readValue } from "./data-flow";
 
 /** Numbers that stand in one row, with the letter of each. */
 export interface NumberRow {
-  /** What the paths begin with, with the slash at its end. */
+  /** The common beginning of the paths, with the slash at its end. */
   readonly prefix: string;
   readonly members: readonly { readonly letter: string; readonly parameter: Parameter }[];
 }
@@ -63,7 +63,7 @@ interface Neighbours {
   readonly members: Parameter[];
 }
 
-/** Neighbours with one prefix. */
+/** Splits a list into runs of neighbours with the same prefix. */
 function runsOf(list: readonly Parameter[]): Neighbours[] {
   const runs: Neighbours[] = [];
   for (const parameter of list) {
@@ -101,7 +101,7 @@ export function blocksOf(list: readonly Parameter[]): ParameterBlock[] {
   return blocks;
 }
 
-/** What a path is called as one thing: `grip` of `grip/position/x`; itself where it is in no row. */
+/** Returns the name of the group of a path: `grip` for `grip/position/x`; the path itself where it is in no row. */
 export function groupOf(list: readonly Parameter[], path: string): string {
   for (const block of blocksOf(list)) {
     if (block.kind === "rows" && path.startsWith(block.prefix)) return block.prefix.slice(0, -1);

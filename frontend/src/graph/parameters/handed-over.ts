@@ -1,5 +1,5 @@
 /**
- * Which outputs of a parent reach which inputs of its child, as the engine looks for them: the twin of
+ * Computes which outputs of a parent reach which inputs of its child, as the engine looks for them: the twin of
  * `renamed` in `umrf/semantics/values.py` (docs/umrf-and-the-engine.md 2.7). Pure.
  *
  * The engine renames inside a sorted tree whose order is not restored, so that after a renaming other

@@ -1,4 +1,4 @@
-/** Names that a new parameter may well have: what its neighbours give or want, and its namesakes have. Pure. */
+/** Converts names of parameters to paths, and suggests names for a new one. Pure. */
 
 import { isolated } from "../../words/isolated";
 import type { ParameterSide } from "../document-keys";
@@ -6,7 +6,7 @@ import type { Action, Graph, Parameter } from "../model";
 import { pathWords } from "../value-text";
 import { handsOver, readValue } from "./data-flow";
 
-/** `pose.position.x` as a path. */
+/** Returns the path of a typed name: `pose/position/x` for `pose.position.x`. */
 export function pathFrom(words: string): string {
   return words
     .trim()
@@ -16,7 +16,7 @@ export function pathFrom(words: string): string {
     .join("/");
 }
 
-/** Why a path cannot be used for one more parameter; null when it can. */
+/** Returns why a path cannot be used for one more parameter; null when it can. */
 export function taken(list: readonly Parameter[], path: string): string | null {
   if (path === "") return "A parameter has a name.";
   const same = list.some((other) => other.path === path);
@@ -28,14 +28,14 @@ export function taken(list: readonly Parameter[], path: string): string | null {
 }
 
 export interface NameSuggestion {
-  /** `pose.position.x`. */
+  /** The name as it is typed: `pose.position.x`. */
   readonly name: string;
   readonly type: string | null;
   /** "given by Look", "wanted by Grip", "as in Look". */
   readonly why: string;
 }
 
-/** What arrows tie directly to an action, on the side where a parameter would meet it. */
+/** Returns the actions that arrows connect directly with an action, on the side where a parameter would meet them. */
 function neighbours({ actions, relations }: Graph, action: Action, side: ParameterSide): Action[] {
   const keys = new Set(
     relations.filter(handsOver).flatMap(({ parent, child }) => {
@@ -46,7 +46,7 @@ function neighbours({ actions, relations }: Graph, action: Action, side: Paramet
   return actions.filter(({ key }) => keys.has(key));
 }
 
-/** In the order in which they are likely; each name once. */
+/** Returns likely names for a new parameter, the likeliest first and each name once. */
 export function nameSuggestions(
   graph: Graph,
   action: Action,

@@ -19,13 +19,13 @@ export interface OutputChoice {
   readonly parentName: string;
   /** Flat name of the output, or of the group of outputs. */
   readonly output: string;
-  /** What of it becomes which input. */
+  /** The outputs and the inputs that they become. */
   readonly ties: readonly Tie[];
   readonly type: string | null;
   /** By which arrow it comes; null where none leads here. */
   readonly relation: string | null;
   readonly reason: string | null;
-  /** It is what the input gets now. */
+  /** True if the input gets it now. */
   readonly taken: boolean;
 }
 
@@ -78,7 +78,7 @@ function waysTo({ relations }: Pick<Graph, "relations">, action: Action): Arriva
 
 const flatNames = (list: readonly Parameter[]): string[] => list.map(({ path }) => flatName(path));
 
-/** What renaming would do to what the arrow brings already; null when nothing. */
+/** Returns what a renaming would break of what the arrow brings already; null when it breaks nothing. */
 function harm({ action }: Arrivals, parent: Action, relation: Relation, ties: readonly Tie[]) {
   const [outputs, inputs] = [flatNames(parent.outputs), flatNames(action.inputs)];
   for (const { output, input } of ties) {
@@ -97,7 +97,7 @@ function harm({ action }: Arrivals, parent: Action, relation: Relation, ties: re
   return lost.length === 0 ? null : `the engine would lose ${lost.map(([to]) => to).join(", ")}`;
 }
 
-/** Why none of these outputs of an action can be taken; null when they can. */
+/** Returns why these outputs of an action cannot be taken; null when they can. */
 function reasonOf(ways: Arrivals, parent: Action, ties: readonly Tie[]): string | null {
   if (parent.missing) return "is not there";
   const find = (list: readonly Parameter[], name: string) =>
@@ -118,7 +118,7 @@ function rankOf({ reason, relation, taken }: OutputChoice): number {
   return relation === null ? 3 : 2;
 }
 
-/** What an input, or a group of inputs, gets now. */
+/** The outputs that an input, or a group of inputs, gets now. */
 type Given = readonly { readonly parent: Key; readonly output: string }[];
 
 function choiceOf(

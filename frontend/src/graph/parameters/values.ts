@@ -6,7 +6,7 @@ export const TYPES = ["string", "number", "bool", "strings", "numbers", "bools"]
 export type PvfType = (typeof TYPES)[number];
 
 export interface ParameterValue {
-  /** As the file says it; null when the text is no parameter of a type. */
+  /** The type as the file spells it; null when the text is no parameter of a type. */
   readonly type: string | null;
   readonly native: PvfType | null;
   /** JSON text of the value; null when there is none. */
@@ -96,22 +96,22 @@ export function withAllowed(text: string, draft: string): Typed {
   return { ok: withMember(text, "pvf_allowed_values", list) };
 }
 
-/** Allowed values as lines. */
+/** Returns the allowed values, one on each line. */
 export function allowedLines(field: ParameterValue): string {
   return field.allowed
     .map((item) => (typeof json(item) === "string" ? String(json(item)) : item))
     .join("\n");
 }
 
-/** Whether a value has to be there when the action runs. True is what the engine assumes. */
+/** Sets whether the action needs a value when it runs. True is what the engine assumes. */
 export const withRequired = (text: string, required: boolean): string =>
   withMember(text, "pvf_required", required ? null : "false");
 
-/** Whether outputs of other actions may never replace the value. */
+/** Locks the value, so that outputs of other actions never replace it, or unlocks it. */
 export const withLock = (text: string, locked: boolean): string =>
   withMember(text, "pvf_updatable", locked ? "false" : null);
 
-/** What is shown in a field for a value: lists have a line for each item. */
+/** Returns the text of a field for a value: lists have a line for each item. */
 export function shown(field: ParameterValue): string {
   const value = json(field.value);
   if (field.native === "string") return typeof value === "string" ? value : (field.value ?? "");
@@ -186,7 +186,7 @@ export function typed(type: PvfType, draft: string): Typed {
   }
 }
 
-/** What is wrong with a draft of a field; null when it may be written. */
+/** Returns what is wrong with a draft of a field; null when it may be written. */
 export function complaint(field: ParameterValue, draft: string): string | null {
   if (field.native === null) return null;
   const result = typed(field.native, draft);
@@ -196,7 +196,7 @@ export function complaint(field: ParameterValue, draft: string): string | null {
   return fits ? null : `Allowed: ${field.allowed.join(", ")}.`;
 }
 
-/** What a new parameter can be: a type, or a group of several. */
+/** The choices for a new parameter: a type, or a group of several. */
 export const GROUPS: Readonly<Record<string, readonly string[]>> = {
   point: ["x", "y", "z"],
   pose: [

@@ -1,5 +1,5 @@
 /**
- * What is wrong, what is only not written yet, and what may go wrong: the twin of
+ * Sorts problems into what is wrong, what is only not written yet, and what may go wrong: the twin of
  * `umrf/problem_kinds.py`, which counts them for lists of graphs. Pure.
  */
 
@@ -9,7 +9,7 @@ interface CheckedPlace {
   readonly path?: string;
 }
 
-/** Where in the graph that an action stands for: `aids` of the actions that lead there, outermost first. */
+/** A place in the graph that an action stands for; `aids` are the actions that lead there, outermost first. */
 export interface CheckedPlaceInside {
   readonly levels: readonly string[];
   readonly aids: readonly string[];
@@ -18,7 +18,7 @@ export interface CheckedPlaceInside {
   readonly where?: CheckedPlace;
 }
 
-/** What of a checked problem is needed here. */
+/** The parts of a checked problem that are needed here. */
 export interface CheckedProblem {
   readonly code: string;
   readonly severity: "error" | "warning";
@@ -80,7 +80,7 @@ export function kindOf(
   return QUIET.has(problem.code) ? "note" : "warning";
 }
 
-/** How many things there are of each kind. */
+/** The number of things of each kind. */
 export interface ProblemCounts {
   readonly wrong: number;
   readonly fillIn: number;

@@ -7,25 +7,25 @@ import { pathWords } from "../value-text";
 import { type CheckedProblem, inputOf, kindOf, type ProblemKind } from "./problem-kinds";
 
 export interface ToldProblem<P extends CheckedProblem = CheckedProblem> {
-  /** The same for the same thing, however often it is checked. */
+  /** An id that stays the same for the same thing, however often it is checked. */
   readonly id: string;
   readonly kind: ProblemKind;
-  /** Whether it keeps the graph from starting. */
+  /** True if it keeps the graph from starting. */
   readonly blocks: boolean;
   readonly code: string;
-  /** What is said, without the code. */
+  /** The message, without the code. */
   readonly message: string;
-  /** What it is about: id of the arrow, else key of the action; null: the graph as a whole. */
+  /** The thing that it is about: the id of an arrow, else the key of an action; null for the graph as a whole. */
   readonly place: string | null;
-  /** What of an action's inputs is to fill in, by the path of the whole; null for anything else. */
+  /** The path of the inputs to fill in, as a whole; null for any other problem. */
   readonly group: string | null;
   /** Inputs without a value, by path: they can be written where it is told. */
   readonly inputs: readonly string[];
-  /** All of the check that it stands for, at least one. */
+  /** All checked problems that it stands for, at least one. */
   readonly problems: readonly [P, ...P[]];
 }
 
-/** Where on the canvas a problem is: a relation, else an action; null: the graph as a whole. */
+/** Returns the place of a problem on the canvas: a relation, else an action; null for the graph as a whole. */
 export function placeOf({ where }: Pick<CheckedProblem, "where">): string | null {
   return where.relation ?? where.aid ?? null;
 }
@@ -49,7 +49,7 @@ function listed(words: readonly string[]): string {
   return words.length < 2 ? words.join("") : `${words.slice(0, -1).join(", ")} and ${words.at(-1)}`;
 }
 
-/** What is said of inputs that have no value. */
+/** Returns the message about inputs without a value. */
 function unwrittenWords(group: string, paths: readonly string[], code: string): string {
   const end = code === "H7" ? "or the graph never starts" : "or it never runs";
   const what = pathWords(group);
@@ -80,7 +80,7 @@ function told<P extends CheckedProblem>({
   };
 }
 
-/** Whether every giver of an input brings what it cannot take. */
+/** Returns a function that tells whether every giver of an input brings a value that the input cannot take. */
 function misfitsIn(flow: DataFlow) {
   return (aid: Key, path: string): boolean => {
     const givers = flow.get(aid)?.get(path) ?? [];
@@ -88,7 +88,10 @@ function misfitsIn(flow: DataFlow) {
   };
 }
 
-/** What is wrong, what is to fill in, what may go wrong, then notes; of each what blocks comes first. */
+/**
+ * Returns the problems to show: first what is wrong, then what to fill in, then what may go wrong, then notes; in
+ * each kind what blocks a start comes first.
+ */
 export function toldProblems<P extends CheckedProblem>(
   problems: readonly P[],
   graph: Pick<Graph, "actions" | "relations">,

@@ -1,4 +1,4 @@
-/** Which field of a form a problem is about, so that it is said there. */
+/** Finds the field of a form that a problem is about, so that the problem is shown there. */
 import { createContext } from "react";
 import type { Problem } from "../../api/graphs";
 import type { ToldProblem } from "../../graph/problems/told-problems";
@@ -41,12 +41,12 @@ export function fieldOfTold({ group, problems }: Told): string | null {
   return group === null ? fieldOfProblem(problems[0]) : `in/${group}`;
 }
 
-/** What is said of one field of one thing. */
+/** Returns the problems of one field of one thing. */
 export function toldAt(told: readonly Told[], of: string, field: string): Told[] {
   return told.filter((each) => (each.place ?? "graph") === of && fieldOfTold(each) === field);
 }
 
-/** Where a problem of a thing shows: the first field of it, else the thing alone. */
+/** Returns the field at which a problem shows: the first one; null where only the thing itself is marked. */
 export function firstField(told: Told): string | null {
   const [input] = told.inputs;
   return input === undefined ? fieldOfTold(told) : `in/${input}`;

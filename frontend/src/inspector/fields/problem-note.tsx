@@ -10,7 +10,7 @@ export function tellNothingLeft(): void {
   notifications.show({ message: "There was nothing left to fix.", autoClose: 4_000 });
 }
 
-/** What mends it; the first of its problems that has something speaks for the others. */
+/** A button that applies the fix of the first of its problems that has one, to all that have one. */
 function FixLink({ told }: { told: Told }) {
   const { doc, mayEdit } = useEditorContext();
   const mended = told.problems.filter((problem) => fixOf(problem) !== null);

@@ -1,4 +1,4 @@
-/** For people who may only look: what changes the graph is off, what shows it is not. */
+/** Turns off the fields of a form where the person may only look, or the action belongs to the library. */
 
 import { MantineThemeProvider } from "@mantine/core";
 import { createContext, type ReactNode, use } from "react";

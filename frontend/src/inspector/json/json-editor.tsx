@@ -28,9 +28,9 @@ import type { Lines } from "./json-positions";
 import style from "./json-view.module.css";
 
 export interface JsonError {
-  /** From 0. */
+  /** The line, counted from 0. */
   readonly line: number;
-  /** From 0; null: the whole line. */
+  /** The column, counted from 0; null for the whole line. */
   readonly column: number | null;
   readonly message: string;
   readonly severity: "error" | "warning";
@@ -40,7 +40,7 @@ interface Props {
   text: string;
   readOnly: boolean;
   faults: readonly JsonError[];
-  /** What is selected in the graph. */
+  /** The lines of what is selected in the graph. */
   marked: Lines | null;
   onChange: (text: string) => void;
   /** The person put the cursor on this line. */

@@ -1,4 +1,4 @@
-/** Where something stands in the JSON text of a graph. Lines count from 0. Pure. */
+/** Finds the lines of actions and arrows in the JSON text of a graph. Lines count from 0. Pure. */
 import { pointedAt } from "../../graph/json-members";
 import { type Action, ENTRY, EXIT, type Graph, type Relation } from "../../graph/model";
 

@@ -1,4 +1,4 @@
-/** What an input gets from outputs, as chips that lead to the actions that give it. */
+/** Shows which outputs an input gets, as chips that lead to the actions that give them, and highlights both ends. */
 
 import { IconArrowLeft } from "@tabler/icons-react";
 import { createContext, useEffect, useRef } from "react";
@@ -40,7 +40,7 @@ export function GiverChips({ givers, path }: Props) {
   );
 }
 
-/** What reaches whom in the open graph, worked out once for all fields of a form. */
+/** The data flow of the open graph, computed once for all fields of a form. */
 export const DataFlowContext = createContext<DataFlow>(new Map());
 
 /** `paths`: of the parameters that the field is about. */

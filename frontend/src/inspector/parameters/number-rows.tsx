@@ -87,7 +87,7 @@ function Row({
   );
 }
 
-/** What gives all of it, or some. */
+/** Returns the first giver of each field that has one. */
 function givenTo(givers: readonly (readonly InputGiver[])[]): InputGiver[] {
   return givers.flatMap(([first]) => (first ? [first] : []));
 }

@@ -14,12 +14,12 @@ const MOST = 40;
 
 interface Props {
   owner: Key;
-  /** Of the input, or of the inputs of a group. */
+  /** The paths of the input, or of the inputs of a group. */
   paths: readonly string[];
   name: string;
   /** Worked out when the list opens: a graph may have a thousand outputs. */
   choices: () => readonly OutputChoice[];
-  /** What it gets comes under another name, which can be taken away. */
+  /** True if what it gets is renamed; the renaming can be removed. */
   renamed: boolean;
 }
 

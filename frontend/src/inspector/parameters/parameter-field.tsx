@@ -24,13 +24,13 @@ interface Props {
   action: Action;
   side: ParameterSide;
   parameter: Parameter;
-  /** What it is called within its group. */
+  /** The name within its group. */
   name: string;
 }
 
 interface LabelProps {
   name: string;
-  /** With its groups. */
+  /** The name with its groups. */
   fullName: string;
   field: ParameterValue;
   open: boolean;
@@ -78,7 +78,7 @@ interface InputProps {
   givers: readonly InputGiver[];
 }
 
-/** What gives it, in the place of its field; a value of its own holds until then. */
+/** Shows the giver of an input in the place of its field; the input's own value is used until then. */
 function Given({ action, parameter, label, givers }: InputProps) {
   const renamed = givers.some((giver) => giver.renamed);
   return (

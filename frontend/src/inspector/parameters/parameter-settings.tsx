@@ -1,4 +1,4 @@
-/** What a parameter is, apart from its value: name, type, allowed values, required, locked. */
+/** The settings of a parameter, apart from its value: name, type, allowed values, required, locked. */
 import { Button, Group, Switch } from "@mantine/core";
 import { IconTrash } from "@tabler/icons-react";
 import { useEditorContext } from "../../edit-actions/editor-context";

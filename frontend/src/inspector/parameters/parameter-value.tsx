@@ -113,7 +113,7 @@ function TypedValue(props: ValueProps & { native: NonNullable<ParameterValue["na
   );
 }
 
-/** One of the allowed values; another that stands there is shown, too. */
+/** A choice among the allowed values; the present value is shown, too, where it is another one. */
 function AllowedValue({ label, name, field, end, write }: ValueProps) {
   const { allowed, value } = field;
   const inLibrary = useInLibrary();

@@ -1,4 +1,4 @@
-/** Which output of an action can reach which input of the next, and why not. Pure. */
+/** Lists the outputs of an action and the inputs of the next that they can reach, with reasons. Pure. */
 import { flatName } from "../../graph/document-keys";
 import type { Action, Parameter, Remap } from "../../graph/model";
 import { parameterValueOf } from "../../graph/parameters/values";
@@ -45,7 +45,7 @@ export function targets(
   });
 }
 
-/** What the engine makes of a renaming that does not fit; null when it does. */
+/** Returns what the engine does with a renaming that does not fit; null when it fits. */
 export function misfit(
   parent: Action | undefined,
   child: Action | undefined,

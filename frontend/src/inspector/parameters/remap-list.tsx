@@ -1,4 +1,4 @@
-/** What an arrow carries over: outputs that reach the next action, under another name if need be. */
+/** The renamings of an arrow: outputs that reach the next action, under another name if need be. */
 import { ActionIcon, Button, Select } from "@mantine/core";
 import { IconArrowDown, IconX } from "@tabler/icons-react";
 import { useState } from "react";

@@ -13,11 +13,11 @@ export const immediately: Schedule = (tell) => tell();
 
 export interface FrameScheduler {
   readonly soon: Schedule;
-  /** What still waits is not told any more. */
+  /** Cancels all calls that still wait. */
   close(): void;
 }
 
-/** Where there are no frames, as in a page that nobody sees, it is told nevertheless, ms. */
+/** In a page without frames, such as a hidden one, listeners are called after this time, ms. */
 const UNSEEN_MS = 100;
 
 /** `gap`: what is told rests so long, ms, before it is told again. */

@@ -12,16 +12,16 @@ import type { Key, Position } from "../../graph/model";
 import { isEqual } from "../../graph/values";
 import { immediately, type Schedule } from "./frame-scheduler";
 
-/** What this page tells the others. */
+/** The awareness state that this page sends to the others. */
 interface Presence {
   /** The pointer, in the coordinates of the canvas. */
   readonly cursor?: Position;
   readonly selection: readonly Key[];
   /** The field being edited, as `<key>|<field>`. */
   readonly editing?: string;
-  /** What of the canvas this page shows: the place of its top left corner, and how large. */
+  /** The part of the canvas that this page shows: the place of its top left corner, and its size. */
   readonly view?: SharedView;
-  /** What is being dragged, and how far it has come. */
+  /** The things being dragged, and the distance so far. */
   readonly drag?: { readonly ids: readonly Key[]; readonly dx: number; readonly dy: number };
 }
 
@@ -191,10 +191,13 @@ export class FollowedPerson {
     this.unhear = presence.onPeople(() => this.look());
   }
 
-  /** The page that is followed; null when none is. */
+  /** Returns the client id of the followed page; null when none is followed. */
   readonly whom = (): number | null => this.client;
 
-  /** What of the canvas they see; the same object until that changes. Null when they do not say. */
+  /**
+   * Returns the part of the canvas that the followed person sees: the same object until it changes, null while
+   * unknown.
+   */
   readonly view = (): SharedView | null => this.place;
 
   readonly onChange = (listener: () => void): (() => void) => {
