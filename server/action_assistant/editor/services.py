@@ -59,11 +59,6 @@ class EditorServices:
         )
         self.invitations = Invitations(journal, people, Keys.of(settings.data), revoked)
         self.change_index = ChangeIndex(journal, workers.graphs)
-        self._remember()
-
-    def _remember(self) -> None:
-        """What looks back, and what works on other graphs than those that everybody has open."""
-        journal, people, workers = self.journal, self.people, self.workers
         self.history = GraphHistory(self.change_index)
         self.going_back = GoingBack(
             journal, self.rooms, self.graph_reader, self.change_index, workers.graphs
@@ -88,7 +83,7 @@ class EditorState:
 
     @property
     def services(self) -> EditorServices:
-        """What serves requests, of which there are none before it is open."""
+        """The services that requests use. Raises RuntimeError before `open` was called."""
         if self._services is None:
             raise RuntimeError("the editor is not open yet")
         return self._services

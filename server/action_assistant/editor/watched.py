@@ -9,7 +9,7 @@ from action_assistant.web.monitoring.watched import Watched
 
 
 class WatchedEditor(Watched):
-    """An open editor."""
+    """Gives the metrics and the status of an open editor."""
 
     def __init__(self, services: EditorServices) -> None:
         workers, self._rooms = services.workers, services.rooms
@@ -17,7 +17,7 @@ class WatchedEditor(Watched):
         super().__init__(services.journal, lanes, (services.rooms.metrics,), {})
 
     def activity(self) -> Activity:
-        """What goes on."""
+        """Return how many sockets and rooms are open."""
         rooms = self._rooms.open_rooms()
         return Activity(sockets=sum(len(room.members) for room in rooms), rooms=len(rooms))
 

@@ -41,7 +41,7 @@ export interface EditorApi {
     };
     /**
      * ActionUses
-     * @description Who uses an action, and what bringing them to its change `seq` would change.
+     * @description The graphs that use an action, and how updating them to its change `seq` would change them.
      */
     ActionUses: {
         seq: number;
@@ -171,7 +171,7 @@ export interface EditorApi {
     };
     /**
      * BuildReport
-     * @description How the last build of an action's package went; `at` is when that ended.
+     * @description The result of the last build of an action's package; `at` is when the build ended.
      */
     BuildReport: {
         package: string;
@@ -189,7 +189,8 @@ export interface EditorApi {
     };
     /**
      * CallingUses
-     * @description In which graphs the actions called `before` stand for a graph that is called `name` now.
+     * @description A request to rename actions called `before` in some graphs, since the graph that they stand for is called
+     *     `name` now.
      */
     CallingUses: {
         before: string;
@@ -226,8 +227,8 @@ export interface EditorApi {
     };
     /**
      * Config
-     * @description What a page has to know. `runner_url` has no slash at its end. `commit`: of this program, null
-     *     when nobody knows.
+     * @description The settings that a page asks for first. `runner_url` has no slash at its end. `commit`: the commit of
+     *     this program, null where it is unknown.
      */
     Config: {
         mode: string;
@@ -262,7 +263,7 @@ export interface EditorApi {
     };
     /**
      * Describing
-     * @description What to call a graph from now on; what is left out stays.
+     * @description A new name or description of a graph. A field that is left out does not change.
      */
     Describing: {
         /** @default null */
@@ -356,7 +357,7 @@ export interface EditorApi {
     };
     /**
      * DraftOf
-     * @description Of which graph something is a draft, since which change of it, and what the draft is called.
+     * @description The origin of a draft: the graph, the change of it that the draft began with, and the name of the draft.
      */
     DraftOf: {
         graph: string;
@@ -437,8 +438,8 @@ export interface EditorApi {
     };
     /**
      * Extracting
-     * @description Which actions to make a sub-graph of, after which change of the graph (without: now), and what to
-     *     call it. `otherwise`: also where it may do something else than they did.
+     * @description A request to move actions into a new sub-graph called `name`. `seq`: the change of the graph that the
+     *     page shows, the newest if left out. `otherwise`: do it even if the graph may then behave otherwise.
      */
     Extracting: {
         actions: string[];
@@ -509,7 +510,7 @@ export interface EditorApi {
     };
     /**
      * FlatCopy
-     * @description Which moment of a graph to make flat, and what to call the new graph.
+     * @description A request to flatten a graph after its change `seq` into a new graph called `name`.
      */
     FlatCopy: {
         seq: number;
@@ -645,7 +646,7 @@ export interface EditorApi {
     };
     /**
      * Guest
-     * @description Somebody who came in by an invitation, and when that was first.
+     * @description A person who came in by an invitation. `at`: when that was for the first time.
      */
     Guest: {
         person: EditorApi["PersonRef"];
@@ -836,16 +837,16 @@ export interface EditorApi {
     };
     /**
      * LastBuild
-     * @description What was told last of builds of an action's package; null if nobody told of one.
+     * @description The last reported build of an action's package; null if none was reported.
      */
     LastBuild: {
         build: EditorApi["ActionBuilt"] | null;
     };
     /**
      * LastExamination
-     * @description What `doctor` found last. `age_s`: how many seconds ago it had looked, and `took_s` for how long; both null,
-     *     as `found`, before it has looked at all. `running_s`: for how many seconds it has been looking again, null
-     *     where it is not. `failed`: why the last look came to nothing; what was found before it stays.
+     * @description The last result of `doctor`. `age_s`: seconds since it was made, and `took_s`: seconds that it took; both
+     *     are null, as `found` is, before the first one. `running_s`: seconds for which the next examination has been
+     *     running, null where none is. `failed`: why the last attempt failed; the result before it stays.
      */
     LastExamination: {
         found: EditorApi["Diagnostic"][] | null;
@@ -1001,8 +1002,8 @@ export interface EditorApi {
     };
     /**
      * MergedGraph
-     * @description How far the graph goes now; whether others had changed it since the text was read; and the errors
-     *     that came with the text.
+     * @description The result of storing an edited text. `seq`: the last change of the graph; `merged`: whether others had
+     *     changed the graph since the text was read; `problems`: errors that the text brought in.
      */
     MergedGraph: {
         seq: number;
@@ -1158,7 +1159,8 @@ export interface EditorApi {
     };
     /**
      * Participant
-     * @description Somebody who acted here. `color`: nobody else has it who is here; grey is nobody's.
+     * @description A person who has acted on this server. `color`: unique among the people who are connected; grey for a
+     *     person who has none.
      */
     Participant: {
         id: string;
@@ -1294,7 +1296,7 @@ export interface EditorApi {
     };
     /**
      * Problems
-     * @description What is wrong with a graph after its change `seq`.
+     * @description The problems of a graph after its change `seq`.
      */
     Problems: {
         seq: number;
@@ -1331,7 +1333,7 @@ export interface EditorApi {
     };
     /**
      * Proposing
-     * @description What to say with a proposal.
+     * @description The note that goes with a proposal to merge a draft.
      */
     Proposing: {
         /** @default  */
@@ -1339,8 +1341,7 @@ export interface EditorApi {
     };
     /**
      * Publishing
-     * @description Which moment of the graph to publish, under what label, and what there is to say of it. Left out:
-     *     as it is now.
+     * @description A request to publish a version. `seq`: the change of the graph to publish, the newest if left out.
      */
     Publishing: {
         /** @default  */
@@ -1475,11 +1476,11 @@ export interface EditorApi {
     };
     /**
      * Sharing
-     * @description How others reach this server, and the links to it.
+     * @description The addresses of this server for other people, and the invitation links.
      *
-     *     `origins`: where the page is for them, the likeliest first; empty when the server listens on this
-     *     computer only. `secure`: whether what is sent is encrypted. `proxied`: the first of them is shown by
-     *     a proxy, whose certificate that is.
+     *     `origins`: the addresses of the page, the likeliest first; empty where the server listens on this computer
+     *     only. `secure`: whether the connection is encrypted. `proxied`: whether a proxy serves the first address, so
+     *     that the certificate is the proxy's.
      */
     Sharing: {
         origins: string[];
@@ -1541,7 +1542,7 @@ export interface EditorApi {
     };
     /**
      * StoredEvent
-     * @description Something that was stored. `seq` counts in `stream`.
+     * @description The header of one event of the log. `seq` counts the events of `stream`.
      */
     StoredEvent: {
         position: number;
@@ -1565,7 +1566,8 @@ export interface EditorApi {
     };
     /**
      * TakingOver
-     * @description Of which graph, and of which of its actions; without one the first that differs.
+     * @description The graph whose action the library takes over, and the `aid` of that action; without one the first action
+     *     that differs.
      */
     TakingOver: {
         graph: string;
@@ -1584,8 +1586,9 @@ export interface EditorApi {
     };
     /**
      * UnpackingAction
-     * @description Which action to unpack, after which change of the graph (without: now). `at`: where it is drawn, for
-     *     one that nobody has placed.
+     * @description A request to replace an action by the actions of the graph that it stands for. `seq`: the change of the
+     *     graph that the page shows, the newest if left out. `at`: where the action is drawn, if it has no stored
+     *     position.
      */
     UnpackingAction: {
         action: string;
@@ -1623,7 +1626,8 @@ export interface EditorApi {
     };
     /**
      * UpdatingUses
-     * @description Which uses to bring to the action's change `seq`, and what is called otherwise since.
+     * @description A request to update uses of an action to its change `seq`. `renames`: parameters that have another name
+     *     since.
      */
     UpdatingUses: {
         seq: number;

@@ -22,9 +22,9 @@ _NICE: Final = 10
 
 
 class LastExamination(msgspec.Struct, frozen=True):
-    """What `doctor` found last. `age_s`: how many seconds ago it had looked, and `took_s` for how long; both null,
-    as `found`, before it has looked at all. `running_s`: for how many seconds it has been looking again, null
-    where it is not. `failed`: why the last look came to nothing; what was found before it stays."""
+    """The last result of `doctor`. `age_s`: seconds since it was made, and `took_s`: seconds that it took; both
+    are null, as `found` is, before the first one. `running_s`: seconds for which the next examination has been
+    running, null where none is. `failed`: why the last attempt failed; the result before it stays."""
 
     found: tuple[Diagnostic, ...] | None
     age_s: float | None

@@ -21,7 +21,7 @@ Asking = Request[Any, Any, Any]
 
 
 class Proposing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What to say with a proposal."""
+    """The note that goes with a proposal to merge a draft."""
 
     note: Remark = ""
 
@@ -35,7 +35,7 @@ class Answering(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
-    """Everything about drafts that graphs have not."""
+    """Return the routes that only drafts have: list, make, propose, answer, preview and merge."""
     return [*_drafts(app_state), *_proposals(app_state), *_merges(app_state)]
 
 

@@ -20,7 +20,7 @@ _SCRIPT: Final = 1_000_000  # bytes of a body that says what to play
 
 
 def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
-    """Everything that only helps to draw."""
+    """Return the routes that read UMRF text for pasting, and that play a graph before it is run."""
 
     @post(
         "/api/pieces",

@@ -27,8 +27,8 @@ _SILENCE: Final = 10.0  # seconds after which a listener is told that we are sti
 
 
 class Config(msgspec.Struct, frozen=True):
-    """What a page has to know. `runner_url` has no slash at its end. `commit`: of this program, null
-    when nobody knows."""
+    """The settings that a page asks for first. `runner_url` has no slash at its end. `commit`: the commit of
+    this program, null where it is unknown."""
 
     mode: str
     version: str
@@ -37,7 +37,7 @@ class Config(msgspec.Struct, frozen=True):
 
 
 class StoredEvent(msgspec.Struct, frozen=True, omit_defaults=True):
-    """Something that was stored. `seq` counts in `stream`."""
+    """The header of one event of the log. `seq` counts the events of `stream`."""
 
     position: int
     stream: str
@@ -56,7 +56,8 @@ class Example(msgspec.Struct, frozen=True):
 
 
 class Participant(msgspec.Struct, frozen=True):
-    """Somebody who acted here. `color`: nobody else has it who is here; grey is nobody's."""
+    """A person who has acted on this server. `color`: unique among the people who are connected; grey for a
+    person who has none."""
 
     id: str
     name: str
@@ -64,7 +65,7 @@ class Participant(msgspec.Struct, frozen=True):
 
 
 def routes(app_state: EditorState, addresses: Addresses) -> list[ControllerRouterHandler]:
-    """Everything that is about no single graph."""
+    """Return the routes that belong to no single graph: settings, people, examples and the stream of events."""
 
     known = commit()
 

@@ -17,7 +17,7 @@ from action_assistant.web.auth.access import Needs, person_of
 
 
 class FlatCopy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Which moment of a graph to make flat, and what to call the new graph."""
+    """A request to flatten a graph after its change `seq` into a new graph called `name`."""
 
     seq: int
     name: str
@@ -36,7 +36,7 @@ async def _whole(
 
 
 def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
-    """Everything about flat graphs."""
+    """Return the routes that flatten a graph with its sub-graphs into one graph."""
 
     @get(
         "/api/graphs/{graph_id:str}/flat",

@@ -38,8 +38,8 @@ class MadeGraph(GraphView, frozen=True, omit_defaults=True):
 
 
 class MergedGraph(msgspec.Struct, frozen=True):
-    """How far the graph goes now; whether others had changed it since the text was read; and the errors
-    that came with the text."""
+    """The result of storing an edited text. `seq`: the last change of the graph; `merged`: whether others had
+    changed the graph since the text was read; `problems`: errors that the text brought in."""
 
     seq: int
     merged: bool
@@ -47,21 +47,21 @@ class MergedGraph(msgspec.Struct, frozen=True):
 
 
 class Describing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What to call a graph from now on; what is left out stays."""
+    """A new name or description of a graph. A field that is left out does not change."""
 
     name: str | None = None
     description: str | None = None
 
 
 class Problems(msgspec.Struct, frozen=True):
-    """What is wrong with a graph after its change `seq`."""
+    """The problems of a graph after its change `seq`."""
 
     seq: int
     problems: tuple[Problem, ...]
 
 
 def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
-    """Everything under `/api/graphs` except versions, rooms and the past."""
+    """Return the routes under `/api/graphs` except those of versions, rooms and history."""
     return [*_catalogue(app_state), *_contents(app_state)]
 
 

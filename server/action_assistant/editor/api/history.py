@@ -60,7 +60,7 @@ async def _moment(services: EditorServices, graph: str, seq: int | None, place: 
 
 
 def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
-    """Everything that looks or goes back."""
+    """Return the routes that read the history of a graph, and those that go back in it."""
     return [*_looking(app_state), *_blaming(app_state), *_going(app_state)]
 
 

@@ -20,11 +20,11 @@ from action_assistant.web.server.openapi import answer
 
 
 class Sharing(msgspec.Struct, frozen=True):
-    """How others reach this server, and the links to it.
+    """The addresses of this server for other people, and the invitation links.
 
-    `origins`: where the page is for them, the likeliest first; empty when the server listens on this
-    computer only. `secure`: whether what is sent is encrypted. `proxied`: the first of them is shown by
-    a proxy, whose certificate that is.
+    `origins`: the addresses of the page, the likeliest first; empty where the server listens on this computer
+    only. `secure`: whether the connection is encrypted. `proxied`: whether a proxy serves the first address, so
+    that the certificate is the proxy's.
     """
 
     origins: tuple[str, ...]
@@ -43,7 +43,7 @@ class Inviting(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 def routes(
     app_state: EditorState, addresses: Addresses, browsers: SessionFiles
 ) -> list[ControllerRouterHandler]:
-    """Everything under `/api/invitations` and `/api/sessions`."""
+    """Return the routes under `/api/invitations` and `/api/sessions`."""
     return [*_links(app_state, addresses), *_one(app_state, addresses), *_sessions(browsers)]
 
 

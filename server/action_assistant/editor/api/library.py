@@ -32,14 +32,15 @@ Pairs = Annotated[list[str] | None, QueryParameter(max_items=1000)]
 
 
 class ActionUses(msgspec.Struct, frozen=True):
-    """Who uses an action, and what bringing them to its change `seq` would change."""
+    """The graphs that use an action, and how updating them to its change `seq` would change them."""
 
     seq: int
     uses: tuple[ActionUse, ...]
 
 
 class UpdatingUses(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Which uses to bring to the action's change `seq`, and what is called otherwise since."""
+    """A request to update uses of an action to its change `seq`. `renames`: parameters that have another name
+    since."""
 
     seq: int
     graphs: tuple[GraphMoment, ...]
@@ -47,14 +48,15 @@ class UpdatingUses(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class TakingOver(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Of which graph, and of which of its actions; without one the first that differs."""
+    """The graph whose action the library takes over, and the `aid` of that action; without one the first action
+    that differs."""
 
     graph: str
     aid: str | None = None
 
 
 class BuildReport(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """How the last build of an action's package went; `at` is when that ended."""
+    """The result of the last build of an action's package; `at` is when the build ended."""
 
     package: Annotated[str, msgspec.Meta(max_length=200)]
     ended_well: bool
@@ -63,13 +65,13 @@ class BuildReport(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class LastBuild(msgspec.Struct, frozen=True):
-    """What was told last of builds of an action's package; None if nobody told of one."""
+    """The last reported build of an action's package; None if none was reported."""
 
     build: h.ActionBuilt | None
 
 
 def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
-    """Everything about the library."""
+    """Return the routes of the action library."""
     return [*_actions(app_state), *_uses(app_state), *_builds(app_state)]
 
 

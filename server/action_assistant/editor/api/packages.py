@@ -17,7 +17,7 @@ Packages = Annotated[list[str] | None, QueryParameter(name="package", max_items=
 
 
 def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
-    """Everything about C++ packages. Nothing is stored."""
+    """Return the routes that generate C++ packages. They store nothing."""
 
     @get(
         "/api/graphs/{graph_id:str}/packages",

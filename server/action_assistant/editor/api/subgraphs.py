@@ -27,8 +27,8 @@ from action_assistant.web.auth.access import Needs, person_of
 
 
 class Extracting(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Which actions to make a sub-graph of, after which change of the graph (without: now), and what to
-    call it. `otherwise`: also where it may do something else than they did."""
+    """A request to move actions into a new sub-graph called `name`. `seq`: the change of the graph that the
+    page shows, the newest if left out. `otherwise`: do it even if the graph may then behave otherwise."""
 
     actions: tuple[Key, ...]
     name: str
@@ -45,8 +45,9 @@ class MadeSubGraph(msgspec.Struct, frozen=True):
 
 
 class UnpackingAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Which action to unpack, after which change of the graph (without: now). `at`: where it is drawn, for
-    one that nobody has placed."""
+    """A request to replace an action by the actions of the graph that it stands for. `seq`: the change of the
+    graph that the page shows, the newest if left out. `at`: where the action is drawn, if it has no stored
+    position."""
 
     action: Key
     seq: int | None = None
@@ -54,7 +55,8 @@ class UnpackingAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class CallingUses(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """In which graphs the actions called `before` stand for a graph that is called `name` now."""
+    """A request to rename actions called `before` in some graphs, since the graph that they stand for is called
+    `name` now."""
 
     before: str
     name: str
@@ -80,7 +82,7 @@ async def _chosen(
 
 
 def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
-    """Everything about making and unpacking."""
+    """Return the routes that make sub-graphs of actions, and that unpack them."""
     # Of two people who make one of the same name at once, the other is told that it is taken.
     making = asyncio.Lock()
 

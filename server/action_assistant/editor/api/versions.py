@@ -15,8 +15,7 @@ from action_assistant.web.server.openapi import FileBytes, answer
 
 
 class Publishing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Which moment of the graph to publish, under what label, and what there is to say of it. Left out:
-    as it is now."""
+    """A request to publish a version. `seq`: the change of the graph to publish, the newest if left out."""
 
     label: str = ""
     seq: int | None = None
@@ -24,7 +23,7 @@ class Publishing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
-    """Everything about versions."""
+    """Return the routes of published versions."""
 
     @get(
         "/api/graphs/{graph_id:str}/versions",

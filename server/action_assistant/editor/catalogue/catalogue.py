@@ -31,7 +31,7 @@ _LARGE_FILE: Final = 256 * 1024  # bytes of an imported file that is stored in a
 
 
 class DraftOf(msgspec.Struct, frozen=True):
-    """Of which graph something is a draft, since which change of it, and what the draft is called."""
+    """The origin of a draft: the graph, the change of it that the draft began with, and the name of the draft."""
 
     graph: str
     seq: int
@@ -69,7 +69,7 @@ class GraphView(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class NewGraph(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """An empty graph."""
+    """The body of a request for an empty graph."""
 
     name: str
     description: str = ""
@@ -100,7 +100,7 @@ class Catalogue:
         return found
 
     async def get(self, graph: str) -> GraphView:
-        """One graph."""
+        """Return one graph as lists show it. Raises NotFound."""
         await self._checks.names.refresh()
         return await self._view(await self._row(graph))
 

@@ -31,9 +31,8 @@ _INSIDE: Final = 200
 
 
 class GraphSummary(msgspec.Struct, frozen=True):
-    """What a list shows of a graph. `damaged`: the first change that cannot be read. `first`: name and
-    description of its first action. What is None is not known, since finding it out takes more than it
-    may."""
+    """The facts about a graph that lists show. `damaged`: the first change that cannot be read. `first`: name
+    and description of its first action. A field is None where finding it out would take too long."""
 
     seq: int
     name: str | None = None
@@ -52,7 +51,8 @@ class GraphSummary(msgspec.Struct, frozen=True):
 
 
 class _About(msgspec.Struct, frozen=True):
-    """What is known of a graph by itself after its change `seq`, asked for when `newest` was its last."""
+    """The facts about a graph without its sub-graphs after its change `seq`. `newest` was its last change when
+    they were asked for."""
 
     seq: int
     newest: int
@@ -68,9 +68,9 @@ class _Member(msgspec.Struct, frozen=True):
 
 
 class NamedInside(msgspec.Struct, frozen=True):
-    """What is inside of a graph, by name: what a result depends on besides the graph itself. `several`:
-    names of more than one graph; `cut`: there are more than these; `hidden`: names of graphs that an
-    action of the library has, too."""
+    """The graphs inside of a graph, by name; the result of a check depends on them too. `several`: names that
+    more than one graph has; `cut`: there are more graphs than these; `hidden`: names that an action of the
+    library has as well as a graph."""
 
     members: tuple[_Member, ...] = ()
     several: tuple[str, ...] = ()
@@ -78,11 +78,11 @@ class NamedInside(msgspec.Struct, frozen=True):
     hidden: tuple[str, ...] = ()
 
     def __bool__(self) -> bool:
-        """Whether a result depends on any of it."""
+        """Tell whether a result depends on any graph inside."""
         return bool(self.members or self.hidden)
 
     def key(self) -> bytes:
-        """The same for the same graphs at the same moments."""
+        """Return a digest that is equal for equal graphs after equal changes; empty without any."""
         return sha256(msgspec.msgpack.encode(self)).digest() if self else b""
 
 
@@ -101,7 +101,7 @@ class GraphChecks:
         self._uses = Recent[tuple[str, int], tuple[str, tuple[str, ...]]](_REMEMBERED)
 
     async def problems(self, sight: GraphAtSeq) -> bytes:
-        """What is wrong with a graph at a moment, as JSON, with the graphs inside as they are now."""
+        """Return the problems of a graph at a moment as JSON, with the graphs inside as they are now."""
         await self.names.refresh()
         named = await self._resolved(*await self._names_at(sight))
         key = sight.graph, sight.seq, named.key()
@@ -145,7 +145,8 @@ class GraphChecks:
         self._remember(graph, _About(1, 1, about))
 
     async def summary(self, graph: str, newest: int) -> GraphSummary:
-        """What a list shows of a graph whose last change is `newest`, as of the last refresh of names."""
+        """Return what lists show of a graph whose last change is `newest`. Names of graphs are those of the
+        last refresh."""
         try:
             about = await self._about(graph, newest)
             named = await self._resolved(about.info.name, about.info.uses)
@@ -180,7 +181,8 @@ class GraphChecks:
         return known[2:]
 
     async def _about(self, graph: str, newest: int) -> _About:
-        """What is known of a graph by itself. Raises Unavailable, TooLarge."""
+        """Return the facts about a graph without its sub-graphs, from the cache or a worker. Raises
+        Unavailable, TooLarge."""
         known = self._abouts.get(graph)
         if known is not None and known.newest >= newest:
             return known
@@ -219,8 +221,9 @@ class GraphChecks:
         return found or self._uses.put(key, await self._reader.ask(contents.names, sight))
 
     async def _resolved(self, own: str, uses: Iterable[str]) -> NamedInside:
-        """What is inside, level by level. An action with the name of the graph that it is in is an
-        action: no engine runs a graph inside itself."""
+        """Find the graphs inside of a graph, level by level, by the names of its actions (`uses`). An action
+        with the name of the graph that contains it is an ordinary action, since no engine runs a graph inside
+        itself."""
         found: dict[str, _Member] = {}
         hidden: set[str] = set()
         level, actions, cut = [(own, uses)], 0, False

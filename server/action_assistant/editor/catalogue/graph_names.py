@@ -78,15 +78,15 @@ class GraphNames:
         return [name for name in names if name in graphs]
 
     def is_ambiguous(self, name: str) -> bool:
-        """Whether several graphs have the name."""
+        """Tell whether several graphs have this name."""
         return len(self._graphs.get(name, ())) > 1
 
     def is_hidden(self, name: str) -> bool:
-        """Whether a graph has the name, and an action of the library, which comes first."""
+        """Tell whether a graph has this name and an action of the library too; then the action counts."""
         return bool(self._actions[name]) and name in self._graphs
 
     def is_taken(self, name: str) -> bool:
-        """Whether a graph, or an action of the library, has the name."""
+        """Tell whether a graph or an action of the library has this name."""
         return name in self._graphs or bool(self._actions[name])
 
     async def refresh(self) -> None:
@@ -111,7 +111,8 @@ class GraphNames:
         return self._next
 
     def _ended(self, task: "asyncio.Task[None]") -> None:
-        """Whoever waited may have left: nobody is told of a failure then."""
+        """Forget a refresh that has ended. Its error is read so that none is logged where nobody waits any
+        more."""
         self._tasks.discard(task)
         if not task.cancelled():
             task.exception()

@@ -44,7 +44,7 @@ _AGAIN_S: Final = 5.0
 
 
 class Guest(msgspec.Struct, frozen=True):
-    """Somebody who came in by an invitation, and when that was first."""
+    """A person who came in by an invitation. `at`: when that was for the first time."""
 
     person: PersonRef
     at: datetime
@@ -122,7 +122,7 @@ class Invitations:
         return self.get(made)
 
     def get(self, invitation: str) -> Invitation:
-        """One of them. Raises NotFound."""
+        """Return one invitation. Raises NotFound."""
         return self._view(self._one(invitation))
 
     async def revoke(self, invitation: str, by: PersonRef) -> Invitation:
@@ -194,7 +194,7 @@ class Invitations:
             await asyncio.to_thread(self._revoked.write_again)
 
     def look(self, proof: str) -> Invited:
-        """What a link invites to. Raises Unauthenticated, Withdrawn."""
+        """Return the role that a link gives, and who made it. Raises Unauthenticated, Withdrawn."""
         invitation, _, secret = proof.partition(".")
         expected = self._keys.secret_of(invitation)
         if not hmac.compare_digest(secret.encode(errors="replace"), expected.encode()):
@@ -207,7 +207,7 @@ class Invitations:
         return Invited(invitation, link.role, self._people.person(link.made_by.id).name)
 
     async def welcome(self, invitation: str, person: PersonRef) -> None:
-        """Somebody comes in: remember who, and by which link. Raises Unavailable."""
+        """Record that a person came in by a link, the first time they do. Raises Unavailable."""
         guests = self._one(invitation).guests
         if any(each.person.id == person.id for each in guests):
             return
@@ -222,7 +222,7 @@ class Invitations:
         await self._journal.append(h.INVITATIONS, [h.draft(kind, author, body)])
 
     async def _read(self, new: str | None = None) -> None:
-        """What the log says, of all or of a new one."""
+        """Read one new invitation from the tables, or all of them."""
         which = select(editor_tables.invitation)
         if new is not None:
             which = which.where(editor_tables.invitation.c.id == new)

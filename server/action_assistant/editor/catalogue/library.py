@@ -54,7 +54,8 @@ class Library:
             return before[1]
 
     async def _sources(self) -> list[tuple[ActionSource, bytes]]:
-        """What was found in each document, the last changed first."""
+        """Return the action that each document holds, with its text; the document that changed last comes
+        first."""
         graph, event = editor_tables.graph, editor_tables.editor_event
         last = (
             select(event.c.seq)

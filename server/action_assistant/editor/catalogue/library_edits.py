@@ -185,12 +185,12 @@ class LibraryEdits:
         return await self._catalogue.get(action)
 
     async def built(self, action: str, build: h.ActionBuilt, author: str) -> None:
-        """Somebody tells how a build of its package went."""
+        """Store the report of a build of an action's package. Raises NotFound."""
         await self._catalogue.require(action, "action")
         await self._journal.append(h.about_stream(action), [h.draft(h.BUILT, author, build)])
 
     async def last_build(self, action: str) -> h.ActionBuilt | None:
-        """What was told last of builds of its package; None if nobody told of one."""
+        """Return the last report of a build of an action's package; None if there is none. Raises NotFound."""
         await self._catalogue.require(action, "action")
         event = editor_tables.editor_event.c
         chosen = (

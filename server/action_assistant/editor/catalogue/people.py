@@ -29,12 +29,12 @@ class People:
 
     @classmethod
     async def known(cls, journal: Journal) -> "People":
-        """Those in the journal."""
+        """Return the people whose names are in the journal."""
         rows = await journal.query(select(editor_tables.person.c.id, editor_tables.person.c.name))
         return cls(journal, {row.id: row.name for row in rows})
 
     async def seen(self, person: PersonRef) -> None:
-        """Somebody acts: remember the name, if it is new."""
+        """Store the name of a person who acts, if it is new or has changed. Raises Unavailable."""
         if self._names.get(person.id) == person.name:
             return
         before = self._names.get(person.id)
@@ -48,11 +48,11 @@ class People:
             raise
 
     def person(self, author: str) -> PersonRef:
-        """Who the author of an event is."""
+        """Return the id and name of the author of an event; the name is empty where it is unknown."""
         return PersonRef(author, self._names.get(author) or _OURS.get(author, ""))
 
     def everyone(self) -> list[PersonRef]:
-        """All of them, by name."""
+        """Return all people, sorted by name."""
         return sorted((PersonRef(*item) for item in self._names.items()), key=lambda p: p.name)
 
 

@@ -128,7 +128,7 @@ class Versions:
         return await self.get(made), True
 
     async def inside(self, graph: str, seq: int | None) -> InsideView:
-        """What publishing a graph would pin. Raises NotFound, Conflict, Unavailable."""
+        """Return the graphs that publishing a graph would include. Raises NotFound, Conflict, Unavailable."""
         sight = await self._graph_reader.moment(graph, seq)
         inside = await self._checks.inside(sight)
         stamp = codec.Stamp(graph=graph)
@@ -199,7 +199,7 @@ def _require_runnable(found: contents.Released, inside: contents.Inside) -> None
 
 
 def _within_limits(label: str, note: str) -> tuple[str, str]:
-    """Both without spaces around them. Raises BadInput."""
+    """Return label and note without spaces around them. Raises BadInput for one that is too long."""
     label, note = " ".join(label.split()), note.strip()
     if len(label) > LABEL_LIMIT:
         raise BadInput(f"A label has up to {LABEL_LIMIT} characters.", where={"path": "/label"})

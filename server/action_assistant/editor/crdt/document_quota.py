@@ -119,10 +119,10 @@ class DocumentQuota:
 
 
 def actions_in(doc: "Doc[Any]") -> int:
-    """How many actions a document has: their keys are those without a field."""
+    """Count the actions of a document. Their keys are those without a field."""
     return sum("|" not in key for key in doc.get("actions", type=Map).keys())  # noqa: SIM118
 
 
 def fields_in(doc: "Doc[Any]") -> int:
-    """How many keys the maps of a document hold."""
+    """Count the keys in all maps of a document."""
     return sum(len(doc.get(root, type=Map)) for root in ROOTS)

@@ -24,7 +24,7 @@ class EventColumns(msgspec.Struct, frozen=True):
 
     @classmethod
     def of(cls, events: Iterable[Event]) -> "EventColumns":
-        """Of at least one event."""
+        """Make columns of events, of which there must be at least one."""
         rows = [(each.seq, each.kind, each.author, each.body) for each in events]
         seqs, kinds, authors, bodies = (list(column) for column in zip(*rows, strict=True))
         return cls(seqs[0], kinds, authors, bodies)
@@ -46,11 +46,11 @@ class EventColumns(msgspec.Struct, frozen=True):
 
     @property
     def size(self) -> int:
-        """Bytes of all bodies."""
+        """The size of all bodies in bytes."""
         return sum(map(len, self.bodies))
 
     def part(self, start: int, end: int) -> "EventColumns":
-        """Those from place `start` to place `end`, without that one."""
+        """Return the events from place `start` up to, and without, place `end`."""
         some = slice(start, end)
         return EventColumns(
             self.first + start, self.kinds[some], self.authors[some], self.bodies[some]

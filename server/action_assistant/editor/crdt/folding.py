@@ -26,8 +26,8 @@ class Folded(msgspec.Struct, frozen=True):
 
 
 def fold_sound(document: bytes, events: EventColumns) -> Folded | None:
-    """As `fold` with learning, of events that are what rooms took: each is read as a whole only where
-    that is needed. Such that no room took may end the process."""
+    """Fold events that rooms have accepted, as `fold` with learning does, but read each one only as far as
+    needed. Events that no room would accept may end the process."""
     replica = ReplicaState.replica(document) if document else Replica()
     if replica is None:
         return None
@@ -52,8 +52,8 @@ def fold(document: bytes, events: EventColumns, learn: bool) -> Folded | None:
 
 
 def _before_the_bad(document: bytes, events: EventColumns, *, learn: bool) -> Folded:
-    """As `fold`, up to the first event that cannot be applied. A replica in which something failed
-    is not gone on with."""
+    """Fold the events before the first one that cannot be applied. Starts with a new replica, since one in
+    which something failed cannot be used any more."""
     bad, why = _first_bad(document, events)
     damaged = StreamDamage(events.first + bad, why)
     if not bad:

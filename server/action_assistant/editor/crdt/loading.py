@@ -36,7 +36,8 @@ class Loaded(msgspec.Struct, frozen=True):
 
 
 class Stored(msgspec.Struct, frozen=True):
-    """As `Loaded`, with the document as the bytes of a snapshot; none where nothing was stored."""
+    """A document read from the log as the bytes of a snapshot, empty where nothing was stored. The other fields
+    are those of `Loaded`."""
 
     document: bytes
     seq: int
@@ -149,8 +150,8 @@ async def _followed(
 async def _folded(
     tail: LogTail, document: bytes, events: EventColumns, learn: bool, run_in_worker: RunInWorker
 ) -> Folded | None:
-    """As `fold`, of those events that are as they were written. In this process nothing is applied
-    before that is known, and nothing that was not read as a whole."""
+    """Fold the events whose chain of hashes is intact. In this process no event is applied before its hash was
+    checked; a worker may begin earlier, and its result is dropped where a check fails."""
     if run_in_worker is run_here or len(document) + events.size <= _SMALL:
         return _fold(document, events.part(0, await tail.sound()), learn)
     folding = asyncio.ensure_future(_folded_aside(document, events, learn, run_in_worker))
@@ -169,7 +170,7 @@ async def _folded(
 
 
 def _heard(folding: "asyncio.Future[Folded | None]") -> None:
-    """What became of events that are not what was written is of no interest."""
+    """Ignore the result for events whose hash does not match; the chain check reports them."""
     if not folding.cancelled():
         folding.exception()
 

@@ -67,8 +67,8 @@ class LogTail:
         return _columns(slices) if slices else None
 
     async def sound(self) -> int:
-        """How many of the events that were given out last are as they were written, from the first
-        one on; there are no more where not all are."""
+        """Check the chain of hashes of the events that `next` returned last. Return how many of them, from the
+        first one on, are as they were written; where some are not, the tail ends there."""
         slices, self._unchecked = self._unchecked, []
         good = await asyncio.to_thread(_linked, self._chain or START, self._stream, slices)
         if good < sum(len(each.seqs) for each in slices):
@@ -80,8 +80,8 @@ class LogTail:
         return good
 
     def _in_place(self, rows: Sequence[Sequence[Any]]) -> StoredColumns | None:
-        """Those before the first that is no event, or not the next one; None when there are none. Where
-        they come in order and their bodies are bytes, the others' types are left to the chain."""
+        """Return the rows up to the first that is not the next event; None when there are none. Types of
+        columns other than the bodies are not looked at here: the chain check finds a wrong one."""
         if not rows:
             return None
         columns = StoredColumns(*zip(*rows, strict=True))
@@ -92,7 +92,8 @@ class LogTail:
         return self._in_place(rows[: self._good(rows)])
 
     def _good(self, rows: Sequence[Sequence[Any]]) -> int:
-        """How many of these, of which not all are what follows, and that."""
+        """Count the rows before the first one that has a wrong type or a wrong number, and note that one as
+        damage."""
         for n, row in enumerate(rows):
             if tuple(map(type, row)) != _TYPES:
                 self._stop("it holds values of the wrong kind", n)
@@ -162,7 +163,7 @@ def _columns(slices: Sequence[StoredColumns]) -> EventColumns:
 
 
 def _linked(chain: bytes, stream: str, slices: Sequence[StoredColumns]) -> int:
-    """How many of these events are in the chain that goes on from here."""
+    """Count the events, from the first one on, that continue the chain of hashes."""
     count = 0
     for each in slices:
         good = _linked_of_one(chain, stream, each)

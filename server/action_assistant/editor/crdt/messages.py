@@ -74,7 +74,7 @@ class Edit(msgspec.Struct, frozen=True, gc=False):
 
 
 class PresenceEntry(msgspec.Struct, frozen=True, gc=False):
-    """What one client says about itself. `state` is JSON text; `null` means gone."""
+    """The awareness entry of one client. `state` is JSON text; `null` means that the client has left."""
 
     client: int
     clock: int
@@ -82,17 +82,18 @@ class PresenceEntry(msgspec.Struct, frozen=True, gc=False):
 
 
 class Presence(msgspec.Struct, frozen=True):
-    """Awareness entries."""
+    """A message with awareness entries."""
 
     entries: tuple[PresenceEntry, ...]
 
 
 class WhoIsThere(msgspec.Struct, frozen=True):
-    """Query awareness."""
+    """A request for all awareness entries."""
 
 
 class CompareMessage(msgspec.Struct, frozen=True):
-    """What the client shows at `seq`, as a fingerprint."""
+    """A fingerprint of the document that the client shows after change `seq`: its number of entries and the sum
+    of their hashes."""
 
     seq: int
     entries: int
@@ -131,20 +132,20 @@ class ByteReader:
         return self._data[self._at - length : self._at]
 
     def byte(self) -> int:
-        """One byte."""
+        """Read one byte. Raises Malformed at the end."""
         if self._at >= len(self._data):
             raise Malformed("the message ends early")
         self._at += 1
         return self._data[self._at - 1]
 
     def skip(self, count: int) -> None:
-        """Pass over bytes."""
+        """Skip `count` bytes. Raises Malformed past the end."""
         if count > self.left:
             raise Malformed("the message ends early")
         self._at += count
 
     def skip_signed(self) -> None:
-        """Pass over a varInt."""
+        """Skip one signed number (lib0 varInt)."""
         while self.byte() & 0x80:
             pass
 
@@ -196,8 +197,8 @@ def _sync(reader: ByteReader) -> Message:
 
 
 def _one_entry(data: bytes) -> PresenceEntry | None:
-    """Of a whole message what one client says about itself, as nearly all of them are; None for others,
-    also for those that cannot be read."""
+    """Read an awareness message with exactly one entry, as nearly all have. Return None for any other message,
+    also for one that cannot be read."""
     try:
         size, at = _short(data, 1)
         end = at + size
@@ -242,7 +243,7 @@ _ACKS: Final = bytes((ACKS,))
 
 
 def number(value: int) -> bytes:
-    """A varUint."""
+    """Encode a number as lib0 varUint."""
     if value < 128:
         return _SMALL[value]
     if value < 1 << 14:
@@ -261,22 +262,22 @@ def text(value: bytes) -> bytes:
 
 
 def question(state: bytes) -> bytes:
-    """Sync step 1."""
+    """Encode a sync step 1 with a state vector."""
     return _QUESTION + text(state)
 
 
 def answer(update: bytes) -> bytes:
-    """Sync step 2."""
+    """Encode a sync step 2 with an update."""
     return _ANSWER + text(update)
 
 
 def change(update: bytes) -> bytes:
-    """An update."""
+    """Encode an update as a message."""
     return _UPDATE + text(update)
 
 
 def presence(entries: Iterable[PresenceEntry]) -> bytes:
-    """Awareness entries."""
+    """Encode awareness entries as a message."""
     packed = [number(e.client) + number(e.clock) + text(e.state) for e in entries]
     return bytes((AWARENESS,)) + text(number(len(packed)) + b"".join(packed))
 
@@ -297,7 +298,7 @@ def read_only(why: str) -> bytes:
 
 
 def epoch(name: str) -> bytes:
-    """Which history of the graph this is."""
+    """Encode the message that names the epoch of the log."""
     return bytes((EPOCH,)) + text(name.encode())
 
 

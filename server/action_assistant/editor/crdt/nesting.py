@@ -31,9 +31,10 @@ class Nesting:
         self.spans: Final = spans or {}
 
     def depths(self, placed: tuple[Placed, ...], known: Mapping[int, int]) -> dict[Span, int]:
-        """How deep an update lies, for a document that has so many clocks of each client.
+        """Return how deep the new structs of an update lie inside of others, by their spans. `known`: how many
+        clocks of each client the document has.
 
-        Raises Malformed for what is too deep.
+        Raises Malformed for types that are nested too deeply.
         """
         if not placed or (not self.spans and not any(each.inside for each in placed)):
             return {}

@@ -27,7 +27,8 @@ _SMALLEST: Final = 6  # bytes of a struct in an update
 
 
 class OpeningTime:
-    """Of one document: what opening it took when that was measured, and what has come since."""
+    """Bounds the time that opening one document takes: the last measured time, and an estimate for what was
+    added since."""
 
     def __init__(self) -> None:
         self._came = 0  # structs that were ever added
@@ -39,7 +40,7 @@ class OpeningTime:
 
     @property
     def came(self) -> int:
-        """How many structs were ever added: says when something was measured."""
+        """The number of structs ever added. It serves as the time of a measurement."""
         return self._came
 
     def opened(self, seconds: float, size: int, came: int | None = None) -> None:
@@ -61,12 +62,12 @@ class OpeningTime:
         self._came += structs
 
     def is_doubtful_with(self, size: int) -> bool:
-        """Whether it has to be measured before updates of so many bytes are applied."""
+        """Tell whether the opening time has to be measured before updates of `size` bytes are applied."""
         return self._came + size / _SMALLEST > self._doubtful_from
 
     @property
     def is_due(self) -> bool:
-        """Whether it should be measured before that is in doubt."""
+        """Tell whether a new measurement should start, so that no edit has to wait for one."""
         return self._came > self._due_from
 
     def _bound(self) -> None:
@@ -77,7 +78,8 @@ class OpeningTime:
         self._doubtful_from = -1.0 if self.is_too_long else self._after(spare)
 
     def _after(self, seconds: float) -> float:
-        """How many structs will have come when opening may take so much longer than it was measured."""
+        """Return the number of structs ever added at which opening may take `seconds` longer than when it was
+        measured."""
         structs = math.sqrt(self._measured_at**2 + 4 * seconds / _STEP)
         return structs - self._measured_at + self._came_then
 
@@ -89,5 +91,5 @@ class OpeningTime:
 
     @property
     def is_too_long(self) -> bool:
-        """Whether it took too long when it was measured last."""
+        """Tell whether the last measured opening time exceeds the limit."""
         return self._seconds > self._limit

@@ -42,7 +42,7 @@ _KEPT_BYTES: Final = 256 * 1024
 
 
 class UpdateEffect(Enum):
-    """What an update did to a document."""
+    """The effect of an update on a document."""
 
     NEWS = "changed it"
     NOTHING = "was known"
@@ -54,7 +54,7 @@ class ForeignClient(Exception):
 
 
 class TooMuchWaits(Exception):
-    """Of this author so much waits for something earlier that no more is kept."""
+    """An author has sent so many updates that wait for earlier ones that no more are kept"""
 
 
 class Replica:
@@ -173,8 +173,8 @@ class Replica:
                 self._known = clocks(self.doc.get_state())
 
     def replay_sound(self, events: EventColumns) -> None:
-        """As `replay` with learning, for a document that then travels as a snapshot, of events that
-        are what rooms took. Raises Malformed, Panicked, Uncertain."""
+        """Replay events that rooms have accepted, as `replay` with learning does, but without reading each as a
+        whole. For a document that is then sent as a snapshot. Raises Malformed, Panicked, Uncertain."""
         for group in events.by_kind():
             if group.kinds[0] == DEFERRED:
                 self._replay_one_by_one(group)
@@ -203,8 +203,8 @@ class Replica:
         self._quota.took(events.size)
 
     def replay_each(self, events: Sequence[Event]) -> Iterator[Event]:
-        """As `replay` without learning, one by one: each event after it was applied, for who watches
-        the document. Raises Malformed, Panicked."""
+        """Replay events one by one without learning, and yield each after it was applied, for callers that
+        observe the document. Raises Malformed, Panicked."""
         for event in events:
             if event.kind == UPDATED and not self._waiting:
                 self._apply(event.body)
@@ -269,7 +269,7 @@ class Replica:
         self._apply(*together)
 
     def _learn(self, read: UpdateOutline, size: int) -> None:
-        """What the log holds is not judged again."""
+        """Update nesting, quota and opening time for an event of the log. Limits are not checked again."""
         with suppress(Malformed):
             self.nesting.learn(self.nesting.depths(read.placed, self._known))
         self._count(read, size)
@@ -301,7 +301,7 @@ class Replica:
         return released
 
     def freed_by(self, read: UpdateOutline) -> list[bytes]:
-        """What waits and would not wait any more, had this been applied."""
+        """Return the waiting updates that could be applied after this one."""
         known = dict(self._known)
         freed: dict[bytes, None] = {}
         news = [read] if read.ready(known) else []
@@ -318,12 +318,12 @@ class Replica:
 
     @property
     def waits(self) -> bool:
-        """Whether anything waits for an earlier update."""
+        """Tell whether any update waits for an earlier one."""
         return bool(self._waiting)
 
     @property
     def waiting_bytes(self) -> int:
-        """How much waits."""
+        """The size in bytes of the updates that wait for earlier ones."""
         return sum(map(len, self._waiting))
 
     def held_back(self) -> list[tuple[bytes, str]]:
@@ -401,7 +401,7 @@ class Replica:
                 apply_updates(self.doc, *updates)
 
     def lacking(self, state: bytes) -> bytes:
-        """What somebody with this state vector lacks. Raises Malformed, Panicked."""
+        """Return the update that a client with this state vector lacks. Raises Malformed, Panicked."""
         if ByteReader(state).number() * 2 > len(state):
             raise Malformed("more clients than bytes")
         if state == NO_CLOCKS:
@@ -411,10 +411,11 @@ class Replica:
 
 
 class ReplicaState(msgspec.Struct, frozen=True, array_like=True):
-    """What a snapshot keeps of a document, and of what waits beside it, with who wrote that.
+    """The content of a snapshot: the document, the updates that wait beside it with their authors, and the
+    owners of clients.
 
-    `form` was the number 1 before waiting updates were kept: who only knows that form does not take
-    a newer one for theirs.
+    `form` was the number 1 before waiting updates were kept, so that an old program does not take a newer
+    snapshot for one of its own.
     """
 
     form: Literal["with what waits"] | int
@@ -428,7 +429,7 @@ class ReplicaState(msgspec.Struct, frozen=True, array_like=True):
 
     @classmethod
     def of(cls, replica: Replica) -> bytes:
-        """As bytes."""
+        """Return the bytes of a snapshot of a replica."""
         state = replica.state()
         spans, waiting = replica.nesting.spans, replica.held_back()
         kept = cls("with what waits", replica.owners, spans, state, waiting, replica.paired.all())
@@ -449,7 +450,7 @@ class ReplicaState(msgspec.Struct, frozen=True, array_like=True):
 
     @classmethod
     def is_form_of(cls, kept: bytes) -> bool:
-        """Whether these bytes look like a snapshot of ours."""
+        """Tell whether these bytes are a snapshot of ours."""
         return cls.read(kept) is not None
 
     @classmethod

@@ -38,7 +38,7 @@ class Clients:
     after them."""
 
     def __init__(self, bodies: Sequence[bytes], authors: Sequence[str]) -> None:
-        """Raises Malformed."""
+        """Read the clients of updates and their authors. Raises Malformed."""
         self.authors: Final[dict[int, str]] = {}
         self.ends: Final[dict[int, int]] = {}
         last: dict[bytes, bytes] = {}  # of each client that is alone in an update
@@ -62,7 +62,7 @@ class Clients:
 
 
 def lies_deep(bodies: Sequence[bytes]) -> bool:
-    """Whether anything in these updates does not lie in a root. Raises Malformed."""
+    """Tell whether any struct of these updates lies inside of another one, not in a root. Raises Malformed."""
     return any(
         any(each.inside for each in stored_outline(body).placed)
         for body in map(bodies.__getitem__, _doubtful(bodies))
@@ -86,7 +86,8 @@ def _doubtful(bodies: Sequence[bytes]) -> list[int]:
 
 
 def _starts(bodies: Sequence[bytes]) -> list[int]:
-    """Where each begins in what is made of them, and the end; one without a byte has its mark alone."""
+    """Return the offset of each body in the joined text, and the end of it. An empty body counts one byte, its
+    separator."""
     return list(itertools.accumulate((len(body) or 1 for body in bodies), initial=0))
 
 

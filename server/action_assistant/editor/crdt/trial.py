@@ -67,7 +67,7 @@ def tried(state: bytes, update: bytes, released: Sequence[bytes]) -> TriedOutlin
 
 
 def adds_nothing(state: bytes, update: bytes) -> bool:
-    """Whether an update would leave a document with this state vector as it is. Raises Malformed,
+    """Tell whether an update would change nothing in a document with this state vector. Raises Malformed,
     Panicked."""
     if update == NOTHING_NEW:
         return True

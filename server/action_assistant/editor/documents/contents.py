@@ -48,13 +48,13 @@ class Inside(msgspec.Struct, frozen=True):
 
     @property
     def key(self) -> tuple[object, ...]:
-        """The same for the same graphs at the same moments."""
+        """A key that is equal for equal graphs after equal changes, for caches."""
         moments = tuple((name, each.graph, each.seq) for name, each in self.graphs)
         return moments, self.several, self.cut, self.hidden
 
     @property
     def resolution(self) -> Resolution:
-        """How names were resolved."""
+        """The result of resolving names of actions to graphs, as checks need it."""
         return Resolution(frozenset(self.several), self.cut, frozenset(self.hidden))
 
 
@@ -70,16 +70,16 @@ class ReadGraph(msgspec.Struct, frozen=True):
 
 
 class Counts(msgspec.Struct, frozen=True):
-    """How many problems of each severity."""
+    """The number of problems of each severity."""
 
     error: int
     warning: int
 
 
 class GraphInfo(msgspec.Struct, frozen=True):
-    """What lists say of a graph. `told`: of its problems, those that people are told to mend or to
-    fill in, one thing once; both as if no action of it were a graph. `first`: name and description of its
-    first action. `uses`: the names of its actions."""
+    """The facts about a graph that lists show. `told`: the number of problems that people are asked to mend or
+    to fill in; both counts leave graphs inside aside. `first`: name and description of its first action.
+    `uses`: the names of its actions."""
 
     name: str
     description: str
@@ -100,7 +100,7 @@ class Read:
         self._found: tuple[object, list[Problem]] | None = None
 
     def problems(self, inside: Inside = NOTHING_INSIDE) -> list[Problem]:
-        """What is wrong with the graph, with these graphs inside."""
+        """Check the graph with these graphs inside, and return its problems. The last result is kept."""
         if self._found is None or self._found[0] != inside.key:
             graph = self.moment.graph
             found = check_written(graph, graphs_of(inside), inside.resolution)
@@ -137,20 +137,20 @@ def graphs_of(inside: Inside) -> dict[str, Graph]:
 
 
 def maps_of(state: bytes) -> Maps:
-    """What a document holds."""
+    """Return the maps of a document, given as one update."""
     doc: Doc[Any] = Doc()
     doc.apply_update(state)
     return document.maps_of(doc)
 
 
 def info(sight: GraphAtSeq) -> GraphInfo:
-    """What a list shows."""
+    """Return the facts about a graph that lists show, without graphs inside."""
     found = read(sight)
     return info_of(found.moment.graph, found.problems())
 
 
 def counted(sight: GraphAtSeq, inside: Inside) -> tuple[Counts, ProblemCounts]:
-    """What a list counts, with the graphs inside."""
+    """Count the problems of a graph with the graphs inside."""
     found = read(sight)
     problems = found.problems(inside)
     return _counts(problems), problem_counts(problems, found.moment.graph)
@@ -168,7 +168,7 @@ def uses_of(graph: Graph) -> tuple[str, ...]:
 
 
 def info_of(graph: Graph, problems: list[Problem]) -> GraphInfo:
-    """As `info`, of a graph that was read already."""
+    """Return the facts about a graph that was read and checked already, as `info` does."""
     return GraphInfo(
         graph.name,
         graph.description,
@@ -194,12 +194,12 @@ def first_action(graph: Graph) -> Action | None:
 
 
 def problems(sight: GraphAtSeq, inside: Inside = NOTHING_INSIDE) -> bytes:
-    """What is wrong, as JSON."""
+    """Return the problems of a graph with the graphs inside, as JSON."""
     return msgspec.json.encode(read(sight).problems(inside))
 
 
 def umrf(sight: GraphAtSeq, stamp: codec.Stamp | None = None) -> bytes:
-    """The canonical text."""
+    """Return the canonical UMRF text of a graph."""
     return codec.write(read(sight).moment.graph, stamp).encode()
 
 
@@ -213,7 +213,7 @@ class ReleasedPart(msgspec.Struct, frozen=True):
 
 
 class Released(msgspec.Struct, frozen=True):
-    """What a version is. `size`: of the graph together with those inside."""
+    """The content of a published version. `size`: that of the graph together with those inside."""
 
     digest: str
     umrf: bytes
@@ -256,7 +256,8 @@ def shown(state: bytes) -> Fingerprint:
 
 
 def labels_of(graph: Graph) -> tuple[str, ...]:
-    """What people sort the graph under: `labels` in its `gui_attributes`, which no engine reads."""
+    """Return the labels of a graph, by which people sort graphs: `labels` in its `gui_attributes`, which no
+    engine reads."""
     attributes = parse_small(dict(graph.extra).get("gui_attributes", "null"))
     labels = attributes.get("labels") if isinstance(attributes, dict) else None
     texts = [text for text in labels if isinstance(text, str)] if isinstance(labels, list) else []

@@ -62,8 +62,8 @@ def read(doc: Doc) -> Graph:  # type: ignore[type-arg]
 
 
 def maps_of(doc: Doc) -> Maps:  # type: ignore[type-arg]
-    """What is in the document, as plain values. Nested shared types, which no client of ours
-    writes, are left out."""
+    """Return the maps of a document as plain values. Nested shared types, which no client of ours writes, are
+    left out."""
     return {
         root: {key: value for key, value in _root(doc, root).items() if isinstance(value, PLAIN)}
         for root in ROOTS
@@ -223,7 +223,7 @@ def _root(doc: Doc, root: Root) -> Map:  # type: ignore[type-arg]
 
 
 def is_same(a: object, b: object) -> bool:
-    """Whether two plain values are one: `True` is not 1."""
+    """Compare two plain values. Unlike in Python, `True` is not equal to 1."""
     return a == b and isinstance(a, bool) == isinstance(b, bool)
 
 

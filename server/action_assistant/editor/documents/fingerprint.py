@@ -19,14 +19,15 @@ from action_assistant.editor.documents.document import Maps
 
 
 class Fingerprint(msgspec.Struct, frozen=True):
-    """How many entries, and the sum of their CRCs: below 2^53 for any document of ours."""
+    """The number of entries of a document and the sum of their CRCs, which is below 2^53 for any document of
+    ours."""
 
     entries: int
     total: int
 
 
 def fingerprint(maps: Maps) -> Fingerprint:
-    """Of everything that is shown."""
+    """Return the fingerprint of everything that a document shows."""
     entries = total = 0
     for root, fields in maps.items():
         head = root.encode() + b"\0"

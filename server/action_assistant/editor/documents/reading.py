@@ -59,7 +59,7 @@ def read_maps(maps: Mapping[str, Mapping[str, object]]) -> Graph:
 
 
 def _owners(fields: Fields) -> dict[str, dict[str, object]]:
-    """What stands right of the first `|`, by what stands left of it."""
+    """Group fields by the part of their key before the first `|`; the inner keys are what follows it."""
     owners: dict[str, dict[str, object]] = defaultdict(dict)
     for key, value in fields.items():
         head, bar, rest = key.partition("|")

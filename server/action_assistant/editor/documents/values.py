@@ -30,7 +30,7 @@ _MAX_DEPTH: Final = 64
 
 
 class Ends(NamedTuple):
-    """What a relation id says: `<parent>><child>`, from the second listing on `…;n`."""
+    """The parts of a relation's id: `<parent>><child>`, and `;n` from the second listing on."""
 
     parent: Key
     child: Key
@@ -38,7 +38,7 @@ class Ends(NamedTuple):
 
 
 def is_aid(text: str) -> bool:
-    """Whether this can be the key of an action in a document."""
+    """Tell whether this text can be the key of an action in a document."""
     return _AID.fullmatch(text) is not None
 
 
@@ -62,18 +62,17 @@ def ends_of(head: str) -> Ends | None:
 
 
 def text(value: object) -> str | None:
-    """A text."""
+    """Return the value if it is a text; None otherwise."""
     return value if isinstance(value, str) else None
 
 
 def direction(value: object) -> Direction:
-    """Where what follows is drawn. Documents that say nothing, or something unknown, were drawn top
-    down."""
+    """Return the direction in which a graph is drawn; `down` where a document has none or an unknown one."""
     return "right" if value == "right" else "down"
 
 
 def number(value: object) -> float | None:
-    """A finite number."""
+    """Return the value as a finite number; None if it is none."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return None
     return float(value) if math.isfinite(value) else None
@@ -88,7 +87,7 @@ def instance_id(value: object) -> int | None:
 
 
 def position(value: object) -> Position | None:
-    """A pair of numbers."""
+    """Return the value as a pair of numbers; None if it is none."""
     if not isinstance(value, list | tuple) or len(value) != 2:
         return None
     x, y = number(value[0]), number(value[1])
@@ -96,7 +95,7 @@ def position(value: object) -> Position | None:
 
 
 def response(value: object) -> Response | None:
-    """One of the six responses."""
+    """Return the value if it is one of the six responses; None otherwise."""
     return value if isinstance(value, str) and value in RESPONSES else None
 
 
@@ -139,7 +138,7 @@ def _refuse(constant: str) -> None:
 
 
 def _depth(value: object, above: int) -> int:
-    """How deep values are nested; stops counting once it is too deep."""
+    """Return how deep values are nested; stop counting once it is too deep."""
     if not isinstance(value, dict | list) or above > _MAX_DEPTH:
         return above
     inner = value.values() if isinstance(value, dict) else value

@@ -28,7 +28,7 @@ _AS_CLASSES: Final = b"\xf0\x80\x80\x80"
 
 
 class PairedTexts:
-    """Those of one document."""
+    """The texts of one document that have characters of two UTF-16 units."""
 
     def __init__(self, kept: Iterable[PairedText] = ()) -> None:
         self._by_client: Final[dict[int, list[PairedText]]] = {}
@@ -36,7 +36,7 @@ class PairedTexts:
         self._add(kept)
 
     def all(self) -> list[PairedText]:
-        """Those of each client in their order."""
+        """Return the texts, those of each client in their order."""
         return [each for found in self._by_client.values() for each in found]
 
     def check(self, update: bytes, read: UpdateOutline, known: Mapping[int, int]) -> None:
@@ -77,7 +77,8 @@ class PairedTexts:
 
 
 def has_paired_texts(bodies: Sequence[bytes]) -> bool:
-    """Whether any of these stored updates brings such a text. Raises Malformed."""
+    """Tell whether any of these stored updates has a text with characters of two UTF-16 units. Raises
+    Malformed."""
     text = b"\x00".join(bodies).translate(_CLASSES)
     starts: list[int] = []
     at = text.find(_AS_CLASSES)
@@ -91,7 +92,8 @@ def has_paired_texts(bodies: Sequence[bytes]) -> bool:
 
 
 def paired_texts_in(state: bytes) -> list[PairedText]:
-    """Those in a document whose snapshot does not tell them; none where looking for them takes long."""
+    """Search a document for such texts, if its snapshot does not list them. Return none where the search would
+    take long."""
     if len(state) <= _MOST_SOUGHT and _OF_TWO.search(state):
         with suppress(Malformed):
             return list(scanned(state, stored=True).paired)

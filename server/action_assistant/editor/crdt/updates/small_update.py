@@ -24,11 +24,12 @@ _DEEPEST: Final = 8  # of arrays and objects in one value
 
 
 class _NotSmall(Exception):
-    """Something that the scanner has to read."""
+    """The update has a part that only the scanner can read"""
 
 
 def small_outline(update: bytes) -> UpdateOutline | None:
-    """What the scanner says of this update; None where it has to say it."""
+    """Return the outline of a small ordinary update, the same as the scanner's; None where the scanner has to
+    read it."""
     if len(update) > _LARGEST:
         return None
     try:
@@ -95,7 +96,8 @@ def _number(update: bytes, at: int) -> tuple[int, int]:
 def _beside(
     update: bytes, at: int, info: int, needs: dict[int, int]
 ) -> tuple[tuple[int, int], int]:
-    """Which struct one stands beside: the one before it, else the one after it."""
+    """Read the origins of a struct. Return the left neighbour, or the right one where there is no left one, and
+    the offset behind them."""
     beside: tuple[int, int] | None = None
     for side in (0x80, 0x40):
         if info & side:
@@ -127,7 +129,7 @@ def _root(update: bytes, at: int, info: int) -> tuple[bool, int]:
 
 
 def _content(update: bytes, at: int, kind: int) -> tuple[int, int]:
-    """What a struct holds; how many clocks it takes."""
+    """Read the content of a struct. Return how many clocks it takes, and the offset behind it."""
     length, at = _number(update, at)
     if not 0 < length <= _LARGEST:
         raise _NotSmall
@@ -141,7 +143,7 @@ def _content(update: bytes, at: int, kind: int) -> tuple[int, int]:
 
 
 def _value(update: bytes, at: int, deepest: int) -> int:
-    """One value."""
+    """Skip one value; return the offset behind it."""
     kind = update[at]
     at += 1
     if kind in {_TEXT, _BYTES}:

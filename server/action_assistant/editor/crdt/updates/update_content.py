@@ -36,7 +36,7 @@ class ContentReader:
         self.paired = b""
 
     def content(self, kind: int) -> int:
-        """How many clocks the next content takes. Raises Malformed."""
+        """Read the content of one struct, and return how many clocks it takes. Raises Malformed."""
         reader = self._reader
         self.paired = b""
         match kind:
@@ -150,7 +150,7 @@ class ContentReader:
 
 
 def length(reader: ByteReader) -> int:
-    """How many clocks a struct says that it takes. Raises Malformed for none."""
+    """Read the length of a struct in clocks. Raises Malformed for 0."""
     found = reader.number()
     if found == 0:
         raise Malformed("a struct of length 0")

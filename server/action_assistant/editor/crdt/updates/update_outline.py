@@ -21,21 +21,21 @@ class PairedText(msgspec.Struct, frozen=True, array_like=True):
 
     @property
     def end(self) -> int:
-        """The clock after it."""
+        """The first clock after the text."""
         return self.start + len(self.units) // 2
 
     def is_within(self, clock: int) -> bool:
-        """Whether this clock is the second of a character."""
+        """Tell whether this clock is the second of a character of two."""
         return (
             self.start < clock < self.end and self.units[2 * (clock - self.start) + 1] >> 2 == 0x37
         )
 
 
 class UpdateOutline(msgspec.Struct, frozen=True):
-    """What an update brings, `(client, from clock, to clock)`, and what must be there before it:
-    of each client so many clocks. `placed`: what need not lie in a root. `fields`: how many keys that
-    may be new are among it, `actions`: how many of them are new actions; `structs`: how many there are
-    in all; `paired`: texts that cannot be parted anywhere."""
+    """The outline of an update. `brings`: the structs in it, as `(client, from clock, to clock)`. `needs`: how
+    many clocks of each client a document must have before. `placed`: structs that may lie inside of others.
+    `fields`: how many keys may be new, `actions`: how many of them are new actions; `structs`: the number of
+    structs; `paired`: texts with characters of two clocks, which must not be split."""
 
     brings: tuple[tuple[int, int, int], ...]
     needs: dict[int, int]
@@ -46,7 +46,8 @@ class UpdateOutline(msgspec.Struct, frozen=True):
     paired: tuple[PairedText, ...] = ()
 
     def ready(self, known: dict[int, int]) -> bool:
-        """Whether everything that it builds on is known, or comes with it."""
+        """Tell whether a document with these clocks of each client (`known`) has everything that the update
+        builds on."""
         ends: dict[int, int] = {}
         if len(self.brings) == 1:  # nearly always
             client, start, end = self.brings[0]

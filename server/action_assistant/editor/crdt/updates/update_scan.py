@@ -69,7 +69,7 @@ _ACTION: Final = "action"
 
 
 class Scan:
-    """What was read so far."""
+    """Reads an update struct by struct, and collects its outline."""
 
     def __init__(self, reader: ByteReader, *, stored: bool) -> None:
         self.parted: Final[list[tuple[int, int]]] = []
@@ -85,7 +85,7 @@ class Scan:
         self._structs = self._actions = self._fields = 0
 
     def whole(self) -> None:
-        """All of an update. Raises Malformed."""
+        """Read the whole update. Raises Malformed."""
         reader = self._reader
         clients = reader.number()
         if clients > MOST_CLIENTS or clients * 3 > reader.left:
@@ -97,7 +97,7 @@ class Scan:
             raise Malformed("something follows the update")
 
     def outline(self) -> UpdateOutline:
-        """What that says."""
+        """Return the outline of the update that was read."""
         return UpdateOutline(
             tuple(self._brings),
             self._needs,
@@ -152,7 +152,8 @@ class Scan:
         return clock
 
     def _struct(self, info: int, needs: dict[int, int]) -> tuple[int, _Reference | None, _Fresh]:
-        """How many clocks it takes, where it lies, and which key may be new with it."""
+        """Read one struct. Return how many clocks it takes, the struct that tells where it lies, and the kind
+        of key that may be new with it."""
         reader, kind = self._reader, info & 31
         if kind == _GC:
             return length(reader), None, _NONE
