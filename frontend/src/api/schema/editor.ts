@@ -2,7 +2,7 @@
 export interface EditorApi {
     /**
      * ActionBuilt
-     * @description Somebody told how the last build of the package of an action went; `at` is when that ended.
+     * @description A build of the package of an action was reported; `at` is when it ended.
      */
     ActionBuilt: {
         package: string;
@@ -199,8 +199,8 @@ export interface EditorApi {
     };
     /**
      * Changes
-     * @description What somebody changed, as a difference, with at most 30 things of a kind and how many more there are.
-     *     `comments`: threads in which something was said.
+     * @description The changes of somebody as a difference, with at most 30 things of each kind, and the number of others.
+     *     `comments`: the number of threads with new comments.
      */
     Changes: {
         /** @default [] */
@@ -218,7 +218,7 @@ export interface EditorApi {
     };
     /**
      * Command
-     * @description What a person does to the graph, and when.
+     * @description A command that a person gives to the running graph, and its time.
      */
     Command: {
         at_ms: number;
@@ -238,7 +238,7 @@ export interface EditorApi {
     };
     /**
      * Counts
-     * @description How many problems of each severity.
+     * @description The number of problems of each severity.
      */
     Counts: {
         error: number;
@@ -324,7 +324,7 @@ export interface EditorApi {
     };
     /**
      * DraftAnswer
-     * @description Somebody's yes or no, having seen the draft after its change `seq`.
+     * @description A person's answer to a proposal, given for the draft after its change `seq`.
      */
     DraftAnswer: {
         author: EditorApi["PersonRef"];
@@ -336,9 +336,9 @@ export interface EditorApi {
     };
     /**
      * DraftConflict
-     * @description What both sides changed since they were last one. `place` is what a choice names; `what` says in
-     *     words what it is about; `removed`: the side that removed it, while the other went on with it.
-     *     `origin` and `draft`: what each side did to it.
+     * @description A conflict between both sides of a draft. `place` is the name by which a choice refers to it; `what`
+     *     names the thing in words; `removed`: the side that removed it while the other changed it. `origin` and
+     *     `draft`: the changes of each side to it.
      */
     DraftConflict: {
         place: string;
@@ -349,7 +349,7 @@ export interface EditorApi {
     };
     /**
      * DraftMoment
-     * @description What both sides are compared with: what the graph was after its change `seq`.
+     * @description The state with which both sides are compared: the graph `graph` after its change `seq`.
      */
     DraftMoment: {
         graph: string;
@@ -366,8 +366,7 @@ export interface EditorApi {
     };
     /**
      * DraftProposal
-     * @description Somebody would like the draft to be merged. `answers`: the last one of each person, in order of
-     *     time.
+     * @description A proposal to merge a draft. `answers`: the last answer of each person, in order of time.
      */
     DraftProposal: {
         author: EditorApi["PersonRef"];
@@ -418,7 +417,7 @@ export interface EditorApi {
     };
     /**
      * EditsOfOne
-     * @description What one person, by id, changed from the change `from_seq` to `seq`.
+     * @description A request to revert what one person, given by id, changed from the change `from_seq` to `seq`.
      */
     EditsOfOne: {
         author: string;
@@ -451,9 +450,9 @@ export interface EditorApi {
     };
     /**
      * ExtractionLook
-     * @description What a sub-graph of chosen actions would be. `umrf`: that graph; null where there is none, for these
-     *     `reasons`. `inputs`, `outputs`: what it takes and gives, by flat name, with types. `changes`: of the
-     *     document of the graph around it after `seq`. `differences`: in what it may then do otherwise.
+     * @description A preview of moving actions into a sub-graph. `umrf`: the sub-graph; null where there can be none, for
+     *     these `reasons`. `inputs`, `outputs`: its parameters by flat name, with their types. `changes`: of the
+     *     document of the outer graph after `seq`. `differences`: in which ways the graph may then behave otherwise.
      */
     ExtractionLook: {
         seq: number;
@@ -481,8 +480,8 @@ export interface EditorApi {
     };
     /**
      * FieldBlame
-     * @description Of which field, as the document's keys name it (docs/contracts.md 1): `in/speed`, `on_true`, "" for
-     *     the name of an action; and `position`.
+     * @description The author of one field, named as in the keys of the document (docs/contracts.md 1): `in/speed`,
+     *     `on_true`, "" for the name of an action; and `position`.
      */
     FieldBlame: {
         value: unknown;
@@ -518,10 +517,11 @@ export interface EditorApi {
     };
     /**
      * FlatGraph
-     * @description What a graph with its sub-graphs is as one graph (docs/decisions/069-flatten.md).
+     * @description A graph with its sub-graphs, flattened into one graph (docs/decisions/069-flatten.md).
      *
-     *     `umrf`: that graph, under the same name; null where none is known to do the same, for these
-     *     `reasons`. `origins`: where each of its actions comes from. `left_out`: what no action has now.
+     *     `umrf`: the flat graph, under the same name; null where none is known to do the same, for these `reasons`.
+     *     `origins`: the graph and action from which each of its actions comes. `left_out`: fields that no action has
+     *     any more.
      */
     FlatGraph: {
         seq: number;
@@ -555,8 +555,8 @@ export interface EditorApi {
     };
     /**
      * GoneBack
-     * @description How far the log of the graph goes now, and of what not all was taken back, since others have changed
-     *     it or built on it: actions, notes and arrows by their keys.
+     * @description The result of going back. `seq`: the last change of the graph now. `left`: keys of actions, notes and
+     *     arrows that were not fully reverted, since others have changed them or built on them.
      */
     GoneBack: {
         seq: number;
@@ -691,13 +691,13 @@ export interface EditorApi {
     };
     /**
      * HistoryEntry
-     * @description Something that was done to a graph, between `at` and `until`.
+     * @description One entry of the history of a graph, from `at` to `until`.
      *
-     *     `seq` is the change of the document that `…/umrf?at=` and `…/restore` take to see the graph as it
-     *     was after that edit; edits begin at `from_seq`, and others may have edited between the two.
-     *     `restored` is the change that was gone back to, `adapted` that of which parameters were taken over,
-     *     `reverted` what was taken back, `merged` what was brought in. `changes` is what this person changed; null where that is too much
-     *     to tell here, or nothing.
+     *     `seq` is the change of the document that `…/umrf?at=` and `…/restore` take to show the graph after this
+     *     entry; edits begin at `from_seq`, and others may have edited between the two. `restored`: the change that
+     *     was restored; `adapted`: the change of the action whose parameters were taken over; `reverted`: the edits
+     *     that were reverted; `merged`: the edits that were merged. `changes`: what this person changed; null where
+     *     there is nothing, or too much to list here.
      */
     HistoryEntry: {
         /** @enum {string} */
@@ -718,7 +718,7 @@ export interface EditorApi {
     };
     /**
      * ImportReport
-     * @description What was found in an imported file: its dialect, what was translated, what is wrong.
+     * @description A report on an imported file: its dialect, what was translated, and its problems.
      *
      *     `remarks` are the notes with their places; all places are in the file as it was sent.
      */
@@ -960,10 +960,11 @@ export interface EditorApi {
     };
     /**
      * MergePreview
-     * @description What a merge would do to the side `into`, where everything that has no choice stays as it is there.
+     * @description The effect of a merge on the side `into`, where conflicts without a choice stay as they are there.
      *
-     *     `seq`, `draft_seq`: the moments that it is about. `changes`: what would change. `problems`: those that this side has not now.
-     *     `umrf`: the text of what comes of it. `authors`: whose changes they are. `origin_did`, `draft_did`: what each side did since they were one.
+     *     `seq`, `draft_seq`: the compared changes of both sides. `changes`: what would change. `problems`: those that
+     *     are new on this side. `umrf`: the resulting text. `authors`: the people whose changes are merged.
+     *     `origin_did`, `draft_did`: the changes of each side since the last merge.
      */
     MergePreview: {
         /** @enum {string} */
@@ -980,8 +981,8 @@ export interface EditorApi {
     };
     /**
      * MergedBy
-     * @description How a value came from another graph: which, and its change there; by whom and when it was merged;
-     *     what the draft is called.
+     * @description The origin of a value that was merged: the graph and its change there, the person who merged it and when,
+     *     and the name of the draft.
      */
     MergedBy: {
         graph: string;
@@ -1012,8 +1013,8 @@ export interface EditorApi {
     };
     /**
      * MergedIn
-     * @description What was brought in: the changes `from_seq` to `seq` of the graph `source`, which is the draft that
-     *     is called `name`, or what that is a draft of; and whose they are.
+     * @description The edits that were merged: the changes `from_seq` to `seq` of the graph `source`, and their authors.
+     *     `source` is the draft called `name`, or the graph of which that is a draft.
      */
     MergedIn: {
         draft: string;
@@ -1025,7 +1026,8 @@ export interface EditorApi {
     };
     /**
      * NewDraft
-     * @description What to call a draft, and of which change of the graph it begins; left out: of the last one.
+     * @description A request for a draft: its name, and the change of the graph that it begins with; the last one if left
+     *     out.
      */
     NewDraft: {
         /** @default  */
@@ -1150,7 +1152,7 @@ export interface EditorApi {
     };
     /**
      * PackageRefusal
-     * @description Why an action has no package. `place`: its name, and below it a JSON pointer.
+     * @description The reason why an action has no package. `place`: the name of the action, and below it a JSON pointer.
      */
     PackageRefusal: {
         action: string;
@@ -1246,8 +1248,8 @@ export interface EditorApi {
     };
     /**
      * Preview
-     * @description What a file would become. `problems`: those of the file, then those of the graph. `remarks`
-     *     are the notes with their places; all places are in the file as it was sent.
+     * @description The graph that importing a file would make. `problems`: those of the file, then those of the graph.
+     *     `remarks` are the notes with their places; all places are in the file as it was sent.
      */
     Preview: {
         dialect: string;
@@ -1366,7 +1368,7 @@ export interface EditorApi {
     };
     /**
      * Rehearsal
-     * @description Everything that would happen, in order. `cut`: there is more than is told.
+     * @description The events of a simulated run, in order. `cut`: whether there are more than are listed.
      */
     Rehearsal: {
         seq: number;
@@ -1375,8 +1377,8 @@ export interface EditorApi {
     };
     /**
      * Rehearsing
-     * @description What to play: the graph after its change `seq` (left out: now), what its actions do as in
-     *     a script of `simulate`, and what people do meanwhile.
+     * @description A request to simulate the graph after its change `seq`, the newest if left out. `script`: what its
+     *     actions do, as in a script of `simulate`; `commands`: what people do meanwhile.
      */
     Rehearsing: {
         /** @default null */
@@ -1437,7 +1439,7 @@ export interface EditorApi {
     };
     /**
      * Reverted
-     * @description Whose changes were taken back, from which to which.
+     * @description The edits that were reverted: their author, the first and the last change.
      */
     Reverted: {
         author: EditorApi["PersonRef"];
@@ -1513,9 +1515,10 @@ export interface EditorApi {
     };
     /**
      * SinceWhen
-     * @description Where the course changes between `good` and `bad`, in order of time. `same`: at `bad` it is the one
-     *     of `good`. `exact`: there is no further place; else only some moments were looked at, and it may have
-     *     changed and changed back between two of them. `looked`: how many moments were simulated.
+     * @description The changes between `good` and `bad` after which the course of a graph differs, in order of time. `same`:
+     *     whether the course at `bad` is that at `good`. `exact`: whether there are no others; otherwise only some
+     *     moments were simulated, and the course may have changed and changed back between them. `looked`: the number
+     *     of simulated moments.
      */
     SinceWhen: {
         good: number;
@@ -1576,8 +1579,8 @@ export interface EditorApi {
     };
     /**
      * TextEdit
-     * @description What an edited text would change after `seq`, and the errors that the graph would then have
-     *     and does not have yet, with their places in that text.
+     * @description The changes that an edited text makes to the graph after `seq`, and the errors that are new with it, with
+     *     their places in that text.
      */
     TextEdit: {
         seq: number;
@@ -1602,9 +1605,10 @@ export interface EditorApi {
     };
     /**
      * UnpackingLook
-     * @description What the document of a graph would have instead of an action that stands for another graph, which is
-     *     `inside`: `changes` after `seq`, none for these `reasons`. `actions`: the keys of what is new;
-     *     `differences`: in what the graph may then do otherwise; `left_out`: fields that no action has now.
+     * @description A preview of replacing an action by the actions of the graph `inside` that it stands for. `changes`: of
+     *     the document after `seq`; none where it cannot be done, for these `reasons`. `actions`: the keys of the new
+     *     actions; `differences`: in which ways the graph may then behave otherwise; `left_out`: fields that no action
+     *     has any more.
      */
     UnpackingLook: {
         seq: number;

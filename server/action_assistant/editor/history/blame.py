@@ -43,8 +43,8 @@ class FieldValue(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class FieldBlame(FieldValue, frozen=True, kw_only=True, omit_defaults=True):
-    """Of which field, as the document's keys name it (docs/contracts.md 1): `in/speed`, `on_true`, "" for
-    the name of an action; and `position`."""
+    """The author of one field, named as in the keys of the document (docs/contracts.md 1): `in/speed`,
+    `on_true`, "" for the name of an action; and `position`."""
 
     field: str
 
@@ -122,7 +122,7 @@ def steps(
 def _values(
     connection: Connection, graph: str, changes: Sequence[LoggedChange]
 ) -> list[FieldValue]:
-    """What people gave, whoever merged it."""
+    """Return the values that people gave a field. A value that was merged keeps the person who gave it."""
     person = stored_people(connection)
     return [
         FieldValue(

@@ -37,7 +37,8 @@ _c, _head = key_change.c, key_change_head.c
 
 
 class ChangeIndex:
-    """Which keys each event changed. What it stores is derived, and may vanish at any time."""
+    """Keeps an index of the keys that each event changed. The index is derived from the log and may be deleted
+    at any time."""
 
     def __init__(self, journal: Journal, run_in_worker: RunInWorker = run_here) -> None:
         self._journal = journal
@@ -152,7 +153,7 @@ class ChangeIndex:
 
 
 def _answered(url: str, question: Callable[..., T], args: tuple[Any, ...]) -> T:
-    """Ask in a worker."""
+    """Ask the question with a connection of the worker's own. Runs in a worker."""
     return ask_from_worker(url, lambda connection: question(connection, *args))
 
 

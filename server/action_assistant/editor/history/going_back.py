@@ -19,7 +19,7 @@ _MOST: Final = 100_000  # changes of keys that are taken back at once
 
 
 class EditsOfOne(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What one person, by id, changed from the change `from_seq` to `seq`."""
+    """A request to revert what one person, given by id, changed from the change `from_seq` to `seq`."""
 
     author: str
     from_seq: int
@@ -27,8 +27,8 @@ class EditsOfOne(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class GoneBack(msgspec.Struct, frozen=True):
-    """How far the log of the graph goes now, and of what not all was taken back, since others have changed
-    it or built on it: actions, notes and arrows by their keys."""
+    """The result of going back. `seq`: the last change of the graph now. `left`: keys of actions, notes and
+    arrows that were not fully reverted, since others have changed them or built on them."""
 
     seq: int
     left: tuple[str, ...] = ()

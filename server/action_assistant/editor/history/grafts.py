@@ -20,8 +20,8 @@ from action_assistant.web.auth.keys import PersonRef
 
 
 class Graft(msgspec.Struct, frozen=True):
-    """What the change `seq` of a graph brought in was what `source` was after its change `upto`. `name`:
-    what the draft is called, None where the graph itself was made as a draft."""
+    """A record that the change `seq` of a graph merged what `source` was after its change `upto`. `name`: the
+    name of the draft; None where the graph itself was made as a draft."""
 
     seq: int
     source: str
@@ -39,8 +39,8 @@ class Original(msgspec.Struct, frozen=True):
 
 
 class MergedBy(msgspec.Struct, frozen=True):
-    """How a value came from another graph: which, and its change there; by whom and when it was merged;
-    what the draft is called."""
+    """The origin of a value that was merged: the graph and its change there, the person who merged it and when,
+    and the name of the draft."""
 
     graph: str
     seq: int

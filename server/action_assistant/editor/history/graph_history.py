@@ -42,7 +42,7 @@ class TakenFrom(msgspec.Struct, frozen=True):
 
 
 class Reverted(msgspec.Struct, frozen=True):
-    """Whose changes were taken back, from which to which."""
+    """The edits that were reverted: their author, the first and the last change."""
 
     author: PersonRef
     from_seq: int
@@ -50,8 +50,8 @@ class Reverted(msgspec.Struct, frozen=True):
 
 
 class MergedIn(msgspec.Struct, frozen=True):
-    """What was brought in: the changes `from_seq` to `seq` of the graph `source`, which is the draft that
-    is called `name`, or what that is a draft of; and whose they are."""
+    """The edits that were merged: the changes `from_seq` to `seq` of the graph `source`, and their authors.
+    `source` is the draft called `name`, or the graph of which that is a draft."""
 
     draft: str
     name: str
@@ -66,13 +66,13 @@ _Special: TypeAlias = int | TakenFrom | Reverted | MergedIn
 
 
 class HistoryEntry(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """Something that was done to a graph, between `at` and `until`.
+    """One entry of the history of a graph, from `at` to `until`.
 
-    `seq` is the change of the document that `…/umrf?at=` and `…/restore` take to see the graph as it
-    was after that edit; edits begin at `from_seq`, and others may have edited between the two.
-    `restored` is the change that was gone back to, `adapted` that of which parameters were taken over,
-    `reverted` what was taken back, `merged` what was brought in. `changes` is what this person changed; None where that is too much
-    to tell here, or nothing.
+    `seq` is the change of the document that `…/umrf?at=` and `…/restore` take to show the graph after this
+    entry; edits begin at `from_seq`, and others may have edited between the two. `restored`: the change that
+    was restored; `adapted`: the change of the action whose parameters were taken over; `reverted`: the edits
+    that were reverted; `merged`: the edits that were merged. `changes`: what this person changed; None where
+    there is nothing, or too much to list here.
     """
 
     kind: Kind
@@ -136,7 +136,7 @@ def _shown(
 
 
 def _edits(shown: Sequence[Sitting]) -> list[Stretch]:
-    """Those of the sittings that changed the document."""
+    """Return the stretches of those sessions that changed the document."""
     return [
         Stretch(sitting.author, sitting.from_seq, sitting.seq)
         for sitting in shown
@@ -188,7 +188,7 @@ def _entry(
 def _changes(
     connection: Connection, graph: str, shown: Sequence[Sitting]
 ) -> dict[tuple[str, int], Changes]:
-    """What each sitting changed, by its author and end."""
+    """Return the changes of each session, by its author and its last change."""
     edits = _edits(shown)
     if not edits:
         return {}
@@ -277,7 +277,7 @@ def _step(row: Row[Any], special: Mapping[int, _Special]) -> Step | None:
 
 
 def _touched(rows: Sequence[LoggedChange]) -> set[str]:
-    """What changes speak of, and the actions between which arrows are."""
+    """Return the owners of the changed keys, with the actions at the ends of arrows among them."""
     owners = {owner_of(row.root, row.key) for row in rows}
     ends = {end for owner in owners if (found := ends_of(owner)) for end in found[:2]}
     return owners | ends

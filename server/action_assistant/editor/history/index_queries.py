@@ -28,10 +28,10 @@ COLUMNS: Final = ("graph", "owner", *LoggedChange._fields)
 
 
 class IndexGrowth(msgspec.Struct, frozen=True):
-    """What the index lacks: rows, as MessagePack by the slice, and the head that follows them.
+    """The rows that the index lacks, as slices of MessagePack, and the head that follows them.
 
-    `after`: the head before. `leftovers`: rows after it are stored, of an earlier attempt that did not
-    reach its end. `unreadable`: the document of the head is none of this version, so all starts anew.
+    `after`: the head before. `leftovers`: whether rows after it are stored from an attempt that did not finish.
+    `unreadable`: whether the document of the head is of another version, so that the index is made anew.
     """
 
     after: int

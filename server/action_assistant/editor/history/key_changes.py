@@ -35,14 +35,14 @@ class LoggedChange(NamedTuple):
 
     @property
     def place(self) -> Place:
-        """Which key it is."""
+        """The key that was changed, with its root."""
         return self.root, self.key
 
 
 class ObservedEvents(msgspec.Struct, frozen=True):
-    """What some events changed, and the document after them, as the bytes of a snapshot, at `seq`.
+    """The changes of keys by some events, and the document after them, as the bytes of a snapshot, at `seq`.
 
-    `damaged`: the event after `seq` cannot be applied.
+    `damaged`: whether the event after `seq` cannot be applied.
     """
 
     document: bytes
@@ -52,8 +52,8 @@ class ObservedEvents(msgspec.Struct, frozen=True):
 
 
 def observed(document: bytes, events: Sequence[Event]) -> ObservedEvents | None:
-    """What events change that follow a document, which is a snapshot's bytes or nothing. None when these
-    bytes are no document."""
+    """Apply events to a document, given as the bytes of a snapshot or empty, and return the keys that each
+    changed. Return None when these bytes are no snapshot."""
     replica = ReplicaState.replica(document) if document else Replica()
     if replica is None:
         return None
@@ -77,7 +77,7 @@ def observed(document: bytes, events: Sequence[Event]) -> ObservedEvents | None:
 
 
 def owner_of(root: Root, key: str) -> str:
-    """What a key speaks of: an action or an end by its key, a relation by its id, a note as `g/ID`, a
+    """Return the owner of a key: an action or an end by its key, a relation by its id, a note as `g/ID`, a
     thread as `c/THREAD`, the graph as ""."""
     if root == "meta":
         return ""
@@ -104,7 +104,7 @@ class _Observer:
         }
 
     def changes(self, event: Event) -> list[LoggedChange]:
-        """What was heard since this was asked last; it is the event's doing."""
+        """Return the changes observed since the last call; `event` made them."""
         heard, self._heard = self._heard, {}
         return [
             LoggedChange(event.seq, event.author, event.at, *place, _packed(before), _packed(after))

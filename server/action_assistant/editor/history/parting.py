@@ -56,9 +56,9 @@ class CourseParting(msgspec.Struct, frozen=True):
 
 
 class Followed(msgspec.Struct, frozen=True):
-    """Where courses part between two moments, in order of time. `same`: at the later one it is the one
-    of the earlier one. `exact`: nothing lies between that was not looked at, so that there are no
-    further partings; `looked`: how many moments were simulated."""
+    """The changes after which the course of a graph differs, in order of time. `same`: whether the course at
+    the end is that at the beginning. `exact`: whether every moment between was ruled out or simulated;
+    `looked`: the number of simulated moments."""
 
     same: bool
     exact: bool
@@ -76,7 +76,7 @@ def followed_between(
     named_at: int,
     inside: Inside,
 ) -> Followed:
-    """As `followed`, of a graph between two of its moments. Raises TooLarge."""
+    """Search the changes of a graph between two of its moments, as `followed` does. Raises TooLarge."""
     changes = stretch_of(connection, graph, good, bad, limit)
     base = index_queries.at(connection, graph, good)
     return followed(base, changes, script, named_at, inside=inside)
@@ -90,9 +90,9 @@ def followed(
     budget_s: float = _BUDGET_S,
     inside: Inside = NOTHING_INSIDE,
 ) -> Followed:
-    """Where the course parts from the one that the graph takes before the `changes`, which are in order
-    of time. `base`: what each key held then. The script's names are those of the moment `named_at`.
-    `inside`: the graphs inside, the same at every moment."""
+    """Find the changes after which the simulated course differs from the one before the first of them.
+    `changes`: in order of time. `base`: the value of each key before them. The names in `script` are those
+    after the change `named_at`. `inside`: the graphs inside, the same at every moment."""
     past = _Past(base, changes, script, named_at, graphs_of(inside))
     if not past.moments:
         return Followed(True, True, 1, ())
@@ -155,15 +155,15 @@ class _Past:
 
     @property
     def looked(self) -> int:
-        """How many moments were simulated."""
+        """The number of moments that were simulated."""
         return len(self._courses)
 
     def is_same(self, moment: int) -> bool:
-        """Whether the course is the first one."""
+        """Tell whether the course of a moment is that of the first one."""
         return self._course(moment) == self._reference
 
     def parting(self, left: int, right: int) -> CourseParting:
-        """What happens between two neighbours, the later one told."""
+        """Describe how the courses of two neighbouring moments differ, as a fact about the later one."""
         change = self.moments[right - 1]
         before, after = self._graph(left), self._graph(right)
         apart = departure(self._course(left), self._course(right))

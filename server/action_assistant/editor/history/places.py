@@ -15,7 +15,7 @@ _OUTCOMES: Final = frozenset(PRECONDITIONS)
 
 
 def places_of(state: bytes) -> dict[Place, Any]:
-    """What a document holds, by place."""
+    """Return the values of a document by their place (root and key)."""
     doc: Doc[Any] = Doc()
     doc.apply_update(state)
     maps = document.maps_of(doc)
@@ -23,7 +23,7 @@ def places_of(state: bytes) -> dict[Place, Any]:
 
 
 def field_of(root: Root, key: str) -> str:
-    """What a key says of its owner."""
+    """Return the field of its owner that a key holds."""
     if root == "meta":
         return key
     if root == "positions":
@@ -32,7 +32,7 @@ def field_of(root: Root, key: str) -> str:
 
 
 def proves(place: Place) -> bool:
-    """Whether the thing that a key speaks of exists because of it."""
+    """Tell whether the owner of a key exists because of this key."""
     root, key = place
     match root:
         case "actions":
@@ -44,7 +44,7 @@ def proves(place: Place) -> bool:
 
 
 def is_place_of_card(place: Place) -> bool:
-    """Whether a key says where something stands, or how a line is led."""
+    """Tell whether a key holds the position of a card or of a line."""
     root, key = place
     return root == "positions" and not key.startswith("g/")
 

@@ -39,7 +39,7 @@ class TakenBack(msgspec.Struct, frozen=True):
 def reverting_edits(
     connection: Connection, graph: str, state: bytes, author: str, first: int, last: int, limit: int
 ) -> TakenBack | None:
-    """As `reverting`, of what a person changed from the change `first` to `last`; None where that is
+    """Revert what a person changed from the change `first` to `last`, as `reverting` does; None where that is
     nothing. Raises TooLarge."""
     changes = index_queries.between(connection, graph, first - 1, last, limit + 1, author)
     if len(changes) > limit:
@@ -50,7 +50,8 @@ def reverting_edits(
 
 
 def one_as_it_was(connection: Connection, graph: str, state: bytes, seq: int, owner: str) -> bytes:
-    """As `as_it_was`, after the change `seq`. Raises NotFound."""
+    """Return the update that makes one thing as it was after the change `seq`, as `as_it_was` does. Raises
+    NotFound."""
     then = index_queries.at(connection, graph, seq)
     if not owner or all(owner_of(*change.place) != owner for change in then):
         raise NotFound(f"There was nothing {owner!r} in this graph after its change {seq}.")
@@ -89,7 +90,7 @@ def as_it_was(state: bytes, then: Sequence[LoggedChange], owner: str) -> bytes:
 
 
 class _Sitting:
-    """What one person did to each key, beside what is there now."""
+    """The changes of one person by key, compared with the document now."""
 
     def __init__(
         self,
@@ -117,11 +118,11 @@ class _Sitting:
             self._kept |= more
 
     def targets(self) -> dict[Place, Packed]:
-        """What each key is to hold again."""
+        """Return the values that keys get back."""
         return {p: old for p, old in self._first.items() if self._goes_back(p)}
 
     def left(self) -> tuple[str, ...]:
-        """Of what something stays."""
+        """Return the owners of which something is not reverted."""
         stay = {
             owner_of(*place)
             for place, old in self._first.items()
@@ -139,17 +140,17 @@ class _Sitting:
         return place in self._last and self._is_untouched(place)
 
     def _is_untouched(self, place: Place) -> bool:
-        """Whether nobody has set a key since this person did."""
+        """Tell whether nobody has set a key since this person did."""
         mine = self._last[place]
         return self._latest[place] == mine.seq and self._now.get(place) == unpacked(mine.after)
 
     def _was_made(self, owner: str) -> bool:
-        """Whether a thing that is there now was made in this sitting."""
+        """Tell whether a thing that exists now was made by these changes."""
         proofs = [place for place in self._places.get(owner, ()) if proves(place)]
         return bool(proofs) and all(self._first.get(place, b"") is None for place in proofs)
 
     def _is_in_use(self, owner: str) -> bool:
-        """Whether others have changed a thing, or led an arrow to it that stays."""
+        """Tell whether others have changed a thing, or connected an arrow to it that stays."""
         own = [place for place in self._places[owner] if not is_place_of_card(place)]
         if any(place in self._latest and not self._is_mine(place) for place in own):
             return True

@@ -45,9 +45,10 @@ class CourseChange(msgspec.Struct, frozen=True):
 
 
 class SinceWhen(msgspec.Struct, frozen=True):
-    """Where the course changes between `good` and `bad`, in order of time. `same`: at `bad` it is the one
-    of `good`. `exact`: there is no further place; else only some moments were looked at, and it may have
-    changed and changed back between two of them. `looked`: how many moments were simulated."""
+    """The changes between `good` and `bad` after which the course of a graph differs, in order of time. `same`:
+    whether the course at `bad` is that at `good`. `exact`: whether there are no others; otherwise only some
+    moments were simulated, and the course may have changed and changed back between them. `looked`: the number
+    of simulated moments."""
 
     good: int
     bad: int
@@ -58,7 +59,7 @@ class SinceWhen(msgspec.Struct, frozen=True):
 
 
 class CourseSearch:
-    """Answers it."""
+    """Searches the history of a graph for the changes that altered its simulated course."""
 
     def __init__(
         self,
@@ -71,7 +72,7 @@ class CourseSearch:
         self._people = people
 
     async def since(self, graph: str, asked: AskingSince) -> SinceWhen:
-        """Where the course changes. Raises BadInput, TooLarge, Unavailable."""
+        """Search between two changes of a graph. Raises BadInput, TooLarge, Unavailable."""
         try:
             script = script_from(asked.script)
         except ValueError as error:

@@ -35,8 +35,8 @@ class Step(NamedTuple):
 
 
 class Sitting(msgspec.Struct, frozen=True):
-    """What one person did between `at` and `until`, from the change `from_seq` to `seq`; others may have
-    edited meanwhile. Of what is no edit `from_seq` is None, and `seq` the change before it."""
+    """The edits of one person between `at` and `until`, from the change `from_seq` to `seq`; others may have
+    edited meanwhile. For an entry that is no edit, `from_seq` is None and `seq` the change before it."""
 
     kind: Kind
     author: str

@@ -34,8 +34,8 @@ _ENDS: Final = {ENTRY, EXIT}
 
 
 class Changes(msgspec.Struct, frozen=True, omit_defaults=True):
-    """What somebody changed, as a difference, with at most 30 things of a kind and how many more there are.
-    `comments`: threads in which something was said."""
+    """The changes of somebody as a difference, with at most 30 things of each kind, and the number of others.
+    `comments`: the number of threads with new comments."""
 
     fields: tuple[Field, ...] = ()
     actions: tuple[ActionChange, ...] = ()
@@ -56,8 +56,8 @@ class Stretch(msgspec.Struct, frozen=True, array_like=True):
 def told(
     base: Sequence[LoggedChange], changes: Sequence[LoggedChange], stretches: Sequence[Stretch]
 ) -> list[Changes]:
-    """What each stretch changed. `base`: what was there before the `changes`, which are in order of
-    time, as far as it is about what they touch."""
+    """Return the changes of each stretch. `changes` are in order of time; `base` holds the values before them
+    of the keys that they touch."""
     state = state_of(base)
     own: list[dict[Place, tuple[Packed, Packed]]] = [{} for _ in stretches]
     found = [Changes() for _ in stretches]
@@ -155,12 +155,12 @@ def names(changes: Iterable[LoggedChange]) -> tuple[str, tuple[str, ...]]:
 
 
 def _is_name_of_action(change: LoggedChange) -> bool:
-    """Whether it is what an action is called: the key of an action alone holds that."""
+    """Tell whether a change sets the name of an action, which is stored under its bare key."""
     return change.root == "actions" and "|" not in change.key
 
 
 class _Current:
-    """Which stretch a change belongs to. Those of one person follow one another."""
+    """Finds the stretch of a change. The stretches of one person do not overlap."""
 
     def __init__(self, stretches: Sequence[Stretch]) -> None:
         self._of: dict[str, list[tuple[int, Stretch]]] = {}
@@ -208,7 +208,7 @@ def shortened(found: Difference, owners: Set[str]) -> Changes:
 
 
 def _most(actions: Sequence[ActionChange]) -> tuple[ActionChange, ...]:
-    """What means something comes before what only stands elsewhere."""
+    """Return at most 30 changes of actions; those that only move a card come last."""
 
     def moved_only(change: ActionChange) -> bool:
         return change.change == "changed" and all(f.field == "position" for f in change.fields)

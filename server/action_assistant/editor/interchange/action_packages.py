@@ -29,7 +29,7 @@ class PackageOutline(msgspec.Struct, frozen=True):
 
 
 class PackageRefusal(msgspec.Struct, frozen=True):
-    """Why an action has no package. `place`: its name, and below it a JSON pointer."""
+    """The reason why an action has no package. `place`: the name of the action, and below it a JSON pointer."""
 
     action: str
     place: str
@@ -64,7 +64,7 @@ class PackageContents(msgspec.Struct, frozen=True):
 
 
 def listed(sight: GraphAtSeq, kind: DocumentKind) -> bytes:
-    """JSON of a `PackageList`."""
+    """Return the packages of a graph's actions, as JSON of a `PackageList`."""
     graph = _of(sight, kind)
     refusals = tuple(dict.fromkeys(_refusals(graph, kind)))
     refused = {refusal.action for refusal in refusals}

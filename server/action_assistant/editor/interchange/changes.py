@@ -22,7 +22,7 @@ from action_assistant.umrf.model import Graph
 
 
 def difference(state: bytes, edit: Callable[[Doc[Any]], None]) -> bytes:
-    """What `edit` changes in a document with this content, as one update."""
+    """Call `edit` on a copy of a document, and return its changes as one update."""
     copy: Doc[Any] = Doc()
     if state:
         copy.apply_update(state)

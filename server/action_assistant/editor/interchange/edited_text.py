@@ -47,8 +47,8 @@ class KeyChange(msgspec.Struct, frozen=True):
 
 
 class TextEdit(msgspec.Struct, frozen=True):
-    """What an edited text would change after `seq`, and the errors that the graph would then have
-    and does not have yet, with their places in that text."""
+    """The changes that an edited text makes to the graph after `seq`, and the errors that are new with it, with
+    their places in that text."""
 
     seq: int
     changes: tuple[KeyChange, ...]
@@ -56,7 +56,8 @@ class TextEdit(msgspec.Struct, frozen=True):
 
 
 def edited_text(sight: GraphAtSeq, text: bytes, inside: Inside) -> bytes:
-    """What an edited text changes, as JSON of a `TextEdit`. For workers. Raises as `text_edit`."""
+    """Compare an edited text with its graph; return JSON of a `TextEdit`. For workers. Raises as `text_edit`
+    does."""
     found = read(sight)
     return msgspec.json.encode(text_edit(found.moment, text, found.problems(inside), inside))
 
@@ -67,10 +68,10 @@ def text_edit(
     known: Iterable[Problem] = (),
     inside: Inside = NOTHING_INSIDE,
 ) -> TextEdit:
-    """What `text`, edited from the canonical text of `moment`, changes. `known`: the problems that
-    the graph has already, with these graphs `inside`.
+    """Compare `text`, edited from the canonical text of `moment`, with its graph, and return the changes.
+    `known`: the problems that the graph has already, with these graphs `inside`.
 
-    Raises BadInput, NotUmrf, TooLarge with the place; nothing is stored either way.
+    Raises BadInput, NotUmrf, TooLarge with the place.
     """
     shown = codec.read(codec.write(moment.graph))
     wanted = importing.read(text)
@@ -141,7 +142,7 @@ def _aligned(old: Graph, wanted: Graph) -> dict[Key, Key]:
 
 
 def _gaps(order: Sequence[Key], kept: set[Key]) -> dict[Key, list[Key]]:
-    """Those that were not kept, by the kept one before them."""
+    """Group the keys that were not kept by the kept key before them; "" stands for the beginning."""
     found: dict[Key, list[Key]] = defaultdict(list)
     last = ""
     for key in order:
@@ -179,7 +180,7 @@ def _place(text: str, path: str) -> dict[str, object] | None:
 
 
 def _naming(file: object, ghost: Action) -> str:
-    """Where a file first names an action in a list of relations."""
+    """Return the JSON pointer at which a file first names an action in a list of relations."""
     if not isinstance(file, dict):
         return ""
     lists: list[tuple[tuple[str | int, ...], object]] = [
@@ -203,7 +204,7 @@ def _naming(file: object, ghost: Action) -> str:
 
 
 def key_changes(maps: Maps, old: Graph, new: Graph) -> list[KeyChange]:
-    """What makes a document with these maps, which show `old`, show `new`: key by key."""
+    """Return the changes of keys that make a document with these maps, which shows `old`, show `new`."""
     wanted = _fields(old, new) | _orders(maps, old, new) | _leftovers(maps, old, new)
     changes = []
     for (root, key), after in sorted(wanted.items(), key=lambda item: item[0]):
@@ -216,7 +217,7 @@ def key_changes(maps: Maps, old: Graph, new: Graph) -> list[KeyChange]:
 
 
 def _fields(old: Graph, new: Graph) -> _Wanted:
-    """What the two say differently; orders are another matter."""
+    """Return the keys whose values differ between both graphs, without those that hold an order."""
     before, after = document.flatten(old), document.flatten(new)
     wanted: _Wanted = {}
     for root, fields in after.items():
@@ -231,7 +232,7 @@ def _fields(old: Graph, new: Graph) -> _Wanted:
 
 
 def _leftovers(maps: Maps, old: Graph, new: Graph) -> _Wanted:
-    """Whatever else stands under the keys of what is gone."""
+    """Remove what else is stored under the keys of actions and relations that are gone."""
     gone = {action.key for action in old.actions} - {action.key for action in new.actions}
     there = {f"{r.parent}>{r.child};{r.listing}" for r in new.relations}
     lost = {f"{r.parent}>{r.child};{r.listing}" for r in old.relations} - there

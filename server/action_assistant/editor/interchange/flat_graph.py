@@ -12,10 +12,11 @@ from action_assistant.umrf.json.embedded import UmrfGraph
 
 
 class FlatGraph(msgspec.Struct, frozen=True):
-    """What a graph with its sub-graphs is as one graph (docs/decisions/069-flatten.md).
+    """A graph with its sub-graphs, flattened into one graph (docs/decisions/069-flatten.md).
 
-    `umrf`: that graph, under the same name; null where none is known to do the same, for these
-    `reasons`. `origins`: where each of its actions comes from. `left_out`: what no action has now.
+    `umrf`: the flat graph, under the same name; null where none is known to do the same, for these `reasons`.
+    `origins`: the graph and action from which each of its actions comes. `left_out`: fields that no action has
+    any more.
     """
 
     seq: int
@@ -26,7 +27,7 @@ class FlatGraph(msgspec.Struct, frozen=True):
 
 
 def flat_graph(sight: GraphAtSeq, inside: Inside) -> bytes:
-    """JSON of a `FlatGraph`."""
+    """Flatten a graph; return JSON of a `FlatGraph`."""
     found = flattened(read(sight).moment.graph, graphs_of(inside))
     if isinstance(found, Unflattenable):
         return msgspec.json.encode(FlatGraph(sight.seq, None, reasons=found.reasons))

@@ -29,7 +29,7 @@ from action_assistant.umrf.model import Graph, Key, Note, Problem
 
 
 class ImportReport(msgspec.Struct, frozen=True):
-    """What was found in an imported file: its dialect, what was translated, what is wrong.
+    """A report on an imported file: its dialect, what was translated, and its problems.
 
     `remarks` are the notes with their places; all places are in the file as it was sent.
     """
@@ -41,9 +41,8 @@ class ImportReport(msgspec.Struct, frozen=True):
 
 
 class Preview(msgspec.Struct, frozen=True):
-    """What a file would become. `problems`: those of the file, then those of the graph. `remarks`
-    are the notes with their places; all places are in the file as it was sent.
-    """
+    """The graph that importing a file would make. `problems`: those of the file, then those of the graph.
+    `remarks` are the notes with their places; all places are in the file as it was sent."""
 
     dialect: str
     notes: tuple[str, ...]
@@ -95,7 +94,7 @@ def names(body: bytes) -> tuple[str, tuple[str, ...]]:
 
 
 def preview(body: bytes, inside: Inside = NOTHING_INSIDE) -> bytes:
-    """What importing a file would make, as JSON of a `Preview`. Raises as `imported` does."""
+    """Read a file and return JSON of its `Preview`. Raises as `imported` does."""
     found = fitting(read_graph(body))
     graph = found.graph
     own = check(graph, graphs=graphs_of(inside), resolution=inside.resolution)

@@ -72,7 +72,7 @@ def brought(body: bytes) -> BroughtAction:
 
 
 def preview(body: bytes) -> bytes:
-    """What bringing a file would make, as JSON of a `Preview`. Raises as `brought` does."""
+    """Read the file of an action and return JSON of its `Preview`. Raises as `brought` does."""
     found = brought(body)
     report = msgspec.json.decode(found.reading, type=importing.ImportReport)
     return msgspec.json.encode(
@@ -83,7 +83,7 @@ def preview(body: bytes) -> bytes:
 
 
 def of_graphs(name: str, sights: Sequence[GraphAtSeq]) -> Action:
-    """What graphs say of an action, without values. Raises NotFound."""
+    """Return an action as graphs use it, without values. Raises NotFound."""
     uses = [use for sight in sights for use in uses_of(read(sight).moment.graph, name)]
     if not uses:
         raise NotFound(f"No graph has an action {name!r}.", where={"path": "/name"})
@@ -157,7 +157,7 @@ def replacing(sight: GraphAtSeq, body: bytes) -> bytes:
 
 
 def replacing_would(sight: GraphAtSeq, body: bytes) -> bytes:
-    """What `replacing` would change, as JSON of a `Difference`. Raises as it does."""
+    """Return the changes that `replacing` would make, as JSON of a `Difference`. Raises as `replacing` does."""
     graph = read(sight).moment.graph
     after = _replaced(_action_of(sight), body)(graph)
     return msgspec.json.encode(difference((sight.seq, graph), (sight.seq, after)))

@@ -24,15 +24,15 @@ _SCRIPT_LIMIT: Final = 500  # behaviours
 
 
 class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What a person does to the graph, and when."""
+    """A command that a person gives to the running graph, and its time."""
 
     at_ms: float
     verb: Literal["stop", "pause", "resume"]
 
 
 class Rehearsing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What to play: the graph after its change `seq` (left out: now), what its actions do as in
-    a script of `simulate`, and what people do meanwhile."""
+    """A request to simulate the graph after its change `seq`, the newest if left out. `script`: what its
+    actions do, as in a script of `simulate`; `commands`: what people do meanwhile."""
 
     seq: int | None = None
     script: Annotated[Any, semantics.SCRIPT] = None
@@ -41,7 +41,7 @@ class Rehearsing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Rehearsal(msgspec.Struct, frozen=True):
-    """Everything that would happen, in order. `cut`: there is more than is told."""
+    """The events of a simulated run, in order. `cut`: whether there are more than are listed."""
 
     seq: int
     trace: tuple[semantics.Trace, ...]
@@ -79,7 +79,7 @@ def _script(value: Any) -> semantics.Script:
 
 
 def _refuse_unreadable(graph: Graph) -> None:
-    """What the engine's parser refuses cannot be played by any rule."""
+    """Raise Conflict for a graph that the engine's parser would refuse, since it cannot be simulated."""
     refusals = refused_by_parser(codec.Reading(graph, "D3"))
     if refusals:
         raise Conflict(f"The engine would refuse this graph: {refusals[0].message}")

@@ -21,8 +21,8 @@ from action_assistant.umrf.signatures import signature_of
 
 
 class ChosenActions(msgspec.Struct, frozen=True):
-    """What to make a sub-graph of, and its name. `taken`: something else is called that; `otherwise`: also
-    where it may do something else than its actions did."""
+    """The actions to move into a sub-graph, and its name. `taken`: whether something else has that name;
+    `otherwise`: do it even if the graph may then behave otherwise."""
 
     keys: tuple[Key, ...]
     name: str
@@ -31,9 +31,10 @@ class ChosenActions(msgspec.Struct, frozen=True):
 
 
 class ExtractionLook(msgspec.Struct, frozen=True):
-    """What a sub-graph of chosen actions would be. `umrf`: that graph; null where there is none, for these
-    `reasons`. `inputs`, `outputs`: what it takes and gives, by flat name, with types. `changes`: of the
-    document of the graph around it after `seq`. `differences`: in what it may then do otherwise."""
+    """A preview of moving actions into a sub-graph. `umrf`: the sub-graph; null where there can be none, for
+    these `reasons`. `inputs`, `outputs`: its parameters by flat name, with their types. `changes`: of the
+    document of the outer graph after `seq`. `differences`: in which ways the graph may then behave otherwise.
+    """
 
     seq: int
     umrf: UmrfGraph | None
@@ -45,9 +46,10 @@ class ExtractionLook(msgspec.Struct, frozen=True):
 
 
 class UnpackingLook(msgspec.Struct, frozen=True):
-    """What the document of a graph would have instead of an action that stands for another graph, which is
-    `inside`: `changes` after `seq`, none for these `reasons`. `actions`: the keys of what is new;
-    `differences`: in what the graph may then do otherwise; `left_out`: fields that no action has now."""
+    """A preview of replacing an action by the actions of the graph `inside` that it stands for. `changes`: of
+    the document after `seq`; none where it cannot be done, for these `reasons`. `actions`: the keys of the new
+    actions; `differences`: in which ways the graph may then behave otherwise; `left_out`: fields that no action
+    has any more."""
 
     seq: int
     inside: str
@@ -68,7 +70,7 @@ class SubGraphFile(msgspec.Struct, frozen=True):
 
 
 def extraction_look(sight: GraphAtSeq, chosen: ChosenActions) -> bytes:
-    """JSON of an `ExtractionLook`."""
+    """Preview moving actions into a sub-graph; return JSON of an `ExtractionLook`."""
     return msgspec.json.encode(_look(sight, _extraction(sight, chosen), chosen))
 
 
@@ -134,7 +136,7 @@ def unpacking_look(
 
 
 def name_of_action(sight: GraphAtSeq, action: Key) -> str:
-    """What an action is called. Raises NotFound."""
+    """Return the name of an action. Raises NotFound."""
     for each in read(sight).moment.graph.actions:
         if each.key == action and not each.missing:
             return each.name

@@ -25,7 +25,7 @@ def packed(graphs: Iterable[tuple[str, bytes]]) -> bytes:
 
 
 def _free_name(graph: str, taken: set[str]) -> str:
-    """One of its own, also where a file system makes no difference of case."""
+    """Return a file name that is not taken, also where a file system ignores case."""
     number = 1
     while (name := graph_file_name(graph, number)).lower() in taken:
         number += 1

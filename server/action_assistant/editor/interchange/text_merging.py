@@ -21,8 +21,8 @@ class MergingOutcome(msgspec.Struct, frozen=True):
 
 
 def merging(then: GraphAtSeq, state: bytes, text: bytes, inside: Inside) -> MergingOutcome:
-    """What `text`, edited from that of the moment `then`, makes of the graph as it is now, with these
-    graphs inside.
+    """Merge an edited text into a graph that may have changed since. `text` was edited from that of the moment
+    `then`; `state` is the document now; `inside` are the graphs inside.
 
     Raises BadInput, NotUmrf, TooLarge with the place.
     """
@@ -37,6 +37,6 @@ def merging(then: GraphAtSeq, state: bytes, text: bytes, inside: Inside) -> Merg
 
 
 def _is_other(now: Maps, change: KeyChange) -> bool:
-    """Whether a key is neither as it was nor as it shall be."""
+    """Tell whether a key has neither the value from before the edit nor the wanted one."""
     value = now.get(change.root, {}).get(change.key, UNSET)
     return chosen(change.before, value, change.after) is None

@@ -9,7 +9,8 @@ Side: TypeAlias = Literal["ours", "theirs"]
 
 
 def chosen(base: object, ours: object, theirs: object) -> Side | None:
-    """Whose value it is; None where both gave it another one. UNSET stands for none."""
+    """Return the side whose value wins; None where both sides changed it in different ways. UNSET stands for no
+    value."""
     if is_same(ours, theirs) or is_same(theirs, base):
         return "ours"
     return "theirs" if is_same(ours, base) else None

@@ -29,7 +29,7 @@ _event, _graph = editor_tables.editor_event.c, editor_tables.graph.c
 
 
 class StoredLocation(msgspec.Struct, frozen=True):
-    """What the file says."""
+    """The content of the file that names the database of a data folder."""
 
     database: str
 
@@ -60,7 +60,7 @@ def journal_of(data: Path, given: str | None) -> str | None:
 
 
 def is_own(data: Path, url: str) -> bool:
-    """Whether a URL names the file in the folder itself."""
+    """Tell whether a URL names the SQLite file in the folder itself."""
     return same(url, _own(data))
 
 
@@ -139,7 +139,7 @@ def _own(data: Path) -> str:
 
 
 def same(one: str, other: str) -> bool:
-    """Whether two URLs name one database."""
+    """Tell whether two URLs name one database."""
     return _address(one) == _address(other)
 
 
@@ -154,7 +154,7 @@ def _address(url: str) -> tuple[object, ...]:
 
 
 def _graphs(url: str) -> int | None:
-    """How many graphs a database holds; None when it cannot be told."""
+    """Count the graphs of a database; None where it cannot be read."""
     counted = select(func.count()).where(_graph.deleted_at.is_(None))
 
     def count(connection: Connection) -> int:
@@ -171,7 +171,7 @@ def _graphs(url: str) -> int | None:
 
 
 def _holds(url: str, mark: Path) -> bool:
-    """Whether a database holds the last event that this folder has seen: then it is the same one, by
+    """Tell whether a database holds the last event that this folder has seen. If so it is the same database by
     another name, or a copy. Raises CannotStart."""
     if _is_nowhere(url):
         return False
@@ -191,7 +191,7 @@ def _holds(url: str, mark: Path) -> bool:
 
 
 def _is_nowhere(url: str) -> bool:
-    """Whether a URL names a file that is not there. Raises CannotStart for what is no URL."""
+    """Tell whether a URL names a SQLite file that does not exist. Raises CannotStart for an invalid URL."""
     database_of(url)
     parsed = make_url(url)
     return parsed.get_backend_name() == "sqlite" and not Path(parsed.database or "").exists()

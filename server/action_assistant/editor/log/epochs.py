@@ -86,7 +86,7 @@ async def _epoch(journal: Journal, mark: Path) -> str:
 
 
 async def _follows(journal: Journal, mark: EpochMark | None) -> bool:
-    """Whether the log still holds the event of the mark."""
+    """Tell whether the log still holds the event of the mark."""
     return mark is None or await _chain(journal, mark.position) == mark.chain
 
 
@@ -96,7 +96,7 @@ async def _chain(journal: Journal, position: int) -> str:
 
 
 def marked(mark: Path) -> EpochMark | None:
-    """What a folder has seen last; None where it has seen nothing, or does not know."""
+    """Read the last event that a folder has seen; None where there is none, or where its file cannot be read."""
     try:
         return msgspec.json.decode(mark.read_bytes(), type=EpochMark)
     except (OSError, msgspec.DecodeError):  # a new folder, or one of an older version

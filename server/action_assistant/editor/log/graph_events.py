@@ -64,7 +64,7 @@ class GraphCreated(msgspec.Struct, frozen=True):
 
 
 class GraphDescribed(msgspec.Struct, frozen=True):
-    """What the document of a graph calls itself, noticed at `seq`."""
+    """The name and description of a graph have changed in its document; noticed at `seq`."""
 
     name: str
     description: str
@@ -122,8 +122,8 @@ class GraphMerged(msgspec.Struct, frozen=True):
 
 
 class DraftProposed(msgspec.Struct, frozen=True):
-    """Somebody would like the draft, as it was after its change `seq`, to be merged. `device`: their
-    browser, "" where that is not known."""
+    """The draft after its change `seq` was proposed to be merged. `device`: the browser of the person, "" where
+    it is not known."""
 
     note: str
     seq: int
@@ -131,7 +131,7 @@ class DraftProposed(msgspec.Struct, frozen=True):
 
 
 class DraftAnswered(msgspec.Struct, frozen=True):
-    """Somebody said yes or no to a proposal, having seen the draft after its change `seq`."""
+    """A proposal was answered with yes or no, for the draft after its change `seq`."""
 
     yes: bool
     note: str
@@ -149,7 +149,7 @@ class BuildFault(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class ActionBuilt(msgspec.Struct, frozen=True):
-    """Somebody told how the last build of the package of an action went; `at` is when that ended."""
+    """A build of the package of an action was reported; `at` is when it ended."""
 
     package: str
     ended_well: bool
@@ -184,7 +184,7 @@ class VersionPublished(msgspec.Struct, frozen=True):
 
 
 class PersonNamed(msgspec.Struct, frozen=True):
-    """Somebody, the event's author, goes by this name."""
+    """The author of the event goes by this name."""
 
     name: str
 
@@ -198,7 +198,7 @@ class MadeInvitation(msgspec.Struct, frozen=True):
 
 
 class AcceptedInvitation(msgspec.Struct, frozen=True):
-    """Somebody, the event's author, came in by a link for the first time."""
+    """The author of the event came in by a link for the first time."""
 
     id: str
     name: str
@@ -236,7 +236,8 @@ _NUL: Final = re.compile(rb"(?<!\\)((?:\\\\)*)\\u0000")
 
 
 def _read(event: Event, kind: type[T]) -> T:
-    """What an event says, as tables can hold it: Postgres has no NUL in a text. The event keeps it."""
+    """Decode the body of an event for the tables. A NUL, which Postgres cannot store in a text, is replaced;
+    the event keeps it."""
     body = event.body
     if b"\\u0000" in body:
         body = _NUL.sub(rb"\1\\ufffd", body)
@@ -244,7 +245,7 @@ def _read(event: Event, kind: type[T]) -> T:
 
 
 def fold(event: Event) -> Sequence[Executable]:
-    """What an event means for the tables."""
+    """Return the statements by which an event changes the tables."""
     if event.kind in {UPDATED, DEFERRED}:
         return ()
     stream, _, name = event.stream.partition("/")

@@ -69,7 +69,7 @@ class PresenceNews:
 
     @cached_property
     def framed(self) -> bytes:
-        """The same message with the header of its WebSocket frame."""
+        """The message of `frame` with the header of a WebSocket frame."""
         return framed(self.frame)
 
     def followed_by(self, later: "PresenceNews") -> "PresenceNews":
@@ -129,7 +129,7 @@ class RoomPresence:
         )
 
     def everyone(self) -> tuple[PresenceEntry, ...]:
-        """Return all entries."""
+        """Return the entries of everybody in the room."""
         return tuple(self._entries.values())
 
     def _is_own(self, owner: PresenceOwner, entry: PresenceEntry) -> bool:

@@ -44,10 +44,11 @@ class WantedMerge(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class MergePreview(msgspec.Struct, frozen=True, kw_only=True):
-    """What a merge would do to the side `into`, where everything that has no choice stays as it is there.
+    """The effect of a merge on the side `into`, where conflicts without a choice stay as they are there.
 
-    `seq`, `draft_seq`: the moments that it is about. `changes`: what would change. `problems`: those that this side has not now.
-    `umrf`: the text of what comes of it. `authors`: whose changes they are. `origin_did`, `draft_did`: what each side did since they were one.
+    `seq`, `draft_seq`: the compared changes of both sides. `changes`: what would change. `problems`: those that
+    are new on this side. `umrf`: the resulting text. `authors`: the people whose changes are merged.
+    `origin_did`, `draft_did`: the changes of each side since the last merge.
     """
 
     into: DraftSide
@@ -90,7 +91,7 @@ class DraftMerges:
         self._checks = checks
 
     async def preview(self, draft: str, asked: AskedMerge) -> MergePreview:
-        """What a merge would do now; nothing is stored. Raises NotFound, Unavailable."""
+        """Compute what a merge would do now, without storing anything. Raises NotFound, Unavailable."""
         pair = await self._drafts.pair(draft)
         inside = await self._brought_up(pair, asked.into)
         found = await self._index.value(
@@ -137,7 +138,7 @@ class DraftMerges:
         return MergedDraft(target, now, seq > 0)
 
     async def _entered(self, graph: str, before: int, now: int, update: bytes) -> int:
-        """Which change the update became, others perhaps beside it; 0 when it changed nothing."""
+        """Return the change that an update became, which others may precede; 0 where it changed nothing."""
         events = await self._journal.read(h.graph_stream(graph), after=before, upto=now)
         return next((event.seq for event in events if event.body == update), 0)
 

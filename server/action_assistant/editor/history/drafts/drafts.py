@@ -34,7 +34,7 @@ _ABOUT: Final = (h.PROPOSED, h.WITHDRAWN, h.ANSWERED, h.MERGED)
 
 
 class DraftAnswer(msgspec.Struct, frozen=True):
-    """Somebody's yes or no, having seen the draft after its change `seq`."""
+    """A person's answer to a proposal, given for the draft after its change `seq`."""
 
     author: PersonRef
     at: datetime
@@ -44,8 +44,7 @@ class DraftAnswer(msgspec.Struct, frozen=True):
 
 
 class DraftProposal(msgspec.Struct, frozen=True, omit_defaults=True):
-    """Somebody would like the draft to be merged. `answers`: the last one of each person, in order of
-    time."""
+    """A proposal to merge a draft. `answers`: the last answer of each person, in order of time."""
 
     author: PersonRef
     at: datetime
@@ -55,7 +54,7 @@ class DraftProposal(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class DraftMoment(msgspec.Struct, frozen=True):
-    """What both sides are compared with: what the graph was after its change `seq`."""
+    """The state with which both sides are compared: the graph `graph` after its change `seq`."""
 
     graph: str
     seq: int
@@ -83,7 +82,8 @@ class DraftView(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class NewDraft(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What to call a draft, and of which change of the graph it begins; left out: of the last one."""
+    """A request for a draft: its name, and the change of the graph that it begins with; the last one if left
+    out."""
 
     name: str = ""
     seq: int | None = None
@@ -138,11 +138,11 @@ class Drafts:
         return sorted(views, key=lambda view: view.updated_at, reverse=True)
 
     async def get(self, draft: str) -> DraftView:
-        """One draft."""
+        """Return one draft. Raises NotFound."""
         return await self._view(await self._row(draft))
 
     async def pair(self, draft: str) -> DraftPair:
-        """Both sides of a draft. Raises NotFound, Unavailable."""
+        """Return both sides of a draft, and the state that they have in common. Raises NotFound, Unavailable."""
         row = await self._row(draft)
         await self._catalogue.require(row.draft_of, "graph")
         await self._index.upto(row.base_graph, row.base_seq)
@@ -231,7 +231,7 @@ class Drafts:
         return msgspec.structs.replace(found, answers=tuple(answers.values())), device
 
     async def _about(self, row: Row[Any]) -> Sequence[Row[Any]]:
-        """What was said of a draft, and what was merged, in order of time."""
+        """Return the events about a draft and its merges, in order of time."""
         event = editor_event.c
         streams = [h.about_stream(row.id), h.about_stream(row.draft_of)]
         return await self._journal.query(
@@ -270,7 +270,8 @@ class Drafts:
     async def _distance(
         self, row: Row[Any], origin: Row[Any]
     ) -> tuple[int | None, int | None, int]:
-        """How far both sides are apart, and the last change of the origin."""
+        """Count the changes of each side since they were equal; also return the last change of the origin. The
+        counts are None where the origin is deleted."""
         newest = [await self._journal.newest(h.graph_stream(g)) for g in (origin.id, row.id)]
         if origin.deleted_at is not None:
             return None, None, newest[0]
@@ -296,6 +297,6 @@ class Drafts:
 
 
 def _ends_proposal(event: Row[Any], row: Row[Any]) -> bool:
-    """Whether this is the merge of the draft into what it is a draft of."""
+    """Tell whether an event is the merge of the draft into its origin."""
     merged = msgspec.json.decode(event.body, type=h.GraphMerged)
     return merged.draft == merged.source == str(row.id)

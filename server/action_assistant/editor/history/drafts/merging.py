@@ -34,8 +34,8 @@ _ENDS: Final = frozenset({ENTRY, EXIT})
 
 
 class FoundConflict(msgspec.Struct, frozen=True):
-    """Both sides changed a key (`key` is its own), or `removed` removed what the other went on with.
-    `place` is what a choice names."""
+    """A conflict: both sides changed a key (`key`), or the side `removed` removed what the other side changed.
+    `place` is the name by which a choice refers to it."""
 
     place: str
     owner: str
@@ -44,21 +44,21 @@ class FoundConflict(msgspec.Struct, frozen=True):
 
 
 class KeyMerge(msgspec.Struct, frozen=True):
-    """What our side has to set so that it is merged; UNSET for what goes. Where nobody has chosen, what
-    stands on our side stays."""
+    """The values that our side has to set so that it is merged; UNSET for a key that is removed. A conflict
+    without a choice keeps the value of our side."""
 
     targets: dict[Place, Any]
     conflicts: tuple[FoundConflict, ...]
 
 
 def merged(base: Places, ours: Places, theirs: Places, choices: Choices) -> KeyMerge:
-    """What merging makes of our side."""
+    """Merge the changes of `theirs` into `ours`, key by key."""
     merge = _Merge(_plain(base), _plain(ours), _plain(theirs), choices)
     return merge.outcome()
 
 
 def _plain(places: Places) -> dict[Place, Any]:
-    """What people said stays where it was said; no value is none."""
+    """Return the values without comments, which stay where they were written, and without empty ones."""
     return {p: value for p, value in places.items() if p[0] != "comments" and value is not None}
 
 
@@ -67,7 +67,7 @@ def _other(side: Side) -> Side:
 
 
 class _Merge:
-    """One merge."""
+    """Merges two sides that both go on from a common base, key by key."""
 
     def __init__(
         self,
@@ -88,7 +88,7 @@ class _Merge:
         self._result: dict[Place, Any] = {}
 
     def outcome(self) -> KeyMerge:
-        """Merge."""
+        """Merge all keys and return the result."""
         actions = [owner for owner in sorted(self._owners) if is_aid(owner)]
         arrows = [owner for owner in sorted(self._owners) if ends_of(owner) is not None]
         self._take_whole(actions, self._is_used)
@@ -118,8 +118,8 @@ class _Merge:
     # --- what came or went ------------------------------------------------------------------------
 
     def _take_whole(self, owners: Iterable[str], matters: Callable[[str, Side], bool]) -> None:
-        """Of what one side removed, every key is taken from that side; or the one that was chosen,
-        where it mattered to the other."""
+        """For things that one side removed, take all keys from that side, or from the chosen side where the
+        removal was a conflict."""
         for owner in owners:
             there: list[Side] = [side for side in self._there if owner in self._there[side]]
             if owner in self._whole or owner not in self._was or len(there) != 1:
@@ -133,7 +133,7 @@ class _Merge:
             self._whole[owner] = self._choices.get(place, "ours")
 
     def _is_used(self, action: str, side: Side) -> bool:
-        """Whether a side changed an action, or an arrow of it."""
+        """Tell whether a side changed an action or an arrow of it."""
         return self._is_changed(action, side) or any(
             self._is_changed(arrow, side)
             for arrow in self._arrows.get(action, ())
@@ -141,7 +141,7 @@ class _Merge:
         )
 
     def _is_changed(self, owner: str, side: Side) -> bool:
-        """Whether a side changed what something is; where it stands does not matter."""
+        """Tell whether a side changed a thing otherwise than by moving it."""
         now = self._sides[side]
         return any(
             not is_same(self._base.get(place, UNSET), now.get(place, UNSET))

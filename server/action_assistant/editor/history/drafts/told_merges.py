@@ -44,9 +44,9 @@ _TOLD: Final = 50  # of which it says the places
 
 
 class DraftConflict(msgspec.Struct, frozen=True, kw_only=True):
-    """What both sides changed since they were last one. `place` is what a choice names; `what` says in
-    words what it is about; `removed`: the side that removed it, while the other went on with it.
-    `origin` and `draft`: what each side did to it."""
+    """A conflict between both sides of a draft. `place` is the name by which a choice refers to it; `what`
+    names the thing in words; `removed`: the side that removed it while the other changed it. `origin` and
+    `draft`: the changes of each side to it."""
 
     place: str
     what: str
@@ -56,7 +56,7 @@ class DraftConflict(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class DraftBase(msgspec.Struct, frozen=True):
-    """What both sides of a draft are compared with: the graph `graph` after its change `seq`."""
+    """The state with which both sides of a draft are compared: the graph `graph` after its change `seq`."""
 
     graph: str
     seq: int
@@ -103,13 +103,13 @@ def merging_since(
     choices: Mapping[str, DraftSide],
     inside: Inside,
 ) -> FoundMerge:
-    """As `merging`, with what the index says of the base."""
+    """Merge both sides of a draft, with the base read from the index. See `merging`."""
     was = index_queries.at(connection, base.graph, base.seq)
     return merging(was, origin, draft, into, choices, inside)
 
 
 class WrittenPreview(msgspec.Struct, frozen=True):
-    """What a merge would do, each part as JSON; and whose changes it would bring in, the last one first."""
+    """The parts of a merge preview, each as JSON; and the authors of the merged changes, the last one first."""
 
     changes: bytes
     conflicts: bytes
@@ -129,7 +129,7 @@ def previewed(
     choices: Mapping[str, DraftSide],
     inside: Inside,
 ) -> WrittenPreview:
-    """As `merging_since`, written for whoever looks at it."""
+    """Preview a merge for the page, as JSON. See `merging_since`."""
     found = merging_since(connection, base, origin, draft, into, choices, inside)
     source = draft if into == "origin" else origin
     write_json = msgspec.json.encode
@@ -153,7 +153,7 @@ def made_merge(
     choices: Mapping[str, DraftSide],
     inside: Inside,
 ) -> MadeMerge:
-    """As `merging_since`, with what is needed to store it."""
+    """Make a merge, with what is needed to store it. See `merging_since`."""
     found = merging_since(connection, base, origin, draft, into, choices, inside)
     left = [conflict for conflict in found.conflicts if conflict.place not in choices]
     unmade = UnmadeChoices(
@@ -195,8 +195,8 @@ def merging(
     choices: Mapping[str, DraftSide],
     inside: Inside = NOTHING_INSIDE,
 ) -> FoundMerge:
-    """What merging does to the side `into`. `base`: the changes that gave each key the value that it
-    had when both sides were last one. `inside`: the graphs inside of either side."""
+    """Merge one side of a draft into the side `into`. `base`: the changes that gave each key the value that it
+    had when both sides were last equal. `inside`: the graphs inside of either side."""
     was = maps_of(state_of(base))
     sides: dict[DraftSide, GraphAtSeq] = {"origin": origin, "draft": draft}
     ours, theirs = sides[into], sides[_other(into)]
@@ -226,14 +226,14 @@ def merging(
 def apart(
     base: Sequence[LoggedChange], origin: GraphAtSeq, draft: GraphAtSeq
 ) -> dict[DraftSide, Changes]:
-    """What each side did since they were one."""
+    """Return the changes of each side since both were equal."""
     was = maps_of(state_of(base))
     maps = {"origin": read(origin).moment.maps, "draft": read(draft).moment.maps}
     return _did(was, {"origin": maps["origin"], "draft": maps["draft"]})
 
 
 def count(changes: Changes) -> int:
-    """How many things were changed."""
+    """Count the things that were changed."""
     kinds = (changes.fields, changes.actions, changes.relations, changes.notes)
     return sum(map(len, kinds)) + changes.more
 
@@ -255,7 +255,7 @@ class _Teller:
         self.did: Final = _did(base, sides)
 
     def label(self, owner: str) -> str:
-        """What people call an action, arrow or note."""
+        """Return the name of an action, arrow or note as people read it."""
         ends = ends_of(owner)
         if ends is not None:
             return f"{self._name(ends.parent)} → {self._name(ends.child)}"
@@ -281,7 +281,7 @@ class _Teller:
         return self._names.get(key, key if key in {ENTRY, EXIT} else "an action that is gone")
 
     def _thing(self, conflict: FoundConflict, side: DraftSide) -> Changes:
-        """What a side did to an action and its arrows, or to an arrow."""
+        """Return the changes of a side to an action and its arrows, or to an arrow."""
         found = self._differences[side]
         owner, ends = conflict.owner, ends_of(conflict.owner)
 
@@ -313,7 +313,7 @@ class _Teller:
 
 
 def _words(root: str, key: str) -> str:
-    """What a key says of its owner, in words."""
+    """Name the field that a key holds, in words."""
     field = key if root == "meta" else key.partition("|")[2]
     if root == "positions":
         return "text"
