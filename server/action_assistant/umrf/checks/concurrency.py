@@ -118,25 +118,26 @@ class Concurrency:
 
     @cached_property
     def _first(self) -> Mask:
-        """The actions with which the graph begins."""
+        """Return, as a mask, the actions with which the graph begins."""
         indices = {index for index in self._children(ENTRY) if self.keys[index] in self._runs}
         return sum(1 << index for index in indices)
 
     @cached_property
     def _needs(self) -> list[Mask]:
-        """For each action the actions that it waits for."""
+        """Return for each action, as a mask, the required parents for which it waits."""
         listed = (self._required.get(key, ()) for key in self.keys)
         return [sum(1 << self.index[each] for each in set(own)) for own in listed]
 
     @cached_property
     def _after(self) -> list[Mask]:
-        """For each action the actions to which a path of arrows leads."""
+        """Return for each action, as a mask, the actions to which a path of arrows leads from
+        it."""
         return reachable([self._children(key) for key in self.keys])
 
     @cached_property
     def _repeated(self) -> Mask:
-        """The actions that may have reported and run again although no path leads from them to
-        themselves.
+        """Return, as a mask, the actions that may have reported and run again although no path
+        leads back to them.
 
         They are started by several parents, or by a loop.
         """

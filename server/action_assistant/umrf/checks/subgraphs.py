@@ -287,9 +287,9 @@ def _findings(inside: Subject) -> tuple[_Finding, ...]:
 
 
 def _finding(inside: Subject, problem: Problem, left: int = 0) -> _Finding:
-    """Return a problem as a finding for the graph around it, which stands for `left` further ones.
+    """Return a problem of a sub-graph as a finding for the graph around it.
 
-    A problem from deeper inside keeps its place.
+    It stands for `left` further problems, and a problem from deeper inside keeps its place.
     """
     place = problem.inside or PlaceInside(
         levels=(),

@@ -292,7 +292,7 @@ def _exits(graph: Graph) -> list[Relation]:
 
 
 def _mended(graph: Graph, lacking: set[str]) -> Graph:
-    """The graph whose exit does not wait for these, nor for outputs."""
+    """Return the graph with an exit that requires neither these parents nor any outputs."""
     names = {action.key: action.full_name for action in graph.actions}
     relations = tuple(
         msgspec.structs.replace(r, required=r.required and names.get(r.parent) not in lacking)

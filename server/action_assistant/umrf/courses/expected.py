@@ -106,7 +106,8 @@ def scripted_by_key(script: Script, graph: Graph) -> Script:
 
 
 def scripted_by_name(script: Script, graph: Graph) -> Script:
-    """Return a script whose actions are under keys with the full names of this graph instead."""
+    """Return a script by keys (`scripted_by_key`) with the full names that these actions have in
+    this graph."""
     names = {action.key: action.full_name for action in graph.actions}
     return Script({names.get(key, key): calls for key, calls in script.behaviours.items()})
 

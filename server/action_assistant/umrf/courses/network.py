@@ -98,28 +98,29 @@ class Network:
 
     @cached_property
     def reachable(self) -> list[Mask]:
-        """For each action the actions, and the exit, to which a path of arrows leads from it."""
+        """Return for each action, as a mask, the actions and the exit to which a path of arrows
+        leads from it."""
         return reachable([[e.child for e in row if e is not None] for row in self.edges])
 
     @cached_property
     def circling(self) -> dict[str, Mask]:
-        """For each outcome the actions that a bypass with it leads back to."""
+        """Return for each outcome the actions that a bypass with it leads back to."""
         return {outcome: self._circling(outcome) for outcome in PRECONDITIONS}
 
     @cached_property
     def plain(self) -> dict[str, Mask]:
-        """For each outcome the actions whose bypass causes nothing but further bypasses."""
+        """Return for each outcome the actions whose bypass causes nothing but further bypasses."""
         return {outcome: self._plain(outcome) for outcome in PRECONDITIONS}
 
     @cached_property
     def ends(self) -> dict[str, Mask]:
-        """For each outcome the actions whose bypass leads to the exit by bypasses alone."""
+        """Return for each outcome the actions whose bypass leads to the exit by bypasses alone."""
         mask = (1 << len(self.nodes)) - 1
         return {o: self._leading(o, {self.exit}) & mask for o in PRECONDITIONS}
 
     @cached_property
     def last(self) -> list[int]:
-        """The actions with an arrow to the exit."""
+        """Return the actions with an arrow to the exit."""
         rows = enumerate(self.edges)
         return [index for index, row in rows if any(e and e.child == self.exit for e in row)]
 

@@ -117,7 +117,8 @@ class _Reader:
     # The graph
 
     def read(self, file: dict[str, Json]) -> Tree:
-        """Read the file, and return the graph with all that was noted about it."""
+        """Read the file, and return the graph with the problems, run states and notes about the
+        file."""
         extra: Extra = []
         if "graph_name" not in file:
             self.report("graph-name-missing", "", "The graph has no name; the engine refuses it.")

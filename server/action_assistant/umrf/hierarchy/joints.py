@@ -148,8 +148,11 @@ def _check_outputs(
 
 
 def _check_end(inside: Graph, end: Relation, following: Sequence[Relation]) -> None:
-    """Refuse an end without the values that the exit waits for, unless it is an error or nobody is
-    handed anything after it."""
+    """Refuse an end that can come without the values of the exit, by a bypass or with an error, if
+    a following action takes values.
+
+    An end in a loop is refused, too. Raises `JoinRefused`.
+    """
     conditions = end.conditions
     empty: list[Precondition] = [o for o in OUTCOMES[:2] if conditions.answer(o) == "bypass"]
     empty += ["on_error"] if conditions.on_error not in ("bypass", "ignore") else []

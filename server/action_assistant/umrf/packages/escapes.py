@@ -187,8 +187,8 @@ def blanks(depth: int) -> Blanks:
 
 
 def visible(text: str) -> str:
-    """Return the text with `U+202E` in place of each invisible control character; line breaks
-    stay."""
+    """Return the text with each invisible control character spelled out, for example as `U+202E`;
+    line breaks stay."""
     return _CONTROLS.sub(
         lambda found: f"U+{ord(found[0]):04X}", text.replace("\r\n", "\n").replace("\t", " ")
     )

@@ -473,7 +473,7 @@ class Core(Clock):
         self._wait(lambda: any(n.active for n in linked), self.facts.stop_poll_ms, then)
 
     def _wait(self, is_active: Callable[[], bool], poll_ms: int, then: Task) -> None:
-        """Call `then` once `going` returns False; it is asked every `poll_ms`."""
+        """Call `then` once `is_active` returns False; it is polled every `poll_ms`."""
 
         def poll() -> None:
             if is_active():
