@@ -25,11 +25,11 @@ const NO_SENTENCES: Readonly<Record<string, string>> = {
   "editor/menus/shortcut-sheet.tsx": "commands of the page",
   "editor/stranded-edits.tsx": "the name of a file",
   "inspector/json/json-positions.ts": "JSON",
-  "library/home/graph-menu.tsx": "the name of a new graph, which is isolated where it stands",
-  "review/run/run-facts.tsx": "words with a name that is isolated in them",
-  "review/run/run-menu.tsx": "the name of a new course, which is isolated where it stands",
+  "home/graph-menu.tsx": "the name of a new graph, which is isolated where it stands",
+  "review/run-facts.tsx": "words with a name that is isolated in them",
+  "review/run-menu.tsx": "the name of a new course, which is isolated where it stands",
   "runs/stop/stop-notice.tsx": "words with a name that is isolated in them",
-  "ui/floating/hold-button.tsx": "words of the page",
+  "ui/hold-button.tsx": "words of the page",
 };
 
 /** Return how an expression calls what it gives, or "" where it is no name. */

@@ -1,15 +1,14 @@
 /** The way to one's own name and appearance. */
 import { UnstyledButton } from "@mantine/core";
 import type { ComponentProps } from "react";
-import { useKnownColors } from "../api/people";
-import { usePerson } from "../api/use-person";
-import { LateOpening } from "../ui/floating/late-opening";
+import { useKnownColors, usePerson } from "../api/people";
+import { LateOpening } from "../ui/late-opening";
+import { lazyPart } from "../ui/lazy-part";
 import { initials } from "../ui/name-colors";
-import { lazyPart } from "../ui/parts/lazy-part";
 import style from "./account-menu.module.css";
 
 const AccountPopover = lazyPart(() =>
-  import("./account-popover").then((part) => part.AccountPopover),
+  import("./account-panel").then((part) => part.AccountPopover),
 );
 
 type Props = Pick<ComponentProps<typeof AccountPopover>, "onShare" | "onLeave">;

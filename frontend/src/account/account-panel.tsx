@@ -1,5 +1,13 @@
 /** One's own name, light or dark, and the way out. */
-import { Button, Group, Stack, Text, TextInput, useMantineColorScheme } from "@mantine/core";
+import {
+  Button,
+  Group,
+  Popover,
+  Stack,
+  Text,
+  TextInput,
+  useMantineColorScheme,
+} from "@mantine/core";
 import {
   IconDeviceDesktop,
   IconHelp,
@@ -9,13 +17,14 @@ import {
   IconShare,
   IconSun,
 } from "@tabler/icons-react";
-import { useState } from "react";
+import { type ButtonHTMLAttributes, cloneElement, type ReactElement, useState } from "react";
 import { Link } from "wouter";
 import { errorText } from "../api/http";
-import { useLive } from "../api/live/use-live";
+import { useLive } from "../api/page-link";
 import { helpUrl } from "../api/page-url";
+import { useMay, usePerson } from "../api/people";
 import { ROLE_WORDS, rememberedName, signOut } from "../api/session";
-import { useMay, usePerson } from "../api/use-person";
+import { useOpening } from "../ui/late-opening";
 import { Segments } from "../ui/segments";
 
 const schemes = [
@@ -142,5 +151,29 @@ export function AccountPanel({ onShare, onClose, onLeave }: Props) {
         </Button>
       </Stack>
     </form>
+  );
+}
+
+interface AccountPopoverProps extends Omit<Parameters<typeof AccountPanel>[0], "onClose"> {
+  button: ReactElement<ButtonHTMLAttributes<HTMLButtonElement>>;
+}
+
+export function AccountPopover({ button, onShare, onLeave }: AccountPopoverProps) {
+  const [open, setOpen] = useOpening();
+  return (
+    <Popover
+      opened={open}
+      onChange={setOpen}
+      position="bottom-end"
+      withArrow
+      trapFocus
+      returnFocus
+      width={264}
+    >
+      <Popover.Target>{cloneElement(button, { onClick: () => setOpen(!open) })}</Popover.Target>
+      <Popover.Dropdown>
+        <AccountPanel onShare={onShare} onLeave={onLeave} onClose={() => setOpen(false)} />
+      </Popover.Dropdown>
+    </Popover>
   );
 }

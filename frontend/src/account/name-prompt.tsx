@@ -2,8 +2,8 @@
 import { Button, CloseButton, TextInput } from "@mantine/core";
 import { useState } from "react";
 import { errorText } from "../api/http";
+import { usePerson } from "../api/people";
 import { rememberedName } from "../api/session";
-import { usePerson } from "../api/use-person";
 import style from "./name-prompt.module.css";
 
 const SUGGESTION = "Operator";

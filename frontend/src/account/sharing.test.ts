@@ -1,8 +1,7 @@
 import { expect, test } from "vitest";
 import { credentialIn } from "../api/session";
 import type { Guest, Sharing } from "../api/sharing";
-import { originsOf } from "./share-dialog";
-import { guestWords } from "./share-link";
+import { guestWords, originsOf } from "./share-dialog";
 import { pastedCredential } from "./sign-in";
 
 const at = "2026-01-01T00:00:00Z";

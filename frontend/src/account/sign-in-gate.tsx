@@ -1,4 +1,6 @@
 /** Lets the page in only with a session, and knows whose it is. */
+
+import { IconPlugConnectedX } from "@tabler/icons-react";
 import { useQueryClient } from "@tanstack/react-query";
 import {
   type ReactNode,
@@ -9,8 +11,9 @@ import {
   useState,
   useSyncExternalStore,
 } from "react";
-import { errorText, isOutcomeUnknown, Refusal } from "../api/http";
-import { pageLink } from "../api/live/page-link";
+import { errorText, isOutcomeUnknown, Refusal, sessionEnd } from "../api/http";
+import { pageLink } from "../api/page-link";
+import { PersonContext } from "../api/people";
 import {
   type Credential,
   credentialIn,
@@ -27,15 +30,13 @@ import {
   takeCredential,
   takeFarewell,
 } from "../api/session";
-import { sessionEnd } from "../api/session-end";
-import { PersonContext } from "../api/use-person";
-import { lazyPart } from "../ui/parts/lazy-part";
-import { PartBoundary } from "../ui/parts/part-boundary";
-import { OfflineBar } from "./offline-bar";
+import { lazyPart, PartBoundary } from "../ui/lazy-part";
+import { useRootMark } from "../ui/use-root-mark";
+import style from "./sign-in-gate.module.css";
 
 const SignIn = lazyPart(() => import("./sign-in").then((part) => part.SignIn));
-const Invitation = lazyPart(() => import("./invitation").then((part) => part.Invitation));
-const SignInBar = lazyPart(() => import("./sign-in-bar").then((part) => part.SignInBar));
+const Invitation = lazyPart(() => import("./sign-in").then((part) => part.Invitation));
+const SignInBar = lazyPart(() => import("./sign-in").then((part) => part.SignInBar));
 
 type Gate =
   | { at: "knocking" }
@@ -218,5 +219,18 @@ export function SignInGate({ children }: { children: ReactNode }) {
         </PartBoundary>
       )}
     </PersonContext>
+  );
+}
+
+function OfflineBar() {
+  useRootMark("data-offline", true);
+  return (
+    <p className={style.bar} role="status">
+      <IconPlugConnectedX size={18} aria-hidden />
+      <span>
+        <b>Offline: this is what this device keeps.</b> Robots cannot be started or stopped from
+        here now; use the hardware stop. Edits wait on this device until the server answers.
+      </span>
+    </p>
   );
 }

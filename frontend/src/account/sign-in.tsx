@@ -1,9 +1,19 @@
 /** The page for somebody whom the server does not know: says how to get in. */
-import { Button, Paper, PasswordInput, Text, Title } from "@mantine/core";
-import { type Credential, credentialIn, openSession, type Person } from "../api/session";
+import { Button, Paper, PasswordInput, Text, TextInput, Title } from "@mantine/core";
+import { type ChangeEvent, type FormEvent, useState } from "react";
+import { errorText } from "../api/http";
+import {
+  type Credential,
+  credentialIn,
+  type InvitationPreview,
+  openSession,
+  type Person,
+  ROLE_WORDS,
+  rememberName,
+} from "../api/session";
 import { Logo } from "../ui/top-bar";
+import { isolated } from "../words/isolated";
 import style from "./sign-in.module.css";
-import { useSignInField } from "./use-sign-in-field";
 
 interface Props {
   /** Why nobody is signed in, when a link was tried. */
@@ -50,4 +60,104 @@ export function SignIn({ why, onOpen }: Props) {
       </Paper>
     </main>
   );
+}
+
+interface InvitationProps {
+  link: Credential;
+  invited: InvitationPreview;
+  onOpen: (person: Person) => void;
+}
+
+export function Invitation({ link, invited, onOpen }: InvitationProps) {
+  const entry = useSignInField(async (name) => {
+    const person = await openSession(link, name);
+    rememberName(person.name);
+    return person;
+  }, onOpen);
+  return (
+    <main className={style.page}>
+      <Paper className={style.card} withBorder radius="lg">
+        <Logo />
+        <Title order={1} size="h3" mt="md">
+          {invited.by === "" ? "You are invited" : `${isolated(invited.by)} invites you`} as{" "}
+          {invited.role}
+        </Title>
+        <Text c="dimmed" mt="xs">
+          To TeMoto Action Assistant, where robot tasks are drawn and run. You may{" "}
+          {ROLE_WORDS[invited.role]}.
+        </Text>
+        <form {...entry.form}>
+          <TextInput
+            mt="lg"
+            label="What should others see you as?"
+            maxLength={60}
+            autoFocus
+            autoComplete="name"
+            {...entry.field}
+          />
+          <Button {...entry.button} variant="filled" fullWidth mt="md">
+            Come in
+          </Button>
+        </form>
+      </Paper>
+    </main>
+  );
+}
+
+export function SignInBar({ onOpen }: { onOpen: (person: Person) => void }) {
+  const entry = useSignInField((pasted) => openSession(pastedCredential(pasted)), onOpen);
+  return (
+    <form className={style.bar} aria-label="Sign in again" {...entry.form}>
+      <p role="status">
+        <b>Your session has ended.</b> Edits stay in this page, and STOP is still sent. Paste your
+        link to go on.
+      </p>
+      <PasswordInput
+        aria-label="Link or token"
+        placeholder="http://…/#t=…"
+        autoComplete="off"
+        {...entry.field}
+      />
+      <Button {...entry.button} variant="filled">
+        Sign in
+      </Button>
+    </form>
+  );
+}
+
+/** `enter` asks the server with what was typed; what it throws is shown at the field. */
+export function useSignInField(
+  enter: (typed: string) => Promise<Person>,
+  onOpen: (person: Person) => void,
+  why = "",
+) {
+  const [typed, setTyped] = useState("");
+  const [problem, setProblem] = useState(why);
+  const [busy, setBusy] = useState(false);
+  const submit = async () => {
+    setBusy(true);
+    try {
+      onOpen(await enter(typed.trim()));
+    } catch (error) {
+      setProblem(errorText(error));
+      setBusy(false);
+    }
+  };
+  return {
+    form: {
+      onSubmit: (event: FormEvent) => {
+        event.preventDefault();
+        void submit();
+      },
+    },
+    field: {
+      value: typed,
+      error: problem || undefined,
+      onChange: (event: ChangeEvent<HTMLInputElement>) => {
+        setTyped(event.currentTarget.value);
+        setProblem("");
+      },
+    },
+    button: { type: "submit", loading: busy, disabled: typed.trim() === "" },
+  } as const;
 }

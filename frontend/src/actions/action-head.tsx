@@ -4,12 +4,12 @@
  */
 import { ActionIcon, Button, Menu } from "@mantine/core";
 import { IconCheck, IconDots, IconDownload, IconPencil, IconTrash } from "@tabler/icons-react";
-import { actionDownload } from "../api/documents/library";
+import { actionDownload } from "../api/library";
 import { redo, undo } from "../edit-actions/all";
 import type { EditAction } from "../edit-actions/edit-action";
 import { isEnabled, labelOf } from "../edit-actions/edit-action";
 import { useEditorContext } from "../edit-actions/editor-context";
-import { Tooltip } from "../ui/floating/tooltip";
+import { Tooltip } from "../ui/tooltip";
 import { isolated } from "../words/isolated";
 import style from "./open-action.module.css";
 

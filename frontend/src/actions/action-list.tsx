@@ -13,8 +13,8 @@ import {
   useState,
 } from "react";
 import { useLocation, useRouter } from "wouter";
-import { useMay } from "../api/use-person";
-import { useSearchKey } from "../ui/hooks/use-search-key";
+import { useMay } from "../api/people";
+import { useSearchKey } from "../ui/hooks";
 import { keyOf } from "../ui/keys";
 import { LongList } from "../ui/long-list";
 import { counted } from "../words/counted";

@@ -3,10 +3,10 @@
 import { Button } from "@mantine/core";
 import type { ReactNode } from "react";
 import { Link } from "wouter";
-import type { LibraryAction } from "../api/documents/library";
 import { useGraphs } from "../api/graphs";
+import type { LibraryAction } from "../api/library";
 import type { Parameter } from "../graph/model";
-import { type RobotAction, type RobotsKnowledge, robotDifferences } from "../library/robot-actions";
+import { type RobotAction, type RobotsKnowledge, robotDifferences } from "../home/robot-actions";
 import { colorOfName } from "../ui/name-colors";
 import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";

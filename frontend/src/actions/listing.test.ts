@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
-import type { LibraryAction } from "../api/documents/library";
-import { knowledgeOf } from "../library/robot-actions";
+import type { LibraryAction } from "../api/library";
+import { knowledgeOf } from "../home/robot-actions";
 import { addressOf, foundActions, listedActions } from "./listing";
 
 const parameter = (path: string) => ({

@@ -1,7 +1,7 @@
 /** Collects the actions of the library, of graphs and of robots into one list, and filters it. Pure. */
-import type { LibraryAction } from "../api/documents/library";
+import type { LibraryAction } from "../api/library";
 import { pathWords } from "../graph/value-text";
-import type { RobotAction, RobotsKnowledge } from "../library/robot-actions";
+import type { RobotAction, RobotsKnowledge } from "../home/robot-actions";
 
 /** One action by its name. `action`: null if only robots have it. */
 export interface ListedAction {

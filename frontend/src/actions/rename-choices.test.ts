@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { type ActionUse, NO_RENAMES } from "../api/documents/library";
+import { type ActionUse, NO_RENAMES } from "../api/library";
 import {
   clashes,
   keyOfRename,

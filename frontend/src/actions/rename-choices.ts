@@ -2,7 +2,7 @@
  * Finds parameters that may have been renamed only: some are suggested by graphs, and people
  * confirm them. Pure.
  */
-import type { ActionUse, Renames } from "../api/documents/library";
+import type { ActionUse, Renames } from "../api/library";
 import type { ParameterSide } from "../graph/document-keys";
 import { memberText } from "../graph/json-members";
 

@@ -2,13 +2,12 @@
 
 import { Tabs } from "@mantine/core";
 import { useState } from "react";
-import { type ActionBuild, useLastBuild } from "../api/documents/library";
+import { type ActionBuild, useLastBuild } from "../api/library";
 import { useThreads } from "../comments/use-threads";
 import type { Action } from "../graph/model";
 import { HistoryList } from "../history/history-list";
 import { PackagePane } from "../packages/package-pane";
-import { lazyPart } from "../ui/parts/lazy-part";
-import { PartBoundary } from "../ui/parts/part-boundary";
+import { lazyPart, PartBoundary } from "../ui/lazy-part";
 import { ago, instant, useNow } from "../ui/times";
 import { counted } from "../words/counted";
 import style from "./open-action.module.css";

@@ -3,13 +3,13 @@ import { Button, Modal, Skeleton } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { useQuery, useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
-import { compareWithFile, replaceAction } from "../api/documents/library";
 import { refreshLibrary } from "../api/graphs";
 import { errorText } from "../api/http";
-import { useLive } from "../api/live/use-live";
+import { compareWithFile, replaceAction } from "../api/library";
+import { useLive } from "../api/page-link";
 import { indexedAction } from "../api/robots";
-import { DifferenceView, meansSomething } from "../history/difference-view";
-import type { RobotAction } from "../library/robot-actions";
+import { DifferenceView, meansSomething } from "../differences/difference-view";
+import type { RobotAction } from "../home/robot-actions";
 import { isolated } from "../words/isolated";
 import style from "./update-dialog.module.css";
 

@@ -1,8 +1,8 @@
 /** Shows an action that is not in the library, as graphs or robots have it, with a button to add it. */
 import { Button } from "@mantine/core";
 import { IconPlus } from "@tabler/icons-react";
-import { useMay } from "../api/use-person";
-import { type RobotAction, type RobotsKnowledge, robotTemplate } from "../library/robot-actions";
+import { useMay } from "../api/people";
+import { type RobotAction, type RobotsKnowledge, robotTemplate } from "../home/robot-actions";
 import { ActionOverview, OnRobots, UsedIn } from "./action-overview";
 import type { ListedAction } from "./listing";
 import style from "./open-action.module.css";

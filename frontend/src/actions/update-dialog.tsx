@@ -5,6 +5,8 @@ import { IconCheck } from "@tabler/icons-react";
 import { useQueryClient } from "@tanstack/react-query";
 import { useId, useState } from "react";
 import { Link } from "wouter";
+import { refreshGraphs, refreshLibrary } from "../api/graphs";
+import { errorText, Refusal, refusedAt } from "../api/http";
 import {
   type ActionUse,
   type ActionUses,
@@ -13,12 +15,9 @@ import {
   type UpdatedUse,
   updateUses,
   useActionUses,
-} from "../api/documents/library";
-import { refusedAt } from "../api/documents/refused-at";
-import { refreshGraphs, refreshLibrary } from "../api/graphs";
-import { errorText, Refusal } from "../api/http";
+} from "../api/library";
+import { DifferenceView } from "../differences/difference-view";
 import { pathWords } from "../graph/value-text";
-import { DifferenceView } from "../history/difference-view";
 import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";
 import {

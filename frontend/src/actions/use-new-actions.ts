@@ -3,12 +3,12 @@ import { notifications } from "@mantine/notifications";
 import { useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
 import { useLocation } from "wouter";
-import { createAction } from "../api/documents/library";
 import { deleteGraph, type GraphSummary, refreshLibrary } from "../api/graphs";
 import { errorText, Refusal } from "../api/http";
-import { useLive } from "../api/live/use-live";
-import type { RobotAction } from "../library/robot-actions";
-import { takeFromRobot } from "../library/take-from-robot";
+import { createAction } from "../api/library";
+import { useLive } from "../api/page-link";
+import type { RobotAction } from "../home/robot-actions";
+import { takeFromRobot } from "../home/robot-actions";
 import { isolated } from "../words/isolated";
 
 /** Return whether the server refused a name that is taken. */

@@ -1,14 +1,13 @@
 /** The installation, for whoever looks after it: both processes, what they take, what is wrong. */
 import { IconServerCog } from "@tabler/icons-react";
-import { useLive } from "../api/live/use-live";
-import { useMay } from "../api/use-person";
+import { useLive } from "../api/page-link";
+import { useMay } from "../api/people";
 import { Empty } from "../ui/empty";
+import { ago, instant } from "../ui/times";
 import style from "./administration.module.css";
-import { BackupsCard } from "./backups-card";
 import { Findings } from "./findings";
-import { ProcessCard } from "./process-card";
-import { RobotLinks } from "./robot-links";
-import { useStatus } from "./status";
+import { Facts, ProcessCard, type StatusFact } from "./process-card";
+import { type Backups, bytes, type ProcessStatus, span, useStatus } from "./status";
 
 function Inside() {
   const { runner } = useLive();
@@ -44,5 +43,85 @@ export function AdministrationPage() {
         )}
       </div>
     </main>
+  );
+}
+
+function factsOf(backups: Backups, now: number): StatusFact[] {
+  const { made_at, failed_why, missing, off_site, proven_at, unsound, next_at, keep } = backups;
+  const [made, proven, next] = [instant(made_at), instant(proven_at), instant(next_at)];
+  const facts: StatusFact[] = [
+    { name: "The last one", value: made === null ? "none was made" : ago(made, now), isBad: !made },
+  ];
+  if (backups.bytes != null && backups.seconds != null) {
+    const took = span(1000 * backups.seconds);
+    facts.push({ name: "Its size", value: `${bytes(backups.bytes)}, made in ${took}` });
+  }
+  for (const what of missing ?? []) facts.push({ name: "It lacks", value: what, isBad: true });
+  if (off_site) facts.push({ name: "Off-site", value: off_site, isBad: true });
+  if (failed_why) facts.push({ name: "Failed since", value: failed_why, isBad: true });
+  facts.push({ name: "Last tried", value: proven === null ? "never" : ago(proven, now) });
+  if (unsound) facts.push({ name: "The last trial", value: unsound, isBad: true });
+  const due = next === null ? "nobody makes them by a timetable" : span(next - now);
+  facts.push({ name: "The next one", value: next === null ? due : `in ${due}` });
+  if (keep) facts.push({ name: "Kept", value: keep });
+  return facts;
+}
+
+export function BackupsCard({ backups, at }: { backups: Backups | null; at: string }) {
+  return (
+    <section className={style.card} aria-label="Backups">
+      <div className={style.cardHead}>
+        <h3>Backups</h3>
+        {backups?.is_late && (
+          <span className={style.state} data-state="lacking">
+            Late
+          </span>
+        )}
+      </div>
+      {backups === null ? (
+        <p className={style.version}>What is known of them cannot be read.</p>
+      ) : (
+        <Facts facts={factsOf(backups, Date.parse(at))} />
+      )}
+    </section>
+  );
+}
+
+export function RobotLinks({ status }: { status: ProcessStatus }) {
+  const { robots } = status.activity;
+  if (robots === undefined || robots.length === 0) return null;
+  const now = Date.parse(status.at);
+  return (
+    <section className={style.card} aria-label="Links to robots">
+      <div className={style.cardHead}>
+        <h3>Links to robots</h3>
+      </div>
+      {/* biome-ignore lint/a11y/noNoninteractiveTabindex: what scrolls is reached by keys */}
+      <div className={style.scroll} tabIndex={0}>
+        <table className={style.figures}>
+          <thead>
+            <tr>
+              <th>Robot</th>
+              <th>State</th>
+              <th>Last answer</th>
+            </tr>
+          </thead>
+          <tbody>
+            {robots.map(({ name, state, why, heard_at }) => {
+              const heard = instant(heard_at);
+              return (
+                <tr key={name}>
+                  <th>
+                    <bdi>{name}</bdi>
+                  </th>
+                  <td title={why}>{state.replace("_", " ")}</td>
+                  <td>{heard === null ? "never" : ago(heard, now)}</td>
+                </tr>
+              );
+            })}
+          </tbody>
+        </table>
+      </div>
+    </section>
   );
 }

@@ -1,10 +1,10 @@
 /** One of the two processes: whether it can do its work, and what it takes. */
 
+import type { ReactNode } from "react";
 import { errorText } from "../api/http";
 import { serverNow } from "../clock/server-clock";
 import { ago, instant } from "../ui/times";
 import style from "./administration.module.css";
-import { Facts, type StatusFact } from "./facts";
 import { bytes, type ProcessStatus, span, type useStatus } from "./status";
 
 /** Bytes of the disk below which somebody should make room. */
@@ -124,5 +124,25 @@ export function ProcessCard({ title, asked: { data, error } }: Props) {
         <Facts facts={[...loadFacts(data), ...activityFacts(data), ...storageFacts(data)]} />
       )}
     </section>
+  );
+}
+
+export interface StatusFact {
+  readonly name: string;
+  readonly value: ReactNode;
+  /** Somebody should look at it. */
+  readonly isBad?: boolean;
+}
+
+export function Facts({ facts }: { facts: readonly StatusFact[] }) {
+  return (
+    <dl className={style.facts}>
+      {facts.map(({ name, value, isBad }) => (
+        <div key={name} data-bad={isBad || undefined}>
+          <dt>{name}</dt>
+          <dd>{value}</dd>
+        </div>
+      ))}
+    </dl>
   );
 }

@@ -1,7 +1,7 @@
 /** Graphs, versions and problems as the editor answers them. */
 import { type QueryClient, useQuery, useQueryClient } from "@tanstack/react-query";
 import { useEffect } from "react";
-import { fetchJson, fetchText } from "./http";
+import { fetchAnswer, fetchJson, fetchText } from "./http";
 import type { EditorApi } from "./schema/editor";
 
 /** `people`: who is in it now. */
@@ -146,4 +146,61 @@ export async function refreshGraphs(client: QueryClient): Promise<void> {
 
 export function refreshLibrary(client: QueryClient): Promise<void> {
   return client.invalidateQueries({ queryKey: queryKeys.actions });
+}
+
+const below = (graph: string) => `/api/graphs/${encodeURIComponent(graph)}`;
+
+export function publishNamed(graph: string, body: EditorApi["Publishing"]): Promise<Version> {
+  return fetchJson(`${below(graph)}/versions`, { method: "POST", body });
+}
+
+/** A graph as it was after a change, as another one; edits of one do not touch the other. */
+export async function copyMoment(graph: string, at: number, name: string): Promise<GraphSummary> {
+  const made = await importGraph(await fetchText(`${below(graph)}/umrf?at=${at}`));
+  try {
+    return await renameGraph(made.id, name);
+  } catch (error) {
+    await deleteGraph(made.id); // two of one name would be worse than none
+    throw error;
+  }
+}
+
+/** A graph inside of a version: as it was then, and what its name stands for now. */
+export type PinnedGraph = EditorApi["PinnedGraph"];
+
+/** One version with all that it has by value. */
+export function fetchVersion(id: string, signal: AbortSignal): Promise<Version> {
+  return fetchJson(`/api/versions/${encodeURIComponent(id)}`, { signal });
+}
+
+export function previewGraph(text: string): Promise<Preview> {
+  return fetchJson("/api/graphs?preview=true", { method: "POST", body: text });
+}
+
+/** The text that a route answers, and which moment of the graph it is of. */
+async function fetchMoment(url: string): Promise<{ text: string; seq: number }> {
+  const response = await fetchAnswer(url);
+  return { text: await response.text(), seq: Number(response.headers.get("x-seq")) };
+}
+
+/** The text of a graph as it is, and the moment that it is of. */
+export function graphMoment(id: string): Promise<{ text: string; seq: number }> {
+  return fetchMoment(`/api/graphs/${encodeURIComponent(id)}/umrf`);
+}
+
+/** One key of the document; a value that is not there is `undefined`. */
+export type KeyChange = EditorApi["KeyChange"];
+/** What an edited text would change, and the errors that would come with it. */
+export type TextChanges = EditorApi["TextEdit"];
+
+/** What the text, edited from that of the moment `seq`, would change. Nothing is stored. */
+export function textChangesOf(id: string, seq: number, text: string): Promise<TextChanges> {
+  const route = `/api/graphs/${encodeURIComponent(id)}/rewriting?seq=${seq}`;
+  return fetchJson(route, { method: "POST", body: text });
+}
+
+export type UmrfKeys = EditorApi["Pieces"];
+
+export function readUmrfKeys(text: string): Promise<UmrfKeys> {
+  return fetchJson("/api/pieces", { method: "POST", body: text });
 }

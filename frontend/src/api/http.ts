@@ -1,9 +1,7 @@
 /** Requests to editor and runner, and how they refuse. */
-
 import { hearAnswer, tick } from "../clock/server-clock";
 import { serverPath } from "./page-url";
 import type { EditorApi } from "./schema/editor";
-import { sessionEnd } from "./session-end";
 
 /** RFC 9457 as both processes answer it. */
 export type ProblemDetails = EditorApi["ProblemDetails"];
@@ -168,4 +166,36 @@ function placeInFile(error: Refusal): string {
     return `line ${where.line}${where.column === undefined ? "" : `, column ${where.column}`}`;
   }
   return where?.path ? `at ${where.path}` : "";
+}
+
+type Listener = () => void;
+
+const listeners = new Set<Listener>();
+let ended = false;
+
+function put(next: boolean): void {
+  if (ended === next) return;
+  ended = next;
+  for (const listener of [...listeners]) listener();
+}
+
+/** Usable without React: `subscribe` and `now` fit `useSyncExternalStore`. */
+export const sessionEnd = {
+  now: (): boolean => ended,
+  subscribe: (listener: Listener): (() => void) => {
+    listeners.add(listener);
+    return () => listeners.delete(listener);
+  },
+  /** A server has answered that nobody is signed in. */
+  notice: (): void => put(true),
+  /** Somebody is signed in. */
+  clear: (): void => put(false),
+};
+
+/** It, as `code` or `graph`; empty where it says nothing. */
+export function refusedAt(error: unknown, name: "code" | "graph"): string {
+  if (!(error instanceof Refusal)) return "";
+  const where: Readonly<Record<string, unknown>> = { ...error.details.where };
+  const said = where[name];
+  return typeof said === "string" ? said : "";
 }

@@ -1,9 +1,9 @@
 /** In which colour people are shown: the server gives each one that nobody else has who is here. */
 import { useQuery } from "@tanstack/react-query";
-import { useCallback, useEffect } from "react";
+import { createContext, use, useCallback, useEffect } from "react";
 import { fetchJson } from "./http";
 import type { EditorApi } from "./schema/editor";
-import { usePerson } from "./use-person";
+import { may, type Permission, type Person } from "./session";
 
 type KnownPerson = EditorApi["Participant"];
 
@@ -80,4 +80,24 @@ export function currentName(
 export function useCurrentName(author: Named | null | undefined): string {
   const { person } = usePerson();
   return currentName(author, person, useKnownPeople(author ? [author.id] : NO_IDS));
+}
+
+export interface SignedIn {
+  person: Person;
+  /** How often somebody has signed in since the page was opened: sockets begin anew with each. */
+  visit: number;
+  rename: (name: string) => Promise<void>;
+}
+
+export const PersonContext = createContext<SignedIn | null>(null);
+
+export function usePerson(): SignedIn {
+  const hold = use(PersonContext);
+  if (hold === null) throw new Error("usePerson needs a signed-in page around it");
+  return hold;
+}
+
+/** Whether the one who is signed in may do this. */
+export function useMay(permission: Permission): boolean {
+  return may(usePerson().person.role, permission);
 }

@@ -1,9 +1,6 @@
 /** Who this browser is: trades the token of the link for a cookie. */
 import { errorText, fetchJson, Refusal } from "./http";
-import { ROLE_WORDS } from "./roles";
 import type { EditorApi } from "./schema/editor";
-
-export { may, type Permission, ROLE_WORDS, type Role } from "./roles";
 
 export type Person = EditorApi["Person"];
 
@@ -134,3 +131,34 @@ export async function renamePerson(name: string): Promise<Person> {
   rememberName(name);
   return answer.person;
 }
+
+export type Role = EditorApi["Person"]["role"];
+
+/** From the least to the most; each may do what those before it may. */
+const ROLES = ["viewer", "editor", "operator", "owner"] as const satisfies readonly Role[];
+
+/** The least role that may do a thing. */
+const FROM = {
+  see: "viewer",
+  stop: "viewer",
+  edit: "editor",
+  simulate: "editor",
+  operate: "operator",
+  register: "operator",
+  share: "owner",
+  restore: "owner",
+} as const satisfies Record<string, Role>;
+
+export type Permission = keyof typeof FROM;
+
+export function may(role: Role, permission: Permission): boolean {
+  return ROLES.indexOf(role) >= ROLES.indexOf(FROM[permission]);
+}
+
+/** What a role may do, to follow "may". */
+export const ROLE_WORDS: Readonly<Record<Role, string>> = {
+  viewer: "look at everything and stop runs",
+  editor: "edit graphs, run them in the simulator, and stop runs",
+  operator: "edit graphs, run them on robots, and stop runs",
+  owner: "do everything",
+};

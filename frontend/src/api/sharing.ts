@@ -2,8 +2,8 @@
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
 import { errorText, fetchJson } from "./http";
 import { serverPath } from "./page-url";
-import type { Role } from "./roles";
 import type { EditorApi } from "./schema/editor";
+import type { Role } from "./session";
 
 export type Guest = EditorApi["Guest"];
 /** `path` follows the origin of the page, and is absent once the link is revoked. `unrecorded`: nobody

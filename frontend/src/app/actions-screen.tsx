@@ -1,11 +1,10 @@
 /** The screen of actions: the bar stays as it is while one action after the other is opened. */
 import { useState } from "react";
 import { ActionsPage } from "../actions/actions-page";
-import { useLibrary } from "../api/documents/library";
-import { usePerson } from "../api/use-person";
+import { useLibrary } from "../api/library";
+import { usePerson } from "../api/people";
 import { useNewGraphs } from "./imports/new-graphs";
-import { PageBar, PageFrame } from "./page-frame";
-import { useTitle } from "./use-title";
+import { PageBar, PageFrame, useTitle } from "./page-frame";
 
 const HERE = { display: "contents" };
 

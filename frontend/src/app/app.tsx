@@ -8,16 +8,16 @@ import { Refusal } from "../api/http";
 import { basePath } from "../api/page-url";
 import { actionDrag } from "../canvas/action-drag";
 import { NewVersionNotice } from "../offline/new-version-notice";
-import { UnansweredStartNotice } from "../runs/start/unanswered-start-notice";
+import { UnansweredStartNotice } from "../runs/start/unanswered-starts";
 import { RestQuestion } from "../runs/stop/rest-question";
 import { LiveRegion } from "../ui/announcer";
-import { lazyPart } from "../ui/parts/lazy-part";
-import { OverlayBoundary } from "../ui/parts/part-boundary";
+import { lazyPart, OverlayBoundary } from "../ui/lazy-part";
 import { DragPreview } from "../ui/pointer-drag";
 import { theme, variables } from "../ui/theme";
 import type { Crumb } from "../ui/top-bar";
 import { DropFiles } from "./imports/drop-files";
 import { importReviews } from "./imports/import-review";
+import { NotFound } from "./page-frame";
 import {
   ActionsScreen,
   AdministrationScreen,
@@ -29,8 +29,7 @@ import {
   RunsScreen,
   Screen,
   StatisticsScreen,
-} from "./lazy-screens";
-import { NotFound } from "./not-found";
+} from "./screens";
 
 /** What a browser says of its network says nothing of a server on this computer or in this room, and what
  * a person asks for happens now or not at all: nothing waits for a network and is sent by itself later. */
@@ -47,7 +46,7 @@ const client = new QueryClient({
   },
 });
 
-const Messages = lazyPart(() => import("../ui/parts/messages").then((part) => part.Messages));
+const Messages = lazyPart(() => import("../ui/messages").then((part) => part.Messages));
 const ImportReviewDialog = lazyPart(() =>
   import("./imports/import-review-dialog").then((part) => part.ImportReviewDialog),
 );

@@ -2,35 +2,31 @@
 
 import { memo, type ReactNode, useEffect, useMemo, useRef, useState } from "react";
 import { Redirect, useSearch } from "wouter";
-import { type GraphAsAction, useGraphsAsActions } from "../api/documents/library";
 import { useVersions, versionName } from "../api/graphs";
-import { newestRun, openRuns } from "../api/live/open-runs";
-import { useLive } from "../api/live/use-live";
+import { type GraphAsAction, useGraphsAsActions } from "../api/library";
+import { newestRun, openRuns } from "../api/live-socket";
+import { useLive } from "../api/page-link";
+import { useMay, usePerson } from "../api/people";
 import { type Run, useLastRun } from "../api/runs";
-import { useMay, usePerson } from "../api/use-person";
 import { levelsOf } from "../canvas/level-path";
 import { serverNow } from "../clock/server-clock";
 import { useSeed } from "../editor/dry-run/use-seed";
 import { Editor, type EditorSummary } from "../editor/editor";
-import { templatesOf, useKnownActions, usePlaceable } from "../library/known-actions";
-import { Sidebar } from "../library/sidebar";
-import { useReplay } from "../review/replay/use-replay";
-import { askedDryRun } from "../review/run/dry-run-link";
+import { templatesOf, useKnownActions, usePlaceable } from "../home/known-actions";
+import { Sidebar } from "../home/sidebar";
+import { askedDryRun } from "../review/dry-run-link";
+import { useReplay } from "../review/replay";
 import { ConnectionStatus } from "../runs/connection-status";
 import { RunDrawer } from "../runs/drawer/run-drawer";
 import { StartControl } from "../runs/start/start-control";
-import { type GraphInRun, isInRun, runOnCanvas } from "../status/progress-inside";
-import { useProgress } from "../status/use-progress";
+import { type GraphInRun, isInRun, runOnCanvas, useProgress } from "../status/progress-inside";
 import { roomUrl } from "../sync/room-connection";
 import { RoomProvider, useLinkPart, useRoom, useThrottledGraph } from "../sync/use-room";
-import { useStableCallback } from "../ui/hooks/use-stable-callback";
-import { lazyPart } from "../ui/parts/lazy-part";
-import { PartBoundary } from "../ui/parts/part-boundary";
+import { lazyPart, PartBoundary } from "../ui/lazy-part";
 import { instant } from "../ui/times";
+import { useStableCallback } from "../ui/use-stable-callback";
 import { useNewGraphs } from "./imports/new-graphs";
-import { Nowhere } from "./not-found";
-import { PageBar, PageFrame } from "./page-frame";
-import { useTitle } from "./use-title";
+import { Nowhere, PageBar, PageFrame, useTitle } from "./page-frame";
 
 const DraftStatus = lazyPart(() => import("../runs/draft-status").then((part) => part.DraftStatus));
 const RecordDryRun = lazyPart(() =>

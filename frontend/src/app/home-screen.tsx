@@ -1,11 +1,9 @@
 /** The first screen: every graph. */
 import { NamePrompt } from "../account/name-prompt";
-import { Home } from "../library/home/home";
-import { lazyPart } from "../ui/parts/lazy-part";
-import { PartBoundary } from "../ui/parts/part-boundary";
+import { Home } from "../home/home";
+import { lazyPart, PartBoundary } from "../ui/lazy-part";
 import { useNewGraphs } from "./imports/new-graphs";
-import { PageBar, PageFrame } from "./page-frame";
-import { useTitle } from "./use-title";
+import { PageBar, PageFrame, useTitle } from "./page-frame";
 
 const KeptGraphs = lazyPart(() => import("./kept-graphs").then((part) => part.KeptGraphs));
 

@@ -1,7 +1,7 @@
 /** The graphs that this device keeps: what there is to open while no server answers. */
 import { useQuery } from "@tanstack/react-query";
 import { Link } from "wouter";
-import { usePerson } from "../api/use-person";
+import { usePerson } from "../api/people";
 import { keptGraphs } from "../sync/kept-graphs";
 import style from "./kept-graphs.module.css";
 

@@ -9,11 +9,11 @@ import { createRoot } from "react-dom/client";
 import { errorText } from "../api/http";
 import { keepPage } from "../offline/page-version";
 import { pageError } from "../runs/stop/stop-surroundings";
-import { restAfterLostFields } from "../ui/lost-field";
+import { restAfterLostFields } from "../ui/focus-field";
 import { App } from "./app";
-import { preloadAt, preloadWhenIdle } from "./lazy-screens";
+import { preloadAt, preloadWhenIdle } from "./screens";
 
-restAfterLostFields(() => void import("./keys-rest").then((part) => part.tellKeysRest()));
+restAfterLostFields(() => void import("../ui/messages").then((part) => part.tellKeysRest()));
 void preloadAt(location.pathname).then(preloadWhenIdle).then(keepPage);
 
 const root = document.getElementById("root");

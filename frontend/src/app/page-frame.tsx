@@ -1,16 +1,17 @@
 /** What every screen has: the bar on top, with room for STOP, and the screen below. */
 import { Button } from "@mantine/core";
-import { IconBolt, IconHistory, IconRobot, IconShare } from "@tabler/icons-react";
-import { memo, type ReactNode, useLayoutEffect, useState } from "react";
+import { IconBolt, IconHistory, IconMapOff, IconRobot, IconShare } from "@tabler/icons-react";
+import { memo, type ReactNode, useEffect, useLayoutEffect, useState } from "react";
 import { Link } from "wouter";
 import { AccountMenu } from "../account/account-menu";
-import { useMay } from "../api/use-person";
-import { MovesNowLine } from "../runs/moves-now-line";
+import { useMay } from "../api/people";
+import { MovesNowLine } from "../runs/moves-now";
 import { graphOnScreen } from "../runs/stop/stop-surroundings";
-import { useStableCallback } from "../ui/hooks/use-stable-callback";
-import { lazyPart } from "../ui/parts/lazy-part";
-import { OverlayBoundary } from "../ui/parts/part-boundary";
+import { Empty } from "../ui/empty";
+import { lazyPart, OverlayBoundary } from "../ui/lazy-part";
 import { type Crumb, TopBar } from "../ui/top-bar";
+import { useStableCallback } from "../ui/use-stable-callback";
+import { isolated } from "../words/isolated";
 import style from "./page-frame.module.css";
 
 const leave = async (person: string) => {
@@ -122,4 +123,47 @@ export function PageBar({ crumbs, status, actions, start, graph, at }: Props) {
 /** Bar above, screen below, each scrolling by itself. */
 export function PageFrame({ children }: { children: ReactNode }) {
   return <div className={style.frame}>{children}</div>;
+}
+
+interface NowhereProps {
+  /** Where one is, in the bar. */
+  crumb: string;
+  title: string;
+  children?: ReactNode;
+}
+
+/** What stands in the place of a page, and the way to all graphs. */
+export function Nowhere({ crumb, title, children }: NowhereProps) {
+  return (
+    <>
+      <PageBar crumbs={[{ label: "Graphs", to: "/" }, { label: crumb }]} />
+      <main>
+        <Empty
+          icon={<IconMapOff size={22} />}
+          title={title}
+          action={
+            <Button component={Link} to="/">
+              All graphs
+            </Button>
+          }
+        >
+          {children}
+        </Empty>
+      </main>
+    </>
+  );
+}
+
+export function NotFound() {
+  return (
+    <PageFrame>
+      <Nowhere crumb="Nowhere" title="There is nothing at this address" />
+    </PageFrame>
+  );
+}
+
+export function useTitle(title: string): void {
+  useEffect(() => {
+    document.title = `${isolated(title)} · TeMoto Action Assistant`;
+  }, [title]);
 }

@@ -1,76 +1,91 @@
-/** The screens that look back: runs, one run, two beside each other, statistics. */
-import { useLocation } from "wouter";
-import { useVersions } from "../api/graphs";
-import { ComparePage } from "../review/compare/compare-page";
-import type { RepeatActions } from "../review/run/run-menu";
-import { RunPage } from "../review/run/run-page";
-import { RunsPage } from "../review/runs-page";
-import { StatisticsPage } from "../review/statistics-page";
-import { nextLabel } from "../runs/start/use-start";
-import { lazyPart } from "../ui/parts/lazy-part";
-import { OverlayBoundary } from "../ui/parts/part-boundary";
-import { PageBar, PageFrame } from "./page-frame";
-import { useTitle } from "./use-title";
+/** Screens whose code is loaded when they are opened, the one at hand first and others when idle. */
+import type { ReactNode } from "react";
+import { basePath } from "../api/page-url";
+import { type LazyPart, lazyPart, PartBoundary, preloadParts, whenIdle } from "../ui/lazy-part";
+import type { Crumb } from "../ui/top-bar";
+import { useNewGraphs } from "./imports/new-graphs";
+import { PageBar, PageFrame, useTitle } from "./page-frame";
 
-const StartDialog = lazyPart(() =>
-  import("../runs/start/start-dialog").then((part) => part.StartDialog),
+const review = () => import("./review-screens");
+
+export const HomeScreen = lazyPart(() => import("./home-screen").then((part) => part.HomeScreen));
+export const GraphScreen = lazyPart(() =>
+  import("./graph-screen").then((part) => part.GraphScreen),
 );
+const RobotsPage = lazyPart(() => import("../robots/robots-page").then((part) => part.RobotsPage));
+const AdministrationPage = lazyPart(() =>
+  import("../administration/administration-page").then((part) => part.AdministrationPage),
+);
+export const ActionsScreen = lazyPart(() =>
+  import("./actions-screen").then((part) => part.ActionsScreen),
+);
+export const RunsScreen = lazyPart(() => review().then((part) => part.RunsScreen));
+export const RunScreen = lazyPart(() => review().then((part) => part.RunScreen));
+export const CompareScreen = lazyPart(() => review().then((part) => part.CompareScreen));
+export const StatisticsScreen = lazyPart(() => review().then((part) => part.StatisticsScreen));
 
-export function RunsScreen() {
-  useTitle("Runs");
+/** By how the path begins below the page's root; the last one is whatever is left. */
+const PLACES: readonly (readonly [start: string, part: Pick<LazyPart<never>, "preload">])[] = [
+  ["/graphs/", GraphScreen],
+  ["/runs", RunsScreen],
+  ["/robots", RobotsPage],
+  ["/actions", ActionsScreen],
+  ["/admin", AdministrationPage],
+  ["/", HomeScreen],
+];
+
+/** Asks for the screen at this address before anything is drawn, or known of who is here. */
+export function preloadAt(path: string): Promise<void> {
+  const below = path.startsWith(basePath) ? path.slice(basePath.length) : path;
+  const [, part] = PLACES.find(([start]) => below.startsWith(start)) ?? ["", HomeScreen];
+  return part.preload();
+}
+
+/** Others follow one by one while nothing else is to be done; not where data is to be saved. */
+export async function preloadWhenIdle(): Promise<void> {
+  const { connection } = navigator as { connection?: { saveData?: boolean } };
+  if (!connection?.saveData) await preloadParts(idle);
+}
+
+const IDLE_WITHIN = 2_000; // ms for each of them
+
+function idle(): Promise<void> {
+  return new Promise((resolve) => {
+    whenIdle(resolve, IDLE_WITHIN);
+  });
+}
+
+/** A screen under its bar: STOP is there before the screen is, and when it never comes. */
+export function Screen({ crumbs, children }: { crumbs: readonly Crumb[]; children: ReactNode }) {
+  const frame = (notice: ReactNode) => (
+    <PageFrame>
+      <PageBar crumbs={crumbs} />
+      <main>{notice}</main>
+    </PageFrame>
+  );
+  return <PartBoundary frame={frame}>{children}</PartBoundary>;
+}
+
+export function RobotsScreen() {
+  const { take } = useNewGraphs();
+  useTitle("Robots");
+  const onImport = (text: string, name: string) => {
+    void take([new File([text], `${name}.umrf.graph.json`, { type: "application/json" })]);
+  };
   return (
     <PageFrame>
-      <PageBar at="runs" crumbs={[{ label: "Graphs", to: "/" }, { label: "Runs" }]} />
-      <RunsPage />
+      <PageBar at="robots" crumbs={[{ label: "Graphs", to: "/" }, { label: "Robots" }]} />
+      <RobotsPage onImport={onImport} />
     </PageFrame>
   );
 }
 
-export function RunScreen({ id }: { id: string }) {
-  useTitle("Run");
+export function AdministrationScreen() {
+  useTitle("Administration");
   return (
     <PageFrame>
-      <RunPage
-        id={id}
-        bar={(parts) => <PageBar at="runs" {...parts} />}
-        start={(again, onClose) => <Again {...again} onClose={onClose} />}
-      />
-    </PageFrame>
-  );
-}
-
-/** A run once more: looked at, held, recorded like every other start. */
-function Again({ engines, onClose, ...what }: RepeatActions & { onClose: () => void }) {
-  const [, go] = useLocation();
-  const versions = useVersions(what.graph).data ?? [];
-  return (
-    <OverlayBoundary>
-      <StartDialog
-        {...what}
-        label={nextLabel(versions, what.seq)}
-        chosen={engines}
-        onChosen={() => undefined}
-        onStarted={([first]) => first && go(`/runs/${first.id}`)}
-        onClose={onClose}
-      />
-    </OverlayBoundary>
-  );
-}
-
-export function CompareScreen() {
-  useTitle("Compare runs");
-  return (
-    <PageFrame>
-      <ComparePage bar={(parts) => <PageBar at="runs" {...parts} />} />
-    </PageFrame>
-  );
-}
-
-export function StatisticsScreen() {
-  useTitle("Statistics");
-  return (
-    <PageFrame>
-      <StatisticsPage bar={(parts) => <PageBar at="runs" {...parts} />} />
+      <PageBar crumbs={[{ label: "Graphs", to: "/" }, { label: "Administration" }]} />
+      <AdministrationPage />
     </PageFrame>
   );
 }

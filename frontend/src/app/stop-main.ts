@@ -1,6 +1,6 @@
 /** First entry of the page: STOP, before and apart from everything else. */
 import "../ui/tokens.css";
-import { pageLink } from "../api/live/page-link";
+import { pageLink } from "../api/page-link";
 import { credentialIn, identityOf, rememberedPerson } from "../api/session";
 import { outliveOutsideChanges } from "../runs/stop/outside-changes";
 import { mountStop } from "../runs/stop/stop-root";

@@ -1,6 +1,6 @@
 /** Sub-graphs as the canvas and the menus know them; the folder `levels`, which is loaded late, fills these stores. */
 import type { ComponentType } from "react";
-import type { LibraryAction } from "../api/documents/library";
+import type { LibraryAction } from "../api/library";
 import type { Action, Key } from "../graph/model";
 import type { ToldProblem } from "../graph/problems/told-problems";
 import type { Progress } from "../status/progress";

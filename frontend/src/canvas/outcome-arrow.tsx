@@ -4,8 +4,7 @@
  */
 import { BaseEdge, EdgeLabelRenderer, type EdgeProps, useStoreApi } from "@xyflow/react";
 import { memo, use, useLayoutEffect, useRef, useState } from "react";
-import { lazyPart } from "../ui/parts/lazy-part";
-import { PartBoundary } from "../ui/parts/part-boundary";
+import { lazyPart, PartBoundary } from "../ui/lazy-part";
 import { pillWord } from "./arrows/bundles";
 import { PILL_PLAY } from "./arrows/docks";
 import { behindPill, pathOf } from "./arrows/line-path";

@@ -6,8 +6,8 @@
 import { Button, Checkbox, Group, Modal, Stack } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { useState } from "react";
-import { callUses } from "../api/documents/inside";
 import { errorText } from "../api/http";
+import { callUses } from "../api/inside";
 import { counted } from "../words/counted";
 
 export interface RenamedUse {

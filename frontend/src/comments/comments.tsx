@@ -3,7 +3,7 @@
 import { Button, NativeSelect } from "@mantine/core";
 import { IconMessageCircle } from "@tabler/icons-react";
 import { useState } from "react";
-import { usePerson } from "../api/use-person";
+import { usePerson } from "../api/people";
 import { serverNow } from "../clock/server-clock";
 import { selectedActions, useEditorContext } from "../edit-actions/editor-context";
 import { beginThread, type Thread } from "../graph/edit/comments";
@@ -11,7 +11,7 @@ import type { Action, Key } from "../graph/model";
 import { endName } from "../graph/relation-words";
 import { pathWords } from "../graph/value-text";
 import { Empty } from "../ui/empty";
-import { Tooltip } from "../ui/floating/tooltip";
+import { Tooltip } from "../ui/tooltip";
 import { isolated } from "../words/isolated";
 import style from "./comments.module.css";
 import { ThreadCard } from "./thread-card";

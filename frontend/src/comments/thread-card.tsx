@@ -3,12 +3,12 @@
 import { Button } from "@mantine/core";
 import { IconCheck, IconRotate2 } from "@tabler/icons-react";
 import { useState } from "react";
-import { usePerson } from "../api/use-person";
+import { usePerson } from "../api/people";
 import { serverNow } from "../clock/server-clock";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { deleteMessage, reply, resolve, type Thread } from "../graph/edit/comments";
 import { usePersonColors } from "../sync/use-room";
-import { textScope, useWaitingTexts } from "../ui/drafts/kept-texts";
+import { textScope, useWaitingTexts } from "../ui/drafts";
 import { initials } from "../ui/name-colors";
 import { ago, useNow } from "../ui/times";
 import style from "./comments.module.css";

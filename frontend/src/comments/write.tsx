@@ -1,9 +1,9 @@
 /** The form in which a person writes a comment or an answer. */
 import { Button, Textarea } from "@mantine/core";
 import type { ReactNode } from "react";
-import { usePerson } from "../api/use-person";
+import { usePerson } from "../api/people";
 import { printedKeys } from "../edit-actions/edit-action";
-import { textScope, useKeptText } from "../ui/drafts/kept-texts";
+import { textScope, useKeptText } from "../ui/drafts";
 import { keyOf } from "../ui/keys";
 import style from "./comments.module.css";
 

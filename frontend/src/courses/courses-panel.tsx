@@ -1,24 +1,29 @@
 /** The tests of a graph: expected courses, whether it still takes them, and what none of them takes. */
-import { Button, Progress, Skeleton } from "@mantine/core";
+import { ActionIcon, Button, Progress, Skeleton } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
-import { IconFlask } from "@tabler/icons-react";
+import { IconFlask, IconTrash } from "@tabler/icons-react";
 import { useQueryClient } from "@tanstack/react-query";
 import { useEffect, useMemo } from "react";
+import { Link } from "wouter";
 import {
+  type CheckedCourse,
   type CheckedCourses,
   dropCourse,
   refreshCourses,
   useCheckedCourses,
-} from "../api/documents/courses";
+} from "../api/courses";
+import type { Script } from "../api/dry-runs";
+import { authorName } from "../api/graphs";
 import { errorText } from "../api/http";
-import { useLive } from "../api/live/use-live";
+import { useLive } from "../api/page-link";
 import { cardHighlights } from "../canvas/card-highlights";
 import { type EditorContext, useEditorContext } from "../edit-actions/editor-context";
 import { endName } from "../graph/relation-words";
-import { CourseRow } from "./course-row";
+import { day, useNow } from "../ui/times";
+import { Tooltip } from "../ui/tooltip";
+import { isolated } from "../words/isolated";
 import style from "./courses.module.css";
-import { UntakenList } from "./untaken-list";
-import { isThere, untakenPlaces } from "./untaken-places";
+import { isThere, UntakenList, untakenPlaces } from "./untaken-list";
 
 /** While this is open, the canvas says what no course takes; in a dry-run it has something else to say. */
 function useUntakenOnCanvas(
@@ -137,5 +142,61 @@ export function CoursesPanel({ seq }: { seq: number }) {
       )}
       {courses.length > 0 && <Unvisited found={found} context={context} />}
     </div>
+  );
+}
+
+const SIGNS = { same: "✓", other: "✗", unknown: "?" } as const;
+const READ = {
+  same: "as expected",
+  other: "goes another way",
+  unknown: "not looked at in time",
+} as const;
+
+interface CourseRowProps {
+  course: CheckedCourse;
+  mayEdit: boolean;
+  onPlay: (script: Script) => void;
+  onDrop: () => void;
+}
+
+export function CourseRow({ course, mayEdit, onPlay, onDrop }: CourseRowProps) {
+  const now = useNow(60_000);
+  const { same, name, run, why } = course;
+  const verdict = same === null ? "unknown" : same ? "same" : "other";
+  return (
+    <li className={style.course} data-verdict={verdict} data-course={name}>
+      <i className={style.sign} aria-hidden>
+        {SIGNS[verdict]}
+      </i>
+      <div className={style.words}>
+        <b>
+          <bdi>{name}</bdi>
+        </b>
+        <span className="visually-hidden">: {READ[verdict]}</span>
+        {why !== "" && <p className={style.why}>{why}</p>}
+        {verdict === "unknown" && <p className={style.why}>{READ.unknown}</p>}
+        <p className={style.by}>
+          <bdi>{authorName(course.author)}</bdi>, {day(course.at / 1000, now)}
+          {" · "}
+          {run === "" ? "from a dry-run" : <Link to={`/runs/${run}`}>its run</Link>}
+        </p>
+      </div>
+      <Tooltip label="Play it on the canvas">
+        <ActionIcon
+          size="sm"
+          aria-label={`Play ${isolated(name)} on the canvas`}
+          onClick={() => onPlay(course.script as Script)}
+        >
+          <IconFlask size={15} aria-hidden />
+        </ActionIcon>
+      </Tooltip>
+      {mayEdit && (
+        <Tooltip label="Expect it no more">
+          <ActionIcon size="sm" aria-label={`Expect ${isolated(name)} no more`} onClick={onDrop}>
+            <IconTrash size={15} aria-hidden />
+          </ActionIcon>
+        </Tooltip>
+      )}
+    </li>
   );
 }

@@ -1,6 +1,6 @@
 /** In a few words whether a graph goes as it is expected to: after it was published, before it is merged. */
 
-import { type CheckedCourses, useCheckedCourses, useCoursesOfText } from "../api/documents/courses";
+import { type CheckedCourses, useCheckedCourses, useCoursesOfText } from "../api/courses";
 import { errorText } from "../api/http";
 import style from "./courses.module.css";
 

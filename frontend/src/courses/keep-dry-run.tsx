@@ -1,17 +1,18 @@
 /** Makes a dry-run an expected course: with the decisions made in it. */
-import { Button } from "@mantine/core";
+import { Button, TextInput } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconShieldCheck } from "@tabler/icons-react";
 import { useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
-import { expectDryRun, refreshCourses } from "../api/documents/courses";
-import { useLive } from "../api/live/use-live";
+import { expectDryRun, refreshCourses } from "../api/courses";
+import { errorText } from "../api/http";
+import { useLive } from "../api/page-link";
 import { commandsOf, scriptOf } from "../dry-run/script";
 import type { DryRun } from "../dry-run/use-dry-run";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { useThrottledLink } from "../sync/use-room";
 import { isolated } from "../words/isolated";
-import { NameField } from "./name-field";
+import style from "./courses.module.css";
 
 /** Why a dry-run cannot be expected; null where it can. */
 function obstacleOf(run: DryRun): string | null {
@@ -56,5 +57,53 @@ export function KeepDryRun({ run }: { run: DryRun }) {
     >
       Expect this course …
     </Button>
+  );
+}
+
+interface NameFieldProps {
+  proposed: string;
+  onKeep: (name: string) => Promise<unknown>;
+  onClose: () => void;
+}
+
+export function NameField({ proposed, onKeep, onClose }: NameFieldProps) {
+  const [name, setName] = useState(proposed);
+  const [busy, setBusy] = useState(false);
+  const [refused, setRefused] = useState("");
+  const keep = async () => {
+    setBusy(true);
+    try {
+      await onKeep(name);
+      onClose();
+    } catch (error) {
+      setRefused(errorText(error));
+    } finally {
+      setBusy(false);
+    }
+  };
+  return (
+    <form
+      className={style.naming}
+      onSubmit={(event) => {
+        event.preventDefault();
+        void keep();
+      }}
+    >
+      <TextInput
+        size="xs"
+        aria-label="Name of the expected course"
+        value={name}
+        maxLength={100}
+        error={refused || undefined}
+        data-autofocus
+        onChange={(event) => setName(event.currentTarget.value)}
+      />
+      <Button size="compact-sm" type="submit" loading={busy} disabled={name.trim() === ""}>
+        Expect this
+      </Button>
+      <Button size="compact-sm" variant="subtle" onClick={onClose}>
+        Cancel
+      </Button>
+    </form>
   );
 }

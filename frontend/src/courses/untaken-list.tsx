@@ -4,19 +4,22 @@ import { IconFlask } from "@tabler/icons-react";
 import { useState } from "react";
 import {
   type ArrowProposal,
+  type CheckedCourses,
   expectDryRun,
   type OutcomeArrow,
   proposeCourse,
-} from "../api/documents/courses";
+} from "../api/courses";
 import type { Script } from "../api/dry-runs";
 import { errorText } from "../api/http";
+import type { UntakenPlaces } from "../canvas/card-highlights";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../canvas/outcome";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { relationId } from "../graph/document-keys";
+import type { Graph, Precondition } from "../graph/model";
 import { endName } from "../graph/relation-words";
+import { isolated } from "../words/isolated";
 import style from "./courses.module.css";
-import { NameField } from "./name-field";
-import { arrowWords } from "./untaken-places";
+import { NameField } from "./keep-dry-run";
 
 type ProposalSearch =
   | { kind: "searching" }
@@ -158,4 +161,31 @@ export function UntakenList({ arrows, ...others }: Props) {
       ))}
     </ul>
   );
+}
+
+/** By relation, those that are listed twice alike: a course cannot tell them apart. */
+export function untakenPlaces(graph: Graph, { coverage }: CheckedCourses): UntakenPlaces {
+  const pairs = new Map<string, Precondition[]>();
+  for (const { parent, child, outcome } of coverage.untaken) {
+    const pair = `${parent}>${child}`;
+    const known = pairs.get(pair);
+    if (known) known.push(outcome);
+    else pairs.set(pair, [outcome]);
+  }
+  const outcomes = new Map<string, readonly Precondition[]>();
+  for (const relation of graph.relations) {
+    const found = pairs.get(`${relation.parent}>${relation.child}`);
+    if (found) outcomes.set(relationId(relation), found);
+  }
+  return { outcomes, actions: new Set(coverage.unvisited) };
+}
+
+/** `Dock_0 → Charge_0`. */
+export function arrowWords(graph: Graph, { parent, child }: OutcomeArrow): string {
+  return `${isolated(endName(graph, parent))} → ${isolated(endName(graph, child))}`;
+}
+
+/** Whether the arrow is on screen still: the answer may be older than the last edit. */
+export function isThere(graph: Graph, { parent, child }: OutcomeArrow): boolean {
+  return graph.relations.some((each) => each.parent === parent && each.child === child);
 }

@@ -1,21 +1,26 @@
 /** Above the canvas of a draft: of what it is one, how far both are apart, and what can be done. */
-import { Button } from "@mantine/core";
+import { Button, Modal, Textarea } from "@mantine/core";
 import { useDebouncedValue } from "@mantine/hooks";
 import { IconGitBranch } from "@tabler/icons-react";
 import { useState } from "react";
 import { Link } from "wouter";
-import { type GraphDraft, useDraft, useDraftOf, withdrawProposal } from "../api/documents/drafts";
+import {
+  type GraphDraft,
+  proposeDraft,
+  useDraft,
+  useDraftOf,
+  withdrawProposal,
+} from "../api/drafts";
+import { usePerson } from "../api/people";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { useThrottledLink } from "../sync/use-room";
-import { lazyPart } from "../ui/parts/lazy-part";
-import { OverlayBoundary } from "../ui/parts/part-boundary";
-import { answersWords, apartWords } from "./draft-words";
+import { textScope, useKeptText } from "../ui/drafts";
+import { lazyPart, OverlayBoundary } from "../ui/lazy-part";
+import { answersWords, apartWords, useDraftStep } from "./draft-steps";
 import style from "./drafts.module.css";
-import { useDraftStep } from "./use-draft-step";
 
 const MergeDialog = lazyPart(() => import("./merge-dialog").then((part) => part.MergeDialog));
-const CompareDialog = lazyPart(() => import("./compare-dialog").then((part) => part.CompareDialog));
-const ProposeDialog = lazyPart(() => import("./propose-dialog").then((part) => part.ProposeDialog));
+const CompareDialog = lazyPart(() => import("./merge-dialog").then((part) => part.CompareDialog));
 
 /** How far both are apart is asked for when the hands rest. */
 const SETTLED_MS = 800;
@@ -134,4 +139,41 @@ function Bar({ id }: { id: string }) {
 export function DraftBar({ id }: { id: string }) {
   const of = useDraftOf(id).data;
   return of ? <Bar id={id} /> : null;
+}
+
+export function ProposeDialog({ draft, onClose }: { draft: GraphDraft; onClose: () => void }) {
+  const { person } = usePerson();
+  const [note, setNote] = useKeptText(`${textScope(draft.id, person.id)}proposal`);
+  const { busy, wrong, step } = useDraftStep();
+  const propose = () =>
+    step(async () => {
+      await proposeDraft(draft.id, note);
+      setNote("");
+      onClose();
+    });
+  const cancel = () => {
+    setNote("");
+    onClose();
+  };
+  return (
+    <Modal opened onClose={onClose} title={<bdi>Propose “{draft.name}”</bdi>}>
+      <Textarea
+        label="What is it for?"
+        description="Others see it in the history of the graph, look at the draft, and say yes or no."
+        autosize
+        minRows={3}
+        maxLength={2000}
+        data-autofocus
+        value={note}
+        error={wrong || undefined}
+        onChange={(event) => setNote(event.currentTarget.value)}
+      />
+      <div className={style.answers}>
+        <Button onClick={cancel}>Cancel</Button>
+        <Button variant="filled" loading={busy} onClick={() => void propose()}>
+          Propose
+        </Button>
+      </div>
+    </Modal>
+  );
 }

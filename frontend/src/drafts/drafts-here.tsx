@@ -1,24 +1,19 @@
 /** The drafts of the open graph, above its history: proposals first, and a new one. */
-import { ActionIcon, Button } from "@mantine/core";
+import { ActionIcon, Button, Modal, TextInput } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconCheck, IconGitBranch, IconTrash, IconX } from "@tabler/icons-react";
 import { type QueryClient, useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
-import { Link } from "wouter";
-import { answerProposal, type GraphDraft, useDrafts } from "../api/documents/drafts";
+import { Link, useLocation } from "wouter";
+import { answerProposal, type GraphDraft, makeDraft, useDrafts } from "../api/drafts";
 import { authorName, deleteGraph, refreshGraphs } from "../api/graphs";
-import { usePerson } from "../api/use-person";
+import { usePerson } from "../api/people";
 import { useEditorContext } from "../edit-actions/editor-context";
-import { lazyPart } from "../ui/parts/lazy-part";
-import { OverlayBoundary } from "../ui/parts/part-boundary";
+import { lazyPart, OverlayBoundary } from "../ui/lazy-part";
 import { isolated } from "../words/isolated";
-import { answersWords, apartWords } from "./draft-words";
+import { answersWords, apartWords, useDraftStep } from "./draft-steps";
 import style from "./drafts.module.css";
-import { useDraftStep } from "./use-draft-step";
 
-const NewDraftDialog = lazyPart(() =>
-  import("./new-draft-dialog").then((part) => part.NewDraftDialog),
-);
 const MergeDialog = lazyPart(() => import("./merge-dialog").then((part) => part.MergeDialog));
 
 interface DraftRowProps {
@@ -165,5 +160,55 @@ export function DraftsHere() {
         {merging && <MergeDialog draft={merging} into="origin" onClose={() => setMerging(null)} />}
       </OverlayBoundary>
     </section>
+  );
+}
+
+interface NewDraftDialogProps {
+  graph: string;
+  /** The change of which it begins; null: as the graph is now. */
+  seq: number | null;
+  onClose: () => void;
+}
+
+export function NewDraftDialog({ graph, seq, onClose }: NewDraftDialogProps) {
+  const [, go] = useLocation();
+  const [name, setName] = useState("");
+  const { busy, wrong, step } = useDraftStep();
+  const make = () =>
+    step(async () => {
+      const made = await makeDraft(graph, { name, seq });
+      onClose();
+      go(`/graphs/${made.id}`);
+    });
+  return (
+    <Modal opened onClose={onClose} title="New draft">
+      <form
+        onSubmit={(event) => {
+          event.preventDefault();
+          void make();
+        }}
+      >
+        <TextInput
+          label="What will it be about?"
+          description={
+            seq === null
+              ? "A draft begins as the graph is now. What you do there changes nothing here until it is merged."
+              : "A draft begins as the graph was at the moment on screen, and changes nothing here until it is merged."
+          }
+          placeholder="gentler grip"
+          maxLength={200}
+          data-autofocus
+          value={name}
+          error={wrong || undefined}
+          onChange={(event) => setName(event.currentTarget.value)}
+        />
+        <div className={style.answers}>
+          <Button onClick={onClose}>Cancel</Button>
+          <Button type="submit" variant="filled" loading={busy}>
+            Make it
+          </Button>
+        </div>
+      </form>
+    </Modal>
   );
 }

@@ -1,26 +1,27 @@
 /** A merge before it is made: what changes, what both changed with a choice, and problems that come along. */
 import { Button, Modal, Skeleton } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
+import { IconAlertTriangle } from "@tabler/icons-react";
 import { useQueryClient } from "@tanstack/react-query";
-import { useState } from "react";
+import { useId, useState } from "react";
 import {
   type DraftChoices,
+  type DraftConflict,
   type DraftSide,
   type GraphDraft,
   type MergePreview,
   mergeDraft,
   useMergePreview,
-} from "../api/documents/drafts";
-import { refreshHistory } from "../api/documents/history";
+} from "../api/drafts";
+import type { Problem } from "../api/graphs";
+import { refreshHistory } from "../api/history";
 import { errorText } from "../api/http";
 import { CoursesOfText } from "../courses/courses-told";
+import { ChangeLines } from "../history/entry-row";
 import { namesWords } from "../history/history-words";
 import { isolated } from "../words/isolated";
+import { useDraftStep } from "./draft-steps";
 import style from "./drafts.module.css";
-import { MergeConflicts } from "./merge-conflicts";
-import { MergeProblems } from "./merge-problems";
-import { isNothing, ToldChanges } from "./told-changes";
-import { useDraftStep } from "./use-draft-step";
 
 interface Props {
   draft: GraphDraft;
@@ -121,6 +122,154 @@ export function MergeDialog(props: Props) {
   return (
     <Modal opened onClose={onClose} size="xl" title={title}>
       <Body {...props} />
+    </Modal>
+  );
+}
+
+interface ConflictSideProps {
+  conflict: DraftConflict;
+  side: DraftSide;
+  name: string;
+  group: string;
+  chosen: boolean;
+  onChoose: () => void;
+}
+
+function Side({ conflict, side, name, group, chosen, onChoose }: ConflictSideProps) {
+  return (
+    <label className={style.side} data-chosen={chosen || undefined}>
+      <span className={style.pick}>
+        <input type="radio" name={group} checked={chosen} onChange={onChoose} />
+        <bdi>{name}</bdi>
+      </span>
+      {conflict.removed === side ? (
+        <p className={style.removed}>removed it</p>
+      ) : (
+        <ToldChanges changes={conflict[side]} nothing="changed it" />
+      )}
+    </label>
+  );
+}
+
+interface MergeConflictsProps {
+  conflicts: readonly DraftConflict[];
+  choices: DraftChoices;
+  names: Readonly<Record<DraftSide, string>>;
+  onChoose: (place: string, side: DraftSide) => void;
+}
+
+export function MergeConflicts({ conflicts, choices, names, onChoose }: MergeConflictsProps) {
+  const group = useId();
+  return (
+    <section aria-label="Changed on both sides">
+      <h3>
+        Both changed {conflicts.length === 1 ? "this" : `these ${conflicts.length}`}: whose counts?
+      </h3>
+      {conflicts.map((conflict) => (
+        <fieldset key={conflict.place} className={style.conflict}>
+          <legend>
+            <bdi>{conflict.what}</bdi>
+          </legend>
+          <div className={style.sides}>
+            {(["origin", "draft"] as const).map((side) => (
+              <Side
+                key={side}
+                conflict={conflict}
+                side={side}
+                name={names[side]}
+                group={`${group} ${conflict.place}`}
+                chosen={choices[conflict.place] === side}
+                onChoose={() => onChoose(conflict.place, side)}
+              />
+            ))}
+          </div>
+        </fieldset>
+      ))}
+    </section>
+  );
+}
+
+export function MergeProblems({ problems }: { problems: readonly Problem[] }) {
+  if (problems.length === 0) return <p className={style.quiet}>No problem comes with it.</p>;
+  return (
+    <section aria-label="Problems that come with it">
+      <h3>
+        {problems.length === 1 ? "1 problem comes" : `${problems.length} problems come`} with it
+      </h3>
+      <ul className={style.problems}>
+        {problems.map((problem) => (
+          <li
+            key={`${problem.code} ${problem.where.path} ${problem.message}`}
+            data-severity={problem.severity}
+          >
+            <IconAlertTriangle size={14} aria-label={problem.severity} />
+            <span>{problem.message}</span>
+          </li>
+        ))}
+      </ul>
+    </section>
+  );
+}
+
+const MOST = 12; // lines
+
+type ToldMerge = MergePreview["changes"];
+
+export const isNothing = ({ fields, actions, relations, notes }: ToldMerge): boolean =>
+  [fields, actions, relations, notes].every((each) => (each?.length ?? 0) === 0);
+
+interface ToldChangesProps {
+  changes: ToldMerge;
+  /** Where nothing is told. */
+  nothing: string;
+}
+
+export function ToldChanges({ changes, nothing }: ToldChangesProps) {
+  if (isNothing(changes)) return <p className={style.quiet}>{nothing}</p>;
+  return (
+    <div className={style.told}>
+      <ChangeLines changes={changes} most={MOST} />
+    </div>
+  );
+}
+
+const NO_CHOICES = {};
+
+function Compared({ draft }: { draft: GraphDraft }) {
+  const found = useMergePreview(draft.id, "origin", NO_CHOICES);
+  if (found.isPending) return <Skeleton height={160} />;
+  if (found.isError) return <p role="alert">{errorText(found.error)}</p>;
+  const { draft_did, origin_did, conflicts } = found.data;
+  return (
+    <>
+      <div className={style.sides}>
+        <section>
+          <h3>In this draft</h3>
+          <ToldChanges changes={draft_did} nothing="Nothing was changed." />
+        </section>
+        <section>
+          <h3>
+            Meanwhile in <bdi>{draft.origin_name || "the graph"}</bdi>
+          </h3>
+          <ToldChanges changes={origin_did} nothing="Nothing was changed." />
+        </section>
+      </div>
+      {conflicts.length > 0 && (
+        <p className={style.quiet}>
+          Both changed {conflicts.map(({ what }) => what).join(", ")}. A merge asks whose counts.
+        </p>
+      )}
+    </>
+  );
+}
+
+export function CompareDialog({ draft, onClose }: { draft: GraphDraft; onClose: () => void }) {
+  return (
+    <Modal opened onClose={onClose} size="xl" title={<bdi>{draft.name}</bdi>}>
+      <Compared draft={draft} />
+      <div className={style.answers}>
+        <Button onClick={onClose}>Close</Button>
+      </div>
     </Modal>
   );
 }

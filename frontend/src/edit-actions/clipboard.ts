@@ -5,8 +5,8 @@
  * secure context; elsewhere what was copied last in this browser serves.
  */
 import { notifications } from "@mantine/notifications";
+import { readUmrfKeys } from "../api/graphs";
 import { errorPlace, errorText } from "../api/http";
-import { readUmrfKeys } from "../api/umrf-keys";
 import { arrange, isUnplaced, positionsOf } from "../canvas/geometry/arrange";
 import { mapsFrom } from "../graph/document-keys";
 import { type Clip, clipOf, isEmpty, paste } from "../graph/edit/clip";

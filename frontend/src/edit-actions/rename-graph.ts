@@ -1,6 +1,6 @@
 /** Another name for the open graph, and the question whether others that run it follow. */
 import { useSyncExternalStore } from "react";
-import { useLibrary } from "../api/documents/library";
+import { useLibrary } from "../api/library";
 import { graphsInside, usedIn } from "../canvas/graphs-inside";
 import { setGraphName } from "../graph/edit";
 import type { EditorContext } from "./editor-context";

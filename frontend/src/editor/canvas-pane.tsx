@@ -8,16 +8,15 @@ import { ChangeMarked } from "../canvas/marks/change-marks";
 import { NO_PROBLEM_MARKS, type ProblemMarks } from "../canvas/marks/problem-marks";
 import { type EditorContext, useEditorContext } from "../edit-actions/editor-context";
 import { EMPTY_GRAPH, type Key, type Position } from "../graph/model";
+import type { SeenPast } from "../history/past-bar";
 import { RobotFilter } from "../outline/robot-filter";
-import type { SeenPast } from "../past/past-bar";
 import { FollowFrame } from "../people/people";
 import { useFollowedView } from "../people/use-followed-view";
 import type { Progress } from "../status/progress";
 import { useGraph, useLinkPart } from "../sync/use-room";
 import { Empty } from "../ui/empty";
-import { useHasFingersOnly } from "../ui/hooks/use-screen-size";
-import { lazyPart } from "../ui/parts/lazy-part";
-import { PartBoundary } from "../ui/parts/part-boundary";
+import { useHasFingersOnly } from "../ui/hooks";
+import { lazyPart, PartBoundary } from "../ui/lazy-part";
 import { useWatched } from "../ui/watched";
 import { EditableCanvas } from "./canvas/editable-canvas";
 import { useCanvasElements } from "./canvas/use-canvas-elements";
@@ -29,7 +28,7 @@ import type { EditorState } from "./use-editor";
 import { useGraphLink } from "./use-graph-link";
 import type { Past } from "./use-past";
 
-const PastBar = lazyPart(() => import("../past/past-bar").then((part) => part.PastBar));
+const PastBar = lazyPart(() => import("../history/past-bar").then((part) => part.PastBar));
 const DraftBar = lazyPart(() => import("../drafts/draft-bar").then((part) => part.DraftBar));
 const DryRunBar = lazyPart(() => import("./dry-run/dry-run-bar").then((part) => part.DryRunBar));
 

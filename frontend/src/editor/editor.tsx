@@ -39,11 +39,10 @@ import { People } from "../people/people";
 import type { Progress } from "../status/progress";
 import type { RoomLink } from "../sync/room-connection";
 import { useThrottledLink } from "../sync/use-room";
-import { useIsPhone, useIsWide } from "../ui/hooks/use-screen-size";
-import { useStableCallback } from "../ui/hooks/use-stable-callback";
-import { lazyPart } from "../ui/parts/lazy-part";
-import { PartBoundary } from "../ui/parts/part-boundary";
+import { useIsPhone, useIsWide } from "../ui/hooks";
+import { lazyPart, PartBoundary } from "../ui/lazy-part";
 import type { Crumb } from "../ui/top-bar";
+import { useStableCallback } from "../ui/use-stable-callback";
 import { CanvasPane } from "./canvas-pane";
 import { Overlays } from "./menus/overlays";
 import { DesktopLayout, DryRunButton, PhoneLayout } from "./panels/layouts";
@@ -113,7 +112,7 @@ function crumbsOf(
 }
 
 const loadLevels = () => import("../levels/levels").then((part) => part.Levels);
-const loadSinceMarks = () => import("../past/since/since-marks").then((part) => part.SinceMarks);
+const loadSinceMarks = () => import("../history/since-marks").then((part) => part.SinceMarks);
 
 const loadLostDrafts = () => import("./panels/lost-drafts").then((part) => part.LostDrafts);
 
@@ -145,14 +144,16 @@ function QuietParts() {
 const FindBar = lazyPart(() => import("../find/find-bar").then((part) => part.FindBar));
 const QuickAdd = lazyPart(() => import("./canvas/quick-add").then((part) => part.QuickAdd));
 const HistoryPanel = lazyPart(() =>
-  import("../past/history-panel").then((part) => part.HistoryPanel),
+  import("../history/history-panel").then((part) => part.HistoryPanel),
 );
 const DraftsHere = lazyPart(() => import("../drafts/drafts-here").then((part) => part.DraftsHere));
 const Inspector = lazyPart(() => import("../inspector/inspector").then((part) => part.Inspector));
 const LevelStatus = lazyPart(() =>
   import("../levels/level-status").then((part) => part.LevelStatus),
 );
-const PastDetails = lazyPart(() => import("../past/past-details").then((part) => part.PastDetails));
+const PastDetails = lazyPart(() =>
+  import("../history/past-details").then((part) => part.PastDetails),
+);
 const Outline = lazyPart(() => import("../outline/outline").then((part) => part.Outline));
 
 /** State of the editor for the parts that the page provides. */

@@ -16,8 +16,7 @@ import {
   useRoom,
   useStrandedEdits,
 } from "../sync/use-room";
-import { lazyPart } from "../ui/parts/lazy-part";
-import { OverlayBoundary } from "../ui/parts/part-boundary";
+import { lazyPart, OverlayBoundary } from "../ui/lazy-part";
 import { Say } from "./room-notice";
 import style from "./room-notices.module.css";
 

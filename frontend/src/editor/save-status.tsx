@@ -9,14 +9,13 @@ import {
   IconRefresh,
 } from "@tabler/icons-react";
 import { useSyncExternalStore } from "react";
-import { usePerson } from "../api/use-person";
+import { usePerson } from "../api/people";
 import { useEditorContext } from "../edit-actions/editor-context";
 import type { RefusalReason, RoomLink } from "../sync/room-connection";
 import { unsavedReason } from "../sync/unsaved-reasons";
 import { useLink, useRoom } from "../sync/use-room";
-import { textScope, useWaitingTexts } from "../ui/drafts/kept-texts";
-import { type DraftCounts, pendingDrafts } from "../ui/drafts/pending-drafts";
-import { Tooltip } from "../ui/floating/tooltip";
+import { type DraftCounts, pendingDrafts, textScope, useWaitingTexts } from "../ui/drafts";
+import { Tooltip } from "../ui/tooltip";
 import { counted } from "../words/counted";
 import style from "./save-status.module.css";
 

@@ -3,7 +3,7 @@ import { QueryClient, QueryClientProvider } from "@tanstack/react-query";
 import { act } from "react";
 import { createRoot, type Root } from "react-dom/client";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
-import { PersonContext } from "../api/use-person";
+import { PersonContext } from "../api/people";
 import { RoomProvider } from "../sync/use-room";
 import { FakeServer } from "../testing/fake-server";
 import { useEditor } from "./use-editor";

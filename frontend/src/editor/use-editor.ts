@@ -2,7 +2,7 @@
 
 import { useLocalStorage } from "@mantine/hooks";
 import { type RefObject, useCallback, useMemo, useRef, useState } from "react";
-import { useMay } from "../api/use-person";
+import { useMay } from "../api/people";
 import { CARD } from "../canvas/geometry/arrange";
 import { useDryRun } from "../dry-run/use-dry-run";
 import {
@@ -22,7 +22,7 @@ import {
   useThrottledLink,
   useUndo,
 } from "../sync/use-room";
-import { useKeptKeys } from "../ui/hooks/use-kept-keys";
+import { useKeptKeys } from "../ui/hooks";
 import { exportGraph } from "./export-graph";
 import { NO_PAST, type Past } from "./use-past";
 

@@ -3,7 +3,7 @@ import { useLocalStorage } from "@mantine/hooks";
 import { startTransition, useCallback, useEffect, useState } from "react";
 import type { PastPlace } from "../edit-actions/editor-context";
 import { pastOf, withPast } from "../edit-actions/graph-links";
-import type { SeenPast } from "../past/past-bar";
+import type { SeenPast } from "../history/past-bar";
 import { Watched } from "../ui/watched";
 
 const WRITTEN = 300; // ms after the last step, since browsers limit changes of the address

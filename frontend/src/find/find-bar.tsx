@@ -21,8 +21,8 @@ import type { Problem } from "../api/graphs";
 import { expandedGraphs } from "../canvas/graphs-inside";
 import { printedKeys } from "../edit-actions/edit-action";
 import { useEditorContext } from "../edit-actions/editor-context";
-import { Tooltip } from "../ui/floating/tooltip";
 import { keyOf } from "../ui/keys";
+import { Tooltip } from "../ui/tooltip";
 import { find, findInside, type Hit } from "./find";
 import style from "./find-bar.module.css";
 

@@ -4,17 +4,17 @@ import { notifications } from "@mantine/notifications";
 import { IconRestore } from "@tabler/icons-react";
 import { useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
+import { authorName } from "../api/graphs";
 import {
   type HistoryEntry,
   refreshHistory,
   restoreMoment,
   useDifference,
   useHistory,
-} from "../api/documents/history";
-import { authorName } from "../api/graphs";
+} from "../api/history";
 import { errorText } from "../api/http";
+import { DifferenceView, meansSomething } from "../differences/difference-view";
 import { clock, day, instant, useNow } from "../ui/times";
-import { DifferenceView, meansSomething } from "./difference-view";
 import style from "./history-list.module.css";
 import { doneWords, isWayBack, momentBefore } from "./history-words";
 

@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import type { HistoryEntry } from "../api/documents/history";
+import type { HistoryEntry } from "../api/history";
 import { doneWords, isWayBack, momentBefore, namesWords } from "./history-words";
 
 const entry = (more: Partial<HistoryEntry>): HistoryEntry => ({

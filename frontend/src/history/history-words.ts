@@ -1,6 +1,7 @@
 /** What was done to a document, in a few words. Pure. */
-import type { HistoryEntry } from "../api/documents/history";
+
 import { authorName, type VersionAuthor } from "../api/graphs";
+import type { HistoryEntry } from "../api/history";
 import { isolated } from "../words/isolated";
 
 const DONE: Readonly<Record<HistoryEntry["kind"], string>> = {

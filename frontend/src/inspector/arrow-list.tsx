@@ -9,7 +9,7 @@ import { relationId } from "../graph/document-keys";
 import { connect, removeRelation, setEntry, unsetEntry } from "../graph/edit";
 import { type Action, ENTRY, EXIT, type Precondition, type Relation } from "../graph/model";
 import { endName } from "../graph/relation-words";
-import { Tooltip } from "../ui/floating/tooltip";
+import { Tooltip } from "../ui/tooltip";
 import { isolated } from "../words/isolated";
 import style from "./inspector.module.css";
 

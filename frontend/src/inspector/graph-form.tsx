@@ -5,7 +5,7 @@ import { FirstShortcut } from "../edit-actions/keys/shortcut-keys";
 import { useRenameGraph } from "../edit-actions/rename-graph";
 import { setGraphDescription } from "../graph/edit";
 import { DraftInput } from "../ui/draft-input";
-import { useHasFingersOnly } from "../ui/hooks/use-screen-size";
+import { useHasFingersOnly } from "../ui/hooks";
 import { SharedField } from "./fields/shared-field";
 import { GraphInterface } from "./graph-interface";
 import style from "./inspector.module.css";

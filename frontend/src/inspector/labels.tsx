@@ -9,7 +9,7 @@ import { asOneEdit } from "../graph/edit/document-writes";
 import { memberText, withMember } from "../graph/json-members";
 import type { Graph } from "../graph/model";
 import { asJsonText } from "../graph/values";
-import { usePendingText } from "../ui/drafts/use-draft";
+import { usePendingText } from "../ui/drafts";
 
 const KEY = "x/gui_attributes";
 

@@ -7,14 +7,9 @@ import { Button, Modal, Skeleton, TextInput } from "@mantine/core";
 import { useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
 import { useLocation } from "wouter";
-import {
-  type FlatGraph,
-  type FlatteningReason,
-  makeFlatGraph,
-  useFlatGraph,
-} from "../api/documents/inside";
 import { type GraphSummary, queryKeys, refreshGraphs } from "../api/graphs";
 import { errorText } from "../api/http";
+import { type FlatGraph, type FlatteningReason, makeFlatGraph, useFlatGraph } from "../api/inside";
 import type { EditorContext } from "../edit-actions/editor-context";
 import { copyNameOf } from "../graph/edit/clip";
 import { counted } from "../words/counted";

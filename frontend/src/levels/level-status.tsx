@@ -8,7 +8,7 @@ import { notifications } from "@mantine/notifications";
 import { IconSitemap, IconStairsUp } from "@tabler/icons-react";
 import { useEffect } from "react";
 import { Link } from "wouter";
-import { useLibrary } from "../api/documents/library";
+import { useLibrary } from "../api/library";
 import { graphsInside, usedIn } from "../canvas/graphs-inside";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { useWatched } from "../ui/watched";

@@ -2,7 +2,7 @@
  * Lists reasons why sub-graphs would behave differently in one graph, each with a link to the
  * action it is about.
  */
-import type { FlatteningReason } from "../api/documents/inside";
+import type { FlatteningReason } from "../api/inside";
 import type { EditorContext } from "../edit-actions/editor-context";
 import style from "./levels.module.css";
 

@@ -4,6 +4,8 @@ import { Button, Modal, Skeleton, TextInput } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { useQuery, useQueryClient } from "@tanstack/react-query";
 import { useEffect, useMemo, useRef, useState } from "react";
+import { refreshGraphs, refreshLibrary } from "../api/graphs";
+import { errorText } from "../api/http";
 import {
   type ExtractionLook,
   type FlatteningReason,
@@ -11,10 +13,8 @@ import {
   lookAtUnpacking,
   makeSubGraph,
   type UnpackingLook,
-} from "../api/documents/inside";
-import { useGraphsAsActions, useLibrary } from "../api/documents/library";
-import { refreshGraphs, refreshLibrary } from "../api/graphs";
-import { errorText } from "../api/http";
+} from "../api/inside";
+import { useGraphsAsActions, useLibrary } from "../api/library";
 import { unplaced } from "../canvas/geometry/arrange";
 import type { EditorContext } from "../edit-actions/editor-context";
 import { newAid, rootOf, splitKey } from "../graph/document-keys";
@@ -27,7 +27,7 @@ import {
 } from "../graph/edit/key-changes";
 import type { Key, Position } from "../graph/model";
 import { announcer } from "../ui/announcer";
-import { useStableCallback } from "../ui/hooks/use-stable-callback";
+import { useStableCallback } from "../ui/use-stable-callback";
 import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";
 import style from "./levels.module.css";

@@ -7,8 +7,8 @@ import { useEditorContext } from "../edit-actions/editor-context";
 import type { Graph, Key } from "../graph/model";
 import { runOnCanvas } from "../status/progress-inside";
 import { announcer } from "../ui/announcer";
-import { useKeptKeys } from "../ui/hooks/use-kept-keys";
-import { useStableCallback } from "../ui/hooks/use-stable-callback";
+import { useKeptKeys } from "../ui/hooks";
+import { useStableCallback } from "../ui/use-stable-callback";
 import { useWatched } from "../ui/watched";
 import { ExpandedCard, progressOf, type StateSource } from "./level-frame";
 import {

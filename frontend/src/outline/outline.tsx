@@ -16,7 +16,7 @@ import { runOnCanvas } from "../status/progress-inside";
 import { useSelectedByOthers } from "../sync/use-room";
 import { announcer } from "../ui/announcer";
 import { Empty } from "../ui/empty";
-import { useIsPhone } from "../ui/hooks/use-screen-size";
+import { useIsPhone } from "../ui/hooks";
 import { keyOf } from "../ui/keys";
 import { isolated } from "../words/isolated";
 import style from "./outline.module.css";

@@ -9,7 +9,7 @@ import { asOneEdit, connect, rename, retarget, setEntry, setResponse } from "../
 import { changeNote } from "../graph/edit/notes";
 import { ENTRY, EXIT, type Precondition, RESPONSES, type Response } from "../graph/model";
 import { endName } from "../graph/relation-words";
-import { useDraft } from "../ui/drafts/use-draft";
+import { useDraft } from "../ui/drafts";
 import { keyOf } from "../ui/keys";
 import { isolated } from "../words/isolated";
 import style from "./outline.module.css";

@@ -3,8 +3,7 @@ import { Skeleton } from "@mantine/core";
 import { useState } from "react";
 import { errorText } from "../api/http";
 import { type PackageRefusal, usePackagesAt } from "../api/packages";
-import { PackageFiles } from "./package-files";
-import { PackageTree } from "./package-tree";
+import { PackageFiles, PackageTree } from "./package-tree";
 import style from "./packages.module.css";
 
 interface Props {

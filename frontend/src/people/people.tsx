@@ -6,8 +6,8 @@ import { CARD, type Positions, type Sizes } from "../canvas/geometry/arrange";
 import { splitKey } from "../graph/document-keys";
 import type { Participant } from "../sync/presence/presence";
 import { useColorsAfterReturn, useFollowing, usePeople } from "../sync/use-room";
-import { Tooltip } from "../ui/floating/tooltip";
 import { initials } from "../ui/name-colors";
+import { Tooltip } from "../ui/tooltip";
 import { isolated } from "../words/isolated";
 import style from "./people.module.css";
 

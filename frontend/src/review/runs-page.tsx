@@ -14,7 +14,7 @@ import { useInfiniteQuery, useMutation } from "@tanstack/react-query";
 import { type MouseEvent, useCallback, useMemo, useState } from "react";
 import { Link, useLocation, useSearch } from "wouter";
 import { errorText } from "../api/http";
-import { useLive } from "../api/live/use-live";
+import { useLive } from "../api/page-link";
 import { useCurrentName } from "../api/people";
 import {
   filterOf,
@@ -32,7 +32,7 @@ import { StateLabel } from "../status/state-label";
 import { Empty } from "../ui/empty";
 import { clock, day, instant, stopwatch, useNow } from "../ui/times";
 import { isolated } from "../words/isolated";
-import { useVersionLabel } from "./run/use-version-label";
+import { useVersionLabel } from "./run-facts";
 import { RunFilters } from "./run-filters";
 import style from "./runs-page.module.css";
 

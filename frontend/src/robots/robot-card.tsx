@@ -1,19 +1,17 @@
 /** One robot: its engine in words, what makes answers a proof, what runs there. */
-
-import { ActionIcon, Button, Menu, Tabs } from "@mantine/core";
+import { ActionIcon, Button, Menu, Tabs, Text } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconAlertTriangle, IconCheck, IconDots, IconPencil, IconTrash } from "@tabler/icons-react";
 import { useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
 import { errorText } from "../api/http";
-import { useLive, useRobotAnsweredAt } from "../api/live/use-live";
-import { forgetRobot, type Registration, type Robot } from "../api/robots";
-import { useMay } from "../api/use-person";
-import { EngineLabel } from "../status/engine-label";
+import { useLive, useRobotAnsweredAt } from "../api/page-link";
+import { useMay } from "../api/people";
+import { forgetRobot, type Registration, type Robot, useIndexedByRobot } from "../api/robots";
+import { EngineLabel } from "../status/state-label";
 import { colorOfName } from "../ui/name-colors";
 import { ago, clock, instant, useNow } from "../ui/times";
 import { isolated } from "../words/isolated";
-import { IndexedActions } from "./indexed-actions";
 import style from "./robot-card.module.css";
 import { RobotLog } from "./robot-log";
 import { RobotRuns } from "./robot-runs";
@@ -175,5 +173,40 @@ export function RobotCard({ robot, onEdit, onImport }: Props) {
         </Tabs>
       )}
     </article>
+  );
+}
+
+function parameters(inputs: Record<string, string>): string {
+  return Object.entries(inputs)
+    .map(([name, type]) => `${isolated(name)}: ${type}`)
+    .join(", ");
+}
+
+function IndexedActions({ robot }: { robot: string }) {
+  const { runner } = useLive();
+  const known = useIndexedByRobot(runner, robot, true);
+  if (known.isPending) return <Text c="dimmed">Reading …</Text>;
+  if (known.isError) return <Text c="var(--error)">What it knows cannot be read now.</Text>;
+  const { actions, graphs, unread } = known.data;
+  return (
+    <>
+      {actions.length === 0 && <Text c="dimmed">It has named no actions.</Text>}
+      <ul className={style.list}>
+        {actions.map(({ name, inputs, outputs }) => (
+          <li key={name}>
+            <b>{name}</b> <span className={style.quiet}>({parameters(inputs)})</span>
+            {Object.keys(outputs).length > 0 && (
+              <span className={style.quiet}> → {parameters(outputs)}</span>
+            )}
+          </li>
+        ))}
+      </ul>
+      {graphs.length > 0 && (
+        <p className={style.graphs}>
+          Graphs of its own: <b>{graphs.map(isolated).join(", ")}</b>
+        </p>
+      )}
+      {unread > 0 && <Text c="var(--warn)">{unread} of its files cannot be read.</Text>}
+    </>
   );
 }

@@ -14,9 +14,9 @@ import {
 import { useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
 import { errorText, Refusal } from "../api/http";
-import { useLive } from "../api/live/use-live";
+import { useLive } from "../api/page-link";
 import { changeRobot, type Registration, registerRobot } from "../api/robots";
-import { usePendingText } from "../ui/drafts/use-draft";
+import { usePendingText } from "../ui/drafts";
 import { isolated } from "../words/isolated";
 import type { EditedRobot } from "./robots-page";
 

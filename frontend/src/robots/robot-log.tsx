@@ -3,7 +3,7 @@
 import { Button, Text } from "@mantine/core";
 import { IconFileImport } from "@tabler/icons-react";
 import { Link } from "wouter";
-import { useLive } from "../api/live/use-live";
+import { useLive } from "../api/page-link";
 import { commandedGraph, type RobotLogLine, useRobotLog } from "../api/robots";
 import { serverNow } from "../clock/server-clock";
 import { clock, day, instant } from "../ui/times";

@@ -1,13 +1,11 @@
 /** Robots: how their engines are, what runs there, who else is at it, and how to add one. */
 import { Button, Code, Skeleton } from "@mantine/core";
-import { IconPlus, IconRobot } from "@tabler/icons-react";
+import { IconPlus, IconRadar2, IconRobot } from "@tabler/icons-react";
 import { useState } from "react";
-import { useLive } from "../api/live/use-live";
-import type { FoundEngine, Registration } from "../api/robots";
-import { useRosReach } from "../api/robots";
-import { useMay } from "../api/use-person";
+import { useLive } from "../api/page-link";
+import { useMay } from "../api/people";
+import { type FoundEngine, type Registration, useFoundEngines, useRosReach } from "../api/robots";
 import { Empty } from "../ui/empty";
-import { FoundEngines } from "./found-engines";
 import { RobotCard } from "./robot-card";
 import { NEW, RobotForm } from "./robot-form";
 import style from "./robots-page.module.css";
@@ -103,5 +101,53 @@ export function RobotsPage({ onImport }: Props) {
       </div>
       {editing && <RobotForm editing={editing} onClose={() => setEditing(null)} />}
     </main>
+  );
+}
+
+interface FoundEnginesProps {
+  may: boolean;
+  on: boolean;
+  onTake: (candidate: FoundEngine) => void;
+}
+
+function words(candidate: FoundEngine): string {
+  if (candidate.problem !== "") return candidate.problem;
+  if (candidate.generation === "older") return "speaks an older generation of messages";
+  if (candidate.actor === "") return "an idle engine does not say its name: you have to know it";
+  return "heard by its feedback";
+}
+
+export function FoundEngines({ may, on, onTake }: FoundEnginesProps) {
+  const { runner } = useLive();
+  const { data } = useFoundEngines(runner, on);
+  const found = data?.engines ?? [];
+  const looking = (data?.left_s ?? 0) > 0;
+  if (found.length === 0 && !looking) return null;
+  return (
+    <section className={style.section} aria-label="In sight, not registered">
+      <h3 className={style.foundEnginesTitle}>
+        <IconRadar2 size={16} aria-hidden /> In sight, not registered
+      </h3>
+      {looking && (
+        <p className={style.quiet} role="status">
+          Looking for engines; others may still come into sight for {Math.ceil(data?.left_s ?? 0)}{" "}
+          s.
+        </p>
+      )}
+      <ul className={style.list}>
+        {found.map((each) => (
+          <li key={`${each.domain} ${each.get_service}`} className={style.line}>
+            <b>{each.actor || "An engine"}</b>
+            <span className={style.quiet}>
+              domain {each.domain} · {each.get_service} · {words(each)}
+            </span>
+            <span className={style.gap} />
+            <Button size="compact-sm" disabled={!may} onClick={() => onTake(each)}>
+              Register{each.actor === "" ? " …" : ""}
+            </Button>
+          </li>
+        ))}
+      </ul>
+    </section>
   );
 }

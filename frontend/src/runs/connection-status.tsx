@@ -1,7 +1,7 @@
 /** Whether the page hears the runner, and how old what it shows of a run is, in words. */
 
 import { IconEye, IconPlugConnectedX } from "@tabler/icons-react";
-import { useLive, useRunSeenAt } from "../api/live/use-live";
+import { useLive, useRunSeenAt } from "../api/page-link";
 import type { Run } from "../api/runs";
 import { serverTimeOf } from "../clock/server-clock";
 import { clock, duration, useNow } from "../ui/times";

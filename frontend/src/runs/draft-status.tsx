@@ -1,14 +1,17 @@
 /** Whether what runs is what is on screen, in words; where it is not, the way to send it. */
+
+import { useQuery } from "@tanstack/react-query";
 import { useMemo } from "react";
-import { useLive } from "../api/live/use-live";
+import { queryKeys, type Version } from "../api/graphs";
+import { fetchJson } from "../api/http";
+import { useLive } from "../api/page-link";
 import type { Run } from "../api/runs";
+import { fromUmrf } from "../canvas/from-umrf";
 import { differences } from "../graph/meaning";
 import type { Graph } from "../graph/model";
 import { runStatus } from "../status/run-status";
-import { lazyPart } from "../ui/parts/lazy-part";
-import { PartBoundary } from "../ui/parts/part-boundary";
+import { lazyPart, PartBoundary } from "../ui/lazy-part";
 import style from "./draft-status.module.css";
-import { useRunningGraph } from "./use-running-graph";
 
 const ModifyRun = lazyPart(() => import("./modify-run").then((part) => part.ModifyRun));
 
@@ -53,5 +56,20 @@ export function DraftStatus({ run, label, graph, seq, settle, obstacle }: Props)
         </PartBoundary>
       )}
     </span>
+  );
+}
+
+export function useRunningGraph(run: Run | null): { seq: number; graph: Graph } | null {
+  const goes = run !== null && run.ended_at === null;
+  const version = useQuery({
+    queryKey: queryKeys.version(run?.version ?? ""),
+    queryFn: ({ signal }) =>
+      fetchJson<Version>(`/api/versions/${encodeURIComponent(run?.version ?? "")}`, { signal }),
+    enabled: goes && run.version !== null,
+    staleTime: Number.POSITIVE_INFINITY,
+  }).data;
+  return useMemo(
+    () => (goes && version ? { seq: version.seq, graph: fromUmrf(version.umrf) } : null),
+    [goes, version],
   );
 }

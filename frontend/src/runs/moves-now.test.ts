@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import type { LiveState } from "../api/live/live-socket";
+import type { LiveState } from "../api/live-socket";
 import type { Run } from "../api/runs";
 import { movesNow } from "./moves-now";
 

@@ -3,8 +3,7 @@ import { readFileSync } from "node:fs";
 import { fileURLToPath } from "node:url";
 import fc from "fast-check";
 import { expect, test } from "vitest";
-import { placesIn } from "./level-places";
-import { factOf } from "./level-words";
+import { factOf, placesIn } from "./level-places";
 
 interface Vector {
   why: string;

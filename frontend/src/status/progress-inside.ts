@@ -1,9 +1,11 @@
 /** What is said of a graph that runs inside of another: its actions are told by the names of all levels. Pure. */
+
+import { useRef } from "react";
 import type { Run } from "../api/runs";
 import { fullName, type Graph } from "../graph/model";
 import { Watched } from "../ui/watched";
 import { placesOf } from "./level-places";
-import { type Progress, progressAt, progressOfAction } from "./progress";
+import { type Progress, progressAt, progressByAid, progressOfAction } from "./progress";
 
 /** The way from the outermost graph to one inside: by the names of the graphs below it, as far as nobody knows
  * which of several actions of a name was entered, and then by the very actions that one is inside of. */
@@ -69,4 +71,29 @@ export function progressBelow(
   levels: readonly string[],
 ): ReadonlyMap<string, Progress> {
   return progressAt(progressInside(run, unsure, { graph, names, levels }), at);
+}
+
+export type ProgressByAid = ReadonlyMap<string, Progress>;
+
+function keptProgress(before: ProgressByAid, now: ProgressByAid): ProgressByAid {
+  if (before.size !== now.size) return now;
+  for (const [key, progress] of now) if (before.get(key) !== progress) return now;
+  return before;
+}
+
+/** `at`: the moment at which a replay stands, ms. `inside`: what is shown is a graph inside of the run's. */
+export function useProgress(
+  run: Run | null,
+  unsure: boolean,
+  at: number | null = null,
+  inside: GraphInRun | null = null,
+): ProgressByAid {
+  const last = useRef<ProgressByAid>(new Map());
+  const found =
+    run === null || inside === null
+      ? progressByAid(run, unsure)
+      : progressInside(run, unsure, inside);
+  const now = progressAt(found, at);
+  last.current = keptProgress(last.current, now);
+  return last.current;
 }

@@ -1,7 +1,7 @@
 /** How a run stands at this moment, wherever it is listed: nobody knows while the runner is not heard. */
 
-import type { LiveState } from "../api/live/live-socket";
-import { useLive } from "../api/live/use-live";
+import type { LiveState } from "../api/live-socket";
+import { useLive } from "../api/page-link";
 import type { Run } from "../api/runs";
 import { serverTimeOf } from "../clock/server-clock";
 import { runEndText, runLabel, type Tone, unknownStatus } from "./progress";

@@ -4,15 +4,19 @@ import {
   IconCircle,
   IconCircleCheck,
   IconExclamationMark,
+  IconHelpCircle,
+  IconHourglass,
   IconLoader2,
+  IconPlugConnectedX,
   IconQuestionMark,
+  IconRotateClockwise2,
   IconSquareFilled,
   IconX,
 } from "@tabler/icons-react";
-import { useRef } from "react";
+import { type RefObject, useEffect, useRef } from "react";
+import type { EngineState, Robot } from "../api/robots";
 import type { Tone } from "./progress";
 import style from "./state-label.module.css";
-import { useInStep } from "./use-in-step";
 
 const signs = {
   idle: IconCircle,
@@ -64,4 +68,33 @@ export function StateLabel({ tone, word, more, pill = false, still = false }: Pr
       {more !== undefined && <span className={style.more}>· {more}</span>}
     </span>
   );
+}
+
+const WORDS: Record<EngineState, { word: string; sign: typeof IconCircleCheck }> = {
+  answering: { word: "answers", sign: IconCircleCheck },
+  busy: { word: "there, but silent", sign: IconHourglass },
+  gone: { word: "gone", sign: IconPlugConnectedX },
+  restarted: { word: "restarted", sign: IconRotateClockwise2 },
+  no_link: { word: "no link", sign: IconHelpCircle },
+};
+
+export function EngineLabel({ robot }: { robot: Robot }) {
+  const { word, sign: Sign } = WORDS[robot.state];
+  return (
+    <span className={style.engineLabelWord} data-state={robot.state} title={robot.why || undefined}>
+      <Sign size={14} stroke={2.2} aria-hidden /> {word}
+    </span>
+  );
+}
+
+/**
+ * Animations of an element that begin at their own times have the page painted at as many times in
+ * each second, which a machine without a GPU has no time for. `on`: it moves now.
+ */
+export function useInStep(element: RefObject<Element | null>, on: boolean): void {
+  useEffect(() => {
+    if (!on) return;
+    for (const animation of element.current?.getAnimations?.({ subtree: true }) ?? [])
+      if (animation instanceof CSSAnimation) animation.startTime = 0;
+  }, [element, on]);
 }

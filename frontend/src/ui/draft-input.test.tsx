@@ -4,7 +4,7 @@ import { act } from "react";
 import { createRoot, type Root } from "react-dom/client";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { DraftChoice, DraftInput } from "./draft-input";
-import { type LostDraft, pendingDrafts } from "./drafts/pending-drafts";
+import { type LostDraft, pendingDrafts } from "./drafts";
 
 vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);
 vi.stubGlobal(

@@ -1,6 +1,6 @@
 /** A field with a draft of its own: what is typed is written when it fits and the typing pauses. */
 import { Autocomplete, Textarea, TextInput, type TextInputProps } from "@mantine/core";
-import { type DraftOptions, useDraft } from "./drafts/use-draft";
+import { type DraftOptions, useDraft } from "./drafts";
 import { keyOf } from "./keys";
 
 interface Props extends DraftOptions {

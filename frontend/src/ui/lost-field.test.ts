@@ -1,6 +1,6 @@
 // @vitest-environment jsdom
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
-import { restAfterLostFields } from "./lost-field";
+import { restAfterLostFields } from "./focus-field";
 
 let stop: () => void;
 const onRest = vi.fn();

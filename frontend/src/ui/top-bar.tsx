@@ -3,7 +3,7 @@
 import { Fragment, type ReactNode, useState } from "react";
 import { Link, useRouter } from "wouter";
 import { isolated } from "../words/isolated";
-import { useDraft } from "./drafts/use-draft";
+import { useDraft } from "./drafts";
 import { keyOf } from "./keys";
 import style from "./top-bar.module.css";
 

@@ -82,7 +82,7 @@ def test_the_table_is_cumulative_and_says_what_was_agreed() -> None:
 
 
 def test_the_page_has_the_same_table() -> None:
-    text = (Path(__file__).parents[3] / "frontend/src/api/roles.ts").read_text()
+    text = (Path(__file__).parents[3] / "frontend/src/api/session.ts").read_text()
     assert re.search(r"ROLES = \[([^\]]*)\]", text)[1] == ", ".join(f'"{role}"' for role in ROLES)  # type: ignore[index]
     table = text[text.index("FROM = {") : text.index("} as const satisfies")]
     assert dict(re.findall(r'(\w+): "(\w+)"', table)) == LEAST

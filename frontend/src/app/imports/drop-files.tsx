@@ -1,7 +1,7 @@
 /** Takes files that are dropped anywhere on the page. */
 import { IconFileImport } from "@tabler/icons-react";
 import { type ReactNode, useEffect, useRef, useState } from "react";
-import { useMay } from "../../api/use-person";
+import { useMay } from "../../api/people";
 import style from "./drop-files.module.css";
 import type { Dropped } from "./dropped-files";
 import { useNewGraphs } from "./new-graphs";

@@ -4,9 +4,9 @@ import { useSyncExternalStore } from "react";
 import type { ProblemPlace } from "../../api/graphs";
 import { countsOf, countWords } from "../../graph/problems/problem-kinds";
 import { toldProblems } from "../../graph/problems/told-problems";
-import { dialectWords } from "./dialects";
 import { type ImportUnderReview, importReviews } from "./import-review";
 import style from "./import-review-dialog.module.css";
+import { dialectWords } from "./take-files";
 
 const MOST_PROBLEMS = 8;
 

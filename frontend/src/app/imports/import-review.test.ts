@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
 import type { Preview } from "../../api/graphs";
-import { dialectWords, isPlain } from "./dialects";
 import { ImportReviews } from "./import-review";
+import { dialectWords, isPlain } from "./take-files";
 
 const preview = (part: Partial<Preview> = {}): Preview => ({
   dialect: "D1",

@@ -60,7 +60,7 @@ export function useNewGraphs(): NewGraphs {
       try {
         const [{ takeFiles }, { placeAfter, progressOf, tellTaken }] = await Promise.all([
           import("./take-files"),
-          import("./tell-taken"),
+          import("./take-files"),
         ]);
         const { tell, end } = progressOf(files.length);
         const found = await takeFiles(files, tell).finally(end);

@@ -1,8 +1,7 @@
 /** The text of a note, and the completion of links in its field; both load their larger half late. */
 import { type ComponentProps, lazy, Suspense } from "react";
 import { spokenNote } from "../../graph/note-links";
-import { lazyPart } from "../../ui/parts/lazy-part";
-import { PartBoundary } from "../../ui/parts/part-boundary";
+import { lazyPart, PartBoundary } from "../../ui/lazy-part";
 import style from "./note-text.module.css";
 
 const Markdown = lazy(() => import("./markdown"));

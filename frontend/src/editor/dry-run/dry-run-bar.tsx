@@ -24,8 +24,8 @@ import { type EditorContext, selectedActions } from "../../edit-actions/editor-c
 import { FirstShortcut } from "../../edit-actions/keys/shortcut-keys";
 import { fullName } from "../../graph/model";
 import { endName } from "../../graph/relation-words";
-import { Tooltip } from "../../ui/floating/tooltip";
 import { stopwatch } from "../../ui/times";
+import { Tooltip } from "../../ui/tooltip";
 import { isolated } from "../../words/isolated";
 import style from "./dry-run-bar.module.css";
 

@@ -5,7 +5,7 @@ import { EDIT_ACTIONS } from "../../edit-actions/all";
 import { type EditActionGroup, isEnabled, labelOf } from "../../edit-actions/edit-action";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import { FirstShortcut } from "../../edit-actions/keys/shortcut-keys";
-import { useOpening } from "../../ui/floating/late-opening";
+import { useOpening } from "../../ui/late-opening";
 import style from "./toolbar.module.css";
 
 const GROUPS: readonly EditActionGroup[] = ["Draw", "Arrange", "Look", "Graph", "Dry-run"];

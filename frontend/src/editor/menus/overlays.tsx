@@ -4,8 +4,7 @@ import { useEffect } from "react";
 import { graphsInside } from "../../canvas/graphs-inside";
 import type { EditorContext, Overlay } from "../../edit-actions/editor-context";
 import type { NewAction } from "../../graph/edit";
-import { lazyPart } from "../../ui/parts/lazy-part";
-import { OverlayBoundary, PartBoundary } from "../../ui/parts/part-boundary";
+import { lazyPart, OverlayBoundary, PartBoundary } from "../../ui/lazy-part";
 
 const ArrowDialog = lazyPart(() => import("./arrow-dialog").then((part) => part.ArrowDialog));
 const RetargetDialog = lazyPart(() => import("./arrow-dialog").then((part) => part.RetargetDialog));

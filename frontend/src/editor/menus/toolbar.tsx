@@ -19,10 +19,10 @@ import {
 import { type EditAction, isEnabled, labelOf } from "../../edit-actions/edit-action";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import { FirstShortcut } from "../../edit-actions/keys/shortcut-keys";
-import { LateOpening } from "../../ui/floating/late-opening";
-import { Tooltip } from "../../ui/floating/tooltip";
-import { useStableCallback } from "../../ui/hooks/use-stable-callback";
-import { lazyPart } from "../../ui/parts/lazy-part";
+import { LateOpening } from "../../ui/late-opening";
+import { lazyPart } from "../../ui/lazy-part";
+import { Tooltip } from "../../ui/tooltip";
+import { useStableCallback } from "../../ui/use-stable-callback";
 import style from "./toolbar.module.css";
 
 function Tool({ editAction, pressed }: { editAction: EditAction; pressed?: boolean }) {

@@ -5,13 +5,13 @@ import { act, useMemo, useSyncExternalStore } from "react";
 import { createRoot, type Root } from "react-dom/client";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import * as Y from "yjs";
-import { PersonContext } from "../../api/use-person";
+import { PersonContext } from "../../api/people";
 import { type EditorContext, EditorReactContext } from "../../edit-actions/editor-context";
 import { addAction, addParameter, removeActions, rename, setField } from "../../graph/edit";
 import { followGraph } from "../../graph/read";
 import { graphIn } from "../../testing/edited-graph";
 import { DraftInput } from "../../ui/draft-input";
-import { keptTexts, textScope } from "../../ui/drafts/kept-texts";
+import { keptTexts, textScope } from "../../ui/drafts";
 import { LostDrafts } from "./lost-drafts";
 
 vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);

@@ -5,13 +5,12 @@
 import { Button, Group } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { useEffect, useMemo, useRef } from "react";
-import { usePerson } from "../../api/use-person";
+import { usePerson } from "../../api/people";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import { type Deleted, Deletions } from "../../graph/edit/deletions";
 import { announcer } from "../../ui/announcer";
 import { copyText } from "../../ui/copy-text";
-import { keptTexts, textScope } from "../../ui/drafts/kept-texts";
-import { pendingDrafts } from "../../ui/drafts/pending-drafts";
+import { keptTexts, pendingDrafts, textScope } from "../../ui/drafts";
 import style from "./lost-drafts.module.css";
 
 interface OfferProps {

@@ -2,7 +2,7 @@
 import { type FocusEvent, type ReactNode, use, useEffect, useRef } from "react";
 import { onePerId, PersonSign } from "../../people/people";
 import { useEditors, usePersonColors, useRoom } from "../../sync/use-room";
-import { DraftOwnerContext } from "../../ui/drafts/use-draft";
+import { DraftOwnerContext } from "../../ui/drafts";
 import { ProblemsContext, toldAt } from "./field-problems";
 import { ProblemNote } from "./problem-note";
 import style from "./shared-field.module.css";

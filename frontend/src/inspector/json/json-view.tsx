@@ -2,7 +2,7 @@
 import { ActionIcon, Button, CopyButton, Kbd, Skeleton } from "@mantine/core";
 import { IconAlertTriangle, IconCheck, IconCopy } from "@tabler/icons-react";
 import { type ReactNode, useMemo, useState } from "react";
-import type { KeyChange } from "../../api/documents/texts";
+import type { KeyChange } from "../../api/graphs";
 import { errorText } from "../../api/http";
 import { printedKeys } from "../../edit-actions/edit-action";
 import {
@@ -11,9 +11,8 @@ import {
   useEditorContext,
 } from "../../edit-actions/editor-context";
 import { applyChanges, collisions, places } from "../../graph/edit/key-changes";
-import { Tooltip } from "../../ui/floating/tooltip";
-import { lazyPart } from "../../ui/parts/lazy-part";
-import { PartBoundary } from "../../ui/parts/part-boundary";
+import { lazyPart, PartBoundary } from "../../ui/lazy-part";
+import { Tooltip } from "../../ui/tooltip";
 import { isolated } from "../../words/isolated";
 import type { JsonError } from "./json-editor";
 import { actionAt, rangeOf, rangeOfArrow } from "./json-positions";

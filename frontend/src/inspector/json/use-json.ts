@@ -1,10 +1,10 @@
 /** The JSON of a graph while it is read and while it is edited: newest text, draft, verdict. */
 import { useQuery } from "@tanstack/react-query";
 import { useEffect, useMemo, useRef, useState } from "react";
-import { graphMoment, type TextChanges, textChangesOf } from "../../api/documents/texts";
+import { graphMoment, type TextChanges, textChangesOf } from "../../api/graphs";
 import { errorText, Refusal } from "../../api/http";
-import { usePerson } from "../../api/use-person";
-import { textScope, useKeptText } from "../../ui/drafts/kept-texts";
+import { usePerson } from "../../api/people";
+import { textScope, useKeptText } from "../../ui/drafts";
 import type { JsonError } from "./json-editor";
 import { lineOf } from "./json-positions";
 

@@ -12,7 +12,7 @@ import { groupChoices } from "../../graph/parameters/output-choices";
 import { complaint, shown, typed, withValue } from "../../graph/parameters/values";
 import { pathWords } from "../../graph/value-text";
 import { DraftInput } from "../../ui/draft-input";
-import { Tooltip } from "../../ui/floating/tooltip";
+import { Tooltip } from "../../ui/tooltip";
 import { isolated } from "../../words/isolated";
 import { SharedField } from "../fields/shared-field";
 import { useInLibrary } from "../fields/view-only";

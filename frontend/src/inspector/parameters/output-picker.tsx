@@ -6,7 +6,7 @@ import { useEditorContext } from "../../edit-actions/editor-context";
 import { leaveOutputs, takeOutputs } from "../../graph/edit/parameters";
 import type { Key } from "../../graph/model";
 import type { OutputChoice } from "../../graph/parameters/output-choices";
-import { Tooltip } from "../../ui/floating/tooltip";
+import { Tooltip } from "../../ui/tooltip";
 import { isolated } from "../../words/isolated";
 import style from "./data-flow.module.css";
 

@@ -10,7 +10,7 @@ import { type InputGiver, readValue, takenGivers } from "../../graph/parameters/
 import { outputChoices } from "../../graph/parameters/output-choices";
 import type { ParameterValue } from "../../graph/parameters/values";
 import { pathWords } from "../../graph/value-text";
-import { Tooltip } from "../../ui/floating/tooltip";
+import { Tooltip } from "../../ui/tooltip";
 import { isolated } from "../../words/isolated";
 import { useInLibrary } from "../fields/view-only";
 import style from "../inspector.module.css";

@@ -13,7 +13,7 @@ import { nameSuggestions, pathFrom, taken } from "../../graph/parameters/names";
 import { fresh, GROUPS, TYPES } from "../../graph/parameters/values";
 import { countsOf } from "../../graph/problems/problem-kinds";
 import { pathWords } from "../../graph/value-text";
-import { usePendingText } from "../../ui/drafts/use-draft";
+import { usePendingText } from "../../ui/drafts";
 import { fieldOfTold, ProblemsContext } from "../fields/field-problems";
 import { SharedField } from "../fields/shared-field";
 import style from "../inspector.module.css";

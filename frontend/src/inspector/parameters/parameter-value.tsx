@@ -11,8 +11,8 @@ import {
   withValue,
 } from "../../graph/parameters/values";
 import { DraftInput } from "../../ui/draft-input";
-import { Tooltip } from "../../ui/floating/tooltip";
 import { Segments } from "../../ui/segments";
+import { Tooltip } from "../../ui/tooltip";
 import { isolated } from "../../words/isolated";
 import { useInLibrary } from "../fields/view-only";
 import style from "../inspector.module.css";

@@ -5,9 +5,9 @@ import type { Run } from "../../api/runs";
 import { mapsOf } from "../../graph/document-keys";
 import { addAction, connect } from "../../graph/edit";
 import { readGraph } from "../../graph/read";
-import { valuesOf, valueText } from "./action-values";
-import { heldHeight, usualHeight } from "./drawer-frame";
-import { allWords, robotTabs } from "./robot-tabs";
+import { heldHeight, usualHeight } from "./run-drawer";
+import { allWords, robotTabs } from "./shown-run";
+import { valuesOf, valueText } from "./values-panel";
 
 const iso = (s: number) => new Date(s * 1000).toISOString();
 const visit = (from: number, until: number | null, result: string | null = null) => ({

@@ -1,21 +1,62 @@
 /** The head of the drawer: which run, how it stands, and what can be done with it. */
-
 import { ActionIcon, Button, Text } from "@mantine/core";
-import { IconChartBar, IconChevronDown, IconChevronUp, IconHistory } from "@tabler/icons-react";
+import { notifications } from "@mantine/notifications";
+import {
+  IconChartBar,
+  IconChevronDown,
+  IconChevronUp,
+  IconEye,
+  IconHistory,
+  IconPlayerPause,
+  IconPlayerPlay,
+} from "@tabler/icons-react";
+import { useMutation } from "@tanstack/react-query";
+import { useState } from "react";
 import { Link } from "wouter";
-import { useLive } from "../../api/live/use-live";
-import { useCurrentName } from "../../api/people";
-import type { Run } from "../../api/runs";
+import { errorText, isOutcomeUnknown } from "../../api/http";
+import { useLive } from "../../api/page-link";
+import { useCurrentName, useMay } from "../../api/people";
+import { needsRestConfirmation } from "../../api/run-stop";
+import { abilitiesOf, pauseOrResume, type Run } from "../../api/runs";
 import { serverTimeOf } from "../../clock/server-clock";
 import { boundsText } from "../../status/durations";
 import { useRunStatus } from "../../status/run-status";
 import { StateLabel } from "../../status/state-label";
+import { lazyPart, OverlayBoundary } from "../../ui/lazy-part";
 import { colorOfName } from "../../ui/name-colors";
 import { clock, day, instant, stopwatch, useNow } from "../../ui/times";
 import { isolated } from "../../words/isolated";
-import { PauseButton } from "../pause-button";
-import { ConfirmRestButton } from "../stop/confirm-rest-button";
 import style from "./run-drawer.module.css";
+
+const ConfirmRestDialog = lazyPart(() =>
+  import("../stop/confirm-rest-dialog").then((part) => part.ConfirmRestDialog),
+);
+
+/** Offers to end a run by a person's word where no answer of its engine can prove that nothing moves. */
+function ConfirmRestButton({ run }: { run: Run }) {
+  const may = useMay("operate");
+  const [asking, setAsking] = useState<boolean | null>(null);
+  if (!may || !needsRestConfirmation(run)) return null;
+  return (
+    <>
+      <Button
+        size="compact-xs"
+        variant="light"
+        color="red"
+        flex="none"
+        leftSection={<IconEye size={14} aria-hidden />}
+        onClick={() => setAsking(true)}
+      >
+        I looked …
+      </Button>
+      <OverlayBoundary>
+        {asking !== null && (
+          <ConfirmRestDialog run={run} opened={asking} onClose={() => setAsking(false)} />
+        )}
+      </OverlayBoundary>
+    </>
+  );
+}
 
 interface Props {
   run: Run;
@@ -134,5 +175,45 @@ export function RunHead(props: Props) {
         {folded !== null && <FoldButton folded={folded} onFold={onFold} />}
       </span>
     </header>
+  );
+}
+
+/** Nobody has answered: it may have been done all the same. */
+function failure(error: unknown, paused: boolean) {
+  const message = errorText(error);
+  if (!isOutcomeUnknown(error)) {
+    return { color: "red", title: paused ? "It does not go on" : "Not paused", message };
+  }
+  return {
+    color: "red",
+    autoClose: false as const,
+    title: `NOT KNOWN whether it ${paused ? "goes on" : "pauses"}`,
+    message: `${message} The robot may ${paused ? "move" : "go on"}.`,
+  };
+}
+
+function PauseButton({ run }: { run: Run }) {
+  const { runner, now } = useLive();
+  const may = useMay(run.simulated ? "simulate" : "operate");
+  const engine = now.engines.find((each) => each.name === abilitiesOf(run));
+  const paused = run.desired === "paused";
+  const steer = useMutation({
+    mutationFn: () => pauseOrResume(runner ?? "", run.id, paused ? "resume" : "pause"),
+    onError: (error) => notifications.show(failure(error, paused)),
+  });
+  const goes = run.state === "running" || run.state === "paused";
+  if (!may || engine?.pauses !== true || !goes || run.desired === "stopped") return null;
+  const Sign = paused ? IconPlayerPlay : IconPlayerPause;
+  return (
+    <Button
+      size="compact-xs"
+      leftSection={<Sign size={13} aria-hidden />}
+      loading={steer.isPending}
+      disabled={now.link === "down"}
+      title={now.link === "down" ? "The runner does not answer" : undefined}
+      onClick={() => steer.mutate()}
+    >
+      {paused ? "Go on" : "Pause"}
+    </Button>
   );
 }

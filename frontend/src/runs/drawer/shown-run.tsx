@@ -1,16 +1,20 @@
 /** A run in the drawer: its head, a tab for each robot, and what they show while it is open. */
 import { Tabs } from "@mantine/core";
-import { useState } from "react";
-import { useLive } from "../../api/live/use-live";
+import { useCallback, useMemo, useState } from "react";
+import { useLive } from "../../api/page-link";
 import { currentAlarm, type Run } from "../../api/runs";
+import { serverTimeOf } from "../../clock/server-clock";
 import type { Graph } from "../../graph/model";
-import { useLanes } from "../../status/lanes/lanes";
+import { type Lane, robotsOf, useLanes } from "../../status/lanes/lanes";
+import { Timeline, type Track } from "../../status/lanes/timeline";
+import { runLabel, type Tone } from "../../status/progress";
 import { StateLabel } from "../../status/state-label";
 import { colorOfName } from "../../ui/name-colors";
-import { DrawerBody } from "./drawer-body";
-import { ALL_ROBOTS, allWords, type RobotTab, robotTabs } from "./robot-tabs";
+import { instant } from "../../ui/times";
+import { movingActions } from "../moves-now";
 import style from "./run-drawer.module.css";
 import { RunHead } from "./run-head";
+import { ValuesPanel } from "./values-panel";
 
 /** What the notice shouts on every page already. */
 const SHOUTED: ReadonlySet<string> = new Set(["stop_unconfirmed", "moves_again"]);
@@ -109,4 +113,138 @@ export function ShownRun(props: ShownRunProps) {
       {folded !== true && tabs.length < 2 && body}
     </Tabs>
   );
+}
+
+/** Since when nothing is heard of a run, ms. */
+function useSilence(): (run: Run) => number | null {
+  const { now } = useLive();
+  return (run) => {
+    if (run.ended_at !== null) return null;
+    const engine = instant(run.unknown_since);
+    if (now.link !== "down") return engine;
+    const since = serverTimeOf(now.since);
+    return Math.min(engine ?? since, since);
+  };
+}
+
+/** The latest of the actions that run; what is chosen comes first. */
+function shownAction(run: Run, selected: string | null): string | null {
+  if (selected !== null) return selected;
+  const going = Object.values(run.actions ?? {}).filter(({ state }) => state === "RUNNING");
+  const begun = (each: (typeof going)[number]) => each.visits.at(-1)?.from ?? "";
+  return going.sort((a, b) => begun(b).localeCompare(begun(a)))[0]?.aid ?? null;
+}
+
+/** The same lanes for other runs of the graph; the same objects while nothing about them changes. */
+function useTracks(others: readonly Run[], graph: Graph, lanes: readonly Lane[]): Track[] {
+  const silenceOf = useSilence();
+  const engines = others.map(({ engine }) => engine).join("\n");
+  const lanesBy = useMemo(() => {
+    const actors = new Map(graph.actions.map((action) => [action.key, action.actor]));
+    const outermost = new Map(lanes.map(({ name, aid }) => [name, aid]));
+    const own = (engine: string) =>
+      lanes.map((lane) => {
+        const aid = outermost.get(lane.levels[0] ?? lane.name) ?? null;
+        return { ...lane, robot: (aid !== null && actors.get(aid)) || engine };
+      });
+    return new Map(engines.split("\n").map((engine) => [engine, own(engine)]));
+  }, [engines, graph, lanes]);
+  return others.map((run) => ({
+    run,
+    silentSince: silenceOf(run),
+    lanes: lanesBy.get(run.engine) ?? lanes,
+  }));
+}
+
+interface DrawerBodyProps {
+  run: Run;
+  lanes: readonly Lane[];
+  others: readonly Run[];
+  graph: Graph;
+  selected: string | null;
+  onPick: (aid: string) => void;
+  /** Where the canvas shows the run, ms; null: as it is now. */
+  cursor: number | null;
+  onSeek: (at: number | null) => void;
+}
+
+export function DrawerBody(props: DrawerBodyProps) {
+  const { run, lanes, others, graph, selected, onPick, cursor, onSeek } = props;
+  const silenceOf = useSilence();
+  const tracks = useTracks(others, graph, lanes);
+  const pick = useCallback(({ aid }: Lane) => aid !== null && onPick(aid), [onPick]);
+  return (
+    <div className={style.body}>
+      <Timeline
+        run={run}
+        lanes={lanes}
+        silentSince={silenceOf(run)}
+        others={tracks}
+        selected={lanes.find(({ aid }) => aid !== null && aid === selected)?.name ?? null}
+        onPick={pick}
+        cursor={cursor}
+        onSeek={onSeek}
+        seeksByKeys
+      />
+      <ValuesPanel run={run} graph={graph} aid={shownAction(run, selected)} />
+    </div>
+  );
+}
+
+export const ALL_ROBOTS = "all";
+
+export interface RobotTab {
+  /** The run's id, or its id and the robot's name where one run has several robots. */
+  readonly id: string;
+  readonly robot: string;
+  readonly run: Run;
+  /** The robot whose actions these are; null: all of the run. */
+  readonly actor: string | null;
+  readonly tone: Tone;
+  readonly words: string;
+}
+
+/** What one robot of a run does, or how its run stands. `unheard`: nothing is heard of any run. */
+function said(run: Run, names: ReadonlySet<string> | null, unheard: boolean) {
+  if (run.ended_at === null && (unheard || run.state === "unknown" || run.state === "lost")) {
+    return { tone: "unknown", words: "not known" } as const;
+  }
+  const own = Object.entries(run.actions ?? {}).filter(([name]) => names?.has(name) ?? true);
+  const moving = movingActions({ ...run, actions: Object.fromEntries(own) });
+  const [first, ...more] = moving;
+  if (run.ended_at === null && run.state === "running" && first !== undefined) {
+    return { tone: "run", words: more.length > 0 ? `${first} +${more.length}` : first } as const;
+  }
+  const { tone, word } = runLabel(run);
+  if (names !== null && run.state === "running") return { tone: "idle", words: "waits" } as const;
+  return { tone, words: word };
+}
+
+/** A tab for each run that goes on; of a single run, for each of the robots in it. */
+export function robotTabs(
+  runs: readonly Run[],
+  lanes: readonly Lane[],
+  unheard: boolean,
+): RobotTab[] {
+  const [only] = runs;
+  const actors = robotsOf(lanes);
+  if (runs.length === 1 && only !== undefined && actors.length > 1) {
+    return actors.map((actor) => {
+      const names = new Set(lanes.filter(({ robot }) => robot === actor).map(({ name }) => name));
+      const robot = actor === "" ? "any robot" : actor;
+      return { id: `${only.id} ${actor}`, robot, run: only, actor, ...said(only, names, unheard) };
+    });
+  }
+  const tabs = runs.map((run) => ({
+    id: run.id,
+    robot: run.simulated ? "simulator" : run.engine,
+    run,
+    actor: null,
+    ...said(run, null, unheard),
+  }));
+  return tabs.sort((a, b) => a.robot.localeCompare(b.robot) || a.run.number - b.run.number);
+}
+
+export function allWords(tabs: readonly RobotTab[]): string {
+  return tabs.length === 2 ? "Both robots" : `All ${tabs.length} robots`;
 }

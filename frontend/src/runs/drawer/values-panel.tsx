@@ -1,13 +1,12 @@
 /** At the right of the lanes: what is known of one action, and how old that is. */
-
 import { useMemo } from "react";
-import { useLive } from "../../api/live/use-live";
+import { useLive } from "../../api/page-link";
 import { type Run, useRun } from "../../api/runs";
-import type { Graph, Key } from "../../graph/model";
-import { spaced } from "../../status/level-words";
-import { duration, stopwatch, useNow } from "../../ui/times";
+import { fullName, type Graph, type Key } from "../../graph/model";
+import { spaced } from "../../status/level-places";
+import { visitBegin, visitEnd } from "../../status/progress";
+import { duration, instant, stopwatch, useNow } from "../../ui/times";
 import { isolated } from "../../words/isolated";
-import { valuesOf } from "./action-values";
 import style from "./run-drawer.module.css";
 
 /** How old the newest answer of the engine is; looked at once a second, with all that tells times. */
@@ -70,4 +69,83 @@ export function ValuesPanel({ run, graph, aid }: Props) {
       )}
     </aside>
   );
+}
+
+interface KnownValue {
+  readonly name: string;
+  readonly text: string;
+  /** `ran`: the engine showed that it ran with it; `sent`: only what was sent is known. */
+  readonly from: "ran" | "sent";
+}
+
+/** An action that was seen to end before this one began, along an arrow that answers its end. */
+interface BeganAfter {
+  readonly name: string;
+  readonly result: string;
+  /** ms after the run's start. */
+  readonly at: number;
+}
+
+export interface ActionValues {
+  readonly name: string;
+  readonly values: readonly KnownValue[];
+  readonly said: string | null;
+  readonly after: readonly BeganAfter[];
+}
+
+/** The value that a parameter's JSON text carries. */
+export function valueText(text: string): string {
+  try {
+    const parsed: unknown = JSON.parse(text);
+    if (typeof parsed === "object" && parsed !== null && "pvf_value" in parsed) {
+      return JSON.stringify(parsed.pvf_value);
+    }
+  } catch {
+    // not JSON: shown as it is
+  }
+  return text;
+}
+
+function beganAfter(run: Run, graph: Graph, key: Key, begun: number | null): BeganAfter[] {
+  const start = instant(run.started_at);
+  if (begun === null || start === null) return [];
+  const names = new Map(graph.actions.map((action) => [action.key, fullName(action)]));
+  return graph.relations.flatMap((relation): BeganAfter[] => {
+    const name = relation.child === key ? names.get(relation.parent) : undefined;
+    if (name === undefined) return [];
+    const visits = run.actions?.[name]?.visits ?? [];
+    const last = visits.findLast((visit) => (visitEnd(visit) ?? Number.POSITIVE_INFINITY) <= begun);
+    const end = last ? visitEnd(last) : null;
+    const outcome = last?.result ? (`on_${last.result}` as const) : null;
+    if (end === null || outcome === null || relation.conditions[outcome] === "ignore") return [];
+    return [{ name, result: last?.result ?? "", at: end - start }];
+  });
+}
+
+/** `sent`: the values that were sent with the run, by full name. */
+export function valuesOf(
+  run: Run,
+  graph: Graph,
+  aid: Key,
+  sent: Run["sent"] | undefined,
+): ActionValues | null {
+  const found = Object.entries(run.actions ?? {}).find(([, action]) => action.aid === aid);
+  if (found === undefined) return null;
+  const [name, action] = found;
+  const last = action.visits.at(-1);
+  const ran = last?.inputs ?? null;
+  const values = Object.entries(ran ?? sent?.[name] ?? {}).map(
+    ([parameter, text]): KnownValue => ({
+      name: parameter.replaceAll("::", " / "),
+      text: valueText(text),
+      from: ran === null ? "sent" : "ran",
+    }),
+  );
+  const begun = last ? visitBegin(last) : null;
+  return {
+    name,
+    values,
+    said: action.messages.at(-1)?.text ?? null,
+    after: beganAfter(run, graph, aid, begun),
+  };
 }

@@ -1,13 +1,25 @@
 /** What was looked at on one engine, item by item, in words. */
-
-import { Loader } from "@mantine/core";
-import { IconAlertTriangle, IconCheck, IconX } from "@tabler/icons-react";
-import type { Preflight, PreflightItem } from "../../api/robots";
-import { SIMULATOR } from "../../api/robots";
+import { Button, Loader } from "@mantine/core";
+import {
+  IconAlertTriangle,
+  IconCheck,
+  IconDownload,
+  IconFilePencil,
+  IconX,
+} from "@tabler/icons-react";
+import { useMutation } from "@tanstack/react-query";
+import { useEffect, useRef, useState } from "react";
+import { Link } from "wouter";
+import { errorText } from "../../api/http";
+import { fetchInside } from "../../api/inside";
+import { useLive } from "../../api/page-link";
+import { serverPath } from "../../api/page-url";
+import { useMay } from "../../api/people";
+import { type Preflight, type PreflightItem, SIMULATOR } from "../../api/robots";
+import { type IndexFolderLook, writeIntoIndex } from "../../api/starts";
+import { HoldButton } from "../../ui/hold-button";
 import { colorOfName } from "../../ui/name-colors";
 import { isolated } from "../../words/isolated";
-import { IndexWriting } from "./index-writing";
-import { InsideRemedies, type MomentLookedAt } from "./inside-remedies";
 import style from "./preflight-list.module.css";
 
 const WAITING: Readonly<Record<string, string>> = {
@@ -92,5 +104,228 @@ export function PreflightList({ engine, alone, look, moment }: Props) {
             ))}
       </ul>
     </div>
+  );
+}
+
+const PATIENCE = 20; // seconds; an engine looks every two
+
+interface IndexWritingProps extends MomentLookedAt {
+  item: PreflightItem;
+  look: Preflight;
+  robot: string;
+}
+
+/** Seconds since something was written that is waited for. Looks again each second until it is too long. */
+function useWaiting(isWaiting: boolean, onLookAgain: () => void): number {
+  const [seconds, setSeconds] = useState(0);
+  const look = useRef(onLookAgain);
+  useEffect(() => {
+    look.current = onLookAgain;
+  });
+  const goes = isWaiting && seconds < PATIENCE;
+  useEffect(() => {
+    if (!goes) return;
+    const timer = setInterval(() => {
+      setSeconds((so) => so + 1);
+      look.current();
+    }, 1_000);
+    return () => clearInterval(timer);
+  }, [goes]);
+  return seconds;
+}
+
+function Waiting({ robot, seconds }: { robot: string; seconds: number }) {
+  if (seconds < PATIENCE)
+    return (
+      <span>
+        <Loader size={12} color="var(--ink3)" /> Written. Waiting until {isolated(robot)} has
+        indexed it …<span aria-hidden> {seconds} s</span>
+      </span>
+    );
+  return (
+    <span>
+      Written, but {isolated(robot)} has not indexed it within {PATIENCE} s. Its engine may look
+      only at its start (<code>--indexing-rate 0</code>): restart it. Or it looks in another folder.
+    </span>
+  );
+}
+
+/** What writing would do, before anybody does it. */
+function What({ folder, robot }: { folder: IndexFolderLook; robot: string }) {
+  const names = folder.writable.map(({ graph }) => isolated(graph)).join(", ");
+  const replaced = folder.writable.filter(({ replaces }) => replaces !== "");
+  const hindered = Object.entries(folder.hindered);
+  return (
+    <>
+      {hindered.map(([graph, why]) => (
+        <span key={graph}>
+          {isolated(graph)} cannot be written into {folder.path}. {why}
+        </span>
+      ))}
+      {hindered.length === 0 && names !== "" && (
+        <span>
+          {names} can be written into {folder.path}. From then on <bdi>{robot}</bdi> refuses{" "}
+          {folder.writable.length > 1 ? "them as graphs of their own" : "it as a graph of its own"}.
+        </span>
+      )}
+      {hindered.length === 0 &&
+        replaced.map(({ graph, replaces }) => (
+          <span key={graph}>
+            {replaces}, which has another {isolated(graph)}, would be replaced, and kept beside.
+          </span>
+        ))}
+      {names === "" && folder.waiting.length > 0 && (
+        <span>
+          {folder.waiting.join(", ")} {folder.waiting.length > 1 ? "are" : "is"} in {folder.path}{" "}
+          already, and {isolated(robot)} has not indexed it. Its engine may look only at its start:
+          restart it.
+        </span>
+      )}
+    </>
+  );
+}
+
+interface WriteButtonProps {
+  folder: IndexFolderLook;
+  robot: string;
+  busy: boolean;
+  onWrite: () => void;
+}
+
+/** The button; where it would replace files it is held, or asks. */
+function WriteButton({ folder, robot, busy, onWrite }: WriteButtonProps) {
+  const replaced = folder.writable.filter(({ replaces }) => replaces !== "");
+  const label = `Write them where ${isolated(robot)} looks them up`;
+  const icon = <IconFilePencil size={14} aria-hidden />;
+  if (replaced.length === 0)
+    return (
+      <Button size="compact-sm" leftSection={icon} loading={busy} onClick={onWrite}>
+        {label}
+      </Button>
+    );
+  const paths = replaced.map(({ replaces }) => replaces).join(", ");
+  return (
+    <HoldButton
+      size="compact-sm"
+      icon={icon}
+      label={
+        busy
+          ? "Writing …"
+          : `Hold to write, replacing ${replaced.length === 1 ? "a file" : "files"}`
+      }
+      name={`${label}, and replace ${paths}`}
+      question={`Replace ${paths}? What is there now is kept beside it.`}
+      disabled={busy}
+      onHeld={onWrite}
+    />
+  );
+}
+
+/** Nothing where the runner has no such folder. Stays until the look is closed, to say how it went. */
+function IndexWriting({ item, look, robot, graph, seq, onLookAgain }: IndexWritingProps) {
+  const { runner } = useLive();
+  const may = useMay("operate");
+  const { folder } = item;
+  const write = useMutation({
+    mutationFn: async () => {
+      const inside = await fetchInside(graph, seq);
+      const replace = (folder?.writable ?? []).flatMap((each) => (each.replaces ? each.graph : []));
+      return writeIntoIndex(runner ?? "", robot, { digest: look.digest, replace, ...inside });
+    },
+    onSuccess: onLookAgain,
+    onError: onLookAgain,
+  });
+  const isBlocked = item.verdict === "blocked";
+  const seconds = useWaiting(write.isSuccess && isBlocked, onLookAgain);
+  if (!isBlocked && !write.isSuccess) return null;
+  if (isBlocked && folder === null) return null;
+  const can =
+    folder !== null && folder.writable.length > 0 && Object.keys(folder.hindered).length === 0;
+  return (
+    <span className={style.remedies}>
+      {folder !== null && !write.isSuccess && <What folder={folder} robot={robot} />}
+      {can && may && !write.isSuccess && (
+        <WriteButton
+          folder={folder}
+          robot={robot}
+          busy={write.isPending}
+          onWrite={() => write.mutate()}
+        />
+      )}
+      {can && !may && <span>Whoever may operate robots can do that.</span>}
+      {write.isError && (
+        <span className={style.failed} role="alert">
+          {errorText(write.error)}
+        </span>
+      )}
+      <span role="status">
+        {write.isPending && "Writing …"}
+        {write.isSuccess && isBlocked && <Waiting robot={robot} seconds={seconds} />}
+        {write.isSuccess && !isBlocked && `Written, and ${isolated(robot)} has indexed it.`}
+      </span>
+    </span>
+  );
+}
+
+/** The moment that is looked at. */
+interface MomentLookedAt {
+  readonly graph: string;
+  readonly seq: number;
+  /** What leads away from the look closes it. */
+  readonly onLeave: () => void;
+  /** Look again, now. */
+  readonly onLookAgain: () => void;
+}
+
+interface InsideRemediesProps extends MomentLookedAt {
+  item: PreflightItem;
+  look: Preflight;
+}
+
+function Files({ graph, seq }: Omit<MomentLookedAt, "onLeave" | "onLookAgain">) {
+  const path = `/api/graphs/${encodeURIComponent(graph)}/subgraphs.zip?at=${seq}`;
+  return (
+    <a className={style.remedy} href={serverPath(path)} download="graphs_inside.zip">
+      <IconDownload size={14} aria-hidden /> Files of the graphs inside (ZIP)
+    </a>
+  );
+}
+
+function OneGraph({ graph, onLeave }: Omit<MomentLookedAt, "seq" | "onLookAgain">) {
+  return (
+    <Link
+      className={style.remedy}
+      to={`/graphs/${encodeURIComponent(graph)}?flat`}
+      onClick={onLeave}
+    >
+      Make it one graph
+    </Link>
+  );
+}
+
+/** Nothing where nothing of this item comes from graphs inside. */
+function InsideRemedies({ item, look, graph, seq, onLeave }: InsideRemediesProps) {
+  if (item.verdict !== "blocked") return null;
+  if (item.code === "subgraphs") {
+    return (
+      <span className={style.remedies}>
+        <span>
+          Put their files into a package that the robot indexes and restart its engine, or start one
+          graph that does the same without graphs inside.
+        </span>
+        <Files graph={graph} seq={seq} />
+        <OneGraph graph={graph} onLeave={onLeave} />
+      </span>
+    );
+  }
+  if (item.code !== "again" || !look.items.some(({ code }) => code === "subgraphs")) return null;
+  return (
+    <span className={style.remedies}>
+      <span>
+        One graph that does the same has no graphs inside that would have to be looked up, and a
+        name of its own.
+      </span>
+      <OneGraph graph={graph} onLeave={onLeave} />
+    </span>
   );
 }

@@ -2,9 +2,9 @@
 import { IconPlayerPlayFilled } from "@tabler/icons-react";
 import type { Script } from "../../api/dry-runs";
 import { useVersions } from "../../api/graphs";
-import { useLive } from "../../api/live/use-live";
+import { useLive } from "../../api/page-link";
 import { SIMULATOR } from "../../api/robots";
-import { HoldButton } from "../../ui/floating/hold-button";
+import { HoldButton } from "../../ui/hold-button";
 import { isolated } from "../../words/isolated";
 import { nextLabel, useStart } from "./use-start";
 

@@ -1,26 +1,24 @@
 /** Before a start: where it goes, what was looked at there, and exactly what will be sent. */
 import { Button, Modal, Text, Textarea } from "@mantine/core";
-import { IconPlayerPlayFilled, IconRefresh } from "@tabler/icons-react";
-import { useQuery } from "@tanstack/react-query";
-import { useState } from "react";
+import { IconPlayerPlayFilled, IconRefresh, IconUserCheck } from "@tabler/icons-react";
+import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
+import { type ReactNode, useState } from "react";
 import { Link } from "wouter";
-import { identifiedText } from "../../api/documents/courses";
-import { fetchInside } from "../../api/documents/inside";
-import { runPreflight } from "../../api/documents/starts";
+import { identifiedText } from "../../api/courses";
 import { errorText } from "../../api/http";
-import { useLive } from "../../api/live/use-live";
-import { type Preflight, type Robot, SIMULATOR } from "../../api/robots";
+import { fetchInside } from "../../api/inside";
+import { useLive } from "../../api/page-link";
+import { useMay, usePerson } from "../../api/people";
+import { type Preflight, type Robot, SIMULATOR, useRosReach } from "../../api/robots";
 import type { Run } from "../../api/runs";
-import { useMay, usePerson } from "../../api/use-person";
-import { EngineLabel } from "../../status/engine-label";
+import { type Approval, approve, fetchApprovals, runPreflight } from "../../api/starts";
 import { HelpLink } from "../../status/help-link";
-import { textScope, useKeptText } from "../../ui/drafts/kept-texts";
-import { HoldButton } from "../../ui/floating/hold-button";
+import { EngineLabel } from "../../status/state-label";
+import { textScope, useKeptText } from "../../ui/drafts";
+import { HoldButton } from "../../ui/hold-button";
 import { colorOfName } from "../../ui/name-colors";
 import { isolated } from "../../words/isolated";
-import { useBehaviours } from "./behaviours-choice";
 import { PreflightList } from "./preflight-list";
-import { SecondPerson } from "./second-person";
 import style from "./start-dialog.module.css";
 import { rememberEngines, useStart } from "./use-start";
 
@@ -281,5 +279,125 @@ export function StartDialog(props: Props) {
         />
       </footer>
     </Modal>
+  );
+}
+
+const NAMED = 6;
+
+function listed(names: readonly string[]): string {
+  const more = names.length - NAMED;
+  return names.slice(0, NAMED).join(", ") + (more > 0 ? ` and ${more} more` : "");
+}
+
+function BehavioursChoice(props: { on: boolean; onChange: (on: boolean) => void }) {
+  const { runner } = useLive();
+  const there = useRosReach(runner).data?.behaviours ?? null;
+  if (there === null) return null;
+  const refused = Object.values(there.refused);
+  return (
+    <fieldset className={style.where}>
+      <legend>What actions do</legend>
+      <label className={style.choice} data-on={!props.on || undefined}>
+        <input
+          type="radio"
+          name="behaviours"
+          checked={!props.on}
+          onChange={() => props.onChange(false)}
+        />
+        <span className={style.name}>Simulated</span>
+        <span className={style.quiet}>each takes a second and succeeds</span>
+      </label>
+      <label className={style.choice} data-on={props.on || undefined}>
+        <input
+          type="radio"
+          name="behaviours"
+          checked={props.on}
+          onChange={() => props.onChange(true)}
+        />
+        <span className={style.name}>Python behaviours</span>
+        <span className={style.quiet}>{listed(there.names) || "none yet"}</span>
+      </label>
+      {(there.problem !== "" || refused.length > 0) && (
+        <Text size="sm" c="dimmed">
+          {[there.problem, ...refused].join(" ").trim()}
+        </Text>
+      )}
+    </fieldset>
+  );
+}
+
+/** Whether behaviours were chosen, and what they are chosen with; neither where nothing is simulated. */
+export function useBehaviours(simulated: boolean): { behaviours: boolean; choice: ReactNode } {
+  const [chosen, choose] = useState(false);
+  const choice = simulated ? <BehavioursChoice on={chosen} onChange={choose} /> : null;
+  return { behaviours: chosen && simulated, choice };
+}
+
+interface SecondPersonProps {
+  graph: string;
+  label: string;
+  looks: readonly Preflight[] | undefined;
+}
+
+const demands = (looks: SecondPersonProps["looks"]) =>
+  looks?.find(({ items }) => items.some(({ code }) => code === "approved"));
+
+function Said({ given, me, label }: { given: readonly Approval[]; me: string; label: string }) {
+  const others = given.filter(({ author }) => author.id !== me);
+  const mine = others.length < given.length;
+  return (
+    <Text size="sm">
+      {others.length > 0 && (
+        <>
+          Said yes to {isolated(label)}:{" "}
+          <bdi>{others.map(({ author }) => isolated(author.name)).join(", ")}</bdi>.{" "}
+        </>
+      )}
+      {mine && `You said yes to ${isolated(label)}: somebody else may start it.`}{" "}
+      <span className={style.doubt}>
+        A second person needs a browser of their own. One link that is opened in two browsers may be
+        one person: that cannot be told here.
+      </span>
+    </Text>
+  );
+}
+
+export function SecondPerson({ graph, label, looks }: SecondPersonProps) {
+  const { runner = "" } = useLive();
+  const { person } = usePerson();
+  const may = useMay("operate");
+  const client = useQueryClient();
+  const digest = demands(looks)?.tree_digest ?? "";
+  const key = ["approvals", digest];
+  const given = useQuery({
+    queryKey: key,
+    queryFn: ({ signal }) => fetchApprovals(runner, digest, signal),
+    enabled: digest !== "",
+  });
+  const say = useMutation({
+    mutationFn: () => approve(runner, { digest, graph, version: label, note: "" }),
+    onSettled: () => client.invalidateQueries({ queryKey: key }),
+  });
+  if (digest === "") return null;
+  const mine = given.data?.some(({ author }) => author.id === person.id) ?? true;
+  return (
+    <section className={style.second} aria-label="A second person">
+      <Said given={given.data ?? []} me={person.id} label={label} />
+      {may && !mine && (
+        <Button
+          size="compact-sm"
+          loading={say.isPending}
+          leftSection={<IconUserCheck size={14} aria-hidden />}
+          onClick={() => say.mutate()}
+        >
+          Say yes to {isolated(label)}, for somebody else to start it
+        </Button>
+      )}
+      {say.error !== null && (
+        <Text size="sm" c="var(--error)" role="alert">
+          {errorText(say.error)}
+        </Text>
+      )}
+    </section>
   );
 }

@@ -1,7 +1,6 @@
 import { expect, test } from "vitest";
 import type { StartFound } from "../../api/runs";
-import { missing, unknownWords } from "./unanswered-start-notice";
-import { type SentStart, UnansweredStarts } from "./unanswered-starts";
+import { missing, type SentStart, UnansweredStarts, unknownWords } from "./unanswered-starts";
 
 const sent: SentStart = {
   request: "q",

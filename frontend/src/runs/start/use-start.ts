@@ -2,11 +2,11 @@
 
 import { notifications } from "@mantine/notifications";
 import { useMutation, useQueryClient } from "@tanstack/react-query";
-import { insideOf } from "../../api/documents/inside";
 import type { Script } from "../../api/dry-runs";
 import { publish, queryKeys, type Version, versionName } from "../../api/graphs";
 import { errorPlace, errorText, isOutcomeUnknown } from "../../api/http";
-import { useLive } from "../../api/live/use-live";
+import { insideOf } from "../../api/inside";
+import { useLive } from "../../api/page-link";
 import { type Started, type StartOrder, startRun } from "../../api/runs";
 import { serverNow } from "../../clock/server-clock";
 import { newAid } from "../../graph/document-keys";

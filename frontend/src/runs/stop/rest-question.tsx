@@ -1,10 +1,9 @@
 /** Asks a person at the robot whether it rests, when the notice beside STOP is pressed, which draws no dialog. */
 import { useEffect, useSyncExternalStore } from "react";
-import { useLive } from "../../api/live/use-live";
+import { useLive } from "../../api/page-link";
+import { useMay } from "../../api/people";
 import { needsRestConfirmation } from "../../api/run-stop";
-import { useMay } from "../../api/use-person";
-import { lazyPart } from "../../ui/parts/lazy-part";
-import { OverlayBoundary } from "../../ui/parts/part-boundary";
+import { lazyPart, OverlayBoundary } from "../../ui/lazy-part";
 import { askedRun, mayAnswer } from "./stop-surroundings";
 
 const ConfirmRestDialog = lazyPart(() =>

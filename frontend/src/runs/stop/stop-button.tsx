@@ -1,9 +1,9 @@
 /** STOP: one, always at the same place, never disabled; STOP ALL by keys from anywhere. */
 
 import { useSyncExternalStore } from "react";
-import type { LiveLink } from "../../api/live/live-socket";
-import { foreignGraphs, openRuns, unheardRobots } from "../../api/live/open-runs";
-import { useLive } from "../../api/live/use-live";
+import type { LiveLink } from "../../api/live-socket";
+import { foreignGraphs, openRuns, unheardRobots } from "../../api/live-socket";
+import { useLive } from "../../api/page-link";
 import type { Run } from "../../api/runs";
 import { isolated } from "../../words/isolated";
 import style from "./stop-button.module.css";

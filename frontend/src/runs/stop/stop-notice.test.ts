@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import type { LiveState, StopRequest } from "../../api/live/live-socket";
+import type { LiveState, StopRequest } from "../../api/live-socket";
 import { needsRestConfirmation } from "../../api/run-stop";
 import type { Run } from "../../api/runs";
 import { runToStop, stopButtonText } from "./stop-button";

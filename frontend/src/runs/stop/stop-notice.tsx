@@ -1,16 +1,16 @@
 /** What became of a Stop, in words, until it is proven. */
 
 import { useState, useSyncExternalStore } from "react";
-import type { LiveState, StopRequest } from "../../api/live/live-socket";
-import { foreignGraphs, openRuns, stopTargets, unheardRobots } from "../../api/live/open-runs";
-import { useLive } from "../../api/live/use-live";
+import type { LiveState, StopRequest } from "../../api/live-socket";
+import { foreignGraphs, openRuns, stopTargets, unheardRobots } from "../../api/live-socket";
+import { useLive } from "../../api/page-link";
 import type { Robot } from "../../api/robots";
 import { needsRestConfirmation } from "../../api/run-stop";
 import type { Run } from "../../api/runs";
 import { serverTimeOf, tick } from "../../clock/server-clock";
 import { HelpLink } from "../../status/help-link";
-import { useRootMark } from "../../ui/hooks/use-root-mark";
 import { clock, duration, instant, useTick } from "../../ui/times";
+import { useRootMark } from "../../ui/use-root-mark";
 import { isolated } from "../../words/isolated";
 import style from "./stop-notice.module.css";
 import { askedRun, mayAnswer } from "./stop-surroundings";

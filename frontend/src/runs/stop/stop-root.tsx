@@ -11,13 +11,12 @@ import {
   useSyncExternalStore,
 } from "react";
 import { createRoot } from "react-dom/client";
-import { pageLink } from "../../api/live/page-link";
+import { pageLink } from "../../api/page-link";
 import { isStopKey } from "../../ui/keys";
 import { StopButton } from "./stop-button";
 import { StopNotice } from "./stop-notice";
 import style from "./stop-root.module.css";
 import { changedFromOutside, drawnStop, pageError } from "./stop-surroundings";
-import { followVisualViewport } from "./visual-viewport";
 
 function Layer({ name, children }: { name: string | undefined; children: ReactNode }) {
   const layer = useRef<HTMLDivElement>(null);
@@ -172,4 +171,36 @@ function draw(place: HTMLElement, times = 0): void {
 export function mountStop(place: HTMLElement): void {
   window.addEventListener("keydown", onKey, { capture: true });
   draw(place);
+}
+
+const SIZES = ["transform", "width", "height"] as const;
+
+/**
+ * Lay `layer`, which is fixed at the upper left, over the visual viewport, at the size that it has
+ * without zoom. Return what ends that.
+ */
+function followVisualViewport(layer: HTMLElement): () => void {
+  const seen = window.visualViewport;
+  if (seen == null) return () => {};
+  const place = () => {
+    const { offsetLeft, offsetTop, width, height, scale } = seen;
+    const whole =
+      scale === 1 && width === window.innerWidth && height === window.innerHeight && !offsetTop;
+    if (whole) for (const name of SIZES) layer.style.removeProperty(name);
+    else {
+      layer.style.transform = `translate(${offsetLeft}px, ${offsetTop}px) scale(${1 / scale})`;
+      layer.style.width = `${width * scale}px`;
+      layer.style.height = `${height * scale}px`;
+    }
+  };
+  place();
+  const on = [
+    [seen, "resize"],
+    [seen, "scroll"],
+    [window, "resize"],
+  ] as const;
+  for (const [target, name] of on) target.addEventListener(name, place);
+  return () => {
+    for (const [target, name] of on) target.removeEventListener(name, place);
+  };
 }

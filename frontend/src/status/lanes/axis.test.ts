@@ -1,8 +1,7 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
 import type { Visit } from "../../api/runs";
-import { growingSpan, renewalOf, shareOf, ticksOf, wholeSpan } from "./axis";
-import { barOf } from "./bars";
+import { barOf, growingSpan, renewalOf, shareOf, ticksOf, wholeSpan } from "./axis";
 
 test("an axis of what goes on grows in steps and always holds all of it", () => {
   expect(growingSpan(57_000)).toBe(60_000);

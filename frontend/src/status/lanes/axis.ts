@@ -1,5 +1,11 @@
 /** The time axis of lanes: how long it is, where a moment stands on it, and its ticks. Pure. */
 
+import { type RefObject, useLayoutEffect } from "react";
+import type { Visit } from "../../api/runs";
+import { serverNow } from "../../clock/server-clock";
+import { instant } from "../../ui/times";
+import { type Tone, visitBegin, visitEnd } from "../progress";
+
 export interface TimeAxis {
   /** When the run began, ms. */
   readonly start: number;
@@ -45,4 +51,111 @@ const MOST_TICKS = 8;
 export function ticksOf(span: number): number[] {
   const step = (TICKS.find((each) => span / 1000 / each <= MOST_TICKS) ?? 7200) * 1000;
   return Array.from({ length: Math.floor(span / step) + 1 }, (_, i) => i * step);
+}
+
+/** Shares of the axis, 0 to 1. */
+interface BarSpan {
+  readonly left: number;
+  readonly width: number;
+}
+
+export interface Bar {
+  /** Where it went on for certain; null where no such moment is known. */
+  readonly sure: BarSpan | null;
+  readonly tone: Tone;
+  /** It goes on, and the bar with it. */
+  readonly open: boolean;
+  /** Where it may have gone on as well: nobody saw its ends. */
+  readonly maybe: BarSpan | null;
+}
+
+const RESULTS: ReadonlySet<string> = new Set(["true", "false", "error", "stopped"]);
+const LEAST = 0.004; // of the axis; what is shorter could not be seen
+
+function toneOf(visit: Visit, open: boolean, over: boolean): Tone {
+  const result = visit.result?.replace(/^on_/, "");
+  if (result !== undefined && RESULTS.has(result)) return result as Tone;
+  if (!open) return "done";
+  return over ? "unknown" : "run";
+}
+
+/** `until`: as far as anything is known of the run, ms. */
+export function barOf(visit: Visit, axis: TimeAxis, until: number, over: boolean): Bar | null {
+  const from = visitBegin(visit);
+  if (from === null) return null;
+  const end = visitEnd(visit);
+  const open = end === null;
+  const to = end ?? until;
+  const at = (moment: number) => shareOf(axis, moment);
+  const earliest = instant(visit.not_before) ?? from;
+  const latest = open ? to : (instant(visit.not_after) ?? until);
+  const wider = at(latest) - at(earliest) - Math.max(0, at(to) - at(from)) > LEAST;
+  return {
+    sure:
+      to > from || !wider ? { left: at(from), width: Math.max(LEAST, at(to) - at(from)) } : null,
+    tone: toneOf(visit, open, over),
+    open: open && !over,
+    maybe: wider ? { left: at(earliest), width: at(latest) - at(earliest) } : null,
+  };
+}
+
+/** A moment of the way, as `Element.animate` takes it. `offset`: the share of the axis, 0 to 1. */
+export interface Waypoint {
+  readonly offset: number;
+  readonly transform: string;
+}
+
+const across = (share: number) => `translateX(${share * 100}%)`;
+
+/** From the begin of the axis to its end. */
+export const WHOLE_WAY: readonly Waypoint[] = [
+  { offset: 0, transform: across(0) },
+  { offset: 1, transform: across(1) },
+];
+
+/** The way of a bar that reaches from a share of the axis to now, within what is right of that share. */
+export function growingWay(left: number): Waypoint[] {
+  const room = Math.max(LEAST, 1 - left);
+  const begun = across(Math.min(1, LEAST / room) - 1);
+  return [
+    { offset: 0, transform: begun },
+    { offset: Math.min(1, left + LEAST), transform: begun },
+    { offset: 1, transform: across(0) },
+  ];
+}
+
+/** How far the time of an animation may be off, ms: it stands still while a computer sleeps. */
+const SLACK = 1000;
+const LOOK = 1000; // ms
+
+/**
+ * Keeps an element where time is on an axis, by a way over all of it. A transform that the page itself
+ * changes has the browser order all layers anew, each time; this one it moves alone. All ways over an
+ * axis take their steps together.
+ */
+export function useMoving(
+  element: RefObject<HTMLElement | null>,
+  axis: TimeAxis,
+  way: readonly Waypoint[],
+): void {
+  useLayoutEffect(() => {
+    const moved = element.current?.animate?.(
+      way.map((point) => ({ ...point })),
+      {
+        duration: axis.span,
+        easing: `steps(${Math.round(axis.span / renewalOf(axis))})`,
+        fill: "both",
+      },
+    );
+    if (moved === undefined) return;
+    const since = () => serverNow() - axis.start;
+    moved.currentTime = since();
+    const looking = setInterval(() => {
+      if (Math.abs(Number(moved.currentTime) - since()) > SLACK) moved.currentTime = since();
+    }, LOOK);
+    return () => {
+      clearInterval(looking);
+      moved.cancel();
+    };
+  }, [element, axis, way]);
 }

@@ -1,17 +1,16 @@
 /** One action over time: its visits as bars, and how it is now at the right. */
-import { type CSSProperties, Fragment, memo, useMemo, useRef } from "react";
+
+import { IconChevronDown, IconChevronRight } from "@tabler/icons-react";
+import { type CSSProperties, Fragment, memo, useCallback, useMemo, useRef, useState } from "react";
 import type { Visit } from "../../api/runs";
 import { colorOfName } from "../../ui/name-colors";
 import { stopwatch, useNow } from "../../ui/times";
 import { durationText } from "../durations";
-import { wayWords } from "../level-words";
+import { wayWords } from "../level-places";
 import { type Progress, type Tone, visitsText } from "../progress";
 import { StateLabel, toneColor } from "../state-label";
-import { shareOf, type TimeAxis } from "./axis";
-import { type Bar, barOf } from "./bars";
-import { LaneToggle } from "./lane-toggle";
+import { type Bar, barOf, growingWay, shareOf, type TimeAxis, useMoving } from "./axis";
 import type { Lane } from "./lanes";
-import { growingWay, useMoving } from "./moving";
 import style from "./timeline.module.css";
 
 interface Props {
@@ -171,3 +170,71 @@ export const LaneRow = memo(function LaneRow(props: Props) {
     </li>
   );
 });
+
+interface LaneToggleProps {
+  /** The way to the action, in words. */
+  words: string;
+  /** Null: nothing is inside; the room for the sign stays. */
+  opened: boolean | null;
+  onOpen: () => void;
+}
+
+export function LaneToggle({ words, opened, onOpen }: LaneToggleProps) {
+  if (opened === null) return <span className={style.toggle} />;
+  return (
+    <button
+      type="button"
+      className={style.toggle}
+      aria-expanded={opened}
+      aria-label={`What ran inside of ${words}`}
+      onClick={onOpen}
+    >
+      <IconChevronRight size={14} aria-hidden />
+    </button>
+  );
+}
+
+interface AllLevelsProps {
+  lanes: readonly { name: string; holds: boolean }[];
+  inside: OpenLanes;
+}
+
+/** Nothing where no lane has others inside. */
+export function AllLevels({ lanes, inside }: AllLevelsProps) {
+  const holding = lanes.filter(({ holds }) => holds);
+  if (holding.length === 0) return null;
+  const all = holding.every(({ name }) => inside.open.has(name));
+  const Icon = all ? IconChevronDown : IconChevronRight;
+  return (
+    <button
+      type="button"
+      className={style.openAll}
+      aria-expanded={all}
+      onClick={() => inside.set(all ? [] : holding.map(({ name }) => name))}
+    >
+      <Icon size={13} aria-hidden /> All levels
+    </button>
+  );
+}
+
+export interface OpenLanes {
+  /** By the names of their actions. */
+  readonly open: ReadonlySet<string>;
+  readonly toggle: (name: string) => void;
+  readonly set: (names: readonly string[]) => void;
+}
+
+export function useOpenLanes(): OpenLanes {
+  const [open, setOpen] = useState<ReadonlySet<string>>(new Set());
+  const toggle = useCallback(
+    (name: string) =>
+      setOpen((before) => {
+        const now = new Set(before);
+        if (!now.delete(name)) now.add(name);
+        return now;
+      }),
+    [],
+  );
+  const set = useCallback((names: readonly string[]) => setOpen(new Set(names)), []);
+  return useMemo(() => ({ open, toggle, set }), [open, toggle, set]);
+}

@@ -3,8 +3,7 @@ import { useRef } from "react";
 import type { Run } from "../../api/runs";
 import { fullName, type Graph } from "../../graph/model";
 import { isEqual } from "../../graph/values";
-import { type LevelPlace, placesIn, placesOf } from "../level-places";
-import { factOf } from "../level-words";
+import { factOf, type LevelPlace, placesIn, placesOf } from "../level-places";
 
 export interface Lane {
   /** As the run tells it. */

@@ -5,8 +5,7 @@ import { act } from "react";
 import { createRoot } from "react-dom/client";
 import { afterEach, expect, test, vi } from "vitest";
 import { hearStamp } from "../../clock/server-clock";
-import { shareOf, type TimeAxis } from "./axis";
-import { growingWay, useMoving, type Waypoint, WHOLE_WAY } from "./moving";
+import { growingWay, shareOf, type TimeAxis, useMoving, type Waypoint, WHOLE_WAY } from "./axis";
 
 afterEach(() => vi.useRealTimers());
 

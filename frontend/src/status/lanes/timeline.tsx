@@ -1,5 +1,4 @@
 /** Lanes of runs over time, by robot: one for each action, with what is not known left hatched. */
-
 import {
   Fragment,
   type KeyboardEvent,
@@ -13,16 +12,21 @@ import type { Run } from "../../api/runs";
 import { serverNow } from "../../clock/server-clock";
 import { keyOf } from "../../ui/keys";
 import { colorOfName } from "../../ui/name-colors";
-import { duration, instant, stopwatch } from "../../ui/times";
+import { duration, instant, stopwatch, useNow } from "../../ui/times";
 import { progressOf, progressOfAction, type Tone } from "../progress";
 import { toneColor } from "../state-label";
-import { growingSpan, shareOf, type TimeAxis, ticksOf, wholeSpan } from "./axis";
-import { LaneRow } from "./lane-row";
-import { AllLevels } from "./lane-toggle";
+import {
+  growingSpan,
+  shareOf,
+  type TimeAxis,
+  ticksOf,
+  useMoving,
+  WHOLE_WAY,
+  wholeSpan,
+} from "./axis";
+import { AllLevels, LaneRow, type OpenLanes, useOpenLanes } from "./lane-row";
 import { type Lane, openLanes, robotsOf } from "./lanes";
-import { Playhead } from "./playhead";
 import style from "./timeline.module.css";
-import { type OpenLanes, useOpenLanes } from "./use-open-lanes";
 
 interface Props extends Track {
   /** The name of a lane. */
@@ -292,4 +296,59 @@ export function Timeline(props: Props) {
       </ul>
     </div>
   );
+}
+
+/** Where the sign of a moment has room beside its line. */
+type Side = "left" | "right" | undefined;
+
+const sideOf = (share: number): Side => (share > 0.9 ? "left" : share < 0.06 ? "right" : undefined);
+
+function Cursor({ side, label, live }: { side: Side; label: string; live: boolean }) {
+  return (
+    <i className={style.cursor} data-live={live || undefined}>
+      <b data-side={side}>{label}</b>
+    </i>
+  );
+}
+
+/** What is told of a moment is drawn anew once a second; its line moves meanwhile. */
+function LiveCursor({ axis, silentSince }: { axis: TimeAxis; silentSince: number | null }) {
+  const now = useNow(1000);
+  const words = silentSince === null ? "live" : "not known";
+  const label = `${stopwatch(now - axis.start)} ${words}`;
+  return <Cursor side={sideOf(shareOf(axis, now))} label={label} live={silentSince === null} />;
+}
+
+/** Moves with time. `silentSince`: what it shows is not known from there on. */
+function LiveHead({ axis, silentSince }: { axis: TimeAxis; silentSince: number | null }) {
+  const sweep = useRef<HTMLDivElement>(null);
+  useMoving(sweep, axis, WHOLE_WAY);
+  return (
+    <div ref={sweep} className={style.sweep}>
+      <LiveCursor axis={axis} silentSince={silentSince} />
+    </div>
+  );
+}
+
+interface PlayheadProps {
+  axis: TimeAxis;
+  /** Where a replay stands, ms; null at the live edge, or at the end of what is over. */
+  cursor: number | null;
+  goes: boolean;
+  silentSince: number | null;
+}
+
+function Playhead({ axis, cursor, goes, silentSince }: PlayheadProps) {
+  if (cursor !== null) {
+    const share = shareOf(axis, cursor);
+    return (
+      <>
+        <i className={style.later} style={{ left: `${share * 100}%` }} />
+        <div className={style.sweep} style={{ transform: `translateX(${share * 100}%)` }}>
+          <Cursor side={sideOf(share)} label={stopwatch(cursor - axis.start)} live={false} />
+        </div>
+      </>
+    );
+  }
+  return goes ? <LiveHead axis={axis} silentSince={silentSince} /> : null;
 }

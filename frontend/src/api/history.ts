@@ -1,0 +1,165 @@
+/** What was done to a document, what that changed, what it was, and the ways back to it. */
+import { type QueryClient, useQuery } from "@tanstack/react-query";
+import type { GraphDifference, GraphSummary, Version } from "./graphs";
+import { fetchJson } from "./http";
+import { recordedScriptOf } from "./review";
+import type { Run } from "./runs";
+import type { EditorApi } from "./schema/editor";
+
+export type HistoryEntry = EditorApi["HistoryEntry"];
+
+const below = (id: string) => `/api/graphs/${encodeURIComponent(id)}`;
+
+/** Newest first. `seq`: the moment on screen, with which it is read again. */
+export function useHistory(id: string, seq: number) {
+  return useQuery({
+    queryKey: ["history", id, seq],
+    queryFn: ({ signal }) => fetchJson<HistoryEntry[]>(`${below(id)}/history`, { signal }),
+    placeholderData: (before) => before,
+  });
+}
+
+/** A page of it, newest first: what was before a change, or the newest. */
+export function fetchHistory(
+  id: string,
+  limit: number,
+  before: number | null,
+  signal: AbortSignal,
+): Promise<HistoryEntry[]> {
+  const from = before === null ? "" : `&before=${before}`;
+  return fetchJson(`${below(id)}/history?limit=${limit}${from}`, { signal });
+}
+
+/** The root maps of the document as they were after a change. */
+export function fetchDocument(
+  id: string,
+  at: number,
+  signal: AbortSignal,
+): Promise<EditorApi["PastDocument"]> {
+  return fetchJson(`${below(id)}/document?at=${at}`, { signal });
+}
+
+/** The steps from one moment to another, key by key, in order of time. */
+export function fetchChanges(
+  id: string,
+  after: number,
+  upto: number,
+  signal: AbortSignal,
+): Promise<EditorApi["DocumentStep"][]> {
+  return fetchJson(`${below(id)}/changes?after=${after}&upto=${upto}`, { signal });
+}
+
+/** What differs from the change `from` to the change `to`; null as `from`: nothing is asked. */
+export function useDifference(id: string, from: number | null, to: number) {
+  return useQuery({
+    enabled: from !== null,
+    queryKey: ["history", id, "difference", from, to],
+    queryFn: ({ signal }) =>
+      fetchJson<GraphDifference>(`${below(id)}/diff?from=${from}&to=${to}`, { signal }),
+    staleTime: Number.POSITIVE_INFINITY,
+  });
+}
+
+export type FieldBlame = EditorApi["FieldBlame"];
+export type FieldValue = EditorApi["FieldValue"];
+
+/** Who gave each field of an action, arrow or note, or of the graph (""), the value that it had then;
+ * without `at` now, which is asked each time. */
+export function useBlame(id: string, of: string, at?: number) {
+  const query = new URLSearchParams({ of, ...(at === undefined ? {} : { at: `${at}` }) });
+  return useQuery({
+    enabled: at !== 0,
+    queryKey: ["history", id, "blame", of, at ?? "now"],
+    queryFn: ({ signal }) => fetchJson<FieldBlame[]>(`${below(id)}/blame?${query}`, { signal }),
+    retry: false,
+  });
+}
+
+/** All values that a field has had until then, newest first. */
+export function useFieldValues(id: string, of: string, field: string, at: number) {
+  const query = new URLSearchParams({ of, field, at: String(at) });
+  return useQuery({
+    queryKey: ["history", id, "values", of, field, at],
+    queryFn: ({ signal }) =>
+      fetchJson<FieldValue[]>(`${below(id)}/blame/values?${query}`, { signal }),
+  });
+}
+
+/** Makes it what it was after an earlier change, or one thing of it, by its key: an edit, which everybody sees. */
+export function restoreMoment(id: string, seq: number, of?: string): Promise<GraphSummary> {
+  const body = of === undefined ? { seq } : { seq, of };
+  return fetchJson(`${below(id)}/restore`, { method: "POST", body });
+}
+
+/** Takes back what one person did, where nobody has changed it since. */
+export function revertEdits(
+  id: string,
+  body: EditorApi["EditsOfOne"],
+): Promise<EditorApi["GoneBack"]> {
+  return fetchJson(`${below(id)}/revert`, { method: "POST", body });
+}
+
+/** Reads again what is on screen. An edit of ours is shown before what it was is written down: what is being read
+ * may be from between, and is given up, since the library would keep the first answer of a moment. */
+export async function refreshHistory(client: QueryClient, id: string): Promise<void> {
+  const all = { queryKey: ["history", id] };
+  await client.cancelQueries(all);
+  await client.invalidateQueries(all);
+}
+
+export type SinceWhen = EditorApi["SinceWhen"];
+
+/** What was asked, and the answer; `good` null: no run before went well, so there is nothing to ask. */
+export interface SinceAnswer {
+  readonly good: Run | null;
+  readonly found: SinceWhen | null;
+}
+
+type Ended = Pick<Run, "number" | "version" | "state" | "result">;
+
+/** Whether a run of a version did what it was for. */
+export function wentWell({ version, state, result }: Ended): boolean {
+  return version !== null && state === "finished" && (result === "on_true" || result === null);
+}
+
+/** The last run, before one, that went well, as far as it is known. */
+export function lastGoodRun<R extends Ended>(
+  runs: readonly R[],
+  before = Number.POSITIVE_INFINITY,
+): R | null {
+  const good = runs.filter((each) => each.number < before && wentWell(each));
+  return good.reduce<R | null>(
+    (last, each) => (last === null || each.number > last.number ? each : last),
+    null,
+  );
+}
+
+async function asked(runner: string, run: Run, graph: string): Promise<SinceAnswer> {
+  const below = `/api/graphs/${encodeURIComponent(graph)}`;
+  const query = new URLSearchParams({ limit: "1000", graph });
+  const [runs, versions] = await Promise.all([
+    fetchJson<Run[]>(`${runner}/api/runs?${query}`),
+    fetchJson<Version[]>(`${below}/versions`),
+  ]);
+  const seqOf = (of: Run) => versions.find(({ id }) => id === of.version)?.seq;
+  const good = lastGoodRun(runs, run.number);
+  const [from, to] = [good === null ? undefined : seqOf(good), seqOf(run)];
+  if (good === null || from === undefined || to === undefined || from > to) {
+    return { good: null, found: null };
+  }
+  const { behaviours } = await recordedScriptOf(runner, run.id);
+  const body = { good: from, bad: to, script: { behaviours } };
+  return { good, found: await fetchJson(`${below}/since`, { method: "POST", body }) };
+}
+
+/** Asked once it is wanted; a run that is over is never asked about again. */
+export function useSince(runner: string | undefined, run: Run, wanted: boolean) {
+  const { graph } = run;
+  return useQuery({
+    queryKey: ["runs", "since", run.id],
+    queryFn: () => asked(runner ?? "", run, graph ?? ""),
+    enabled: wanted && runner !== undefined && graph !== null,
+    staleTime: Number.POSITIVE_INFINITY,
+    retry: false,
+  });
+}

@@ -1,0 +1,86 @@
+/** The graphs inside of a graph, by value: what goes along with starts, looks and expected courses. */
+import { useQuery } from "@tanstack/react-query";
+import type { GraphSummary } from "./graphs";
+import { fetchJson } from "./http";
+import type { Inside } from "./runs";
+import type { EditorApi } from "./schema/editor";
+
+interface Pinned {
+  subgraphs?: readonly object[] | null | undefined;
+  tree_digest?: string | null | undefined;
+}
+
+/** What a version, a run or a moment has inside, as it is sent. */
+export function insideOf({ subgraphs, tree_digest }: Pinned): Inside {
+  if (!subgraphs?.length || !tree_digest) return {};
+  return { subgraphs, tree_digest };
+}
+
+/** What is inside of a moment, as it is now. */
+export async function fetchInside(
+  graph: string,
+  seq: number,
+  signal?: AbortSignal,
+): Promise<Inside> {
+  const route = `/api/graphs/${encodeURIComponent(graph)}/subgraphs?at=${seq}`;
+  return insideOf(await fetchJson<EditorApi["InsideView"]>(route, { ...(signal && { signal }) }));
+}
+
+/** Gives the actions that stand for a graph in these others its new name. Answers where there were some. */
+export function callUses(
+  graph: string,
+  uses: EditorApi["CallingUses"],
+): Promise<EditorApi["CalledUses"]> {
+  const route = `/api/graphs/${encodeURIComponent(graph)}/uses`;
+  return fetchJson(route, { method: "POST", body: uses, timeoutMs: 60_000 });
+}
+
+const flatRoute = (graph: string): string => `/api/graphs/${encodeURIComponent(graph)}/flat`;
+
+/** A graph and those inside of it as one graph that does the same, or why there is none. */
+export type FlatGraph = EditorApi["FlatGraph"];
+/** Why not, and about which action of which level. */
+export type FlatteningReason = EditorApi["FlatteningReason"];
+
+/** It is asked for anew each time: what is inside may have changed. */
+export function useFlatGraph(graph: string) {
+  return useQuery({
+    queryKey: ["graphs", graph, "flat"],
+    queryFn: ({ signal }) => fetchJson<FlatGraph>(flatRoute(graph), { signal }),
+    staleTime: 0,
+    gcTime: 0,
+  });
+}
+
+export function makeFlatGraph(graph: string, body: EditorApi["FlatCopy"]): Promise<GraphSummary> {
+  return fetchJson(flatRoute(graph), { method: "POST", body });
+}
+
+const routeOf = (graph: string, route: string): string =>
+  `/api/graphs/${encodeURIComponent(graph)}/${route}`;
+
+/** What a sub-graph of chosen actions would be, or why there is none. */
+export type ExtractionLook = EditorApi["ExtractionLook"];
+type ExtractionWish = EditorApi["Extracting"];
+
+export function lookAtExtraction(graph: string, body: ExtractionWish): Promise<ExtractionLook> {
+  return fetchJson(routeOf(graph, "extraction"), { method: "POST", body });
+}
+
+/** A new graph of them; the graph around it is changed by who asks. */
+export function makeSubGraph(
+  graph: string,
+  body: ExtractionWish,
+): Promise<EditorApi["MadeSubGraph"]> {
+  return fetchJson(routeOf(graph, "subgraphs"), { method: "POST", body });
+}
+
+/** What a graph would have instead of an action that stands for another. */
+export type UnpackingLook = EditorApi["UnpackingLook"];
+
+export function lookAtUnpacking(
+  graph: string,
+  body: EditorApi["UnpackingAction"],
+): Promise<UnpackingLook> {
+  return fetchJson(routeOf(graph, "unpacking"), { method: "POST", body });
+}

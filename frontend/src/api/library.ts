@@ -1,0 +1,139 @@
+/** The library of actions, each a document of its own, as the editor answers it. */
+import { keepPreviousData, type QueryClient, useQuery } from "@tanstack/react-query";
+import { type GraphDifference, type GraphSummary, type Preview, queryKeys } from "./graphs";
+import { fetchJson } from "./http";
+import { serverPath } from "./page-url";
+import type { EditorApi } from "./schema/editor";
+
+/** `document`: its own; null where only graphs use it. `differs_in`: of `used_in`, where parameters are others. */
+export type LibraryAction = EditorApi["LibraryAction"];
+
+/** Parameters that are called otherwise now: pairs of paths, the old one first. */
+export type Renames = EditorApi["Renames"];
+
+export const NO_RENAMES: Renames = { inputs: [], outputs: [] };
+
+/** A graph that uses the action. `count`: how often; `changed`: whether an update would change it. */
+export type ActionUse = EditorApi["ActionUse"];
+/** `seq`: the change of the action's document that this was worked out from. */
+export type ActionUses = EditorApi["ActionUses"];
+export type UpdatedUse = EditorApi["UpdatedGraph"];
+
+const below = (id: string) => `/api/actions/${encodeURIComponent(id)}`;
+
+/** Every action of the library, and what else graphs use, by name. */
+export function fetchLibrary(signal?: AbortSignal): Promise<LibraryAction[]> {
+  return fetchJson("/api/actions", { ...(signal && { signal }) });
+}
+
+export function useLibrary() {
+  return useQuery({
+    queryKey: queryKeys.actions,
+    queryFn: ({ signal }) => fetchLibrary(signal),
+    refetchInterval: 15_000,
+  });
+}
+
+/** A graph as the action that stands for it in another: what its first actions lack, what its last one gives. */
+export type GraphAsAction = EditorApi["GraphAsAction"];
+
+export function useGraphsAsActions() {
+  return useQuery({
+    queryKey: [...queryKeys.actions, "graphs"],
+    queryFn: ({ signal }) => fetchJson<GraphAsAction[]>("/api/actions/graphs", { signal }),
+    refetchInterval: 30_000,
+  });
+}
+
+/** How the package's last build went, as somebody has told it; null before that. */
+export type ActionBuild = EditorApi["ActionBuilt"];
+
+export function useLastBuild(id: string) {
+  return useQuery({
+    queryKey: ["build", id],
+    queryFn: ({ signal }) => fetchJson<EditorApi["LastBuild"]>(`${below(id)}/build`, { signal }),
+    refetchInterval: 15_000,
+  });
+}
+
+/** Actions that were deleted and can be brought back. */
+export function useDeletedActions(wanted: boolean) {
+  return useQuery({
+    enabled: wanted,
+    queryKey: [...queryKeys.actions, "deleted"],
+    queryFn: ({ signal }) => fetchJson<GraphSummary[]>("/api/actions/deleted", { signal }),
+  });
+}
+
+/** `fromGraphs`: with what graphs know of it, instead of empty. */
+export function createAction(name: string, fromGraphs = false): Promise<GraphSummary> {
+  const body = fromGraphs ? { name, from_graphs: true } : { name };
+  return fetchJson("/api/actions", { method: "POST", body });
+}
+
+export function previewAction(text: string): Promise<Preview> {
+  return fetchJson("/api/actions?preview=true", { method: "POST", body: text });
+}
+
+/** Takes in the file of one action as it is. */
+export function importAction(text: string): Promise<GraphSummary> {
+  return fetchJson("/api/actions", { method: "POST", body: text });
+}
+
+/** Makes an action that the library has what its file says; with `seq` only while that is its last change. */
+export function replaceAction(id: string, text: string, seq?: number): Promise<GraphSummary> {
+  const query = seq === undefined ? "" : `?seq=${seq}`;
+  return fetchJson(`${below(id)}/umrf${query}`, { method: "PUT", body: text });
+}
+
+/** What that would change. */
+export function compareWithFile(id: string, text: string): Promise<GraphDifference> {
+  return fetchJson(`${below(id)}/umrf`, { method: "POST", body: text });
+}
+
+/** Where the browser gets the file of the action alone from. */
+export function actionDownload(id: string): string {
+  return serverPath(`${below(id)}/umrf`);
+}
+
+function renamesQuery({ inputs, outputs }: Renames): string {
+  const query = new URLSearchParams();
+  const pair = ([from, to]: readonly [string, string]) =>
+    `${encodeURIComponent(from)}:${encodeURIComponent(to)}`;
+  for (const each of inputs) query.append("inputs", pair(each));
+  for (const each of outputs) query.append("outputs", pair(each));
+  const text = query.toString();
+  return text === "" ? "" : `?${text}`;
+}
+
+/** What updating each graph to the parameters of the document would change. */
+export function useActionUses(id: string, renames: Renames) {
+  const query = renamesQuery(renames);
+  return useQuery({
+    queryKey: ["uses", id, query],
+    queryFn: ({ signal }) => fetchJson<ActionUses>(`${below(id)}/uses${query}`, { signal }),
+    placeholderData: keepPreviousData,
+    staleTime: 0,
+    gcTime: 0,
+    refetchOnWindowFocus: false,
+  });
+}
+
+export function refreshUses(client: QueryClient, id: string): Promise<void> {
+  return client.invalidateQueries({ queryKey: ["uses", id] });
+}
+
+interface Updating {
+  readonly seq: number;
+  readonly graphs: readonly { readonly graph: string; readonly seq: number }[];
+  readonly renames: Renames;
+}
+
+export function updateUses(id: string, body: Updating): Promise<UpdatedUse[]> {
+  return fetchJson(`${below(id)}/uses`, { method: "POST", body, timeoutMs: 60_000 });
+}
+
+/** The document takes over the parameters that a graph's use of it has. */
+export function takeFromGraph(id: string, graph: string): Promise<GraphSummary> {
+  return fetchJson(`${below(id)}/take`, { method: "POST", body: { graph } });
+}

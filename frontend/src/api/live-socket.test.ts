@@ -1,0 +1,431 @@
+import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { serverNow } from "../clock/server-clock";
+import { sessionEnd } from "./http";
+import { LiveSocket } from "./live-socket";
+import type { Run } from "./runs";
+
+/** The browser's end of a socket whose other end is the test. */
+class Wire {
+  static readonly OPEN = 1;
+  static all: Wire[] = [];
+  readyState = 1;
+  sent: string[] = [];
+  onmessage: ((event: { data: string }) => void) | null = null;
+  onclose: ((event: { code: number }) => void) | null = null;
+  readonly url: string;
+  constructor(url: string) {
+    this.url = url;
+    Wire.all.push(this);
+  }
+  send(text: string) {
+    this.sent.push(text);
+  }
+  close(code = 1000) {
+    this.readyState = 3;
+    this.onclose?.({ code });
+  }
+  say(message: object) {
+    this.onmessage?.({ data: JSON.stringify(message) });
+  }
+}
+
+const newest = () => {
+  const wire = Wire.all.at(-1);
+  if (!wire) throw new Error("no socket was opened");
+  return wire;
+};
+
+const run = (state: string, ended: string | null = null) =>
+  ({ id: "r", number: 1, state, ended_at: ended }) as unknown as Run;
+
+/** A link to a runner in which these runs go on. */
+function opened(...runs: object[]): LiveSocket {
+  const live = new LiveSocket("http://h:1");
+  live.open();
+  newest().say({ type: "hello", engines: [], runs });
+  return live;
+}
+
+const posted = vi.fn();
+
+beforeEach(() => {
+  vi.useFakeTimers();
+  Wire.all = [];
+  posted.mockReset();
+  vi.stubGlobal("WebSocket", Wire);
+  vi.stubGlobal("fetch", async (url: string, init: RequestInit) => {
+    posted(init.method, url);
+    const body = url.endsWith("/api/runs/r") ? run("lost", "2026-01-01T00:00:00Z") : {};
+    return new Response(JSON.stringify(body), { status: 200 });
+  });
+});
+
+afterEach(() => {
+  vi.useRealTimers();
+  vi.unstubAllGlobals();
+});
+
+test("a socket that is closed because the session ended says so at once", () => {
+  const live = new LiveSocket("http://127.0.0.1:8001");
+  live.open();
+  newest().close(1006);
+  expect(sessionEnd.now()).toBe(false);
+  vi.advanceTimersByTime(1_000);
+  newest().close(4401);
+  expect(sessionEnd.now()).toBe(true);
+  sessionEnd.clear();
+  live.close();
+});
+
+test("one socket, by the runner's own address", () => {
+  const live = new LiveSocket("https://robots.example/runner");
+  live.open();
+  expect(Wire.all.map((wire) => wire.url)).toEqual(["wss://robots.example/runner/api/live"]);
+  live.close();
+});
+
+test("a runner that falls silent is unknown, and asked again", async () => {
+  const live = opened(run("running"));
+  expect(live.state.link).toBe("live");
+  await vi.advanceTimersByTimeAsync(3_000);
+  expect(live.state.link).toBe("live");
+  newest().say({ type: "beat", at: "" });
+  await vi.advanceTimersByTimeAsync(4_000);
+  expect(live.state.link).toBe("down");
+  expect(live.state.runs.get("r")?.state).toBe("running");
+  await vi.advanceTimersByTimeAsync(1_000);
+  expect(Wire.all.length).toBe(2);
+  live.close();
+});
+
+test("Stop goes by socket and by POST at once", async () => {
+  const live = opened(run("running"));
+  live.stop("r");
+  expect(JSON.parse(newest().sent[0] ?? "")).toMatchObject({ type: "stop", run: "r" });
+  expect(posted).toHaveBeenCalledWith("POST", "http://h:1/api/runs/r/stop");
+  await vi.advanceTimersByTimeAsync(10);
+  expect(live.state.stops.at(-1)?.state).toBe("heard");
+  expect(live.state.runs.get("r")?.state).toBe("running");
+  live.close();
+});
+
+test("that a Stop is proven is noted when the runner says so, and stays when it falls silent", async () => {
+  const live = opened({ ...run("running"), alarms: [] });
+  live.stop("all");
+  await vi.advanceTimersByTimeAsync(10);
+  expect(live.state.stops[0]?.provenAt).toBeUndefined();
+  newest().say({ type: "run", run: { ...run("stopped", "2026-01-01T00:00:00Z"), alarms: [] } });
+  const proven = live.state.stops[0]?.provenAt;
+  expect(proven).toBeDefined();
+  await vi.advanceTimersByTimeAsync(4_000);
+  expect(live.state.link).toBe("down");
+  expect(live.state.stops[0]?.provenAt).toBe(proven);
+  live.close();
+});
+
+test("nothing is noted as proven while a robot's graphs, or the robot itself, are not known to rest", async () => {
+  for (const engine of [
+    { name: "David", state: "answering", holds: [{ graph: "theirs", active: true, run: null }] },
+    { name: "David", state: "silent", holds: [] },
+  ]) {
+    const live = new LiveSocket("http://h:1");
+    live.open();
+    newest().say({ type: "hello", engines: [engine], runs: [] });
+    live.stop("all");
+    await vi.advanceTimersByTimeAsync(10);
+    expect(live.state.stops[0]).toMatchObject({ state: "heard" });
+    expect(live.state.stops[0]?.provenAt).toBeUndefined();
+    live.close();
+  }
+});
+
+test("a Stop is heard although the socket fails just then", async () => {
+  const live = opened(run("running"));
+  newest().send = () => {
+    throw new DOMException("it is closing", "InvalidStateError");
+  };
+  const warned = vi.spyOn(console, "warn").mockImplementation(() => undefined);
+  live.stop("r");
+  await vi.advanceTimersByTimeAsync(10);
+  expect(posted).toHaveBeenCalledWith("POST", "http://h:1/api/runs/r/stop");
+  expect(live.state.stops.at(-1)?.state).toBe("heard");
+  expect(warned).toHaveBeenCalledOnce();
+  warned.mockRestore();
+  live.close();
+});
+
+test("a Stop that nobody hears is sent again until somebody does", async () => {
+  const live = opened(run("running"));
+  newest().close();
+  let dead = true;
+  vi.stubGlobal("fetch", async (url: string, init: RequestInit) => {
+    if (init.method === "POST") posted("POST", url);
+    if (dead) throw new TypeError("no network");
+    return new Response("{}", { status: 202 });
+  });
+  live.stop("all");
+  await vi.advanceTimersByTimeAsync(20_000);
+  expect(live.state.stops.at(-1)?.state).toBe("unheard");
+  const tries = posted.mock.calls.length;
+  expect(tries).toBeGreaterThan(10);
+  // After a while "all" means the runs that could be seen, none that somebody starts later.
+  expect(posted).toHaveBeenLastCalledWith("POST", "http://h:1/api/runs/r/stop");
+  dead = false;
+  await vi.advanceTimersByTimeAsync(2_000);
+  expect(live.state.stops.at(-1)?.state).toBe("heard");
+  const heard = posted.mock.calls.length;
+  await vi.advanceTimersByTimeAsync(10_000);
+  expect(posted.mock.calls.length).toBe(heard);
+  live.close();
+});
+
+test("what was unknown when all was to be stopped is stopped, however late it is heard", async () => {
+  answering({});
+  const live = new LiveSocket("http://h:1"); // nothing was heard of any run yet
+  live.open();
+  live.stop("all");
+  await vi.advanceTimersByTimeAsync(20_000);
+  expect(live.state.stops.at(-1)?.state).toBe("unheard");
+  posted.mockReset();
+  answering({ "/api/stop": 202 });
+  await vi.advanceTimersByTimeAsync(1_500);
+  expect(posted).toHaveBeenCalledWith("POST", "http://h:1/api/stop");
+  expect(live.state.stops.at(-1)?.state).toBe("heard");
+  live.close();
+});
+
+test("a graph that others started keeps a late Stop of everything one of everything", async () => {
+  const live = new LiveSocket("http://h:1");
+  live.open();
+  const holds = [{ graph: "theirs", state: "RUNNING", active: true, run: null, stopping: null }];
+  const engines = [{ name: "David", holds }];
+  newest().say({ type: "hello", engines, runs: [run("running")] });
+  answering({});
+  live.stop("all");
+  await vi.advanceTimersByTimeAsync(10_000);
+  expect(posted).toHaveBeenLastCalledWith("POST", "http://h:1/api/stop");
+  live.close();
+});
+
+test("a Stop that nobody has heard is not crowded out by others", async () => {
+  const live = new LiveSocket("http://h:1");
+  live.open();
+  answering({});
+  live.stop("r");
+  for (let n = 0; n < 9; n += 1) live.stop(`other${n}`);
+  for (let n = 0; n < 9; n += 1) live.stop("all"); // a key that is held down
+  await vi.advanceTimersByTimeAsync(3_000);
+  expect(live.state.stops.map((stop) => stop.run)).toHaveLength(11);
+  posted.mockReset();
+  answering({ "/stop": 202 });
+  await vi.advanceTimersByTimeAsync(2_000);
+  expect(posted).toHaveBeenCalledWith("POST", "http://h:1/api/runs/r/stop");
+  expect(posted.mock.calls.filter(([, url]) => url === "http://h:1/api/stop")).toHaveLength(1);
+  expect(live.state.stops.every((stop) => stop.state === "heard")).toBe(true);
+  live.close();
+});
+
+test("one run that cannot be stopped now keeps no other from being stopped", async () => {
+  const live = new LiveSocket("http://h:1");
+  live.open();
+  const other = { ...run("running"), id: "q" };
+  newest().say({ type: "hello", engines: [], runs: [run("running"), other] });
+  newest().close();
+  answering({});
+  live.stop("all");
+  await vi.advanceTimersByTimeAsync(6_000);
+  posted.mockReset();
+  answering({ "/runs/r/stop": 503, "/runs/q/stop": 202 });
+  await vi.advanceTimersByTimeAsync(1_500);
+  expect(posted).toHaveBeenCalledWith("POST", "http://h:1/api/runs/q/stop");
+  expect(live.state.stops.at(-1)?.state).toBe("unheard");
+  live.close();
+});
+
+test("a Stop of everything is about the runs that went on then, and those that the runner stops since", async () => {
+  const live = opened(run("running"));
+  live.stop("all");
+  await vi.advanceTimersByTimeAsync(10);
+  const said = (id: string, desired: string) =>
+    newest().say({ type: "run", run: { ...run("running"), id, desired } });
+  said("unseen", "stopped");
+  said("calm", "running");
+  expect(live.state.stops.at(-1)?.runs).toEqual(["r", "unseen"]);
+  newest().say({ type: "beat", at: "" });
+  await vi.advanceTimersByTimeAsync(3_000);
+  newest().say({ type: "beat", at: "" });
+  await vi.advanceTimersByTimeAsync(3_400);
+  said("later", "stopped");
+  expect(live.state.stops.at(-1)?.runs).toEqual(["r", "unseen"]);
+  live.close();
+});
+
+test("how old a proof is does not follow from whose clock is right", () => {
+  const live = opened();
+  const theirs = Date.now() - 600_000; // the runner's clock is ten minutes behind
+  const moment = (ms: number) => new Date(ms).toISOString();
+  const beat = { type: "beat", at: moment(theirs), heard: {}, seen: { r: moment(theirs - 400) } };
+  const age = () => serverNow() - (live.runSeenAt.get("r") ?? Number.NaN);
+  newest().say(beat);
+  expect(age()).toBeCloseTo(400);
+  vi.advanceTimersByTime(2_000);
+  newest().say(beat); // the same, two seconds under way
+  expect(age()).toBeCloseTo(2_400);
+  vi.setSystemTime(Date.now() + 3 * 3_600_000); // somebody sets the clock of this device
+  expect(age()).toBeCloseTo(2_400);
+  live.close();
+});
+
+test("when the runner has nothing to stop it with, a Stop is refused and not repeated", async () => {
+  const live = new LiveSocket("http://h:1");
+  live.open();
+  const problem = { type: "forbidden", title: "Forbidden", status: 403, detail: "not you" };
+  vi.stubGlobal("fetch", async () => new Response(JSON.stringify(problem), { status: 403 }));
+  live.stop("r");
+  await vi.advanceTimersByTimeAsync(5_000);
+  expect(live.state.stops.at(-1)).toMatchObject({ state: "refused", detail: "not you" });
+  live.close();
+});
+
+test("when only a proxy says no, a Stop is sent again", async () => {
+  const live = new LiveSocket("http://h:1");
+  live.open();
+  const asked = vi.fn(async () => new Response("<h1>429</h1>", { status: 429 }));
+  vi.stubGlobal("fetch", asked);
+  live.stop("r");
+  await vi.advanceTimersByTimeAsync(5_000);
+  expect(live.state.stops.at(-1)).toMatchObject({ state: "unheard" });
+  expect(asked.mock.calls.length).toBeGreaterThan(1);
+  live.close();
+});
+
+test("a run that ended while the link was down is asked for", async () => {
+  const live = opened(run("running"));
+  newest().close();
+  await vi.advanceTimersByTimeAsync(1_000);
+  newest().say({ type: "hello", engines: [], runs: [] });
+  await vi.advanceTimersByTimeAsync(10);
+  expect(live.state.runs.get("r")?.state).toBe("lost");
+  live.close();
+});
+
+test("a run that is told as it was draws nothing, and how it stands is told at once", () => {
+  const live = new LiveSocket("http://h:1");
+  live.open();
+  const told = { ...run("running"), actions: {}, alarms: [] } as unknown as Run;
+  newest().say({ type: "hello", engines: [], runs: [told] });
+  const listener = vi.fn();
+  live.subscribe(listener);
+  newest().say({ type: "run", run: told });
+  vi.advanceTimersByTime(1_000);
+  expect(listener).not.toHaveBeenCalled();
+  newest().say({ type: "run", run: { ...told, state: "stopping" } });
+  expect(listener).toHaveBeenCalledTimes(1);
+  expect(live.state.runs.get("r")?.state).toBe("stopping");
+  live.close();
+});
+
+test("a new name dials anew without a moment of doubt", () => {
+  const live = opened(run("running"));
+  live.redial();
+  expect(Wire.all.length).toBe(2);
+  expect(Wire.all[0]?.readyState).toBe(3);
+  expect(live.state.link).toBe("live");
+  live.close();
+});
+
+test("a beat says when each robot last answered, without another render of everything", () => {
+  const live = opened();
+  const all = vi.fn();
+  const seers = vi.fn();
+  live.subscribe(all);
+  live.subscribeSeen(seers);
+  const at = new Date().toISOString();
+  newest().say({ type: "beat", at, seen: {}, heard: { David: "1970-01-01T00:00:02Z" } });
+  expect(live.robotAnsweredAt.get("David")).toBe(2000);
+  expect(seers).toHaveBeenCalledOnce();
+  expect(all).not.toHaveBeenCalled();
+  live.close();
+});
+
+/** What the runner and the editor answer when they are asked over HTTP. */
+function answering(answers: Record<string, number | [number, object]>) {
+  vi.stubGlobal("fetch", async (url: string, init: RequestInit) => {
+    posted(init.method ?? "GET", url);
+    const [, found] = Object.entries(answers).find(([part]) => url.includes(part)) ?? [];
+    if (found === undefined) throw new TypeError("no network");
+    const [status, body] = Array.isArray(found) ? found : [found, {}];
+    return Response.json(body, { status });
+  });
+}
+
+/** The socket is refused before it opens, again and again. */
+async function refusing(seconds: number): Promise<void> {
+  for (let i = 0; i < seconds * 10; i += 1) {
+    if (newest().readyState === 1) newest().close(1006);
+    await vi.advanceTimersByTimeAsync(100);
+  }
+}
+
+test("a runner that an encrypted page may not ask is said to be so, and breaks nothing", async () => {
+  vi.stubGlobal("location", new URL("https://robots.example/"));
+  vi.stubGlobal("WebSocket", function refuse() {
+    throw new DOMException("insecure", "SecurityError");
+  });
+  const live = new LiveSocket("http://robots.example:8001");
+  live.open();
+  await vi.advanceTimersByTimeAsync(1_000);
+  expect(live.state.link).toBe("down");
+  expect(live.state.unreached?.why).toContain("--public-url https://robots.example/");
+  live.close();
+});
+
+test("once the session has ended nobody knocks again until somebody signs in", async () => {
+  answering({ "/api/session": 401, "/api/reach": 401 });
+  const live = new LiveSocket("http://h:1");
+  live.open();
+  await refusing(10);
+  expect(sessionEnd.now()).toBe(true);
+  const dialled = Wire.all.length;
+  const asked = posted.mock.calls.length;
+  await refusing(120);
+  expect([Wire.all.length, posted.mock.calls.length]).toEqual([dialled, asked]);
+  sessionEnd.clear();
+  live.redial();
+  expect(Wire.all.length).toBe(dialled + 1);
+  live.close();
+});
+
+test("a runner that does not know a session which the editor knows ends no session", async () => {
+  answering({ "/api/session": 200, "/api/reach": 401 });
+  const live = new LiveSocket("http://h:1");
+  live.open();
+  await refusing(60);
+  expect(sessionEnd.now()).toBe(false);
+  expect(live.state.unreached?.why).toContain("does not know your session");
+  expect(Wire.all.length).toBeLessThan(12);
+  live.close();
+});
+
+test("a proxy that passes no sockets on is told from a runner that does not answer", async () => {
+  answering({ "/api/reach": 200 });
+  const live = new LiveSocket("https://robots.example/runner");
+  live.open();
+  await refusing(3);
+  expect(live.state.unreached?.why).toContain("WebSockets");
+  answering({});
+  await refusing(10);
+  expect(live.state.unreached?.why).toContain("does not answer");
+  newest().say({ type: "hello", engines: [], runs: [] });
+  expect(live.state.unreached).toBeNull();
+  live.close();
+});
+
+test("a proxy that leads the runner's address elsewhere is told so", async () => {
+  answering({ "/api/reach": [502, { type: "misrouted", title: "T", detail: "To the runner!" }] });
+  const live = new LiveSocket("https://robots.example/runner");
+  live.open();
+  await refusing(3);
+  expect(live.state.unreached?.why).toContain("To the runner!");
+  live.close();
+});

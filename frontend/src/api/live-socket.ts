@@ -1,0 +1,542 @@
+/** The one socket to the runner: live state of runs, and the way for Stop. */
+import { hearStamp, tick } from "../clock/server-clock";
+import { newAid } from "../graph/document-keys";
+import { isEqual } from "../graph/values";
+import { errorText, isFinal, isSignedIn, sessionEnd } from "./http";
+import { pageUrl } from "./page-url";
+import type { HeldGraph, Robot } from "./robots";
+import { getRun, postStop } from "./run-stop";
+import type { Run } from "./runs";
+import type { RunnerApi } from "./schema/runner";
+
+export type LiveLink = "connecting" | "live" | "down";
+
+/** A Stop that a person asked for. It is done when the run's own state says so, not before. */
+export interface StopRequest {
+  id: string;
+  run: string | "all";
+  /** The tick at which it was asked. */
+  at: number;
+  /** Which runs "all" is about: those that went on when it was asked, as far as this page knew, and those
+   * that the runner stops since. */
+  runs: readonly string[];
+  /**
+   * `asked`: nobody has answered yet; `unheard`: it could not be sent, and is sent again;
+   * `heard`: the runner is stopping; `refused`: it will not.
+   */
+  state: "asked" | "heard" | "refused" | "unheard";
+  detail: string;
+  /** The tick at which the runner had it. */
+  heardAt?: number;
+  /** The tick at which all that it is about was told to rest: that stays proven, whatever is unknown later. */
+  provenAt?: number;
+}
+
+export interface LiveState {
+  link: LiveLink;
+  /** The tick at which the link became what it is. */
+  since: number;
+  /** Why the link is not there, as far as that was found out. */
+  unreached?: UnreachableReason | null;
+  engines: readonly Robot[];
+  runs: ReadonlyMap<string, Run>;
+  stops: readonly StopRequest[];
+}
+
+type RunnerMessage = RunnerApi["RunnerMessage"];
+type PageMessage = RunnerApi["PageMessage"];
+
+const SESSION_ENDED = 4401;
+const SILENCE = 3_500; // ms; the runner beats each second
+const STOPS_KEPT = 5; // that somebody has answered
+const JOINS = 6_000; // ms after "all" is heard in which a run that is being stopped is one of its
+const AGAIN = 1_000; // ms between two tries to send a Stop
+const SOON = 5_000; // ms; the longest wait for another try to reach the runner
+const SELDOM = 60_000; // ms; the same where trying soon has proven to be of no use
+const TOGETHER = 100; // ms in which news of runs are told together, unless they are urgent
+const ALL_HOLDS = 5_000; // ms; later, "all" would mean runs that nobody had seen when it was asked
+
+/** Usable without React: `subscribe` and `now` fit `useSyncExternalStore`. */
+export class LiveSocket {
+  state: LiveState = {
+    link: "connecting",
+    since: tick(),
+    engines: [],
+    runs: new Map(),
+    stops: [],
+  };
+  /** When each open run was last shown by its engine, by the server's clock. Apart from `now`: it changes each second. */
+  runSeenAt: ReadonlyMap<string, number> = new Map();
+  /** When each robot last answered, by the server's clock. */
+  robotAnsweredAt: ReadonlyMap<string, number> = new Map();
+  readonly #seers = new Set<() => void>();
+  readonly #runner: string;
+  readonly #listeners = new Set<() => void>();
+  #socket: WebSocket | null = null;
+  #watch: ReturnType<typeof setTimeout> | undefined;
+  #again: ReturnType<typeof setTimeout> | undefined;
+  #tries = 0;
+  #closed = false;
+  /** News of runs that listeners are told of soon. */
+  #untold: ReturnType<typeof setTimeout> | undefined;
+  #toldAt = 0; // tick
+  /** What was found out about the last socket that did not open. */
+  #unreached: UnreachableReason | null = null;
+
+  constructor(runner: string) {
+    this.#runner = runner;
+  }
+
+  open(): void {
+    this.#closed = false;
+    this.#connect();
+  }
+
+  close(): void {
+    this.#closed = true;
+    clearTimeout(this.#watch);
+    clearTimeout(this.#again);
+    clearTimeout(this.#untold);
+    this.#socket?.close();
+    this.#socket = null;
+  }
+
+  /** A fresh socket in place of the old one: the runner knows a socket by the session it opened with. */
+  redial(): void {
+    if (this.#closed) return;
+    const old = this.#socket;
+    this.#socket = null;
+    this.#unreached = null;
+    this.#tries = 0;
+    old?.close();
+    this.#connect();
+  }
+
+  subscribe = (listener: () => void): (() => void) => {
+    this.#listeners.add(listener);
+    return () => this.#listeners.delete(listener);
+  };
+
+  subscribeSeen = (seer: () => void): (() => void) => {
+    this.#seers.add(seer);
+    return () => this.#seers.delete(seer);
+  };
+
+  /**
+   * Sends Stop over the socket and by POST at once: whichever arrives first counts. While nobody
+   * hears it, it is sent again for as long as the page is open.
+   */
+  stop(run: string | "all"): void {
+    const open = [...this.state.runs.values()].filter((each) => each.ended_at === null);
+    const runs = run === "all" ? open.map((each) => each.id) : [];
+    const stop: StopRequest = {
+      id: newAid(),
+      run,
+      at: tick(),
+      runs,
+      state: "asked",
+      detail: "",
+    };
+    this.#putStop(stop);
+    void this.#keepStopping(stop, this.#isWhole(runs));
+  }
+
+  /** Whether these are all that could be seen to move when somebody asked to stop all. */
+  #isWhole(runs: readonly string[]): boolean {
+    return runs.length > 0 && foreignGraphs(this.state).length === 0;
+  }
+
+  /** `whole`: its runs are all that it is about, so that it can be narrowed to them. */
+  async #keepStopping({ id, run, at, runs }: StopRequest, whole: boolean): Promise<void> {
+    for (;;) {
+      const late = run === "all" && whole && tick() - at > ALL_HOLDS;
+      const sent = (late ? runs : [run]).map((each) => this.#sendStop(each, id));
+      const errors = (await Promise.allSettled(sent)).flatMap((each) =>
+        each.status === "rejected" ? [each.reason as unknown] : [],
+      );
+      const [error] = [...errors.filter((each) => !isFinal(each)), ...errors];
+      if (error === undefined) this.#answerStop(id, "heard", "");
+      else this.#answerStop(id, isFinal(error) ? "refused" : "unheard", errorText(error));
+      const now = this.state.stops.find((stop) => stop.id === id);
+      if (this.#closed || now?.state !== "unheard") return;
+      await new Promise((done) => setTimeout(done, AGAIN));
+    }
+  }
+
+  async #sendStop(run: string, id: string): Promise<unknown> {
+    const posted = postStop(this.#runner, run, id); // first: a socket that fails keeps it from nothing
+    if (this.#socket?.readyState === WebSocket.OPEN) {
+      const message: PageMessage = { type: "stop", run, stop_id: id };
+      try {
+        this.#socket.send(JSON.stringify(message));
+      } catch (error) {
+        console.warn("A Stop goes by POST alone", error);
+      }
+    }
+    return posted;
+  }
+
+  /** Takes in a run that this page has just started, before the socket tells of it. */
+  learn(run: Run): void {
+    if (!this.state.runs.has(run.id)) this.#putRun(run);
+  }
+
+  #connect(): void {
+    clearTimeout(this.#again);
+    if (this.#closed) return;
+    const barred = blockedByBrowser(this.#runner);
+    if (barred !== null) {
+      this.#unreached = barred;
+      this.#down();
+      return;
+    }
+    const socket = new WebSocket(`${this.#runner.replace(/^http/, "ws")}/api/live`);
+    let opened = false;
+    this.#socket = socket;
+    this.#expect(socket);
+    socket.onopen = () => {
+      opened = true;
+    };
+    socket.onmessage = (event) => {
+      opened = true;
+      this.#expect(socket);
+      this.#hear(JSON.parse(String(event.data)) as RunnerMessage);
+    };
+    socket.onclose = ({ code }) => {
+      if (code === SESSION_ENDED) sessionEnd.notice();
+      this.#lost(socket, opened);
+    };
+  }
+
+  /** A socket that stays silent is as good as closed, whatever TCP believes. */
+  #expect(socket: WebSocket): void {
+    clearTimeout(this.#watch);
+    this.#watch = setTimeout(() => {
+      this.#lost(socket, false);
+      socket.close();
+    }, SILENCE);
+  }
+
+  #lost(socket: WebSocket, opened: boolean): void {
+    if (this.#socket !== socket) return;
+    this.#socket = null;
+    clearTimeout(this.#watch);
+    this.#down();
+    if (!opened && !this.#closed) void this.#findOut();
+  }
+
+  /** There is no link; another try comes after a while, unless nobody is signed in. */
+  #down(): void {
+    if (this.state.link !== "down") this.#set({ link: "down", since: tick() });
+    this.#set({ unreached: this.#unreached });
+    clearTimeout(this.#again);
+    if (this.#closed || this.#unreached?.kind === "ended") return;
+    const longest = this.#unreached?.kind === "strange" ? SELDOM : SOON;
+    const wait = Math.min(longest, 250 * 2 ** this.#tries) * (0.7 + 0.6 * Math.random());
+    this.#tries += 1;
+    this.#again = setTimeout(() => this.#connect(), wait);
+  }
+
+  /** A browser does not tell why a socket did not open. */
+  async #findOut(): Promise<void> {
+    const turn = this.#again;
+    const found = await findUnreachableReason(this.#runner);
+    if (this.#closed || this.state.link === "live" || turn !== this.#again) return;
+    this.#unreached = found;
+    this.#set({ unreached: found });
+    if (found.kind === "ended") clearTimeout(this.#again);
+  }
+
+  #hear(message: RunnerMessage): void {
+    switch (message.type) {
+      case "hello": {
+        this.#tries = 0;
+        this.#unreached = null;
+        const runs = new Map(this.state.runs);
+        const open = new Set(message.runs.map((run) => run.id));
+        // What this page believed to be open and the runner no longer names has ended unseen.
+        for (const [id, run] of runs) {
+          if (open.has(id) || run.ended_at !== null) continue;
+          runs.delete(id);
+          getRun(this.#runner, id).then(
+            (ended) => this.#putRun(ended),
+            (error: Error) => console.warn("A run's end is not known", id, error.message),
+          );
+        }
+        for (const run of message.runs) runs.set(run.id, withKeptParts(runs.get(run.id), run));
+        this.#joinStops(message.runs);
+        this.#set({
+          link: "live",
+          unreached: null,
+          since: tick(),
+          engines: message.engines,
+          runs,
+        });
+        break;
+      }
+      case "run":
+        this.#putRun(message.run);
+        break;
+      case "stopping":
+        this.#answerStop(message.stop_id, "heard", "");
+        break;
+      case "refused":
+        this.#answerStop(message.stop_id, "refused", message.detail);
+        break;
+      case "engines":
+        this.#set({ engines: message.engines });
+        break;
+      case "beat": {
+        hearStamp(message.at);
+        const seen = times(message.seen);
+        const heard = times(message.heard);
+        if (seen.size + heard.size + this.runSeenAt.size + this.robotAnsweredAt.size === 0) break;
+        this.runSeenAt = seen;
+        this.robotAnsweredAt = heard;
+        for (const seer of this.#seers) seer();
+        break;
+      }
+    }
+  }
+
+  /** An action that ends tells of itself and of the next one: they are drawn together. */
+  #putRun(run: Run): void {
+    const before = this.state.runs.get(run.id);
+    const now = withKeptParts(before, run);
+    if (now === before) return; // the runner tells of each change of what it knows, also of the unseen
+    this.#joinStops([run]);
+    this.state = { ...this.state, runs: new Map(this.state.runs).set(run.id, now) };
+    const wait = this.#toldAt + TOGETHER - tick();
+    if (wait <= 0 || isUrgentChange(before, now)) this.#tell();
+    else this.#untold ??= setTimeout(() => this.#tell(), wait);
+  }
+
+  /** One that nobody has answered stays, and is sent on, until it is asked for anew. */
+  #putStop(stop: StopRequest): void {
+    const waits = (each: StopRequest) => each.state === "asked" || each.state === "unheard";
+    const others = this.state.stops.filter((each) => !(waits(each) && each.run === stop.run));
+    const answered = others.filter((each) => !waits(each)).slice(1 - STOPS_KEPT);
+    const kept = others.filter((each) => waits(each) || answered.includes(each));
+    this.#set({ stops: [...kept, stop] });
+  }
+
+  #answerStop(id: string, state: StopRequest["state"], detail: string): void {
+    const heard = state === "heard" && { heardAt: tick() };
+    const stops = this.state.stops.map((stop) =>
+      stop.id === id && stop.state !== "heard" ? { ...stop, state, detail, ...heard } : stop,
+    );
+    this.#set({ stops });
+  }
+
+  /** What the runner stops, and this page had not known when it asked to stop all. */
+  #joinStops(told: readonly Run[]): void {
+    const stopping = told.filter((run) => run.ended_at === null && run.desired === "stopped");
+    if (stopping.length === 0) return;
+    const stops = this.state.stops.map((stop) => {
+      const { heardAt = Number.POSITIVE_INFINITY } = stop;
+      if (stop.run !== "all" || tick() - heardAt > JOINS) return stop;
+      const more = stopping.map(({ id }) => id).filter((id) => !stop.runs.includes(id));
+      return more.length === 0 ? stop : { ...stop, runs: [...stop.runs, ...more] };
+    });
+    this.state = { ...this.state, stops };
+  }
+
+  #set(part: Partial<LiveState>): void {
+    this.state = { ...this.state, ...part };
+    this.#tell();
+  }
+
+  /** What is proven is noted at once: later the runner may be silent, and other runs may begin. */
+  #noteProven(): void {
+    const isNew = (stop: StopRequest) => stop.provenAt === undefined && isProven(stop, this.state);
+    if (!this.state.stops.some(isNew)) return;
+    const stops = this.state.stops.map((stop) =>
+      isNew(stop) ? { ...stop, provenAt: tick() } : stop,
+    );
+    this.state = { ...this.state, stops };
+  }
+
+  #tell(): void {
+    this.#noteProven();
+    clearTimeout(this.#untold);
+    this.#untold = undefined;
+    this.#toldAt = tick();
+    for (const listener of this.#listeners) listener();
+  }
+}
+
+/** Moments of the server's clock by name, ms since 1970. */
+function times(told: Record<string, string> | undefined): Map<string, number> {
+  return new Map(Object.entries(told ?? {}).map(([name, at]) => [name, Date.parse(at)]));
+}
+
+type RunActionsTold = NonNullable<Run["actions"]>;
+
+function keptActions(before: RunActionsTold, now: RunActionsTold): RunActionsTold {
+  let changed = Object.keys(before).length !== Object.keys(now).length;
+  const kept: RunActionsTold = {};
+  for (const [name, action] of Object.entries(now)) {
+    const known = before[name];
+    if (known !== undefined && isEqual(known, action)) kept[name] = known;
+    else {
+      kept[name] = action;
+      changed = true;
+    }
+  }
+  return changed ? kept : before;
+}
+
+/**
+ * Each message tells of all actions, and few have changed: what did not is not drawn again. A run of
+ * which nothing has changed is the one from before.
+ */
+export function withKeptParts(before: Run | undefined, now: Run): Run {
+  if (before?.actions == null || now.actions == null) return now;
+  const kept = { ...now, actions: keptActions(before.actions, now.actions) };
+  return isEqual(before, kept) ? before : kept;
+}
+
+/** What nobody shall see later than it can be drawn: how the run itself stands, and what is alarming. */
+const URGENT = [
+  "state",
+  "desired",
+  "ended_at",
+  "unconfirmed",
+  "unknown_since",
+  "moves_again_at",
+  "at_rest",
+  "proof_at",
+  "recorded",
+  "stopped_by",
+] as const satisfies readonly (keyof Run)[];
+
+export function isUrgentChange(before: Run | undefined, now: Run): boolean {
+  if (before === undefined || before.alarms.length !== now.alarms.length) return true;
+  return URGENT.some((field) => !isEqual(before[field], now[field]));
+}
+
+/** The runs that go on, newest first, as far as this page knows. */
+export function openRuns(now: LiveState): Run[] {
+  return [...now.runs.values()]
+    .filter((run) => run.ended_at === null)
+    .sort((a, b) => b.number - a.number);
+}
+
+/** The newest run of a graph that this page has heard of live. */
+export function newestRun(now: LiveState, graph: string): Run | null {
+  let newest: Run | null = null;
+  for (const run of now.runs.values()) {
+    if (run.graph === graph && (newest === null || run.number > newest.number)) newest = run;
+  }
+  return newest;
+}
+
+/** What robots run that nobody started from here, as `robot: graph`. Sub-graphs belong to theirs. */
+export function foreignGraphs(now: LiveState): { robot: Robot; held: HeldGraph }[] {
+  return now.engines.flatMap((robot) => {
+    const moving = robot.holds.filter((held) => held.active);
+    const tops = moving.filter((held) => !moving.some((top) => isPart(held.graph, top.graph)));
+    return tops.filter((held) => !isOurs(now, robot, held)).map((held) => ({ robot, held }));
+  });
+}
+
+function isPart(graph: string, top: string): boolean {
+  return graph !== top && graph.startsWith(`${top}__`);
+}
+
+function isOurs(now: LiveState, robot: Robot, held: HeldGraph): boolean {
+  return openRuns(now).some(
+    (run) =>
+      run.engine === robot.name && (run.id === held.run || isPart(held.graph, run.graph_name)),
+  );
+}
+
+/** Robots that do not answer now: what they run is not known. */
+export function unheardRobots(now: LiveState): Robot[] {
+  return now.engines.filter(
+    ({ simulated, state }) => !simulated && state !== "answering" && state !== "restarted",
+  );
+}
+
+/** The runs that a Stop is about, as far as this page knows them. */
+export function stopTargets(stop: StopRequest, now: LiveState): Run[] {
+  const all = stop.run === "all";
+  return [...now.runs.values()].filter((run) =>
+    all ? stop.runs.includes(run.id) : [run.id, run.group].includes(stop.run),
+  );
+}
+
+/** Whether the runner says, and says it now, that all rests that a Stop is about. */
+function isProven(stop: StopRequest, now: LiveState): boolean {
+  if (now.link !== "live" || stop.state !== "heard") return false;
+  const runs = stopTargets(stop, now);
+  if (runs.some((run) => run.ended_at === null || run.state === "lost")) return false;
+  if (stop.run !== "all") return runs.length > 0;
+  return foreignGraphs(now).length === 0 && unheardRobots(now).length === 0;
+}
+
+/**
+ * `ended`: nobody is signed in any more. `strange`: asking again soon is of no use. `mute`: it answers,
+ * so a Stop arrives, but what becomes of it is not seen.
+ */
+export interface UnreachableReason {
+  readonly kind: "ended" | "strange" | "mute" | "silent";
+  readonly why: string;
+}
+
+const PATIENCE = 3_000; // ms
+
+/** What can be said without asking: browsers keep an encrypted page from what is not. */
+function blockedByBrowser(runner: string): UnreachableReason | null {
+  const encrypted = globalThis.location?.protocol === "https:";
+  if (!encrypted || !runner.startsWith("http:")) return null;
+  return {
+    kind: "strange",
+    why: `This page came encrypted, and browsers keep it from the runner at ${runner}, which is not. A proxy has to show both: start the server with --public-url ${pageUrl()}/ and lead what is below runner/ to the runner’s port.`,
+  };
+}
+
+/** Asked after a socket did not open. */
+async function findUnreachableReason(runner: string): Promise<UnreachableReason> {
+  const answer = await asked(`${runner}/api/reach`);
+  if (answer === null)
+    return { kind: "silent", why: `The runner does not answer.${stray(runner)}` };
+  if (answer.status === 401) return unknownTo(runner);
+  if (!answer.ok || !/json/.test(answer.headers.get("content-type") ?? "")) {
+    return { kind: "strange", why: await astray(runner, answer) };
+  }
+  return {
+    kind: "mute",
+    why: "The runner answers, but no live connection to it opens: a proxy in between has to pass WebSockets on (nginx: proxy_http_version 1.1, and the headers Upgrade and Connection).",
+  };
+}
+
+async function asked(url: string): Promise<Response | null> {
+  const init: RequestInit = { credentials: "include", signal: AbortSignal.timeout(PATIENCE) };
+  return fetch(url, init).catch(() => null);
+}
+
+async function unknownTo(runner: string): Promise<UnreachableReason> {
+  const known = await isSignedIn();
+  if (known === "no") return { kind: "ended", why: "Your session has ended." };
+  const here = known === "yes" ? ", though the editor does" : "";
+  return {
+    kind: "strange",
+    why: `The runner at ${runner} does not know your session${here}. It needs the editor’s token, and the address of this page: --public-url where a proxy stands before them.`,
+  };
+}
+
+async function astray(runner: string, answer: Response): Promise<string> {
+  const problem: unknown = await answer.json().catch(() => null);
+  const detail = (problem as { detail?: unknown } | null)?.detail;
+  if (typeof detail === "string") return detail;
+  return `What answers at ${runner} is not the runner (${answer.status}): the proxy has to lead it to the runner’s port.`;
+}
+
+/** A server that was told another host takes this page for one of that host. */
+function stray(runner: string): string {
+  const { hostname } = new URL(runner);
+  const own = globalThis.location?.hostname ?? hostname;
+  if (own === hostname) return "";
+  return ` The server says that it is at ${hostname}, and this page is at ${own}: a proxy before it has to pass on the Host header, and the server needs --public-url ${pageUrl()}/.`;
+}

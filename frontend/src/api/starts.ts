@@ -1,0 +1,45 @@
+/** Before a start: what is looked at, and who has said yes. */
+import { fetchJson } from "./http";
+import type { Preflight } from "./robots";
+import type { Inside } from "./runs";
+import type { RunnerApi } from "./schema/runner";
+
+export type Approval = RunnerApi["Approval"];
+
+/** Who has said yes to exactly the graph with this digest. */
+export function fetchApprovals(
+  runner: string,
+  digest: string,
+  signal: AbortSignal,
+): Promise<Approval[]> {
+  return fetchJson(`${runner}/api/approvals?digest=${encodeURIComponent(digest)}`, { signal });
+}
+
+export function approve(runner: string, body: RunnerApi["ApprovalRequest"]): Promise<Approval> {
+  return fetchJson(`${runner}/api/approvals`, { method: "POST", body });
+}
+
+/** What stands between a graph and its start, engine by engine. Sends nothing but a get. */
+export function runPreflight(
+  runner: string,
+  what: { graph: string; umrf: string } & Inside,
+  engines: readonly string[],
+  behaviours: boolean,
+  signal: AbortSignal,
+): Promise<Preflight[]> {
+  const body = { engines, ...(behaviours ? { behaviours } : {}), ...what };
+  return fetchJson(`${runner}/api/preflight`, { method: "POST", body, signal });
+}
+
+/** As the runner has it, and what could be written there. */
+export type IndexFolderLook = RunnerApi["IndexFolderState"];
+
+/** Has graphs inside of a task written there. */
+export function writeIntoIndex(
+  runner: string,
+  robot: string,
+  body: { digest: string; replace: string[] } & Inside,
+): Promise<RunnerApi["IndexWriteAnswer"]> {
+  const route = `${runner}/api/robots/${encodeURIComponent(robot)}/index`;
+  return fetchJson(route, { method: "POST", body, timeoutMs: 30_000 });
+}

@@ -1,0 +1,221 @@
+/** What an entry of the history changed, in words about actions, arrows and notes. Pure. */
+import type { HistoryEntry } from "../api/history";
+import { type FieldChange, linesOf } from "../differences/difference-words";
+import { isolated } from "../words/isolated";
+
+/** `looks`: only where things stand, which means nothing to a robot. `said`: notes and comments. */
+type LineSign = "added" | "removed" | "changed" | "looks" | "said";
+
+export interface LinePart {
+  readonly kind: "text" | "name" | "old" | "new";
+  readonly text: string;
+}
+
+export interface EntryLine {
+  readonly sign: LineSign;
+  readonly parts: readonly LinePart[];
+  /** The action, arrow or note that it is about, by its key. */
+  readonly of: string | null;
+}
+
+type SittingChanges = NonNullable<HistoryEntry["changes"]>;
+type ChangedAction = NonNullable<SittingChanges["actions"]>[number];
+type ChangedArrow = NonNullable<SittingChanges["relations"]>[number];
+type ChangedNote = NonNullable<SittingChanges["notes"]>[number];
+
+const LONGEST = 60; // letters of a value
+
+const text = (words: string): LinePart => ({ kind: "text", text: words });
+const name = (words: string): LinePart => ({ kind: "name", text: words });
+const short = (value: string): string =>
+  value.length > LONGEST ? `${value.slice(0, LONGEST)}…` : value;
+
+/** `Drive_0` as people say it: the number only where there is one. */
+export function spokenName(fullName: string): string {
+  if (fullName === "entry") return "Entry";
+  if (fullName === "exit") return "Exit";
+  const [, own, number] = /^(.*)_(\d+)$/s.exec(fullName) ?? [];
+  if (own === undefined) return fullName || "an action";
+  return number === "0" ? own || "an action" : `${own} ${number}`;
+}
+
+/** From what to what, without a side on which nothing stood. */
+function fromTo(before: string | null, after: string | null): LinePart[] {
+  const old =
+    before === null || before === "" ? null : ({ kind: "old", text: short(before) } as const);
+  const is = after === null || after === "" ? null : ({ kind: "new", text: short(after) } as const);
+  if (old === null) return is === null ? [] : [text(" "), is];
+  return [text(" "), old, text(" → "), is ?? text("nothing")];
+}
+
+/** Input and output are said where that is not plain: values that people set are inputs. */
+const plainField = (field: string): string =>
+  field.replace(/^input /, "").replace(/^actor$/, "robot");
+
+function actionLines(action: ChangedAction, arrows: number): EntryLine[] {
+  const of = action.aid;
+  const spoken = name(spokenName(action.name));
+  if (action.change === "added") return [{ sign: "added", of, parts: [text("added "), spoken] }];
+  if (action.change === "removed") {
+    const its =
+      arrows === 0 ? [] : [text(` and its ${arrows === 1 ? "arrow" : `${arrows} arrows`}`)];
+    return [{ sign: "removed", of, parts: [text("removed "), spoken, ...its] }];
+  }
+  const renamed = action.fields.find(({ field }) => field === "name");
+  const others = action.fields.filter(({ field }) => field !== "name" && field !== "position");
+  const lines: EntryLine[] = linesOf(others).map((line) => ({
+    sign: "changed",
+    of,
+    parts: [
+      text("set "),
+      spoken,
+      text(` ${plainField(line.name)}`),
+      ...fromTo(line.before, line.after),
+    ],
+  }));
+  if (renamed === undefined) return lines;
+  const was = { kind: "old", text: spokenName(String(renamed.before)) } as const;
+  return [{ sign: "changed", of, parts: [text("renamed "), was, text(" to "), spoken] }, ...lines];
+}
+
+const WHEN: Readonly<Record<string, string>> = {
+  on_true: "true",
+  on_false: "false",
+  on_error: "error",
+  on_stopped: "stopped",
+};
+
+/** `when true or false`, and what then happens unless that is the usual: it runs. */
+export function whenWords(when: readonly (readonly [outcome: string, response: string])[]): string {
+  const responses = [...new Set(when.map(([, response]) => response))];
+  return responses
+    .map((response) => {
+      const outcomes = when.flatMap(([on, then]) => (then === response ? [WHEN[on] ?? on] : []));
+      return `when ${outcomes.join(" or ")}${response === "run" ? "" : `: ${response}`}`;
+    })
+    .join(", ");
+}
+
+const isOutcome = ({ field }: FieldChange): boolean => field in WHEN;
+const isBend = ({ field }: FieldChange): boolean => field.startsWith("waypoints/");
+
+function outcomeLine(field: FieldChange, of: string, ends: readonly LinePart[]): EntryLine {
+  const when = text(` when ${WHEN[field.field]}`);
+  const [was, is] = [String(field.before), String(field.after)];
+  if (was === "ignore") {
+    const then = is === "run" ? [] : [text(`: ${is}`)];
+    return { sign: "added", of, parts: [text("connected "), ...ends, when, ...then] };
+  }
+  if (is === "ignore")
+    return { sign: "removed", of, parts: [text("disconnected "), ...ends, when] };
+  return { sign: "changed", of, parts: [text("set "), ...ends, when, ...fromTo(was, is)] };
+}
+
+function arrowLines(arrow: ChangedArrow): EntryLine[] {
+  const of = arrow.ends.join(">");
+  const ends = [name(spokenName(arrow.parent)), text(" → "), name(spokenName(arrow.child))];
+  if (arrow.change !== "changed") {
+    const words = arrow.when.length === 0 ? [] : [text(` ${whenWords(arrow.when)}`)];
+    const did = text(arrow.change === "added" ? "connected " : "removed the arrow ");
+    return [{ sign: arrow.change, of, parts: [did, ...ends, ...words] }];
+  }
+  const others = arrow.fields.filter((field) => !isOutcome(field) && !isBend(field));
+  return [
+    ...arrow.fields.filter(isOutcome).map((field) => outcomeLine(field, of, ends)),
+    ...linesOf(others).map((line): EntryLine => {
+      const field = line.name === "required" ? "waits for it" : line.name;
+      const parts = [text("set "), ...ends, text(` ${field}`), ...fromTo(line.before, line.after)];
+      return { sign: "changed", of, parts };
+    }),
+  ];
+}
+
+const NOTED = { added: "wrote", removed: "removed", changed: "changed" } as const;
+
+function noteLine(note: ChangedNote): EntryLine {
+  const said = note.text === "" ? "" : ` “${short(note.text.replace(/\s+/g, " "))}”`;
+  const of = `g/${note.id}`;
+  return { sign: "said", of, parts: [text(`${NOTED[note.change]} a note${said}`)] };
+}
+
+function graphLines(fields: readonly FieldChange[]): EntryLine[] {
+  return linesOf(fields).map((line) => {
+    if (line.name === "name") {
+      const parts = [text("renamed the graph"), ...fromTo(line.before, line.after)];
+      return { sign: "changed", of: null, parts };
+    }
+    const sign = line.name === "direction" ? "looks" : "changed";
+    const words = text(
+      sign === "looks" ? "turned the drawing" : `set the graph's ${isolated(line.name)}`,
+    );
+    const values = sign === "looks" ? [] : fromTo(line.before, line.after);
+    return { sign, of: null, parts: [words, ...values] };
+  });
+}
+
+const counted = (count: number, what: string): string =>
+  `${count} ${what}${count === 1 ? "" : "s"}`;
+
+/** What only looks otherwise, as one line. */
+function looksLine(
+  actions: readonly ChangedAction[],
+  arrows: readonly ChangedArrow[],
+  notes: readonly ChangedNote[],
+): EntryLine[] {
+  const moved = actions.filter(
+    ({ change, fields }) =>
+      change === "changed" && fields.some(({ field }) => field === "position"),
+  ).length;
+  const bent = arrows.filter(({ fields }) => fields.some(isBend)).length;
+  const papers = notes.filter((note) => note.moved).length;
+  const things = [
+    ...(moved > 0 ? [counted(moved, "card")] : []),
+    ...(papers > 0 ? [counted(papers, "note")] : []),
+  ];
+  const did = [
+    ...(things.length > 0 ? [`moved ${things.join(", ")}`] : []),
+    ...(bent > 0 ? [`bent ${counted(bent, "arrow")}`] : []),
+  ];
+  if (did.length === 0) return [];
+  return [{ sign: "looks", of: null, parts: [text(did.join(" and "))] }];
+}
+
+const ORDER: readonly LineSign[] = ["added", "removed", "changed", "said", "looks"];
+
+/** Everything that somebody changed: what came and went first, what only looks otherwise last. */
+export function entryLines(changes: SittingChanges): EntryLine[] {
+  const { fields = [], actions = [], relations = [], notes = [], comments = 0 } = changes;
+  const gone = new Set(actions.flatMap((each) => (each.change === "removed" ? [each.aid] : [])));
+  const goesAlong = (arrow: ChangedArrow) =>
+    arrow.change === "removed" && arrow.ends.some((end) => gone.has(end));
+  const arrowsOf = (aid: string) =>
+    relations.filter((arrow) => goesAlong(arrow) && arrow.ends.includes(aid)).length;
+  const lines: EntryLine[] = [
+    ...actions.flatMap((action) => actionLines(action, arrowsOf(action.aid))),
+    ...relations.filter((arrow) => !goesAlong(arrow)).flatMap(arrowLines),
+    ...graphLines(fields),
+    ...notes.filter((note) => !note.moved).map(noteLine),
+    ...looksLine(actions, relations, notes),
+  ];
+  if (comments > 0) {
+    const words = comments === 1 ? "wrote a comment" : `wrote comments in ${comments} threads`;
+    lines.push({ sign: "said", of: null, parts: [text(words)] });
+  }
+  return lines.sort((a, b) => ORDER.indexOf(a.sign) - ORDER.indexOf(b.sign));
+}
+
+/** The first lines, and how many are left out. */
+export function shortened(
+  changes: SittingChanges,
+  most: number,
+): { lines: EntryLine[]; more: number } {
+  const all = entryLines(changes);
+  // One line more takes no more room than to say that there is one more.
+  const shown = all.length + (changes.more ?? 0) <= most + 1 ? all : all.slice(0, most);
+  return { lines: shown, more: all.length - shown.length + (changes.more ?? 0) };
+}
+
+/** A line as it is read out. */
+export function lineText({ parts }: EntryLine): string {
+  return parts.map((part) => part.text).join("");
+}

@@ -1,0 +1,157 @@
+/** Below the canvas while it shows the past: what one sees, the line of all moments, and the way back. */
+import { Button } from "@mantine/core";
+import { IconHistory } from "@tabler/icons-react";
+import { useEffect, useLayoutEffect, useMemo, useSyncExternalStore } from "react";
+import { errorText } from "../api/http";
+import type { ChangeMarks } from "../canvas/marks/change-marks";
+import {
+  type EditorContext,
+  type PastPlace,
+  useEditorContext,
+} from "../edit-actions/editor-context";
+import type { Graph } from "../graph/model";
+import { usePersonColors, useThrottledLink } from "../sync/use-room";
+import { Segments } from "../ui/segments";
+import { useNow } from "../ui/times";
+import { ChangesWalk } from "./changes-walk";
+import { CompareWith, useRunning } from "./compare-with";
+import { momentWords, useCompared } from "./compared";
+import type { GraphChanges } from "./graph-difference";
+import style from "./past-bar.module.css";
+import { marksOf, Scrubber } from "./scrubber";
+import { EarlierCanvas, type SideBySide, sideBySide } from "./side-by-side";
+import { useTimeline } from "./timeline";
+
+export interface SeenPast {
+  /** As it was; without what is drawn of another moment. */
+  readonly graph: Graph;
+  /** What differs from the moment with which it is compared. */
+  readonly changes: GraphChanges | null;
+  /** What the canvas shows: what is gone since then, too, unless the canvas beside it shows that. */
+  readonly drawn: Graph;
+  readonly marks: ChangeMarks | null;
+  /** What is beside it; null where one canvas shows all. */
+  readonly side: SideBySide | null;
+}
+
+function seenPast(
+  graph: Graph,
+  changes: GraphChanges | null,
+  words: readonly [earlier: string, later: string] | null,
+): SeenPast {
+  const side =
+    changes === null || words === null ? null : sideBySide(changes, words, EarlierCanvas);
+  if (side !== null) return { graph, changes, drawn: graph, marks: side.marks[1], side };
+  const { shown, marks } = changes ?? { shown: graph, marks: null };
+  return { graph, changes, drawn: shown, marks, side };
+}
+
+/** Nothing that was begun on the graph as it is now goes on over the past. */
+function useNothingOpen({ openOverlay, dryRun }: EditorContext): void {
+  // biome-ignore lint/correctness/useExhaustiveDependencies: once, when one begins to look back
+  useEffect(() => {
+    openOverlay(null);
+    dryRun?.close();
+  }, []);
+}
+
+const VIEWS = [
+  { value: "one", label: "One canvas" },
+  { value: "side", label: "Side by side" },
+] as const;
+
+interface Props {
+  /** What the canvas shows now. */
+  drawn: PastPlace;
+  /** What was asked for last: a step costs this bar alone until its graph is there. */
+  wanted: { subscribe: (listener: () => void) => () => void; now: () => PastPlace | null };
+  show: (seen: SeenPast, place: PastPlace) => void;
+  /** The two moments stand beside each other. */
+  side: boolean;
+  onSide: (side: boolean) => void;
+}
+
+export function PastBar({ drawn, wanted, show, side, onSide }: Props) {
+  const place = useSyncExternalStore(wanted.subscribe, wanted.now) ?? drawn;
+  const context = useEditorContext();
+  const { id, lookAt } = context;
+  const { seq } = useThrottledLink();
+  const now = useNow(60_000);
+  const timeline = useTimeline(id);
+  const running = useRunning(id, timeline);
+  const { entries, items, versions } = timeline;
+  const compared = useCompared(id, place, timeline, running, seq);
+  const { graph, changes, newest, from, to } = compared;
+  useNothingOpen(context);
+  const words = (at: number | null) =>
+    at === null ? "" : at === newest ? "now" : momentWords(entries, at, now);
+  const [before, after] = [compared.foreign === null ? words(from) : "as it runs", words(to)];
+  const { here } = compared;
+  useLayoutEffect(() => {
+    if (graph !== null && here) {
+      show(seenPast(graph, changes, side ? [before, after] : null), place);
+    }
+  }, [show, graph, here, changes, side, before, after, place]);
+  const marks = useMemo(() => marksOf(items, versions), [items, versions]);
+  const colorOf = usePersonColors(entries.map(({ author }) => author.id));
+  const goTo = (at: number) => lookAt({ ...place, at: Math.min(Math.max(1, at), newest) });
+  return (
+    <section
+      className={style.bar}
+      aria-label="The past"
+      data-past
+      data-at={compared.here ? place.at : undefined}
+      aria-busy={!compared.here}
+    >
+      <div className={style.row}>
+        <p className={style.title}>
+          <IconHistory size={16} aria-hidden /> <b>You look at the past.</b>{" "}
+          <span>Nothing here changes the graph.</span>
+        </p>
+        <span className={style.when}>{momentWords(entries, place.at, now)}</span>
+        <Button size="compact-sm" variant="filled" onClick={() => lookAt(null)}>
+          Back to now
+        </Button>
+      </div>
+      <Scrubber
+        at={place.at}
+        other={from === null ? null : from === place.at ? to : from}
+        newest={newest}
+        words={momentWords(entries, place.at, now)}
+        {...{ marks, colorOf }}
+        onAt={goTo}
+        onStep={(by) => goTo(compared.walk?.neighbour(by) ?? place.at + by)}
+        onLeave={() => lookAt(null)}
+      />
+      <div className={style.row}>
+        <span className={style.compare}>
+          Compare with <CompareWith {...{ place, timeline, running, newest }} />
+        </span>
+        {changes && (
+          <Segments
+            label="How both are shown"
+            size="xs"
+            data={VIEWS}
+            value={side ? "side" : "one"}
+            onChange={(next) => onSide(next === "side")}
+          />
+        )}
+        {changes && <ChangesWalk changes={changes} />}
+        {compared.foreign !== null && <Foreign run={compared.foreign} {...{ running }} />}
+        {seq === 0 && <p>The past is on the server, which is not there now.</p>}
+        {compared.error && <p role="alert">{errorText(compared.error)}</p>}
+      </div>
+    </section>
+  );
+}
+
+/** That what runs is nothing that was ever published here. */
+function Foreign({ run, running }: { run: string; running: ReturnType<typeof useRunning> }) {
+  const words = running.find((each) => each.run === run)?.words ?? "a run that is over";
+  return (
+    <p role="note" className={style.foreign}>
+      <b>What runs is no version of this graph</b> ({words}). It is compared as it was sent; whose
+      the differences are is not known.
+    </p>
+  );
+}

@@ -1,0 +1,255 @@
+/** One version: its name, note, author and digest, its runs, and what can be done with it. */
+import { ActionIcon, Button } from "@mantine/core";
+import { IconCopy, IconCopyPlus, IconGitCompare, IconLink, IconRestore } from "@tabler/icons-react";
+import { useQuery } from "@tanstack/react-query";
+import { Link } from "wouter";
+import { authorName, fetchVersion, type PinnedGraph, type Version } from "../api/graphs";
+import { useLive } from "../api/page-link";
+import type { ListedRun } from "../api/review";
+import type { Tone } from "../status/progress";
+import { type Heard, runStatus, useRunStatus } from "../status/run-status";
+import { StateLabel } from "../status/state-label";
+import { day, hourMinute, instant } from "../ui/times";
+import { Tooltip } from "../ui/tooltip";
+import { copied } from "./restoring";
+import style from "./versions.module.css";
+
+const NEWEST = 3; // runs that are named
+
+const timeWords = (text: string | null, now: number): string => {
+  const at = instant(text);
+  return at === null ? "" : `${day(at, now)} ${hourMinute(at)}`;
+};
+
+function RunItem({ run, now }: { run: ListedRun; now: number }) {
+  const { tone, word } = useRunStatus(run);
+  const at = run.started_at ?? run.requested_at;
+  return (
+    <li>
+      <Link to={`/runs/${run.id}`}>
+        <StateLabel still tone={tone} word={`Run ${run.number}`} />
+        <span>{word}</span>
+        <time dateTime={at}>{timeWords(at, now)}</time>
+      </Link>
+    </li>
+  );
+}
+
+function Runs({ runs, now }: { runs: readonly ListedRun[]; now: number }) {
+  const { now: heard } = useLive();
+  if (runs.length === 0) return <p className={style.quiet}>{runsWords(runs, heard)}</p>;
+  return (
+    <>
+      {runs.length > 1 && (
+        <p className={style.counts}>
+          <span className="visually-hidden">{runsWords(runs, heard)}</span>
+          <span aria-hidden>
+            {runs.length} runs:{" "}
+            {resultCounts(runs, heard).map(({ tone, word, count }) => (
+              <StateLabel key={word} still tone={tone} word={`${count} ${word}`} />
+            ))}
+          </span>
+        </p>
+      )}
+      <ul className={style.runs} aria-label="Newest runs">
+        {runs.slice(0, NEWEST).map((run) => (
+          <RunItem key={run.id} run={run} now={now} />
+        ))}
+      </ul>
+    </>
+  );
+}
+
+interface Props {
+  listed: ListedVersion;
+  now: number;
+  chosen: boolean;
+  /** It is what the graph is now: there is nothing to compare, and no way back. */
+  isNow: boolean;
+  link: string;
+  mayEdit: boolean;
+  busy: boolean;
+  onChoose: () => void;
+  onCompare: () => void;
+  onCopy: () => void;
+  onRestore: () => void;
+}
+
+function Ways(props: Props) {
+  const { listed, isNow, mayEdit, busy, link, onCompare, onCopy, onRestore } = props;
+  const button = { size: "compact-sm", variant: "default" } as const;
+  return (
+    <div className={style.ways}>
+      {!isNow && (
+        <Button
+          {...button}
+          leftSection={<IconGitCompare size={14} aria-hidden />}
+          onClick={onCompare}
+        >
+          Compare with now
+        </Button>
+      )}
+      <Button
+        {...button}
+        leftSection={<IconLink size={14} aria-hidden />}
+        onClick={() => void copied(link, "The link")}
+      >
+        <span>
+          <span className="visually-hidden">Copy </span>Link
+        </span>
+      </Button>
+      {mayEdit && (
+        <Button
+          {...button}
+          loading={busy}
+          leftSection={<IconCopyPlus size={14} aria-hidden />}
+          onClick={onCopy}
+        >
+          Copy {listed.number} as a new graph
+        </Button>
+      )}
+      {mayEdit && !isNow && (
+        <Button
+          {...button}
+          loading={busy}
+          leftSection={<IconRestore size={14} aria-hidden />}
+          onClick={onRestore}
+        >
+          Make it so again
+        </Button>
+      )}
+    </div>
+  );
+}
+
+export function VersionItem(props: Props) {
+  const { listed, now, chosen, onChoose } = props;
+  const { version, number, runs } = listed;
+  const { label, note, digest, author, at } = version;
+  return (
+    <li className={style.version} data-chosen={chosen || undefined} data-version={number}>
+      <button type="button" className={style.choose} aria-pressed={chosen} onClick={onChoose}>
+        <b className={style.number}>{number}</b>
+        {label !== "" && <bdi className={style.label}>{label}</bdi>}
+      </button>
+      {note && (
+        <p className={style.note} dir="auto">
+          {note}
+        </p>
+      )}
+      <p className={style.facts}>
+        <bdi>{authorName(author)}</bdi> · <time dateTime={at}>{timeWords(at, now)}</time> ·{" "}
+        <code title={digest}>{shortDigest(digest)}</code>
+        <Tooltip label="Copy the whole digest">
+          <ActionIcon
+            size="sm"
+            variant="subtle"
+            aria-label={`Copy the digest of ${number}`}
+            onClick={() => void copied(digest, "The digest")}
+          >
+            <IconCopy size={13} aria-hidden />
+          </ActionIcon>
+        </Tooltip>
+      </p>
+      <Runs runs={runs} now={now} />
+      {chosen && <InsideVersion version={version} />}
+      {chosen && <Ways {...props} />}
+    </li>
+  );
+}
+
+const NONE: readonly PinnedGraph[] = [];
+
+/** Whether a name stands for the same thing still. */
+function stateOf({ digest, current_digest }: PinnedGraph): "same" | "changed" | "gone" {
+  if (current_digest === null) return "gone";
+  return current_digest === digest ? "same" : "changed";
+}
+
+const STATE_WORDS = { same: "as it is now", changed: "changed since", gone: "no graph any more" };
+
+function InsideVersion({ version }: { version: Version }) {
+  const { id, digest, tree_digest } = version;
+  const { data: graphs = NONE } = useQuery({
+    enabled: tree_digest !== null && tree_digest !== digest,
+    queryKey: ["versions", id, "inside"],
+    queryFn: async ({ signal }) => (await fetchVersion(id, signal)).subgraphs ?? NONE,
+    staleTime: 0,
+  });
+  if (graphs.length === 0) return null;
+  const changed = graphs.filter((each) => stateOf(each) !== "same").length;
+  return (
+    <>
+      <p className={style.quiet}>
+        {graphs.length === 1 ? "1 graph" : `${graphs.length} graphs`} inside
+        {changed > 0 && `, ${changed} otherwise now: published again, it takes them as they are`}
+      </p>
+      <ul className={style.inside} aria-label="Graphs inside of it">
+        {graphs.map((each) => (
+          <li key={each.name} data-state={stateOf(each)}>
+            <Link to={`/graphs/${each.graph}`}>
+              <bdi>{each.name}</bdi>
+            </Link>
+            <code title={each.digest}>{shortDigest(each.digest)}</code>
+            <span className={style.quiet}>{STATE_WORDS[stateOf(each)]}</span>
+          </li>
+        ))}
+      </ul>
+    </>
+  );
+}
+
+export interface ListedVersion {
+  readonly version: Version;
+  /** `v11`: its place among all of them. */
+  readonly number: string;
+  /** Its runs, the newest first. */
+  readonly runs: readonly ListedRun[];
+}
+
+/** `versions` and `runs`: the newest first. */
+export function listedVersions(
+  versions: readonly Version[],
+  runs: readonly ListedRun[],
+): ListedVersion[] {
+  const of = new Map<string, ListedRun[]>();
+  for (const run of runs) {
+    if (run.version === null) continue;
+    const known = of.get(run.version);
+    if (known) known.push(run);
+    else of.set(run.version, [run]);
+  }
+  return versions.map((version, i) => ({
+    version,
+    number: `v${versions.length - i}`,
+    runs: of.get(version.id) ?? [],
+  }));
+}
+
+interface ResultCount {
+  readonly tone: Tone;
+  readonly word: string;
+  readonly count: number;
+}
+
+/** How often its runs ended in which way, the most frequent first. */
+function resultCounts(runs: readonly ListedRun[], heard: Heard): ResultCount[] {
+  const found = new Map<string, ResultCount>();
+  for (const run of runs) {
+    const { tone, word } = runStatus(run, heard);
+    const known = found.get(word);
+    found.set(word, { tone, word, count: (known?.count ?? 0) + 1 });
+  }
+  return [...found.values()].sort((a, b) => b.count - a.count);
+}
+
+/** `3 runs: 2 finished, 1 error`. */
+export function runsWords(runs: readonly ListedRun[], heard: Heard): string {
+  const [only, ...others] = runs;
+  if (only === undefined) return "No run yet";
+  const counted = resultCounts(runs, heard).map(({ word, count }) => `${count} ${word}`);
+  return `${others.length === 0 ? "1 run" : `${runs.length} runs`}: ${counted.join(", ")}`;
+}
+
+/** The start of a digest, by which people tell versions apart. */
+const shortDigest = (digest: string): string => digest.slice(0, 8);

@@ -1,0 +1,105 @@
+/** The first page: every graph, and how to begin. */
+import { Button, Skeleton } from "@mantine/core";
+import { IconAlertTriangle, IconFileImport, IconPlus } from "@tabler/icons-react";
+import type { ReactNode } from "react";
+import { useGraphs } from "../api/graphs";
+import { errorText } from "../api/http";
+import { useMay } from "../api/people";
+import { Empty } from "../ui/empty";
+import { lazyPart, PartBoundary } from "../ui/lazy-part";
+import { GraphCards } from "./graph-cards";
+import style from "./home.module.css";
+
+const DeletedGraphs = lazyPart(() => import("./deleted-graphs").then((part) => part.DeletedGraphs));
+
+interface Props {
+  onNew: () => void;
+  onImport: () => void;
+  /** What the device has while the list cannot be read. */
+  kept: ReactNode;
+  /** Before the graphs: what is asked of who comes for the first time. */
+  greeting?: ReactNode;
+}
+
+function Skeletons() {
+  return (
+    <div className={style.cards} aria-hidden>
+      {[0, 1, 2, 3].map((i) => (
+        <div className={style.card} key={i}>
+          <div className={style.preview} />
+          <div className={style.body}>
+            <Skeleton height={12} width="50%" mb={10} />
+            <Skeleton height={9} width="90%" mb={8} />
+            <Skeleton height={9} width="40%" />
+          </div>
+        </div>
+      ))}
+    </div>
+  );
+}
+
+export function Home({ onNew, onImport, kept, greeting }: Props) {
+  const mayEdit = useMay("edit");
+  const graphs = useGraphs();
+  const list = graphs.data ?? [];
+  return (
+    <main className={style.page}>
+      <div className={style.inner}>
+        <div className={style.hello}>
+          <div>
+            <h2 className={style.title}>What should the robots do?</h2>
+            <p className={style.lead}>
+              Draw a task as a graph of actions, say what follows each outcome, run it in the
+              simulator, and look at what happened. The examples below show one idea each.
+            </p>
+          </div>
+          {mayEdit && (
+            <div className={style.buttons}>
+              <Button leftSection={<IconFileImport size={16} />} onClick={onImport}>
+                Import a file
+              </Button>
+              <Button variant="filled" leftSection={<IconPlus size={16} />} onClick={onNew}>
+                New graph
+              </Button>
+            </div>
+          )}
+        </div>
+        {greeting}
+        {graphs.isPending && <Skeletons />}
+        {graphs.isError && (
+          <>
+            <Empty icon={<IconAlertTriangle size={22} />} title="The list cannot be read">
+              {errorText(graphs.error)}
+            </Empty>
+            {kept}
+          </>
+        )}
+        {graphs.isSuccess && list.length === 0 && (
+          <Empty
+            icon={<IconPlus size={22} />}
+            title="No graph yet"
+            action={
+              mayEdit && (
+                <Button variant="filled" onClick={onNew}>
+                  New graph
+                </Button>
+              )
+            }
+          >
+            {mayEdit
+              ? "Begin with an empty one, or drop a UMRF file anywhere on this page."
+              : "What the others make appears here."}
+          </Empty>
+        )}
+        {list.length > 0 && <GraphCards graphs={list} />}
+        {graphs.isSuccess && (
+          <div className={style.foot}>
+            <PartBoundary waiting={null}>
+              <DeletedGraphs />
+            </PartBoundary>
+          </div>
+        )}
+      </div>
+    </main>
+  );
+}

@@ -1,0 +1,121 @@
+/** What can be added: the actions of the library and what graphs use besides, and graphs; each once. */
+import { useMemo } from "react";
+import {
+  type GraphAsAction,
+  type LibraryAction,
+  useGraphsAsActions,
+  useLibrary,
+} from "../api/library";
+import type { NewAction } from "../graph/edit";
+import { pathWords } from "../graph/value-text";
+
+export interface KnownAction {
+  readonly template: NewAction;
+  /** Its document in the library; null: only graphs use it. */
+  readonly document: string | null;
+  /** The graphs that use it, by id. */
+  readonly usedIn: readonly string[];
+  /** Its parameters with their types, for people. */
+  readonly takes: readonly string[];
+  readonly gives: readonly string[];
+}
+
+type Parameters = LibraryAction["inputs"];
+
+const words = (list: Parameters): string[] =>
+  list.map(
+    ({ path, pvf_type, required }) =>
+      `${pathWords(path)}: ${pvf_type ?? "no type"}${required ? "" : ", optional"}`,
+  );
+
+const bare = (list: Parameters) => list.map(({ path, text }) => ({ path, text }));
+
+function knownAction(answer: LibraryAction): KnownAction {
+  const { name, type, description, inputs, outputs, used_in, document } = answer;
+  return {
+    template: { name, type, description, inputs: bare(inputs), outputs: bare(outputs) },
+    document,
+    usedIn: used_in,
+    takes: words(inputs),
+    gives: words(outputs),
+  };
+}
+
+const NONE: readonly LibraryAction[] = [];
+
+export function useKnownActions(): { actions: readonly KnownAction[]; ready: boolean } {
+  const { data = NONE, isPending } = useLibrary();
+  const actions = useMemo(() => data.map(knownAction), [data]);
+  return { actions, ready: !isPending };
+}
+
+/** A graph, as the action that stands for it in another. */
+export interface KnownGraph {
+  readonly graph: string;
+  readonly template: NewAction;
+}
+
+const NO_GRAPHS: readonly GraphAsAction[] = [];
+
+const pathsOf = ({ inputs = [], outputs = [] }: NewAction): string =>
+  JSON.stringify([inputs, outputs].map((list) => list.map(({ path }) => path).sort()));
+
+interface Placeable {
+  readonly actions: readonly KnownAction[];
+  readonly graphs: readonly KnownGraph[];
+}
+
+/**
+ * Each name once. Engines look for an action before a graph of its name, so that one of the library
+ * comes first; one that only graphs use, with the parameters of a graph of its name, is that graph.
+ */
+export function placeable(
+  actions: readonly KnownAction[],
+  graphs: readonly KnownGraph[],
+  current: string | undefined,
+): Placeable {
+  const own = new Set(actions.flatMap(({ document, template }) => (document ? template.name : [])));
+  const byName = new Map(graphs.map(({ template }) => [template.name, pathsOf(template)]));
+  const isGraph = ({ document, template }: KnownAction) =>
+    document === null && byName.get(template.name) === pathsOf(template);
+  const seen = new Set<string>();
+  const others = graphs.filter(({ graph, template: { name } }) => {
+    const first = graph !== current && !own.has(name) && !seen.has(name);
+    if (first) seen.add(name);
+    return first;
+  });
+  return { actions: actions.filter((action) => !isGraph(action)), graphs: others };
+}
+
+/** What can be placed in a graph: not the graph itself. */
+export function usePlaceable(current: string | undefined): Placeable & { ready: boolean } {
+  const { actions, ready } = useKnownActions();
+  const { data = NO_GRAPHS } = useGraphsAsActions();
+  return useMemo(() => {
+    const graphs = data.map(({ graph, name, description, inputs, outputs }) => {
+      const template: NewAction = {
+        name,
+        description,
+        inputs: bare(inputs),
+        outputs: bare(outputs),
+        ofGraph: true,
+      };
+      return { graph, template };
+    });
+    return { ...placeable(actions, graphs, current), ready };
+  }, [actions, data, current, ready]);
+}
+
+/** All of it for a search by name: of an action and a graph of one name the action. */
+export function templatesOf({ actions, graphs }: Placeable): NewAction[] {
+  const all = [...actions, ...graphs].map(({ template }) => template);
+  return [
+    ...new Map(all.reverse().map((template) => [template.name, template])).values(),
+  ].reverse();
+}
+
+/** `location, pose.position.x`, for a line under the name. */
+export function signature(template: NewAction): string {
+  const names = (template.inputs ?? []).map((input) => pathWords(input.path));
+  return names.length === 0 ? "no parameters" : names.join(", ");
+}

@@ -1,0 +1,105 @@
+/** Two runs on one canvas: a row for each in every card, and the flag where they part. */
+
+import { ReactFlowProvider } from "@xyflow/react";
+import { useCallback, useMemo } from "react";
+import type { Comparison } from "../api/review";
+import type { Run } from "../api/runs";
+import { CardStateContext } from "../canvas/card-highlights";
+import { fromUmrf } from "../canvas/from-umrf";
+import { GraphView } from "../canvas/graph-view";
+import type { Tone } from "../status/progress";
+import { useProgress } from "../status/progress-inside";
+import { StateLabel } from "../status/state-label";
+import { isolated } from "../words/isolated";
+import style from "./compare-page.module.css";
+import { type ActionSummary, comparedActions, outermostAid, rangeText } from "./differences";
+
+const MOST = 4; // outcomes in a row; the rest are counted
+
+interface RowProps {
+  number: number;
+  ghost: boolean;
+  summary: ActionSummary | null;
+}
+
+function RunRow({ number, ghost, summary }: RowProps) {
+  const results = (summary?.results ?? [])
+    .map((result, visit) => ({ result: result as Tone, visit }))
+    .slice(-MOST);
+  const often = (summary?.results.length ?? 0) > 1;
+  const more = (summary?.results.length ?? 0) - results.length;
+  return (
+    <span className={style.runRow}>
+      <b data-ghost={ghost || undefined}>{number}</b>
+      {summary === null ? (
+        <span className={style.none}>did not run</span>
+      ) : (
+        <>
+          {more > 0 && <span className={style.none}>{more} +</span>}
+          {results.map(({ result, visit }) => (
+            <StateLabel key={visit} still tone={result} word={often ? "" : result} />
+          ))}
+          <span>{rangeText(summary.took)}</span>
+        </>
+      )}
+    </span>
+  );
+}
+
+interface Props {
+  found: Comparison;
+  /** The second run, whole. */
+  run: Run;
+  selected: string | null;
+  onSelect: (aid: string | null) => void;
+}
+
+export function ComparedCanvas({ found, run, selected, onSelect }: Props) {
+  const graph = useMemo(() => fromUmrf(run.umrf), [run.umrf]);
+  const progress = useProgress(run, false);
+  const actions = useMemo(
+    () => new Map(comparedActions(found).map((each) => [each.aid, each])),
+    [found],
+  );
+  const parting = found.parting ? outermostAid(found, found.parting.step) : null;
+  const stateOf = useCallback(
+    (aid: string) => {
+      const action = actions.get(aid);
+      return (
+        <span className={style.rows}>
+          {aid === parting && (
+            <span className={style.flag}>
+              1 · first difference{found.parting?.step.levels.length ? ", inside" : ""}
+            </span>
+          )}
+          <RunRow number={found.b.number} ghost={false} summary={action?.b ?? null} />
+          <RunRow number={found.a.number} ghost summary={action?.a ?? null} />
+        </span>
+      );
+    },
+    [actions, parting, found],
+  );
+  const picked = useMemo(() => new Set(selected === null ? [] : [selected]), [selected]);
+  return (
+    <ReactFlowProvider>
+      <CardStateContext value={stateOf}>
+        <GraphView
+          graph={graph}
+          progress={progress}
+          selected={picked}
+          onSelect={onSelect}
+          label={`Runs ${found.b.number} and ${found.a.number} of ${isolated(found.b.graph_name)}`}
+        />
+      </CardStateContext>
+    </ReactFlowProvider>
+  );
+}
+
+export function Legend({ found }: { found: Comparison }) {
+  return (
+    <p className={style.legend}>
+      <b>{found.b.number}</b> this run <b data-ghost>{found.a.number}</b> ghost · arrows as run{" "}
+      {found.b.number} took them
+    </p>
+  );
+}

@@ -1,0 +1,183 @@
+import fc from "fast-check";
+import { expect, test } from "vitest";
+import type { ComparedStep, Comparison } from "../api/review";
+import type { Visit } from "../api/runs";
+import {
+  causeSentence,
+  comparedActions,
+  differencesOf,
+  likelyCause,
+  outermostAid,
+  overlap,
+  sameAsSeen,
+} from "./differences";
+
+const iso = (s: number) => new Date(s * 1000).toISOString();
+const visit = (from: number, until: number, result: Visit["result"], latest = until): Visit => ({
+  from: iso(from),
+  not_before: iso(from),
+  until: iso(until),
+  not_after: iso(latest),
+  result,
+  how: "observed",
+  inputs: null,
+});
+const step = (action: string, part: Partial<ComparedStep>): ComparedStep => ({
+  action,
+  levels: [],
+  name: action,
+  aid: action,
+  visit: 1,
+  a: null,
+  b: null,
+  relation: "same",
+  slower: null,
+  ...part,
+});
+const comparison = (steps: ComparedStep[], part: Partial<Comparison> = {}): Comparison => {
+  const first = steps.find(({ relation }) => /result|only/.test(relation));
+  return {
+    a: { number: 41, engine: "atlas" },
+    b: { number: 43, engine: "atlas" },
+    same_graph: true,
+    same_engine: true,
+    graph: { before: 0, after: 0, fields: [], actions: [], relations: [], notes: [] },
+    parameters: [],
+    subgraphs: [],
+    steps,
+    left_out: 0,
+    parting: first ? { step: first, text: "", messages_a: [], messages_b: [] } : null,
+    text: "",
+    ...part,
+  } as unknown as Comparison;
+};
+const closes = step("Close_0", {
+  a: visit(0, 3, "true"),
+  b: visit(0, 4.5, "false"),
+  relation: "result",
+});
+
+test("the first difference is numbered 1, and those after it follow in the order of the steps", () => {
+  const report = step("Report_0", { a: visit(5, 6, "true"), relation: "only_a" });
+  const found = differencesOf(comparison([step("Drive_0", {}), closes, report]));
+  expect(found.map(({ number, title }) => `${number} ${title}`)).toEqual([
+    "1 Close 0 ended false",
+    "2 Report 0 ran only in run 41",
+  ]);
+  expect(found[0]?.text).toBe("After 4.5 s. In run 41 it ended true after 3.0 s.");
+});
+
+test("ranges that overlap are said to be no difference", () => {
+  const drive = step("Drive_0", {
+    a: visit(0, 12, "true", 12.3),
+    b: visit(0, 12.1, "true", 12.4),
+  });
+  expect(sameAsSeen(comparison([drive]))).toEqual([
+    { name: "Drive 0", text: "12.1–12.4 s and 12.0–12.3 s overlap: no difference is claimed" },
+  ]);
+  const ms = fc.nat(10_000);
+  fc.assert(
+    fc.property(ms, ms, ms, ms, (a, b, c, d) => {
+      const [x, y] = [
+        { least: Math.min(a, b), most: Math.max(a, b) },
+        { least: Math.min(c, d), most: Math.max(c, d) },
+      ];
+      expect(overlap(x, y)).toBe(overlap(y, x));
+      if (!overlap(x, y)) expect(x.most < y.least || y.most < x.least).toBe(true);
+    }),
+  );
+});
+
+test("what is not known to differ is no difference: an end that one run did not show", () => {
+  const unknown = step("Close_0", { a: visit(0, 3, null), b: visit(0, 3, "true") });
+  expect(differencesOf(comparison([{ ...unknown, relation: "unknown" }]))).toEqual([]);
+  expect(differencesOf(comparison([{ ...unknown, relation: "end" }]))).toEqual([]);
+});
+
+test("the likely cause is the nearest thing that differed, and none where nothing did", () => {
+  expect(likelyCause(comparison([closes]))).toBeNull();
+  expect(likelyCause(comparison([closes], { same_engine: false }))).toContain("atlas");
+  const changed = {
+    before: 0,
+    after: 0,
+    fields: [],
+    relations: [],
+    notes: [],
+    actions: [
+      {
+        change: "changed" as const,
+        aid: "Close_0",
+        name: "Close",
+        fields: [
+          { field: "position", before: 1, after: 2 },
+          { field: "in/torque", before: '{"pvf_value":12.5}', after: '{"pvf_value":8.0}' },
+        ],
+      },
+    ],
+  };
+  expect(likelyCause(comparison([closes], { graph: changed }))).toBe(
+    "its torque was 8 instead of 12.5",
+  );
+});
+
+test("what happened on the way comes before any difference of the graphs, and no false cause is named", () => {
+  const text = "in run 43 Ada pressed Stop while Close ran (0.7 s)";
+  const because = { kind: "operator_stop", run: 43, text };
+  const stopped = comparison([closes], { because, same_engine: false });
+  expect(causeSentence(stopped)).toBe(`Likely because ${text}.`);
+  expect(causeSentence(comparison([], { because }))).toBe(`In${text.slice(2)}.`);
+  expect(causeSentence(comparison([]))).toBeNull();
+  const arrow = {
+    change: "changed" as const,
+    parent: "Drive_0",
+    child: "Close_0",
+    ends: [],
+    when: [],
+  };
+  const fields = [{ field: "waypoints/run", before: null, after: "[]" }];
+  const graph = { ...comparison([]).graph, relations: [{ ...arrow, fields }] };
+  const moved = comparison([closes], {
+    graph,
+    same_graph: false,
+  } as unknown as Partial<Comparison>);
+  expect(causeSentence(moved)).toBe("Nothing that differed before is known to explain it.");
+  expect(causeSentence(comparison([closes]))).toBe("Nothing that is known differed before.");
+});
+
+test("visits of one action are told together, their durations as the range of their sum", () => {
+  const again = step("Close_0", { visit: 2, b: visit(5, 6, "error", 7), relation: "only_b" });
+  expect(comparedActions(comparison([closes, again]))).toMatchObject([
+    {
+      a: { results: ["true"], took: { least: 3_000, most: 3_000 } },
+      b: { results: ["false", "error"], took: { least: 5_500, most: 6_500 } },
+    },
+  ]);
+});
+
+test("what is inside of an action stands below it, and what differs there is told with the way", () => {
+  const outer = step("Fetch_0", {
+    a: visit(0, 9, "true"),
+    b: visit(0, 9, "error"),
+    relation: "result",
+  });
+  const inner = { aid: null, levels: ["Fetch_0"] };
+  const grip = step("g__Fetch__0/Grip_0", {
+    ...inner,
+    name: "Grip_0",
+    a: visit(1, 3, "true"),
+    b: visit(1, 2, "error"),
+    relation: "result",
+  });
+  const lost = step("h__Gone__0/Grip_0", { aid: null, b: visit(8, 9, "true"), relation: "only_b" });
+  const close = step("Close_0", { a: visit(9, 10, "true"), relation: "only_a" });
+  const found = comparison([grip, outer, close, lost], { subgraphs: ["Fetch"] });
+  expect(comparedActions(found).map(({ name, around, holds }) => [name, around, holds])).toEqual([
+    ["Fetch_0", null, true],
+    ["g__Fetch__0/Grip_0", "Fetch_0", false],
+    ["Close_0", null, false],
+    ["h__Gone__0/Grip_0", null, false],
+  ]);
+  expect(differencesOf(found)[0]?.title).toBe("Fetch 0 › Grip 0 ended with an error");
+  expect(likelyCause(found)).toBe("the graph inside Fetch 0 was another one");
+  expect(outermostAid(found, grip)).toBe("Fetch_0");
+});

@@ -1,0 +1,78 @@
+/** What a run tells is told in the order in which it can have happened. */
+import { expect, test } from "vitest";
+import type { Run } from "../api/runs";
+import { eventLines } from "./run-events";
+
+/** An action that the engine says to have begun and ended at these times. */
+function ran(from: string, until: string): Run {
+  return {
+    id: "r",
+    number: 1,
+    graph: null,
+    graph_name: "patrol",
+    version: null,
+    digest: "",
+    engine: "simulator",
+    simulated: true,
+    state: "finished",
+    desired: "running",
+    proof_at: null,
+    unknown_since: null,
+    unconfirmed: null,
+    at_rest: null,
+    took: null,
+    moves_again_at: null,
+    result: "on_true",
+    requested_at: "2026-11-20T09:00:00.500Z",
+    started_at: "2026-11-20T09:00:01.000Z",
+    ended_at: "2026-11-20T09:00:03.000Z",
+    author: { id: "p1", name: "Ada" },
+    stopped_by: null,
+    detail: "",
+    alarms: [],
+    group: null,
+    recorded: true,
+    actions: {
+      Look_0: {
+        aid: "a",
+        state: "FINISHED",
+        visits: [
+          {
+            from,
+            not_before: from,
+            until,
+            not_after: until,
+            result: "true",
+            how: "observed",
+            inputs: null,
+          },
+        ],
+        older: 0,
+        messages: [],
+      },
+    },
+  };
+}
+
+test("nothing comes before the start, although the engine's clock stands behind", () => {
+  const told = eventLines(ran("2026-11-20T09:00:00.990Z", "2026-11-20T09:00:02.000Z"), "v1");
+  expect(told.map(({ name, text }) => [name, text])).toEqual([
+    [null, "Ada started v1 in the simulator"],
+    ["Look 0", "runs"],
+    ["Look 0", "true"],
+    [null, "Run finished"],
+  ]);
+});
+
+test("an end that was seen between two moments is told between them", () => {
+  const run = ran("2026-11-20T09:00:01.000Z", "2026-11-20T09:00:02.000Z");
+  const [look] = Object.values(run.actions ?? {});
+  const visit = look?.visits[0];
+  if (visit === undefined) throw new Error("no visit");
+  visit.not_after = "2026-11-20T09:00:02.900Z";
+  expect(eventLines(run, "v1").map(({ text }) => text)).toContain("true (not before +1.0)");
+  visit.not_after = null;
+  expect(eventLines(run, "v1").map(({ text }) => text)).toContain(
+    "true (not before +1.0); its code may go on",
+  );
+});

@@ -1,0 +1,171 @@
+/** What a run was, in a table. */
+
+import { ActionIcon, Button, TagsInput, Textarea } from "@mantine/core";
+import { notifications } from "@mantine/notifications";
+import { IconPin, IconPinFilled } from "@tabler/icons-react";
+import { useQueryClient } from "@tanstack/react-query";
+import { useVersions, versionName } from "../api/graphs";
+import { errorText } from "../api/http";
+import { type RunMarks, setMarks, useLabels, useMarks, useRaw } from "../api/review";
+import { type Run, requesterPlace, runPlace } from "../api/runs";
+import { boundsText } from "../status/durations";
+import { runEndText } from "../status/progress";
+import { useDraft } from "../ui/drafts";
+import { clock, day, instant, useNow } from "../ui/times";
+import { isolated } from "../words/isolated";
+import style from "./run-facts.module.css";
+
+type Rest = NonNullable<Run["at_rest"]>;
+
+interface Props {
+  runner: string | undefined;
+  run: Run;
+  version: string;
+  by: string;
+}
+
+function restWords(rest: Rest, moment: (at: number | null) => string): string {
+  const who = rest.by ? `by ${isolated(rest.by.name)}${requesterPlace(rest.by)}` : "by the runner";
+  return `${moment(instant(rest.at))} ${who}: “${rest.how}”`;
+}
+
+export function RunFacts({ runner, run, version, by }: Props) {
+  const raw = useRaw(runner, run).data;
+  const now = useNow(60_000);
+  const start = instant(run.started_at);
+  const end = instant(run.ended_at);
+  const moment = (at: number | null) => (at === null ? "—" : `${day(at, now)} ${clock(at)}`);
+  const rows: [string, string][] = [
+    ["Graph", run.graph_name],
+    ["Version", version],
+    ["Digest", run.digest],
+    ["Engine", runPlace(run)],
+    ["Started by", `${by}${requesterPlace(run.author)}`],
+    ["Started", moment(start)],
+    ...(run.stopped_by
+      ? [
+          ["Stopped by", `${run.stopped_by.name}${requesterPlace(run.stopped_by)}`] as [
+            string,
+            string,
+          ],
+        ]
+      : []),
+    ["End known", moment(end)],
+    ["Took", (end !== null && boundsText(run.took)) || "—"],
+    ["End", end === null ? "goes on" : runEndText(run)],
+    ["Result", run.result?.replace(/^on_/, "") ?? "—"],
+    ["Why", run.detail || "—"],
+    ["Recorded", run.recorded ? "all of it" : "NOT all of it: the journal could not be written"],
+    ...(run.archived
+      ? [
+          ["Archived", `${moment(instant(run.archived.at))}, ${run.archived.file}`] as [
+            string,
+            string,
+          ],
+        ]
+      : []),
+    ...(raw
+      ? [["Raw messages", raw.text || `here, ${raw.hours.length} h`] as [string, string]]
+      : []),
+    ["Last proof", moment(instant(run.proof_at))],
+    ...(run.at_rest ? [["Seen at rest", restWords(run.at_rest, moment)] as [string, string]] : []),
+    ...(run.despite ?? []).map(({ code, text }): [string, string] => ["In spite of", text ?? code]),
+    ...(run.override ? [["Because", `“${run.override.reason}”`] as [string, string]] : []),
+  ];
+  return (
+    <dl className={style.facts}>
+      {rows.map(([name, value]) => (
+        <div key={`${name} ${value}`}>
+          <dt>{name}</dt>
+          <dd className={name === "Digest" ? style.mono : undefined}>{value}</dd>
+        </div>
+      ))}
+    </dl>
+  );
+}
+
+/** The marks of a run and a way to change them, shown at once and taken back if refused. */
+function useEditedMarks(runner: string | undefined, run: string) {
+  const client = useQueryClient();
+  const marks = useMarks(runner, run);
+  const change = async (part: Partial<RunMarks>): Promise<void> => {
+    if (runner === undefined) return;
+    const key = ["runs", "marks", run];
+    const before = client.getQueryData<RunMarks>(key);
+    if (before) client.setQueryData(key, { ...before, ...part });
+    try {
+      client.setQueryData(key, await setMarks(runner, run, part));
+      void client.invalidateQueries({ queryKey: ["runs", "list"] });
+      void client.invalidateQueries({ queryKey: ["runs", "labels"] });
+    } catch (error) {
+      client.setQueryData(key, before);
+      notifications.show({ color: "red", title: "Not noted", message: errorText(error) });
+    }
+  };
+  return { marks: marks.data, change };
+}
+
+export function PinRun({ runner, run }: { runner: string | undefined; run: string }) {
+  const { marks, change } = useEditedMarks(runner, run);
+  const pinned = marks?.pinned ?? false;
+  return (
+    <ActionIcon
+      aria-label={pinned ? "Unpin this run" : "Pin this run"}
+      aria-pressed={pinned}
+      disabled={marks === undefined}
+      onClick={() => void change({ pinned: !pinned })}
+    >
+      {pinned ? <IconPinFilled size={16} aria-hidden /> : <IconPin size={16} aria-hidden />}
+    </ActionIcon>
+  );
+}
+
+export function RunNotes({ runner, run }: { runner: string | undefined; run: string }) {
+  const { marks, change } = useEditedMarks(runner, run);
+  const known = useLabels(runner).data ?? [];
+  const saved = marks?.note ?? "";
+  const field = useDraft({
+    value: saved,
+    onCommit(note) {
+      void change({ note });
+      return true;
+    },
+    onLeaving: true,
+  });
+  return (
+    <section className={style.notes} aria-label="Notes">
+      <TagsInput
+        label="Labels"
+        placeholder={marks?.labels.length ? "" : "For example “demo”"}
+        data={known}
+        maxTags={20}
+        maxLength={60}
+        clearable
+        disabled={marks === undefined}
+        value={marks?.labels ?? []}
+        onChange={(labels) => void change({ labels: labels.map((each) => each.trim()) })}
+      />
+      <Textarea
+        label="Note"
+        placeholder="What should the next person know about this run?"
+        autosize
+        minRows={2}
+        maxLength={4000}
+        disabled={marks === undefined}
+        value={field.text}
+        onChange={(event) => field.change(event.currentTarget.value)}
+        onBlur={field.leave}
+      />
+      {field.text !== saved && (
+        <Button size="compact-sm" onClick={field.leave}>
+          Save note
+        </Button>
+      )}
+    </section>
+  );
+}
+
+export function useVersionLabel(run: Run): string {
+  const versions = useVersions(run.graph ?? "", run.version).data;
+  return versionName(versions, run.version) || run.digest.slice(0, 7);
+}

@@ -1,0 +1,344 @@
+/** One run: its version on the canvas, every visit on the timeline, what was said, how it ended. */
+
+import { Skeleton, Tabs } from "@mantine/core";
+import { IconAlertTriangle } from "@tabler/icons-react";
+import { ReactFlowProvider } from "@xyflow/react";
+import { memo, type ReactNode, useCallback, useEffect, useMemo, useState } from "react";
+import { useSearch } from "wouter";
+import { errorText } from "../api/http";
+import { useLive } from "../api/page-link";
+import { useCurrentName } from "../api/people";
+import { type ReplayMark, useReplayData } from "../api/replay";
+import { useRunsOfSameStart } from "../api/review";
+import { type Run, useRun } from "../api/runs";
+import { fromUmrf } from "../canvas/from-umrf";
+import { GraphView } from "../canvas/graph-view";
+import { serverTimeOf } from "../clock/server-clock";
+import { type Lane, lanesOf, useLanes } from "../status/lanes/lanes";
+import { Timeline, type Track } from "../status/lanes/timeline";
+import { INTO } from "../status/level-places";
+import { runEndText, runLabel } from "../status/progress";
+import { useProgress } from "../status/progress-inside";
+import { useRunStatus } from "../status/run-status";
+import { StateLabel } from "../status/state-label";
+import { Empty } from "../ui/empty";
+import { instant, useNow } from "../ui/times";
+import type { Crumb } from "../ui/top-bar";
+import { isolated } from "../words/isolated";
+import { FailureCauses } from "./causes";
+import { graphsOn, LevelBar, type LevelCursor, useLevel } from "./levels";
+import { type ReplayCursor, useReplay } from "./replay";
+import { PlayerControls, silentTimesOf, timelineSignsOf } from "./replay-controls";
+import { DryRunFromHere, RunActions } from "./run-actions";
+import { RawEvents, RunEvents } from "./run-events";
+import { PinRun, RunFacts, RunNotes, useVersionLabel } from "./run-facts";
+import type { RepeatActions } from "./run-menu";
+import style from "./run-page.module.css";
+import { RunParameters } from "./run-parameters";
+import { RunPrint } from "./run-print";
+
+export interface RunBarParts {
+  crumbs: readonly Crumb[];
+  status?: ReactNode;
+  actions?: ReactNode;
+}
+
+const NO_MARKS: readonly ReplayMark[] = [];
+
+interface Props {
+  id: string;
+  bar: (parts: RunBarParts) => ReactNode;
+  /** The dialog by which everything is started. */
+  start: (again: RepeatActions, onClose: () => void) => ReactNode;
+}
+
+/** The moment to which a link points, in ms after the start. */
+function momentAsked(run: Run, search: string): number | null {
+  const t = new URLSearchParams(search).get("t");
+  const start = instant(run.started_at);
+  return t !== null && start !== null && Number.isFinite(Number(t)) ? start + Number(t) : null;
+}
+
+/** Keeps the address in step, so that it can be sent to somebody. */
+function useAddress(id: string, replay: ReplayCursor, { way, key }: LevelCursor): void {
+  const { at, start, playing } = replay;
+  useEffect(() => {
+    const query = new URLSearchParams();
+    for (const { graph, action } of way) query.append("in", `${graph}~${action}`);
+    if (at !== null) query.set("t", String(Math.round(at - start)));
+    if (key !== null) query.set("action", key);
+    const search = query.size > 0 ? `?${query}` : "";
+    if (playing) return; // browsers refuse an address that changes with every frame
+    window.history.replaceState(window.history.state, "", `/runs/${id}${search}`);
+  }, [id, at, start, playing, way, key]);
+}
+
+/** The runs that began together with this one, as they are known now. */
+function useTracks(runner: string | undefined, run: Run): readonly Track[] {
+  const { now } = useLive();
+  const mates = useRunsOfSameStart(runner, run).data;
+  return useMemo(
+    () =>
+      (mates ?? []).map((stored) => {
+        const live = now.runs.get(stored.id);
+        const mate = live ? { ...stored, ...live, umrf: stored.umrf } : stored;
+        return { run: mate, lanes: lanesOf(mate, fromUmrf(mate.umrf), mate.engine) };
+      }),
+    [mates, now.runs],
+  );
+}
+
+function crumbsOf(run: Run): Crumb[] {
+  return [
+    { label: "Runs", to: "/runs" },
+    {
+      label: run.graph_name,
+      ...(run.graph === null ? {} : { to: `/graphs/${run.graph}` }),
+    },
+    { label: `Run ${run.number}` },
+  ];
+}
+
+/** How the run goes, or went at the moment that is shown. */
+function RunStatus({ newest, run, past }: RunStatusProps) {
+  const now = useRunStatus(run);
+  const { tone, word } = runLabel(run);
+  const then = { tone, word: run.ended_at === null ? word : runEndText(run) };
+  return (
+    <>
+      <StateLabel pill {...(past ? then : now)} />
+      {past && <span className={style.simulated}>as it was then</span>}
+      {newest.simulated && <span className={style.simulated}>simulated</span>}
+    </>
+  );
+}
+
+interface RunStatusProps {
+  newest: Run;
+  /** As it was at the moment that is shown. */
+  run: Run;
+  past: boolean;
+}
+
+interface AboutRunProps {
+  runner: string | undefined;
+  newest: Run;
+  replay: ReplayCursor;
+  label: string;
+  marks: readonly ReplayMark[];
+  /** The chosen action as the run calls it. */
+  selected: string | null;
+  onSelect: (fact: string | null) => void;
+}
+
+/** What was said, with which values, by whom: beside the canvas. */
+function AboutRun({ runner, newest, replay, label, marks, selected, onSelect }: AboutRunProps) {
+  const by = useCurrentName(newest.author);
+  return (
+    <aside className={style.side} aria-label="About the run">
+      <RunPrint run={newest} version={label} by={by} />
+      <Tabs defaultValue="events" keepMounted={false} className={style.tabs ?? ""}>
+        <Tabs.List>
+          <Tabs.Tab value="events">Events</Tabs.Tab>
+          <Tabs.Tab value="parameters">Parameters</Tabs.Tab>
+          <Tabs.Tab value="facts">Facts</Tabs.Tab>
+          <Tabs.Tab value="raw">Raw</Tabs.Tab>
+        </Tabs.List>
+        <Tabs.Panel value="events" className={style.panel ?? ""}>
+          <RunEvents
+            run={newest}
+            version={label}
+            selected={selected}
+            onPick={onSelect}
+            marks={marks}
+            at={replay.at}
+            onSeek={replay.seek}
+          />
+        </Tabs.Panel>
+        <Tabs.Panel value="parameters" className={style.panel ?? ""}>
+          <RunParameters run={replay.run} selected={selected} onPick={onSelect} />
+        </Tabs.Panel>
+        <Tabs.Panel value="facts" className={style.panel ?? ""}>
+          <RunNotes runner={runner} run={newest.id} />
+          <RunFacts runner={runner} run={newest} version={label} by={by} />
+        </Tabs.Panel>
+        <Tabs.Panel value="raw" className={style.panel ?? ""}>
+          <RawEvents runner={runner} run={newest} />
+        </Tabs.Panel>
+      </Tabs>
+    </aside>
+  );
+}
+
+/** The engines of a run, and of those that began together with it. */
+function enginesOf(run: Run, mates: readonly Track[]): string[] {
+  if (run.simulated) return ["simulator"];
+  return [run.engine, ...mates.map(({ run: mate }) => mate.engine)].sort();
+}
+
+/** The page is drawn with time, the canvas only with what changes on it. */
+const RunCanvas = memo(function RunCanvas(props: Parameters<typeof GraphView>[0]) {
+  return (
+    <ReactFlowProvider>
+      <GraphView {...props} />
+    </ReactFlowProvider>
+  );
+});
+
+interface RunTimelineProps {
+  newest: Run;
+  replay: ReplayCursor;
+  replayData: Parameters<typeof timelineSignsOf>[0];
+  unsure: boolean;
+  level: LevelCursor;
+  /** The runs that began together with this one. */
+  mates: readonly Track[];
+}
+
+/** Every visit, and the controls of the replay. */
+function RunTimeline(props: RunTimelineProps) {
+  const { newest, replay, replayData, unsure, level, mates } = props;
+  const { now } = useLive();
+  const { graph } = level.sent.top;
+  const lanes = useLanes(newest, graph, mates.length > 0 ? newest.engine : "");
+  const { sent, pick } = level;
+  const onPick = useCallback(({ name }: Lane) => pick(name), [pick]);
+  const picks = useCallback(
+    ({ aid, levels }: Lane) =>
+      aid !== null || (levels.length > 0 && graphsOn(sent, levels) !== null),
+    [sent],
+  );
+  const silent = instant(newest.unknown_since);
+  const until = instant(newest.ended_at) ?? silent ?? replay.end;
+  const signs = useMemo(() => timelineSignsOf(replayData), [replayData]);
+  const gaps = useMemo(() => silentTimesOf(replayData, newest, until), [replayData, newest, until]);
+  return (
+    <section className={style.strip} aria-label="Timeline">
+      <PlayerControls replay={replay} goes={newest.ended_at === null}>
+        <DryRunFromHere run={newest} at={replay.at} />
+      </PlayerControls>
+      {replay.failed !== null && (
+        <p className={style.failed} role="alert">
+          The replay cannot be loaded: {errorText(replay.failed)}
+        </p>
+      )}
+      <Timeline
+        run={newest}
+        lanes={lanes}
+        silentSince={unsure ? serverTimeOf(now.since) : silent}
+        selected={level.fact}
+        onPick={onPick}
+        picks={picks}
+        cursor={replay.at}
+        onSeek={replay.seek}
+        signs={signs}
+        gaps={gaps}
+        others={mates}
+      />
+    </section>
+  );
+}
+
+function canvasLabel({ graph_name }: Run, { levels }: LevelCursor, version: string): string {
+  const inside = levels.length > 0 ? `, inside ${levels.join(INTO)}` : "";
+  return `Version ${version} of ${isolated(graph_name)}${inside}`;
+}
+
+function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
+  const { now: live, runner } = useLive();
+  const search = useSearch();
+  const level = useLevel(newest, search);
+  const goes = newest.ended_at === null;
+  const unsure = goes && live.link === "down";
+  const present = useNow(1000, goes);
+  const until = unsure ? serverTimeOf(live.since) : (instant(newest.ended_at) ?? present);
+  const replay = useReplay(runner, newest, until, momentAsked(newest, search));
+  const { run } = replay;
+  const past = replay.at !== null;
+  useAddress(newest.id, replay, level);
+  const progress = useProgress(run, unsure && !past, replay.at, level.inside);
+  const mates = useTracks(runner, newest);
+  const engines = useMemo(() => enginesOf(newest, mates), [newest, mates]);
+  const [again, setAgain] = useState<RepeatActions | null>(null);
+  const picked = useMemo(() => new Set(level.key === null ? [] : [level.key]), [level.key]);
+  const replayData = useReplayData(runner, newest.id, 0, true).data;
+  const label = useVersionLabel(newest);
+  const show = (at: number, fact: string | null) => {
+    replay.seek(at);
+    if (fact !== null) level.pick(fact);
+  };
+  return (
+    <>
+      {bar({
+        crumbs: crumbsOf(newest),
+        status: <RunStatus newest={newest} run={run} past={past} />,
+        actions: (
+          <>
+            <PinRun runner={runner} run={newest.id} />
+            <RunActions runner={runner} run={newest} engines={engines} onStart={setAgain} />
+          </>
+        ),
+      })}
+      <main className={style.page}>
+        <FailureCauses runner={runner} run={newest} onShow={show} />
+        <section className={style.canvas} aria-label="Graph of the run">
+          <RunCanvas
+            key={level.levels.join("\n")}
+            graph={level.graph}
+            progress={progress}
+            selected={picked}
+            onSelect={level.select}
+            label={canvasLabel(newest, level, label)}
+          />
+          <LevelBar level={level} name={newest.graph_name} />
+        </section>
+        <RunTimeline
+          newest={newest}
+          replay={replay}
+          replayData={replayData}
+          unsure={unsure}
+          level={level}
+          mates={mates}
+        />
+        <AboutRun
+          runner={runner}
+          newest={newest}
+          replay={replay}
+          label={label}
+          marks={replayData?.marks ?? NO_MARKS}
+          selected={level.fact}
+          onSelect={level.pick}
+        />
+      </main>
+      {again !== null && start(again, () => setAgain(null))}
+    </>
+  );
+}
+
+export function RunPage({ id, bar, start }: Props) {
+  const { runner, now } = useLive();
+  const stored = useRun(runner, id);
+  const live = now.runs.get(id);
+  const run = useMemo(() => {
+    if (!stored.data) return null;
+    return live ? { ...stored.data, ...live, umrf: stored.data.umrf } : stored.data;
+  }, [stored.data, live]);
+  if (run !== null) return <Shown run={run} bar={bar} start={start} />;
+  const crumbs = [{ label: "Runs", to: "/runs" }, { label: "Run" }];
+  return (
+    <>
+      {bar({ crumbs })}
+      <main className={style.page}>
+        {stored.isError ? (
+          <Empty icon={<IconAlertTriangle size={22} />} title="This run cannot be shown">
+            {errorText(stored.error)}
+          </Empty>
+        ) : (
+          <section className={style.canvas} aria-busy="true">
+            <Skeleton height="100%" radius={0} />
+          </section>
+        )}
+      </main>
+    </>
+  );
+}

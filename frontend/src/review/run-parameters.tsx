@@ -1,0 +1,165 @@
+/** Values as they were sent beside those that the engine reported, visit by visit. */
+import type { ActionRun, Run } from "../api/runs";
+import { placesOf, wayWords } from "../status/level-places";
+import style from "./run-parameters.module.css";
+
+interface Props {
+  run: Run;
+  /** The action that is chosen, as the run calls it. */
+  selected: string | null;
+  onPick: (fact: string | null) => void;
+}
+
+function Value({ text, differs }: { text: string | null; differs: boolean }) {
+  if (text === null) return <td className={style.none}>—</td>;
+  return (
+    <td data-differs={differs || undefined}>
+      {differs && <abbr title="Not what was sent: it was changed on the way">≠ </abbr>}
+      <code title={text}>{text}</code>
+    </td>
+  );
+}
+
+function Rows({ rows }: { rows: readonly ParameterRow[] }) {
+  return (
+    <tbody>
+      {rows.map((row) => (
+        <tr key={row.parameter}>
+          <th scope="row">{row.parameter.replaceAll("::", " / ")}</th>
+          <Value text={row.sent} differs={false} />
+          {row.ran.map((text, i) => (
+            // biome-ignore lint/suspicious/noArrayIndexKey: visits only ever grow
+            <Value key={i} text={text} differs={text !== row.sent} />
+          ))}
+        </tr>
+      ))}
+    </tbody>
+  );
+}
+
+function Action(props: { name: string; action: ActionRun; run: Run; onPick: () => void }) {
+  const { name, action, run, onPick } = props;
+  const words = wayWords(placesOf(run).get(name) ?? { levels: [], name });
+  const found = parametersOfVisits(run.sent?.[name] ?? {}, action);
+  return (
+    <section className={style.action} aria-label={`Parameters of ${words}`}>
+      <h2>
+        <button type="button" onClick={onPick}>
+          <bdi>{words}</bdi>
+        </button>
+      </h2>
+      {found.rows.length === 0 ? (
+        <p className={style.none}>No parameter has a value.</p>
+      ) : (
+        <div className={style.scroll}>
+          <table>
+            <thead>
+              <tr>
+                <th>Parameter</th>
+                <th>Sent</th>
+                {found.visits.map((words) => (
+                  <th key={words}>{words}</th>
+                ))}
+              </tr>
+            </thead>
+            <Rows rows={found.rows} />
+          </table>
+        </div>
+      )}
+      {found.unseen > 0 && (
+        <p className={style.none}>
+          Of {found.unseen === 1 ? "1 visit" : `${found.unseen} visits`} nobody saw the values.
+        </p>
+      )}
+    </section>
+  );
+}
+
+export function RunParameters({ run, selected, onPick }: Props) {
+  const all = Object.entries(run.actions ?? {});
+  const chosen = all.filter(([name]) => selected === null || name === selected);
+  const told = chosen.filter(
+    ([name, action]) =>
+      selected !== null ||
+      run.sent?.[name] !== undefined ||
+      action.visits.some((visit) => Object.keys(visit.inputs ?? {}).length > 0),
+  );
+  return (
+    <div className={style.parameters}>
+      {selected !== null && (
+        <button type="button" className={style.all} onClick={() => onPick(null)}>
+          Show all actions
+        </button>
+      )}
+      {told.length === 0 && <p className={style.none}>No action was given a value.</p>}
+      {told.map(([name, action]) => (
+        <Action key={name} name={name} action={action} run={run} onPick={() => onPick(name)} />
+      ))}
+    </div>
+  );
+}
+
+interface ParameterRow {
+  parameter: string;
+  /** JSON text; null where it had no value. */
+  sent: string | null;
+  /** One for each group of visits. */
+  ran: readonly (string | null)[];
+}
+
+export interface ParametersOfVisits {
+  rows: readonly ParameterRow[];
+  /** The groups of visits in words: neighbours that ran with the same are one. */
+  visits: readonly string[];
+  /** Visits whose values nobody saw. */
+  unseen: number;
+}
+
+type ReportedValues = Readonly<Record<string, string>>;
+
+interface VisitGroup {
+  first: number;
+  last: number;
+  values: ReportedValues;
+}
+
+function alike(a: ReportedValues, b: ReportedValues): boolean {
+  const names = Object.keys(a);
+  return names.length === Object.keys(b).length && names.every((name) => a[name] === b[name]);
+}
+
+function groupsOf(action: ActionRun): VisitGroup[] {
+  const groups: VisitGroup[] = [];
+  action.visits.forEach((visit, i) => {
+    if (visit.inputs == null) return;
+    const number = action.older + i + 1;
+    const before = groups.at(-1);
+    if (before?.last === number - 1 && alike(before.values, visit.inputs)) before.last = number;
+    else groups.push({ first: number, last: number, values: visit.inputs });
+  });
+  return groups;
+}
+
+function wordsOf(group: VisitGroup, only: boolean): string {
+  if (only) return "Ran with";
+  return group.first === group.last
+    ? `Visit ${group.first}`
+    : `Visits ${group.first}–${group.last}`;
+}
+
+const MOST = 12; // groups of visits side by side; the newest
+
+export function parametersOfVisits(sent: ReportedValues, action: ActionRun): ParametersOfVisits {
+  const groups = groupsOf(action).slice(-MOST);
+  const names = new Set([...Object.keys(sent), ...groups.flatMap((g) => Object.keys(g.values))]);
+  const only = groups.length === 1 && action.older + action.visits.length === 1;
+  return {
+    rows: [...names].sort().map((parameter) => ({
+      parameter,
+      sent: sent[parameter] ?? null,
+      ran: groups.map((group) => group.values[parameter] ?? null),
+    })),
+    visits: groups.map((group) => wordsOf(group, only)),
+    unseen: action.visits.filter((visit) => visit.inputs == null).length,
+  };
+}

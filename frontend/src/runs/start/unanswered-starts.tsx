@@ -1,0 +1,195 @@
+/** What has become of starts that nobody answered: unknown until the runner tells, never sent again. */
+import { CloseButton, Loader } from "@mantine/core";
+import { useQuery } from "@tanstack/react-query";
+import { useEffect, useSyncExternalStore } from "react";
+import { Link } from "wouter";
+import { useLive } from "../../api/page-link";
+import { SIMULATOR } from "../../api/robots";
+import { findStart, type Run, type StartFound } from "../../api/runs";
+import { useRunStatus } from "../../status/run-status";
+import { colorOfName } from "../../ui/name-colors";
+import { isolated } from "../../words/isolated";
+import style from "./unanswered-starts.module.css";
+
+const AGAIN = 2_000; // ms between two looks
+const PATIENCE = 5_000; // ms that one look waits
+
+/** The engines of a start that the runner has no run for. */
+export function missing(sent: SentStart, found: StartFound | undefined): string[] {
+  const there = new Set((found?.runs ?? []).map((run) => run.engine));
+  return sent.engines.filter((engine) => !there.has(engine));
+}
+
+/** What is known of those without a run, and what is not. */
+export function unknownWords(
+  sent: SentStart,
+  found: StartFound | undefined,
+  silent: boolean,
+): string | null {
+  const left = missing(sent, found);
+  if (left.length === 0) return null;
+  const where = left.map((engine) => (engine === SIMULATOR ? "the simulator" : engine));
+  const head = `NOT KNOWN whether ${sent.what} started on ${where.map(isolated).join(", ")}.`;
+  const after = "It is looked for, and not sent again. Stop works.";
+  if (silent || found === undefined) return `${head} The runner has not answered. ${after}`;
+  if (found.under_way) return `${head} The runner is still carrying it out. ${after}`;
+  return `${head} The runner has nothing of it so far. ${after}`;
+}
+
+function Found({ run }: { run: Run }) {
+  const { word } = useRunStatus(run);
+  return (
+    <p className={style.found}>
+      <i style={{ background: colorOfName(run.engine) }} aria-hidden />
+      <span>
+        Started after all: <Link to={`/runs/${run.id}`}>run {run.number}</Link> on{" "}
+        {run.simulated ? "the simulator" : run.engine}, {word}.
+      </span>
+    </p>
+  );
+}
+
+function Start({ sent }: { sent: SentStart }) {
+  const { live, runner, now } = useLive();
+  const look = useQuery({
+    queryKey: ["starts", sent.request],
+    queryFn: ({ signal }) => findStart(runner ?? "", sent.request, PATIENCE, signal),
+    enabled: runner !== undefined,
+    refetchInterval: ({ state }) => (missing(sent, state.data).length > 0 ? AGAIN : false),
+    retry: false,
+    staleTime: 0,
+  });
+  const found = look.data;
+  useEffect(() => {
+    for (const run of found?.runs ?? []) live?.learn(run);
+  }, [found, live]);
+  const runs = (found?.runs ?? []).map((run) => now.runs.get(run.id) ?? run);
+  const unknown = unknownWords(sent, found, look.isError || now.link === "down");
+  const told = unknown === null || (found !== undefined && !found.under_way && !look.isError);
+  return (
+    <div className={style.start} data-unknown={unknown !== null || undefined}>
+      <div>
+        {unknown !== null && <p role="alert">{unknown}</p>}
+        {runs.map((run) => (
+          <Found key={run.id} run={run} />
+        ))}
+      </div>
+      {told ? (
+        <CloseButton
+          size="sm"
+          aria-label="Hide"
+          onClick={() => unansweredStarts.settle(sent.request)}
+        />
+      ) : (
+        <Loader size="xs" color="currentColor" aria-label="Looking" />
+      )}
+    </div>
+  );
+}
+
+export function UnansweredStartNotice() {
+  const starts = useSyncExternalStore(unansweredStarts.subscribe, unansweredStarts.list);
+  if (starts.length === 0) return null;
+  return (
+    <section className={style.notice} aria-label="Starts that are not sure">
+      {starts.map((sent) => (
+        <Start key={sent.request} sent={sent} />
+      ))}
+    </section>
+  );
+}
+
+export interface SentStart {
+  /** Its `request_id`: by this the runner knows what it has become. */
+  request: string;
+  graph: string;
+  /** What was sent, in words: "v3 of patrol". */
+  what: string;
+  engines: readonly string[];
+  /** When it was sent, ms. */
+  at: number;
+}
+
+const KEY = "aa.starts";
+const MOST = 20;
+
+type Storing = Pick<Storage, "getItem" | "setItem">;
+
+/** Usable without React: `subscribe` and `list` fit `useSyncExternalStore`. */
+export class UnansweredStarts {
+  readonly #storage: Storing | null;
+  readonly #listeners = new Set<() => void>();
+  #sent: readonly SentStart[];
+  /** Requests whose answer this page still waits for. */
+  readonly #awaited = new Set<string>();
+  #unsure: readonly SentStart[];
+
+  /** What is stored was sent by a page that is gone: its answer comes no more. */
+  constructor(storage: Storing | null) {
+    this.#storage = storage;
+    this.#sent = stored(storage);
+    this.#unsure = this.#sent;
+  }
+
+  subscribe = (listener: () => void): (() => void) => {
+    this.#listeners.add(listener);
+    return () => this.#listeners.delete(listener);
+  };
+
+  /** Those that will not be answered any more. */
+  list = (): readonly SentStart[] => this.#unsure;
+
+  /** It is about to leave; from here on only an answer says what became of it. */
+  sends(start: SentStart): void {
+    this.#awaited.add(start.request);
+    this.#put([...this.#sent, start].slice(-MOST));
+  }
+
+  /** There will be no answer. */
+  doubt(request: string): void {
+    this.#awaited.delete(request);
+    this.#put(this.#sent);
+  }
+
+  /** It was answered, or somebody has seen what became of it. */
+  settle(request: string): void {
+    this.#awaited.delete(request);
+    this.#put(this.#sent.filter((each) => each.request !== request));
+  }
+
+  #put(sent: readonly SentStart[]): void {
+    this.#sent = sent;
+    this.#unsure = sent.filter(({ request }) => !this.#awaited.has(request));
+    try {
+      this.#storage?.setItem(KEY, JSON.stringify(sent));
+    } catch {
+      // A tab that stores nothing still knows it until it is loaded anew.
+    }
+    for (const listener of this.#listeners) listener();
+  }
+}
+
+function stored(storage: Storing | null): readonly SentStart[] {
+  try {
+    const found: unknown = JSON.parse(storage?.getItem(KEY) ?? "[]");
+    return Array.isArray(found) ? found.filter(isSent) : [];
+  } catch {
+    return [];
+  }
+}
+
+function isSent(value: unknown): value is SentStart {
+  if (typeof value !== "object" || value === null) return false;
+  const { request, what, engines } = value as Partial<SentStart>;
+  return typeof request === "string" && typeof what === "string" && Array.isArray(engines);
+}
+
+function storage(): Storing | null {
+  try {
+    return window.sessionStorage;
+  } catch {
+    return null; // a browser may forbid it
+  }
+}
+
+export const unansweredStarts = new UnansweredStarts(storage());

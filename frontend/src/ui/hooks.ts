@@ -1,0 +1,94 @@
+/** Hooks about the device: the size of its screen, its search key, and what it keeps for its person. */
+import { useLocalStorage, useMediaQuery } from "@mantine/hooks";
+import { useCallback, useEffect, useMemo } from "react";
+import { keyOf } from "./keys";
+
+const AT_ONCE = { getInitialValueInEffect: false };
+
+/** Room for the list, the canvas and the details side by side. */
+export function useIsWide(): boolean {
+  return useMediaQuery("(min-width: 1101px)", true, AT_ONCE);
+}
+
+/** One thing at a time. */
+export function useIsPhone(): boolean {
+  return useMediaQuery("(max-width: 600px)", false, AT_ONCE);
+}
+
+/** Nothing that hovers: there is no mouse, and most likely no keyboard. */
+export function useHasFingersOnly(): boolean {
+  return useMediaQuery("(pointer: coarse) and (hover: none)", false, AT_ONCE);
+}
+
+const TYPING = "input, textarea, select, [contenteditable=true], [role=dialog], [role=menu]";
+
+export function useSearchKey(): void {
+  useEffect(() => {
+    const onKey = (event: KeyboardEvent) => {
+      if (keyOf(event) !== "/" || event.ctrlKey || event.metaKey || event.altKey) return;
+      if (event.target instanceof Element && event.target.closest(TYPING) !== null) return;
+      const field = document.querySelector<HTMLElement>("[data-search]");
+      if (field === null) return;
+      event.preventDefault();
+      field.focus();
+    };
+    window.addEventListener("keydown", onKey);
+    return () => window.removeEventListener("keydown", onKey);
+  }, []);
+}
+
+export type ListTab = "graphs" | "actions";
+
+export function useListTab() {
+  return useLocalStorage<ListTab>({
+    key: "aa.list-tab",
+    defaultValue: "graphs",
+    getInitialValueInEffect: false,
+  });
+}
+
+/** Keys by graph, the last one that was changed at the end. */
+type KeptKeys = Readonly<Record<string, readonly string[]>>;
+
+const MOST_GRAPHS = 200;
+const NONE: ReadonlySet<string> = new Set();
+
+/** What was kept for a graph; what has another shape is as if it were not there. */
+export function keptIn(kept: unknown, id: string): ReadonlySet<string> {
+  const found: unknown =
+    typeof kept === "object" && kept !== null ? (kept as Record<string, unknown>)[id] : undefined;
+  if (!Array.isArray(found) || found.length === 0) return NONE;
+  return new Set(found.filter((key): key is string => typeof key === "string"));
+}
+
+export function withKept(
+  kept: unknown,
+  id: string,
+  keys: readonly string[],
+  isIn: boolean,
+): KeptKeys {
+  const next = new Set(keptIn(kept, id));
+  for (const key of keys) {
+    if (isIn) next.add(key);
+    else next.delete(key);
+  }
+  const others = Object.entries(typeof kept === "object" && kept !== null ? kept : {})
+    .filter(([graph]) => graph !== id)
+    .slice(1 - MOST_GRAPHS);
+  return Object.fromEntries(next.size > 0 ? [...others, [id, [...next]]] : others);
+}
+
+/** `name`: of the place on the device. */
+export function useKeptKeys(name: string, id: string) {
+  const [kept, keep] = useLocalStorage<KeptKeys>({
+    key: name,
+    defaultValue: {},
+    getInitialValueInEffect: false,
+  });
+  const put = useCallback(
+    (keys: readonly string[], isIn: boolean) => keep((before) => withKept(before, id, keys, isIn)),
+    [keep, id],
+  );
+  const keys = useMemo(() => keptIn(kept, id), [kept, id]);
+  return useMemo(() => ({ keys, put }), [keys, put]);
+}
