@@ -1,6 +1,6 @@
-"""The execution service: starts at most once, stops until proven, takes up what a crash left.
+"""The execution service: the commands of people on runs and robots, and the runs that a crash left.
 
-All of it lives on one event loop. Runs that are not over are in memory; the journal has everything.
+It lives on one event loop. Open runs are in memory; the journal has all runs.
 """
 
 import logging
@@ -50,7 +50,8 @@ _LOST: Final = (
 
 
 class ExecutionService:
-    """Everything that goes on. `opened` gives it, with its tasks running."""
+    """Carries out commands of people on runs and robots. `opened` opens it, with its tasks
+    running."""
 
     def __init__(
         self,
@@ -106,9 +107,9 @@ class ExecutionService:
         past: Past | None = None,
         sources: StartSources = NO_SOURCES,
     ) -> "AsyncIterator[ExecutionService]":
-        """The service, after it has taken up what an earlier process left. `past` reads runs that
-        are over, `simulator` makes what simulated ones run on. `sources`: what starts have, and are
-        looked at with, besides."""
+        """Open the service, after it has adopted the runs that an earlier process left open. `past`
+        reads runs that are over; `simulator` makes links of simulated runs; `sources`: behaviours,
+        expected courses and index folders for starts."""
         async with anyio.create_task_group() as tasks:
             control = cls(
                 journal,
@@ -131,7 +132,7 @@ class ExecutionService:
         self._runs.watch(watcher)
 
     def watch_robots(self, watcher: Callable[[], None]) -> None:
-        """Be told, at once, when a robot is not as it was."""
+        """Call `watcher` whenever a robot has changed, at once."""
         self._robot_watchers.append(watcher)
 
     def _robots_changed(self) -> None:
@@ -169,21 +170,23 @@ class ExecutionService:
     # --- stop, pause, resume ------------------------------------------------------------------
 
     def stop_all(self, author: Author, stop_id: str = "") -> StoppedAll:
-        """Want everything stopped; what this concerns. Never waits."""
+        """Begin to stop all runs and all foreign graphs, and return which these are. Never
+        waits."""
         self._stops.note("", author, stop_id)
         runs = [run for run in tuple(self.open) if self._stop(run, author, stop_id)]
         self.robots.stop_foreign_graphs(author, self._runs.on)
         return StoppedAll(runs, self.robots.foreign_stops.graphs(), self.robots.unheard())
 
     def stop_robot(self, name: str, author: Author) -> tuple[list[str], list[str]]:
-        """Want whatever a robot runs stopped: runs of ours, graphs of others. Raises NotFound."""
+        """Begin to stop all runs and foreign graphs of a robot; return the ids of the runs and the
+        names of the graphs. Raises NotFound."""
         graphs = self.robots.stop_foreign_graphs(author, self._runs.on, name)
         self._stops.note(name, author)
         return [run for run in self._runs.on(name) if self._stop(run, author, "")], graphs
 
     async def stop(self, run: str, author: Author, stop_id: str = "") -> list[str]:
-        """Want one run stopped, or all of a group; nothing when it is over. Waits for nothing unless
-        the run is not known. Raises NotFound."""
+        """Begin to stop a run, or all runs of a group, and return their ids; empty when it is over.
+        Waits only to look up an id that is not open. Raises NotFound."""
         if run in self.open:
             return [run] if self._stop(run, author, stop_id) else []
         group = [each for each, opened in tuple(self.open.items()) if opened.run.group == run]
@@ -205,7 +208,7 @@ class ExecutionService:
         return await interventions.pause(await self._movable(run), author)
 
     async def resume(self, run: str, author: Author) -> Run:
-        """Let a paused run go on. Raises NotFound, Conflict, Unavailable."""
+        """Resume a paused run. Raises NotFound, Conflict, Unavailable."""
         return await interventions.resume(await self._movable(run), author)
 
     async def modify(self, run: str, body: bytes, author: Author) -> Run:
@@ -223,8 +226,8 @@ class ExecutionService:
         )
 
     async def confirm_rest(self, run: str, asked: interventions.RestRequest, author: Author) -> Run:
-        """Take somebody's word that a run is at rest, where its engine's is none. Raises NotFound,
-        BadInput, Conflict."""
+        """Record that a person has seen a run at rest, where its engine cannot prove it. Raises
+        NotFound, BadInput, Conflict."""
         opened = await self._movable(run)
         return interventions.confirm_rest(opened, asked, author)
 
@@ -238,31 +241,31 @@ class ExecutionService:
     # --- what there is ------------------------------------------------------------------------
 
     async def find(self, run: str) -> Run:
-        """A run, open or over. Raises NotFound."""
+        """Return a run, open or over. Raises NotFound."""
         return await self._runs.find(run)
 
     async def simulates(self, run: str) -> bool:
-        """Whether nothing moves in the world because of a run. Raises NotFound."""
+        """Return whether a run is simulated. Raises NotFound."""
         opened = self.open.get(run)
         return bool(
             opened.run.simulated if opened is not None else (await self._over(run)).simulated
         )
 
     async def _over(self, run: str) -> Row[Any]:
-        """What the table tells of a run: that takes no time. Raises NotFound, Unavailable."""
+        """Return state and `simulated` of a run from the table. Raises NotFound, Unavailable."""
         rows = await self._journal.query(queries.of_run(run))
         if not rows:
             raise NotFound("There is no such run.")
         return rows[0]
 
     async def register(self, asked: Registration, author: Author) -> Robot:
-        """Take a robot into the registry, or change it. Raises BadInput, Conflict, Unavailable."""
+        """Register a robot, or change its registration. Raises BadInput, Conflict, Unavailable."""
         async with self._starts.turn(asked.name):
             self._check_unused(asked.name)
             return await self.robots.register(asked, author)
 
     async def remove(self, robot: str, author: Author) -> None:
-        """Take a robot out of the registry. Raises NotFound, Conflict, Unavailable."""
+        """Remove a robot from the registry. Raises NotFound, Conflict, Unavailable."""
         async with self._starts.turn(robot):
             self._check_unused(robot)
             await self.robots.remove(robot, author)
@@ -280,7 +283,8 @@ class ExecutionService:
             )
 
     def _foreign(self, engine: KnownEngine, command: ForeignCommand) -> Commanded:
-        """Somebody else has told a robot something: which run of ours that concerns."""
+        """Pass a command of somebody else to the runs on that robot; return the event of it, with
+        the run that it concerns."""
         self._runs.late_activity.sent_by_others(command)
         runs = [each.run for each in self._runs.on(engine.registration.name).values()]
         for each in runs:
@@ -300,9 +304,10 @@ class ExecutionService:
     # --- after a restart ----------------------------------------------------------------------
 
     async def _take_up(self) -> None:
-        """Adopt what an earlier process left: pending stops first of all; nothing is started."""
+        """Adopt the robots, open runs and foreign Stops that an earlier process left. Stops that
+        were wanted go on; no run is started."""
         self._runs.last_number = (await self._journal.query(queries.last_number()))[0][0]
-        ground = RegistryContext(
+        context = RegistryContext(
             self._journal,
             self._tasks,
             self._clock_us,
@@ -313,7 +318,7 @@ class ExecutionService:
             ForeignStopLoop,
         )
         self._tasks.start_soon(self._runs.late_activity.run)
-        self.robots.open(ground)
+        self.robots.open(context)
         for row in await self._journal.query(queries.all_robots()):
             self.robots.add(registration_of(row))
         for row in await self._journal.query(queries.open_runs()):
